@@ -1,0 +1,56 @@
+# Everything runs on .venv in this checkout. `make help` lists the targets.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+RESULTS := results
+
+.DEFAULT_GOAL := help
+.PHONY: help setup shaker campaign test test-all lint format type bench docs clean
+
+help:  ## list the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
+
+setup: $(STAMP)  ## create .venv with everything for normal use
+
+$(STAMP): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "sloshlab needs Python 3.11 or newer; remedy: make PYTHON=/path/to/python3.11 setup" >&2; exit 1; }
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade pip
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[formats,dev,docs]'
+	@touch $@
+
+shaker: setup  ## the shaker experiment on raw_data: maps and report
+	$(BIN)/python -m pipelines.experiments shaker raw_data/shaker $(RESULTS)/shaker
+
+campaign: setup  ## make the recordings of raw_data again
+	$(BIN)/sloshlab virtual campaign -o raw_data/shaker
+
+test: setup  ## the tests, at most 10 minutes on 2 cores
+	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+test-all: setup  ## all tests
+	$(BIN)/python -m pytest -n 2
+
+lint: setup  ## style and the direction of imports
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+
+format: setup  ## put the code into the project's format
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+type: setup  ## static types
+	$(BIN)/mypy
+
+bench: setup  ## speed and memory as ratios in one run
+	$(BIN)/python -m tests.benchmarks
+
+docs: setup  ## the documentation as a web site in site/
+	$(BIN)/mkdocs build --strict --quiet
+
+clean:  ## remove everything that make made, the environment included
+	rm -rf $(VENV) $(RESULTS) site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""Get a recording: from files of other systems, from devices, from the virtual laboratory."""

@@ -1,0 +1,1 @@
+"""One module per experiment: which stages, in which order; the command line; reports."""

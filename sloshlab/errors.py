@@ -1,0 +1,83 @@
+"""Everything that sloshlab raises on purpose.
+
+Each class is also the builtin that a caller would expect, so that ``except ValueError`` still
+works. A message says what is wrong, what was got, what is allowed and what to do about it.
+"""
+
+from __future__ import annotations
+
+
+class SloshlabError(Exception):
+    """Root of the tree: catch it to catch every error that sloshlab raises on purpose."""
+
+
+class InputError(SloshlabError, ValueError):
+    """An input cannot be used as it is.
+
+    Parameters
+    ----------
+    what : str
+        The thing that is wrong, with the file and channel it belongs to.
+    got : str, optional
+        What was found.
+    allowed : str, optional
+        What would have been accepted.
+    remedy : str, optional
+        What the reader of the message can do about it.
+
+    Examples
+    --------
+    >>> print(InputError("tank.height_m", got="-1", allowed="> 0", remedy="measure the inside height"))
+    tank.height_m: got -1; allowed: > 0; remedy: measure the inside height
+    """
+
+    def __init__(self, what: str, *, got: str = "", allowed: str = "", remedy: str = "") -> None:
+        self.what, self.got, self.allowed, self.remedy = what, got, allowed, remedy
+        parts = [
+            f"got {got}" if got else "",
+            f"allowed: {allowed}" if allowed else "",
+            f"remedy: {remedy}" if remedy else "",
+        ]
+        details = "; ".join(part for part in parts if part)
+        text = f"{what}: {details}" if details else what
+        super().__init__(" ".join(text.split()))
+
+
+class RecordingError(InputError):
+    """A recording breaks the recording format or holds data that no analysis can use."""
+
+
+class RigError(InputError):
+    """A rig description is incomplete or impossible."""
+
+
+class UnitsError(InputError):
+    """Units are missing, unknown, or of another quantity."""
+
+
+class ChannelMapError(InputError):
+    """The map from a foreign file's columns to channels is incomplete or contradictory."""
+
+
+class FileFormatError(InputError):
+    """A foreign file cannot be read by the reader of its format."""
+
+
+class AnalysisError(InputError):
+    """A recording is well formed, but the analysis asked for is not possible with it."""
+
+
+class MissingExtraError(SloshlabError, ImportError):
+    """An optional dependency is not installed.
+
+    Examples
+    --------
+    >>> print(MissingExtraError("nptdms", extra="formats", purpose="reading TDMS files"))
+    reading TDMS files needs nptdms, which is not installed; remedy: pip install 'sloshlab[formats]'
+    """
+
+    def __init__(self, package: str, *, extra: str, purpose: str) -> None:
+        self.package, self.extra = package, extra
+        super().__init__(
+            f"{purpose} needs {package}, which is not installed; remedy: pip install 'sloshlab[{extra}]'"
+        )

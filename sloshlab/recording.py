@@ -1,0 +1,465 @@
+"""The recording format: one run is one netCDF-4 file.
+
+Readers accept exactly the format; variables and attributes that it does not know are kept. Units
+are converted to SI once, on reading. Sizes are checked before anything is allocated.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, TypeVar
+
+import numpy as np
+import xarray as xr
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from sloshlab import atomic_file
+from sloshlab.errors import RecordingError, UnitsError
+from sloshlab.units import SI_UNITS, factor_to_si
+
+FORMAT: Final = "1"
+MAXIMUM_DECODED_BYTES: Final = 6 * 2**30
+"""Recordings that would need more memory than this once decoded are refused before allocation."""
+
+JITTER_ALLOWED_STEPS: Final = 1e-6
+"""Largest deviation of the time coordinate from a uniform one, in steps."""
+
+LOST, CLIPPED, CRC_REPAIRED, OUT_OF_ORDER = 1, 2, 4, 8
+"""Bits of `quality(time)`."""
+
+_TIME_CHUNK = 1 << 18
+
+PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class RunAttributes(BaseModel):
+    """Global attributes of a recording; unknown ones are kept."""
+
+    model_config = ConfigDict(frozen=True, extra="allow", strict=True)
+
+    sloshlab_format: Literal["1"]
+    run_id: Annotated[str, Field(min_length=1, max_length=200)]
+    experiment: Literal["shaker_sweep", "shaker_vfa", "beam_free", "beam_random", "sdof_free", "other"]
+    configuration: Literal["sloshing", "frozen", "empty"]
+    rig: str
+    sampling_rate_hz: PositiveFloat
+    start_time_utc: str
+    initial_displacement_m: FiniteFloat | None = None
+    sweep_start_hz: PositiveFloat | None = None
+    sweep_rate_octave_per_s: FiniteFloat | None = None
+    acceleration_g: FiniteFloat | None = None
+    repeat: int | None = None
+
+    @field_validator("start_time_utc")
+    @classmethod
+    def _iso_8601(cls, value: str) -> str:
+        try:
+            datetime.fromisoformat(value)
+        except ValueError:
+            raise ValueError("must be ISO 8601, for example 2026-01-31T12:00:00Z") from None
+        return value
+
+
+class ChannelAttributes(BaseModel):
+    """Attributes of one channel; unknown ones are kept."""
+
+    model_config = ConfigDict(frozen=True, extra="allow", strict=True)
+
+    units: str
+    quantity: Literal["force", "acceleration", "velocity", "displacement", "voltage"]
+    block_from: str | None = None
+    block_to: str | None = None
+    x_m: FiniteFloat | None = None
+    range_min: FiniteFloat | None = None
+    range_max: FiniteFloat | None = None
+    noise_std: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+
+
+M = TypeVar("M", bound=BaseModel)
+
+_SCALED_ATTRIBUTES = ("range_min", "range_max", "noise_std")
+_STORAGE_ATTRIBUTES = ("scale_factor", "add_offset", "_FillValue", "missing_value")
+
+
+def channels(recording: xr.Dataset, quantity: str | None = None) -> list[str]:
+    """Names of the channels of a recording, of one quantity if given, sorted.
+
+    Examples
+    --------
+    >>> channels(xr.Dataset({"force_cell_1": ("time", [0.0], {"quantity": "force"})}))
+    ['force_cell_1']
+    """
+    return sorted(
+        str(name)
+        for name, variable in recording.data_vars.items()
+        if variable.dims == ("time",)
+        and variable.attrs.get("quantity") in SI_UNITS
+        and quantity in (None, variable.attrs["quantity"])
+    )
+
+
+def run_attributes(recording: xr.Dataset, *, name: str = "recording") -> RunAttributes:
+    """The validated global attributes of a recording.
+
+    Raises
+    ------
+    RecordingError
+        If one is missing or of a wrong type.
+    """
+    return _validated(RunAttributes, recording.attrs, what=name)
+
+
+def read_recording(
+    path: str | os.PathLike[str],
+    *,
+    maximum_decoded_bytes: int = MAXIMUM_DECODED_BYTES,
+) -> xr.Dataset:
+    """Read and validate one recording.
+
+    Parameters
+    ----------
+    path : path-like
+        A netCDF-4 file in the recording format.
+    maximum_decoded_bytes : int
+        Recordings that need more memory than this are refused before anything is allocated.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``time``; channels float64 (float32 where stored so) in SI units, NaN where lost;
+        ``quality`` uint8 where present. Upward positive.
+
+    Raises
+    ------
+    RecordingError
+        If the file is not a recording, or holds what no analysis can use.
+    """
+    import netCDF4
+
+    file = Path(path)
+    if not file.is_file():
+        raise RecordingError(f"recording {file}", got="no such file", allowed="a netCDF-4 file")
+    try:
+        with netCDF4.Dataset(file, mode="r") as source:
+            source.set_auto_maskandscale(False)
+            return _decoded(source, str(file), maximum_decoded_bytes)
+    except RecordingError:
+        raise
+    except (
+        OSError,
+        RuntimeError,
+        UnicodeError,
+        AttributeError,
+        KeyError,
+        IndexError,
+        TypeError,
+        ValueError,
+        MemoryError,
+        OverflowError,
+    ) as error:
+        raise RecordingError(
+            f"recording {file}",
+            got=f"a file that cannot be read ({error})",
+            allowed="a complete netCDF-4 file",
+            remedy="the file is cut short, damaged or of another format; copy it again or use `sloshlab import`",
+        ) from error
+
+
+def write_recording(
+    recording: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    encoding: Mapping[str, Mapping[str, Any]] | None = None,
+) -> None:
+    """Validate a recording and write it atomically.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        In the recording format, units stated on every channel.
+    path : path-like
+        Where to write.
+    encoding : mapping, optional
+        Per variable, as for `xarray.Dataset.to_netcdf`; scaled integers are given here.
+
+    Raises
+    ------
+    RecordingError
+        If the data set breaks the format; nothing is written then.
+    """
+    validate_recording(recording, name=str(path))
+    chosen: dict[str, dict[str, Any]] = {}
+    for name, variable in recording.variables.items():
+        compressed = {"zlib": True, "complevel": 4, "shuffle": True} if variable.ndim else {}
+        if variable.dtype.kind not in "fiu":
+            compressed = {}
+        chosen[str(name)] = {**compressed, **(encoding or {}).get(str(name), {})}
+    with atomic_file.replaced(path) as temporary:
+        recording.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=chosen)
+
+
+def validate_recording(recording: xr.Dataset, *, name: str = "recording") -> RunAttributes:
+    """Check an in-memory recording against the format.
+
+    Returns
+    -------
+    RunAttributes
+        Its validated global attributes.
+
+    Raises
+    ------
+    RecordingError
+        On the first breach found.
+    """
+    attributes = run_attributes(recording, name=name)
+    if "time" not in recording.coords or recording["time"].dims != ("time",):
+        raise RecordingError(f"{name}: time", got="no coordinate time(time)", allowed="seconds, uniform")
+    time = np.asarray(recording["time"].values)
+    _check_time(_chunks(time), time.size, attributes.sampling_rate_hz, name)
+    found = False
+    for channel, variable in recording.data_vars.items():
+        if not _is_channel(str(channel), variable.dims, variable.attrs):
+            continue
+        found = True
+        described = _channel_attributes(str(channel), variable.attrs, name)
+        _checked_factor(str(channel), described, name)
+    if not found:
+        raise _no_channel(name)
+    _check_lost_are_flagged(recording, name)
+    return attributes
+
+
+def _decoded(source: Any, name: str, maximum_decoded_bytes: int) -> xr.Dataset:
+    attributes = _validated(RunAttributes, _attributes_of(source), what=name)
+    if "time" not in source.dimensions or "time" not in source.variables:
+        raise RecordingError(
+            f"{name}: time",
+            got="no dimension and coordinate 'time'",
+            allowed="time(time), seconds from the trigger",
+        )
+    n_samples = len(source.dimensions["time"])
+    _check_size(source, n_samples, name, maximum_decoded_bytes)
+    time_variable = source.variables["time"]
+    if time_variable.dimensions != ("time",) or np.dtype(time_variable.dtype) != np.float64:
+        raise RecordingError(
+            f"{name}: time", got=f"{time_variable.dtype}{time_variable.dimensions}", allowed="float64(time)"
+        )
+    units = _attributes_of(time_variable).get("units", "s")
+    if units not in ("s", "second", "seconds"):
+        raise RecordingError(f"{name}: units of time", got=repr(units), allowed="'s', seconds from the trigger")
+    time = np.asarray(time_variable[:], dtype=np.float64)
+    _check_time(_chunks(time), n_samples, attributes.sampling_rate_hz, name)
+    variables: dict[str, xr.Variable] = {}
+    for channel, variable in source.variables.items():
+        if channel == "time":
+            continue
+        its_attributes = _attributes_of(variable)
+        if _is_channel(channel, variable.dimensions, its_attributes):
+            variables[channel] = _decoded_channel(channel, variable, its_attributes, name)
+        elif np.dtype(variable.dtype).kind in "fiub" or variable.dtype is str:
+            stored = {key: value for key, value in its_attributes.items() if key != "_FillValue"}
+            variables[channel] = xr.Variable(variable.dimensions, variable[...], stored)
+    if not any("quantity" in variable.attrs for variable in variables.values()):
+        raise _no_channel(name)
+    recording = xr.Dataset(
+        variables, coords={"time": ("time", time, {"units": "s"})}, attrs=_attributes_of(source)
+    )
+    _check_lost_are_flagged(recording, name)
+    return recording
+
+
+def _check_size(source: Any, n_samples: int, name: str, maximum_decoded_bytes: int) -> None:
+    if n_samples == 0:
+        raise RecordingError(f"{name}: time", got="0 samples", allowed="≥ 2 samples", remedy="record again")
+    if n_samples == 1:
+        raise RecordingError(f"{name}: time", got="1 sample", allowed="≥ 2 samples", remedy="record again")
+    needed = 0
+    for variable in source.variables.values():
+        size = 1
+        for dimension in variable.dimensions:
+            size *= len(source.dimensions[dimension])
+        needed += 8 * size
+    if needed > maximum_decoded_bytes:
+        raise RecordingError(
+            f"{name}: size",
+            got=f"{n_samples} samples, {needed / 2**30:.1f} GiB decoded",
+            allowed=f"≤ {maximum_decoded_bytes / 2**30:.1f} GiB",
+            remedy="split the run into shorter files",
+        )
+
+
+def _chunks(values: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:
+    for start in range(0, values.size, _TIME_CHUNK):
+        yield start, values[start : start + _TIME_CHUNK]
+
+
+def _check_time(chunks: Iterable[tuple[int, np.ndarray]], n_samples: int, rate_hz: float, name: str) -> None:
+    if n_samples < 2:
+        raise RecordingError(
+            f"{name}: time", got=f"{n_samples} samples", allowed="≥ 2 samples", remedy="record again"
+        )
+    step = 1.0 / rate_hz
+    origin = np.nan
+    worst, worst_at = 0.0, 0
+    last = np.nan
+    for start, chunk in chunks:
+        if not np.isfinite(chunk).all():
+            raise RecordingError(
+                f"{name}: time",
+                got="NaN or infinity in the time coordinate",
+                allowed="uniform seconds",
+                remedy="time is never lost: keep it and flag the samples",
+            )
+        if start == 0:
+            origin = float(chunk[0])
+        deviation = np.abs(chunk - (origin + step * np.arange(start, start + chunk.size)))
+        at = int(deviation.argmax())
+        if deviation[at] > worst:
+            worst, worst_at = float(deviation[at]), start + at
+        last = float(chunk[-1])
+    mean_step = (last - origin) / (n_samples - 1)
+    resolution = 4 * np.spacing(max(abs(origin), abs(last)))
+    rate_error = abs(mean_step - step) * (n_samples - 1)
+    if worst <= JITTER_ALLOWED_STEPS * step + resolution:
+        return
+    if mean_step <= 0 or (rate_error > 0.5 * worst and abs(mean_step / step - 1) > JITTER_ALLOWED_STEPS):
+        raise RecordingError(
+            f"{name}: sampling_rate_hz",
+            got=f"{rate_hz:.9g} Hz, but the mean time step is {mean_step:.9g} s",
+            allowed="the rate of the time coordinate",
+            remedy="correct the attribute or the time coordinate",
+        )
+    raise RecordingError(
+        f"{name}: time is not uniform",
+        got=f"jitter of {worst / step:.3g} steps ({worst:.3g} s) at sample {worst_at}",
+        allowed=f"≤ {JITTER_ALLOWED_STEPS:g} steps",
+        remedy="resample on the device's sample counter, or mark the gap in `quality`",
+    )
+
+
+def _is_channel(name: str, dimensions: tuple[Any, ...], attributes: Mapping[str, Any]) -> bool:
+    if tuple(dimensions) != ("time",) or name == "quality":
+        return False
+    return "quantity" in attributes or name.partition("_")[0] in SI_UNITS
+
+
+def _decoded_channel(channel: str, variable: Any, attributes: dict[str, Any], name: str) -> xr.Variable:
+    described = _channel_attributes(channel, attributes, name)
+    factor = _checked_factor(channel, described, name)
+    kind = np.dtype(variable.dtype).kind
+    if kind not in "fiu":
+        raise RecordingError(f"{name}: {channel}", got=f"values of type {variable.dtype}", allowed="numbers")
+    raw = variable[:]
+    if not isinstance(raw, np.ndarray) or raw.shape != (len(variable),):
+        raise RecordingError(f"{name}: {channel}", got="values that cannot be read", allowed="one per time")
+    scale = _number(attributes, "scale_factor", 1.0, channel, name) * factor
+    offset = _number(attributes, "add_offset", 0.0, channel, name) * factor
+    fill = attributes.get("_FillValue", attributes.get("missing_value"))
+    if kind == "f" and scale == 1.0 and offset == 0.0:
+        values = raw
+    else:
+        values = raw * (raw.dtype.type(scale) if kind == "f" else np.float64(scale))
+        if offset:
+            values += offset
+    if fill is not None and np.ndim(fill) == 0 and not (kind == "f" and np.isnan(fill)):
+        lost = raw == fill
+        if lost.any():
+            values = values.copy() if values is raw else values
+            values[lost] = np.nan
+    kept = {key: value for key, value in attributes.items() if key not in _STORAGE_ATTRIBUTES}
+    kept["units"] = SI_UNITS[described.quantity]
+    for key in _SCALED_ATTRIBUTES:
+        if key in kept:
+            kept[key] = float(kept[key]) * factor
+    return xr.Variable(("time",), values, kept)
+
+
+def _number(attributes: Mapping[str, Any], key: str, default: float, channel: str, name: str) -> float:
+    value = attributes.get(key, default)
+    if isinstance(value, str) or np.ndim(value) != 0 or not np.isfinite(value):
+        raise RecordingError(f"{name}: {channel}: {key}", got=repr(value), allowed="a finite number")
+    return float(value)
+
+
+def _channel_attributes(channel: str, attributes: Mapping[str, Any], name: str) -> ChannelAttributes:
+    described = _validated(ChannelAttributes, attributes, what=f"{name}: {channel}")
+    prefix = channel.partition("_")[0]
+    if prefix in SI_UNITS and prefix != described.quantity:
+        raise RecordingError(
+            f"{name}: {channel}: quantity",
+            got=repr(described.quantity),
+            allowed=f"'{prefix}', as the channel is named",
+            remedy="rename it or correct `quantity`",
+        )
+    return described
+
+
+def _checked_factor(channel: str, described: ChannelAttributes, name: str) -> float:
+    try:
+        return factor_to_si(described.units, described.quantity)
+    except UnitsError as error:
+        raise RecordingError(
+            f"{name}: {channel}: {error.what}", got=error.got, allowed=error.allowed, remedy=error.remedy
+        ) from error
+
+
+def _check_lost_are_flagged(recording: xr.Dataset, name: str) -> None:
+    flags = recording.get("quality")
+    if flags is not None and (flags.dims != ("time",) or flags.dtype.kind not in "ui"):
+        raise RecordingError(f"{name}: quality", got=f"{flags.dtype}{flags.dims}", allowed="uint8(time)")
+    for channel in channels(recording):
+        values = recording[channel].values
+        if np.isfinite(values.sum()):
+            continue
+        not_finite = ~np.isfinite(values)
+        if np.isinf(values[not_finite]).any():
+            raise RecordingError(f"{name}: {channel}", got="infinite values", allowed="numbers, NaN where lost")
+        unflagged = not_finite if flags is None else not_finite & ((flags.values & LOST) == 0)
+        count = int(unflagged.sum())
+        if count:
+            at = float(recording["time"].values[int(unflagged.argmax())])
+            raise RecordingError(
+                f"{name}: {channel}",
+                got=f"{count} NaN samples that are not flagged as lost, the first at {at:.6g} s",
+                allowed="NaN only where `quality` has bit 1 (lost)",
+                remedy="flag them in `quality`, or find out where they come from",
+            )
+
+
+def _no_channel(name: str) -> RecordingError:
+    return RecordingError(
+        f"{name}: channels",
+        got="none",
+        allowed="at least one variable(time) with `quantity`",
+        remedy="use `sloshlab import` with a channel map",
+    )
+
+
+def _attributes_of(source: Any) -> dict[str, Any]:
+    attributes: dict[str, Any] = {}
+    for key in source.ncattrs():
+        value = source.getncattr(key)
+        attributes[key] = value.item() if isinstance(value, np.generic) else value
+    return attributes
+
+
+def _validated(model: type[M], attributes: Mapping[Any, Any], *, what: str) -> M:
+    plain = {
+        str(key): value.item() if isinstance(value, np.generic) else value for key, value in attributes.items()
+    }
+    try:
+        return model.model_validate(plain)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = str(first["loc"][0]) if first["loc"] else "attributes"
+        missing = first["type"] == "missing"
+        raise RecordingError(
+            f"{what}: attribute {place}",
+            got="nothing" if missing else repr(first["input"])[:80],
+            allowed=first["msg"].removeprefix("Value error, ").removeprefix("Input should be "),
+            remedy="set it" if missing else "correct it",
+        ) from error
