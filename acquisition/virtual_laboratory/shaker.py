@@ -1,0 +1,257 @@
+"""The virtual shaker: how the tank is moved.
+
+The shaker controls acceleration: ü ≅ a₀ cos φ (1.12), with φ(0) = Ω_i/(R ln 2) for an octave sweep (1.13).
+It has a stroke limit, and it does not keep its law exactly. Phase φ(t) and displacement amplitude A(t)
+are smooth splines, and u = −A cos φ with its harmonics is differentiated exactly, so displacement,
+velocity and acceleration belong together at any time, sampled or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+
+from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.errors import InputError
+
+FloatArray = NDArray[np.float64]
+Law = Literal["octave", "linear", "stepped", "vfa"]
+
+STROKE_LIMIT_M: Final = 0.0125
+IMPACT_PHASE_RAD: Final = 1.35 * np.pi
+"""Where in the cycle the liquid meets the roof: on the way down, soon after ü = −a₀."""
+
+_KNOT_STEP_S = 0.05
+_JOIN_SHARPNESS = 20.0
+_START_RAMP_S, _STOP_RAMP_S = 1.5, 1.0
+_VFA_HALF_SWEEPS, _VFA_AMPLITUDE_HALF_SWEEPS = 5, 12
+_VFA_LOWEST_G = 0.25
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What the shaker is told to do.
+
+    Attributes
+    ----------
+    acceleration_g
+        Amplitude a₀/g where the stroke allows it; for a VFA run the highest one.
+    law
+        ``octave``, ``linear`` in frequency, ``stepped`` sine, or ``vfa``: frequency and amplitude
+        both go to and fro, at rates that fill the plane.
+    start_hz, stop_hz
+        Frequencies at the beginning and the end; a downward sweep starts high. A VFA run starts at
+        the lower one whatever the order.
+    duration_s
+        Length of the run, ramps included.
+    n_steps
+        Dwells of a stepped run.
+    """
+
+    acceleration_g: float
+    law: Law = "octave"
+    start_hz: float = 5.0
+    stop_hz: float = 20.0
+    duration_s: float = 240.0
+    n_steps: int = 24
+
+    def __post_init__(self) -> None:
+        for name in ("acceleration_g", "start_hz", "stop_hz"):
+            if not 0 < getattr(self, name) < 1e4:
+                raise InputError(f"sweep: {name}", got=f"{getattr(self, name):g}", allowed="> 0 and < 10000")
+        if not 5 <= self.duration_s <= 7200:
+            raise InputError("sweep: duration_s", got=f"{self.duration_s:g}", allowed="5 … 7200 s")
+        if not 2 <= self.n_steps <= 1000:
+            raise InputError("sweep: n_steps", got=str(self.n_steps), allowed="2 … 1000")
+        if self.law not in ("octave", "linear", "stepped", "vfa"):
+            raise InputError("sweep: law", got=repr(self.law), allowed="octave, linear, stepped, vfa")
+
+    @property
+    def rate_octave_per_s(self) -> float:
+        """R of an octave sweep, negative downward."""
+        return float(np.log2(self.stop_hz / self.start_hz)) / self.duration_s
+
+    @property
+    def initial_phase_rad(self) -> float:
+        """φ(0): Ω_i/(R ln 2) for an octave sweep (1.13), 0 for the others."""
+        if self.law != "octave" or self.start_hz == self.stop_hz:
+            return 0.0
+        return 2 * np.pi * self.start_hz / (self.rate_octave_per_s * np.log(2))
+
+    def frequency_hz(self, time_s: FloatArray) -> FloatArray:
+        """Nominal frequency."""
+        share = np.clip(time_s / self.duration_s, 0.0, 1.0)
+        if self.law == "linear":
+            return self.start_hz + (self.stop_hz - self.start_hz) * share
+        if self.law == "stepped":
+            share = _stairs(share * self.n_steps, self.duration_s / self.n_steps) / (self.n_steps - 1)
+        if self.law == "vfa":
+            low, high = sorted((self.start_hz, self.stop_hz))
+            return low * (high / low) ** _to_and_fro(share * _VFA_HALF_SWEEPS)
+        return self.start_hz * (self.stop_hz / self.start_hz) ** share
+
+    def level_g(self, time_s: FloatArray) -> FloatArray:
+        """Nominal acceleration amplitude before the stroke limit."""
+        if self.law != "vfa":
+            return np.full(time_s.shape, self.acceleration_g)
+        lowest = min(_VFA_LOWEST_G, self.acceleration_g)
+        share = _to_and_fro(time_s / self.duration_s * _VFA_AMPLITUDE_HALF_SWEEPS)
+        return lowest + (self.acceleration_g - lowest) * share
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """How far the shaker misses its law; all zero is a perfect shaker."""
+
+    start_phase_rad: float = 0.0
+    frequency_error: float = 0.0
+    phase_wander_rad: float = 0.0
+    amplitude_ripple: float = 0.0
+    harmonics: tuple[tuple[int, float, float], ...] = ()
+    ramps: bool = False
+    slow_seed: int = 0
+
+    @classmethod
+    def drawn(cls, generator: np.random.Generator) -> Imperfections:
+        """One run's imperfections."""
+        orders = ((2, 0.015), (3, 0.008))
+        return cls(
+            start_phase_rad=float(generator.uniform(-np.pi, np.pi)),
+            frequency_error=float(generator.uniform(-5e-5, 5e-5)),
+            phase_wander_rad=float(generator.uniform(0.03, 0.08)),
+            amplitude_ripple=float(generator.uniform(0.006, 0.010)),
+            harmonics=tuple(
+                (
+                    order,
+                    float(largest * generator.uniform(0.5, 1.0)),
+                    float(-order * IMPACT_PHASE_RAD + generator.uniform(-0.6, 0.6)),
+                )
+                for order, largest in orders
+            ),
+            ramps=True,
+            slow_seed=int(generator.integers(2**31)),
+        )
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The true motion of the tank, upward positive, at any time.
+
+    Attributes
+    ----------
+    phase, amplitude
+        Splines of φ(t) [rad] and of the displacement amplitude of the fundamental A(t) [m].
+    harmonics
+        (order h, ratio d_h of its acceleration to the fundamental's, phase θ_h [rad]): the
+        acceleration holds d_h a₀ cos(hφ + θ_h).
+    """
+
+    phase: BSpline
+    amplitude: BSpline
+    duration_s: float
+    harmonics: tuple[tuple[int, float, float], ...] = ()
+    _derivatives: tuple[BSpline, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        splines = tuple(spline.derivative(order) for spline in (self.phase, self.amplitude) for order in (1, 2))
+        object.__setattr__(self, "_derivatives", splines)
+
+    def omega_rad_per_s(self, time_s: FloatArray) -> FloatArray:
+        """Ω = φ̇."""
+        return np.asarray(self._derivatives[0](time_s))
+
+    def amplitude_m(self, time_s: FloatArray) -> FloatArray:
+        """u₀ = A ≥ 0."""
+        return np.maximum(self.amplitude(time_s), 0.0)
+
+    def fundamental(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """u, u̇ and ü of the fundamental alone [m, m/s, m/s²]."""
+        return self._component(time_s, 1, 1.0, 0.0)
+
+    def state(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """u, u̇ and ü with all harmonics [m, m/s, m/s²]."""
+        u, velocity, acceleration = self.fundamental(time_s)
+        for order, ratio, angle in self.harmonics:
+            more = self._component(time_s, order, ratio, angle)
+            u, velocity, acceleration = u + more[0], velocity + more[1], acceleration + more[2]
+        return u, velocity, acceleration
+
+    def _component(
+        self, time_s: FloatArray, order: int, ratio: float, angle: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        phi, phi1, phi2 = (np.asarray(f(time_s)) for f in (self.phase, *self._derivatives[:2]))
+        a, a1, a2 = (np.asarray(f(time_s)) for f in (self.amplitude, *self._derivatives[2:]))
+        rotor = -ratio / order**2 * np.exp(1j * (order * phi + angle))
+        turn = 1j * order * phi1
+        velocity = (a1 + turn * a) * rotor
+        acceleration = (a2 + 2 * turn * a1 + (1j * order * phi2 + turn**2) * a) * rotor
+        return (a * rotor).real, velocity.real, acceleration.real
+
+
+def shaken(plan: SweepPlan, imperfections: Imperfections | None = None) -> Motion:
+    """The motion that the shaker makes of a plan.
+
+    Parameters
+    ----------
+    plan : SweepPlan
+        What it is told.
+    imperfections : Imperfections, optional
+        A perfect shaker without them: no ramps, law kept exactly, no harmonics.
+
+    Returns
+    -------
+    Motion
+        Its fundamental never exceeds the stroke limit.
+
+    Examples
+    --------
+    >>> motion = shaken(SweepPlan(acceleration_g=6.0))
+    >>> round(float(motion.amplitude_m(np.array([0.0]))[0]), 4)
+    0.0125
+    """
+    faults = imperfections or Imperfections()
+    slow = np.random.default_rng(faults.slow_seed)
+    n_knots = max(int(np.ceil(plan.duration_s / _KNOT_STEP_S)) + 1, 12)
+    time_s = np.linspace(0.0, plan.duration_s, n_knots)
+    omega = 2 * np.pi * plan.frequency_hz(time_s) * (1 + faults.frequency_error)
+    turned = make_interp_spline(time_s, omega, k=5).antiderivative()(time_s)
+    wander = faults.phase_wander_rad * _slow_noise(time_s, slow)
+    phi = make_interp_spline(time_s, plan.initial_phase_rad + faults.start_phase_rad + turned + wander, k=5)
+    omega_true = phi.derivative()(time_s)
+    level = plan.level_g(time_s) * GRAVITY_M_PER_S2 * (1 + faults.amplitude_ripple * _slow_noise(time_s, slow))
+    stroke = STROKE_LIMIT_M * omega_true**2
+    acceleration = (level**-_JOIN_SHARPNESS + stroke**-_JOIN_SHARPNESS) ** (-1 / _JOIN_SHARPNESS)
+    if faults.ramps:
+        acceleration = acceleration * _ramps(time_s, plan.duration_s)
+    amplitude = make_interp_spline(time_s, acceleration / omega_true**2, k=5)
+    return Motion(phi, amplitude, plan.duration_s, faults.harmonics)
+
+
+def _slow_noise(time_s: FloatArray, generator: np.random.Generator) -> FloatArray:
+    """Smooth noise of unit variance, 0.02…0.3 Hz."""
+    frequencies = generator.uniform(0.02, 0.3, 10)
+    phases = generator.uniform(0, 2 * np.pi, 10)
+    waves = np.cos(2 * np.pi * frequencies[:, None] * time_s + phases[:, None])
+    return np.asarray(np.sqrt(2 / 10) * waves.sum(axis=0))
+
+
+def _ramps(time_s: FloatArray, duration_s: float) -> FloatArray:
+    up = np.clip(time_s / _START_RAMP_S, 0, 1)
+    down = np.clip((duration_s - time_s) / _STOP_RAMP_S, 0, 1)
+    return np.asarray(0.25 * (1 - np.cos(np.pi * up)) * (1 - np.cos(np.pi * down)))
+
+
+def _to_and_fro(x: FloatArray) -> FloatArray:
+    """A rounded triangle wave: 0 at even x, 1 at odd x, mostly straight between."""
+    return np.asarray(0.5 - np.arcsin(0.985 * np.cos(np.pi * x)) / (2 * np.arcsin(0.985)))
+
+
+def _stairs(x: FloatArray, dwell_s: float) -> FloatArray:
+    """0, 1, 2, … with rounded risers at integer x, each about 0.4 s wide."""
+    last = np.round(x.max())
+    risers = np.arange(1, last)[:, None]
+    return np.asarray((0.5 * (1 + np.tanh((x - risers) * dwell_s / 0.2))).sum(axis=0))

@@ -1,0 +1,309 @@
+"""One run of the virtual shaker, from the rig description to a recording."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from acquisition.virtual_laboratory.liquid_force import LiquidForce
+from acquisition.virtual_laboratory.sensors import (
+    ACCELEROMETERS,
+    CHANNELS,
+    FORCE_CELLS,
+    LOST_COUNT,
+    Laboratory,
+    Reading,
+    cell_forces,
+    reading,
+)
+from acquisition.virtual_laboratory.shaker import Imperfections, Law, Motion, SweepPlan, shaken
+from sloshlab.errors import InputError
+from sloshlab.recording import CLIPPED, LOST, write_recording
+from sloshlab.rig import Rig
+
+FloatArray = NDArray[np.float64]
+Experiment = Literal["shaker_sweep", "shaker_vfa"]
+Configuration = Literal["sloshing", "frozen", "empty"]
+
+START_TIME_UTC = "2026-01-12T09:00:00Z"
+_LARGEST_SAMPLES = 50_000_000
+
+
+@dataclass(frozen=True)
+class VirtualShaker:
+    """The truth behind one run: what no recording holds.
+
+    Attributes
+    ----------
+    motion : Motion
+        True motion of the tank.
+    liquid : LiquidForce or None
+        True force of the liquid; None for an empty tank.
+    dry_mass_kg : float
+        True M_dry.
+    """
+
+    motion: Motion
+    liquid: LiquidForce | None
+    dry_mass_kg: float
+
+    def external_force_n(self, time_s: FloatArray) -> FloatArray:
+        """F_ext = M_dry ü − F_S (1.6) [N], upward positive, without the weight."""
+        inertia = self.dry_mass_kg * self.motion.state(time_s)[2]
+        return inertia if self.liquid is None else inertia - self.liquid.force_n(time_s)
+
+
+def virtual_shaker(
+    rig: Rig,
+    plan: SweepPlan,
+    *,
+    configuration: Configuration = "sloshing",
+    seed: int = 0,
+    imperfect: bool = True,
+    laboratory: Laboratory | None = None,
+) -> VirtualShaker:
+    """The truth of the run that `virtual_shaker_run` records for the same arguments."""
+    if configuration not in ("sloshing", "frozen", "empty"):
+        raise InputError("configuration", got=repr(configuration), allowed="sloshing, frozen, empty")
+    truth = laboratory or (Laboratory.drawn(0) if imperfect else Laboratory.perfect())
+    generator = np.random.default_rng([seed, 1])
+    motion = shaken(plan, Imperfections.drawn(generator) if imperfect else None)
+    liquid = None
+    if configuration != "empty":
+        liquid = LiquidForce(motion, rig, seed=int(generator.integers(2**31)), frozen=configuration == "frozen")
+    return VirtualShaker(motion, liquid, rig.tank.dry_mass_kg * truth.dry_mass_factor)
+
+
+def virtual_shaker_run(
+    rig: Rig,
+    *,
+    experiment: Experiment = "shaker_sweep",
+    configuration: Configuration = "sloshing",
+    acceleration_g: float = 3.0,
+    direction: Literal["up", "down"] = "up",
+    law: Law = "octave",
+    start_hz: float = 5.0,
+    stop_hz: float = 20.0,
+    duration_s: float = 240.0,
+    n_steps: int = 24,
+    sampling_rate_hz: float = 512.0,
+    seed: int = 0,
+    laboratory: Laboratory | None = None,
+    imperfect: bool = True,
+    lost: tuple[float, int] | None = None,
+    n_clipped: int = 0,
+    run_id: str | None = None,
+    rig_name: str = "rig.toml",
+    repeat: int = 1,
+    start_time_utc: str = START_TIME_UTC,
+) -> xr.Dataset:
+    """Record one run of the virtual shaker.
+
+    Parameters
+    ----------
+    rig : Rig
+        Tank and liquid as believed; the fill level chooses the liquid's law.
+    experiment : {'shaker_sweep', 'shaker_vfa'}
+        A VFA run (frequency and amplitude both vary) ignores `law` and `direction`.
+    configuration : {'sloshing', 'frozen', 'empty'}
+        What the tank holds.
+    acceleration_g : float
+        Amplitude in g where the stroke limit of 12.5 mm allows it; of a VFA run the largest.
+    direction : {'up', 'down'}
+        From `start_hz` to `stop_hz` or back.
+    law : {'octave', 'linear', 'stepped'}
+        How the frequency goes.
+    start_hz, stop_hz, duration_s, n_steps, sampling_rate_hz : float
+        Of the sweep and of the recorder; `n_steps` of a stepped run.
+    seed : int
+        Of everything that differs between repeats.
+    laboratory : Laboratory, optional
+        Gains and true dry mass; by default those of laboratory 0, or perfect ones.
+    imperfect : bool
+        If false the shaker keeps its law and the sensors are exact; the liquid still scatters.
+    lost : (float, int), optional
+        Time in s and number of samples lost on all channels.
+    n_clipped : int
+        About so many samples of ``force_cell_1`` clipped.
+    run_id, rig_name, repeat, start_time_utc
+        Global attributes.
+
+    Returns
+    -------
+    xarray.Dataset
+        In the recording format, values as the converter gives them, upward positive.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
+
+    Examples
+    --------
+    >>> tank = "[tank]\\nheight_m=0.0272\\nlength_m=0.1172\\nwidth_m=0.078\\ndry_mass_kg=0.61\\n"
+    >>> rig = Rig.from_toml_text(tank + "[liquid]\\ndensity_kg_per_m3=1000.0\\nfill_level=0.5\\n")
+    >>> run = virtual_shaker_run(rig, acceleration_g=1.0, duration_s=5.0)
+    >>> run.sizes["time"], run.attrs["experiment"]
+    (2560, 'shaker_sweep')
+    """
+    if experiment not in ("shaker_sweep", "shaker_vfa"):
+        raise InputError("experiment", got=repr(experiment), allowed="shaker_sweep, shaker_vfa")
+    if direction not in ("up", "down"):
+        raise InputError("direction", got=repr(direction), allowed="up, down")
+    first, last = (start_hz, stop_hz) if direction == "up" else (stop_hz, start_hz)
+    plan = SweepPlan(
+        acceleration_g=acceleration_g,
+        law="vfa" if experiment == "shaker_vfa" else law,
+        start_hz=first,
+        stop_hz=last,
+        duration_s=duration_s,
+        n_steps=n_steps,
+    )
+    time_s = _sample_times(duration_s, sampling_rate_hz, max(start_hz, stop_hz))
+    laboratory = laboratory or (Laboratory.drawn(0) if imperfect else Laboratory.perfect())
+    shaker = virtual_shaker(
+        rig, plan, configuration=configuration, seed=seed, imperfect=imperfect, laboratory=laboratory
+    )
+    readings = _readings(shaker, time_s, laboratory, seed=seed, noisy=imperfect, n_clipped=n_clipped)
+    lost_samples = _lost_samples(time_s, lost)
+    for its_reading in readings.values():
+        its_reading.counts[lost_samples] = LOST_COUNT
+    attributes = {
+        "sloshlab_format": "1",
+        "run_id": run_id or f"virtual_{experiment}_{configuration}_{acceleration_g:.2f}g_seed{seed}",
+        "experiment": experiment,
+        "configuration": configuration,
+        "rig": rig_name,
+        "sampling_rate_hz": float(sampling_rate_hz),
+        "start_time_utc": start_time_utc,
+        "acceleration_g": float(acceleration_g),
+        "repeat": int(repeat),
+        "sweep_start_hz": float(first),
+        "sweep_stop_hz": float(last),
+        "sweep_law": plan.law,
+        "sweep_duration_s": float(duration_s),
+    }
+    if plan.law == "octave":
+        attributes["sweep_rate_octave_per_s"] = plan.rate_octave_per_s
+    return _dataset(time_s, readings, lost_samples, attributes)
+
+
+def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a virtual run as scaled int16, compressed as far as zlib can.
+
+    The same run gives the same bytes.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        From `virtual_shaker_run`.
+    path : path-like
+        The recording to write.
+    """
+    squeeze = {"zlib": True, "complevel": 9, "shuffle": True, "chunksizes": (run.sizes["time"],)}
+    encoding: dict[str, dict[str, Any]] = {str(name): dict(squeeze) for name in run.variables}
+    for name in CHANNELS:
+        encoding[name].update(
+            dtype="int16", scale_factor=run[name].encoding["scale_factor"], _FillValue=np.int16(LOST_COUNT)
+        )
+    encoding["time"]["_FillValue"] = None
+    if "quality" in run:
+        encoding["quality"]["_FillValue"] = None
+    write_recording(run, path, encoding=encoding)
+
+
+def _sample_times(duration_s: float, sampling_rate_hz: float, highest_hz: float) -> FloatArray:
+    if not 10 * highest_hz <= sampling_rate_hz <= 1e6:
+        raise InputError(
+            "sampling_rate_hz",
+            got=f"{sampling_rate_hz:g}",
+            allowed=f"{10 * highest_hz:g} … 1e6",
+            remedy="at least 10 samples per cycle are needed",
+        )
+    n_samples = round(duration_s * sampling_rate_hz)
+    if n_samples > _LARGEST_SAMPLES:
+        raise InputError("length of the run", got=f"{n_samples} samples", allowed=f"≤ {_LARGEST_SAMPLES}")
+    return np.arange(n_samples) / sampling_rate_hz
+
+
+def _readings(
+    shaker: VirtualShaker,
+    time_s: FloatArray,
+    laboratory: Laboratory,
+    *,
+    seed: int,
+    noisy: bool,
+    n_clipped: int,
+) -> dict[str, Reading]:
+    acceleration = shaker.motion.state(time_s)[2]
+    truths = dict(zip(FORCE_CELLS, cell_forces(shaker.external_force_n(time_s), time_s, laboratory), strict=True))
+    truths.update(dict.fromkeys(ACCELEROMETERS, acceleration))
+    generator = np.random.default_rng([seed, 2])
+    return {
+        name: reading(
+            truth,
+            quantity=name.partition("_")[0],
+            gain=laboratory.gain[name],
+            offset_share=laboratory.offset_share[name],
+            generator=generator,
+            noisy=noisy,
+            n_clipped=n_clipped if name == FORCE_CELLS[0] else 0,
+        )
+        for name, truth in truths.items()
+    }
+
+
+def _lost_samples(time_s: FloatArray, lost: tuple[float, int] | None) -> NDArray[np.bool_]:
+    flags = np.zeros(time_s.size, dtype=bool)
+    if lost is not None:
+        start = int(np.searchsorted(time_s, lost[0]))
+        flags[start : start + int(lost[1])] = True
+    return flags
+
+
+def _dataset(
+    time_s: FloatArray,
+    readings: Mapping[str, Reading],
+    lost_samples: NDArray[np.bool_],
+    attributes: Mapping[str, Any],
+) -> xr.Dataset:
+    variables: dict[str, xr.Variable] = {}
+    flags = np.where(lost_samples, np.uint8(LOST), np.uint8(0)).astype(np.uint8)
+    for name, its_reading in readings.items():
+        variables[name] = xr.Variable(
+            ("time",),
+            its_reading.values,
+            _channel_attributes(name, its_reading),
+            {"scale_factor": its_reading.step},
+        )
+        flags[its_reading.clipped] |= CLIPPED
+    if flags.any():
+        variables["quality"] = xr.Variable(
+            ("time",),
+            flags,
+            {
+                "flag_masks": np.array([1, 2, 4, 8], dtype=np.uint8),
+                "flag_meanings": "lost clipped crc_repaired out_of_order",
+            },
+        )
+    return xr.Dataset(variables, coords={"time": ("time", time_s, {"units": "s"})}, attrs=dict(attributes))
+
+
+def _channel_attributes(name: str, its_reading: Reading) -> dict[str, Any]:
+    quantity = name.partition("_")[0]
+    attributes: dict[str, Any] = {
+        "units": {"force": "N", "acceleration": "m s-2"}[quantity],
+        "quantity": quantity,
+        "range_min": -its_reading.half_scale,
+        "range_max": its_reading.half_scale,
+        "noise_std": its_reading.noise_std,
+    }
+    if quantity == "force":
+        attributes.update(block_from="shaker", block_to="tank")
+    return attributes
