@@ -1,0 +1,92 @@
+"""One table of quantities: units, sign and meaning of everything that is written to a result.
+
+Results start from empty attributes and read them here, so that no arithmetic can leave stale units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import xarray as xr
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Units, long name and mathematical symbol of a result."""
+
+    units: str
+    long_name: str
+    symbol: str = ""
+
+    @property
+    def label(self) -> str:
+        """Axis label: symbol or long name with units."""
+        units = self.units.replace("kg s-1", "kg/s").replace("m s-2", "m/s²").replace("m s-1", "m/s")
+        return f"{self.symbol or self.long_name}" + (f" [{units}]" if units != "1" else "")
+
+
+QUANTITIES: Final[dict[str, Quantity]] = {
+    "run": Quantity("1", "run identifier"),
+    "time_s": Quantity("s", "centre of the window, from the trigger", "t"),
+    "frequency_hz": Quantity("Hz", "excitation frequency", "f"),
+    "amplitude_m": Quantity("m", "displacement amplitude of the fundamental", "u₀"),
+    "acceleration_g": Quantity("1", "acceleration amplitude of the fundamental in multiples of 9.81 m/s²", "a₀/g"),
+    "n_cycles": Quantity("1", "cycles averaged"),
+    "work_j": Quantity("J", "dissipated work per cycle, positive = dissipated", "W"),
+    "work_j_std": Quantity("J", "standard deviation of the work from cycle to cycle", "σ(W)"),
+    "work_harmonic_j": Quantity("J", "work per cycle of the fundamental, πγΩu₀²", "πγΩu₀²"),
+    "phase_error_rad": Quantity("rad", "measured phase minus the phase of the sweep law", "φ − φ_law"),
+    "w_bar": Quantity("1", "dissipated work per cycle over m_l u₀² Ω², positive = dissipated", "W̄"),
+    "w_bar_std": Quantity("1", "standard error of W̄ from the cycle scatter", "σ(W̄)"),
+    "beta": Quantity("1", "sloshing-effective mass fraction; the liquid adds (1 + β) m_l", "β"),
+    "beta_std": Quantity("1", "standard error of β from the cycle scatter", "σ(β)"),
+    "gamma_kg_per_s": Quantity("kg s-1", "equivalent viscous coefficient, positive = dissipating", "γ"),
+    "loss_factor": Quantity("1", "W/(2π · ½ m_l u₀² Ω²)", "η"),
+    "omega_bar": Quantity("1", "Ω/√(g/h)", "ω̄"),
+    "u_bar": Quantity("1", "u₀/h", "ū"),
+    "v_bar": Quantity("1", "Ω u₀/√(g h)", "v̄"),
+    "fill_level": Quantity("1", "liquid depth over tank height", "α"),
+    "apparent_mass_kg": Quantity("kg", "in-phase force over acceleration", "Re F/ü"),
+    "dissipated_mass_kg": Quantity("kg", "dissipated work per cycle over u₀² Ω²", "W/(u₀Ω)²"),
+    "dissipated_mass_kg_std": Quantity("kg", "standard error of W/(u₀Ω)² from the cycle scatter", "σ(W/(u₀Ω)²)"),
+    "harmonic_amplitude_n": Quantity("N", "amplitude of the repeated dynamic force at Ω … 5Ω"),
+    "subharmonic_amplitude_n": Quantity("N", "amplitude of the repeated dynamic force at Ω/2 and 3Ω/2"),
+    "regime": Quantity("1", "regime of the liquid: quiet, Faraday, impacts, chaotic"),
+    "force_ratio": Quantity(
+        "1", "RMS of the dynamic force without its fundamental over that of the liquid's inertia"
+    ),
+    "subharmonic_share": Quantity(
+        "1", "share of the power beside the fundamental that repeats every second cycle"
+    ),
+    "harmonic_share": Quantity("1", "share of the power beside the fundamental at 2Ω … 5Ω"),
+    "unrepeated_share": Quantity("1", "share of the power beside the fundamental that does not repeat"),
+    "crest_factor": Quantity("1", "largest dynamic force of a cycle over its RMS"),
+    "w_bar_over_v_bar": Quantity("1", "W̄ over ω̄ and v̄", "W̄"),
+    "beta_over_v_bar": Quantity("1", "β over ω̄ and v̄", "β"),
+    "measured": Quantity("1", "1 inside the measured region of ω̄ and ū"),
+    "measured_over_v_bar": Quantity("1", "1 inside the measured region of ω̄ and v̄"),
+    "measured_work_j": Quantity("1", "1 inside the measured region of f and u₀"),
+    "harmonic": Quantity("1", "multiple of the excitation frequency"),
+    "subharmonic": Quantity("1", "multiple of the excitation frequency"),
+}
+
+
+def described(dataset: xr.Dataset) -> xr.Dataset:
+    """A copy whose variables carry the attributes of the table and nothing else.
+
+    Raises
+    ------
+    KeyError
+        If a variable is not in the table: add it there first.
+    """
+    result = dataset.copy(deep=False)
+    for name in [*result.data_vars, *result.coords]:
+        quantity = QUANTITIES.get(str(name)) or QUANTITIES[str(name).removesuffix("_std")]
+        attributes = {"long_name": quantity.long_name}
+        if result[name].dtype.kind in "fiu":
+            attributes["units"] = quantity.units
+        if str(name) not in QUANTITIES:
+            attributes["long_name"] = f"standard error of: {quantity.long_name}"
+        result[name].attrs = attributes
+    return result

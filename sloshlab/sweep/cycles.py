@@ -1,0 +1,291 @@
+"""One row per cycle: the loop integral, the phasors and the powers, in a single pass over the samples.
+
+Symbols of the kernel: φ phase of the tank's acceleration within the cycle, F force on the tank
+[N], a acceleration, v velocity of the tank (SI), d = m_i a - F the force that is left once the
+inertia m_i of everything on the cells is removed (the dynamic sloshing force Δf).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from sloshlab.quadrature import MARGIN_SAMPLES, STEP_WEIGHTS, boundary_weights
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+BoolArray = npt.NDArray[np.bool_]
+
+N_HARMONICS = 5
+"""Harmonics 1 … 5 of the excitation frequency are kept."""
+
+_WORK, _MEAN_FORCE, _POWER, _PEAK = 0, 1, 2, 3
+_N_SCALARS = 4
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """What every cycle of a sweep gave; all arrays have one entry per cycle.
+
+    Attributes
+    ----------
+    start_s, stop_s : ndarray, shape (n,)
+        Boundaries t_n, t_{n+1} [s].
+    usable : ndarray of bool, shape (n,)
+        False where a lost or clipped sample touches the cycle.
+    work_j : ndarray, shape (n,)
+        W = ∮ F u̇ dt [J], positive = dissipated.
+    force_phasor, acceleration_phasor : ndarray, shape (n, 5)
+        Complex amplitudes at Ω … 5Ω relative to the phase φ of the acceleration [N, m s-2].
+    velocity_phasor : ndarray, shape (n,)
+        Complex amplitude of u̇ at Ω [m s-1].
+    subharmonic_phasor : ndarray, shape (n, 2)
+        Contribution of this cycle to the amplitudes of d at Ω/2 and 3Ω/2 [N]; meaningful as the
+        mean over an even number of consecutive cycles.
+    dynamic_power : ndarray, shape (n,)
+        Mean of d² over the cycle, its mean removed [N²].
+    dynamic_peak : ndarray, shape (n,)
+        Largest |d| of the cycle [N].
+    inertia_kg : float
+        m_i.
+    """
+
+    start_s: FloatArray
+    stop_s: FloatArray
+    usable: BoolArray
+    work_j: FloatArray
+    force_phasor: ComplexArray
+    acceleration_phasor: ComplexArray
+    velocity_phasor: ComplexArray
+    subharmonic_phasor: ComplexArray
+    dynamic_power: FloatArray
+    dynamic_peak: FloatArray
+    inertia_kg: float
+
+    @property
+    def omega_rad_per_s(self) -> FloatArray:
+        """Ω of each cycle [rad/s], shape (n,)."""
+        return 2 * np.pi / (self.stop_s - self.start_s)
+
+    @property
+    def harmonic_work_j(self) -> FloatArray:
+        """πγΩu₀² = ½ T Re(F₁ u̇₁*), the work of the fundamental alone [J], shape (n,)."""
+        duration = self.stop_s - self.start_s
+        return np.asarray(0.5 * duration * (self.force_phasor[:, 0] * self.velocity_phasor.conj()).real)
+
+    @property
+    def dynamic_phasor(self) -> ComplexArray:
+        """Amplitudes of d at Ω … 5Ω [N], shape (n, 5)."""
+        return np.asarray(self.inertia_kg * self.acceleration_phasor - self.force_phasor)
+
+
+def evaluate_cycles(
+    force: FloatArray,
+    motion: FloatArray,
+    boundaries_s: FloatArray,
+    *,
+    sampling_rate_hz: float,
+    inertia_kg: float = 0.0,
+    motion_is_velocity: bool = False,
+    unusable: BoolArray | None = None,
+) -> Cycles:
+    """Evaluate every cycle between consecutive boundaries.
+
+    The velocity is the integral of the acceleration over the cycle; the two constants of
+    integration are set by asking that the tank's velocity returns after a cycle and has no mean.
+    Both hold for a sweep to second order in the relative change per cycle.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_samples,)
+        Force on the tank, F_ext [N], upward positive; NaN where lost.
+    motion : ndarray, shape (n_samples,)
+        Acceleration [m s-2] or velocity [m s-1] of the tank; NaN where lost.
+    boundaries_s : ndarray, shape (n_cycles + 1,)
+        t_n with ü = a₀ cos φ, φ(t_n) = 2πn, counted from the first sample [s].
+    sampling_rate_hz : float
+        Sampling rate [Hz].
+    inertia_kg : float
+        Mass whose inertia is removed to get the dynamic force; it has no influence on the work.
+    motion_is_velocity : bool
+        True if `motion` is a velocity.
+    unusable : ndarray of bool, shape (n_samples,), optional
+        True where a sample must not be used (clipped, flagged). NaN samples need no flag.
+
+    Returns
+    -------
+    Cycles
+    """
+    positions = np.asarray(boundaries_s, dtype=np.float64) * sampling_rate_hz
+    inside = (positions[:-1] >= MARGIN_SAMPLES + 1) & (positions[1:] <= force.size - MARGIN_SAMPLES - 2)
+    long_enough = np.diff(positions) > 4
+    slope = np.gradient(np.arange(positions.size, dtype=np.float64), positions, edge_order=2)
+    scalars, phasors = _kernel(
+        force,
+        motion,
+        positions,
+        slope,
+        inside & long_enough,
+        1.0 / sampling_rate_hz,
+        inertia_kg,
+        motion_is_velocity,
+        np.zeros(0, dtype=np.bool_) if unusable is None else unusable,
+    )
+    return Cycles(
+        start_s=np.asarray(boundaries_s[:-1]),
+        stop_s=np.asarray(boundaries_s[1:]),
+        usable=np.isfinite(scalars[:, _WORK]),
+        work_j=scalars[:, _WORK],
+        force_phasor=phasors[:, :N_HARMONICS],
+        acceleration_phasor=phasors[:, N_HARMONICS : 2 * N_HARMONICS],
+        velocity_phasor=phasors[:, 2 * N_HARMONICS],
+        subharmonic_phasor=phasors[:, 2 * N_HARMONICS + 1 :],
+        dynamic_power=scalars[:, _POWER],
+        dynamic_peak=scalars[:, _PEAK],
+        inertia_kg=inertia_kg,
+    )
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _kernel(
+    force: FloatArray,
+    motion: FloatArray,
+    positions: FloatArray,
+    slope: FloatArray,
+    evaluable: BoolArray,
+    step_s: float,
+    inertia_kg: float,
+    motion_is_velocity: bool,
+    unusable: BoolArray,
+) -> tuple[FloatArray, ComplexArray]:
+    n_cycles = positions.size - 1
+    scalars = np.full((n_cycles, _N_SCALARS), np.nan)
+    phasors = np.full((n_cycles, 2 * N_HARMONICS + 3), np.nan + 0j)
+    for n in range(n_cycles):
+        if evaluable[n] and _complete(force, motion, unusable, positions[n], positions[n + 1]):
+            _one_cycle(
+                force,
+                motion,
+                positions[n],
+                positions[n + 1],
+                slope[n] * (positions[n + 1] - positions[n]),
+                slope[n + 1] * (positions[n + 1] - positions[n]),
+                step_s,
+                inertia_kg,
+                motion_is_velocity,
+                n % 2,
+                scalars[n],
+                phasors[n],
+            )
+    return scalars, phasors
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _complete(force: FloatArray, motion: FloatArray, unusable: BoolArray, start: float, stop: float) -> bool:
+    """True if no sample that the cycle needs is lost or flagged."""
+    first, last = int(np.ceil(start)) - MARGIN_SAMPLES, int(np.floor(stop)) + MARGIN_SAMPLES
+    total = 0.0
+    for i in range(first, last + 1):
+        total += force[i] + motion[i]
+    if not np.isfinite(total):
+        return False
+    if unusable.size:
+        for i in range(first, last + 1):
+            if unusable[i]:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "nsz", "arcp"})  # type: ignore[untyped-decorator]
+def _one_cycle(
+    force: FloatArray,
+    motion: FloatArray,
+    start: float,
+    stop: float,
+    slope_start: float,
+    slope_stop: float,
+    step_s: float,
+    inertia_kg: float,
+    motion_is_velocity: bool,
+    parity: int,
+    scalars: FloatArray,
+    phasors: ComplexArray,
+) -> None:
+    p, q = int(np.ceil(start)), int(np.floor(stop))
+    length = stop - start
+    duration = length * step_s
+    left, right = np.empty(6), np.empty(6)
+    boundary_weights(p - start, left)
+    boundary_weights(stop - q, right)
+    # φ/2π of the cycle as the cubic x + x (1-x) (c₀ (1-x) - c₁ x) with the measured slopes at both ends
+    c_start, c_stop = slope_start - 1.0, slope_stop - 1.0
+    work = sum_force = sum_force_time = sum_velocity = sum_motion = peak = 0.0
+    sum_d = sum_d2 = 0.0
+    velocity_1 = time_1 = 0.0 + 0.0j
+    half_1 = half_3 = 0.0 + 0.0j
+    force_k = np.zeros(N_HARMONICS, dtype=np.complex128)
+    motion_k = np.zeros(N_HARMONICS, dtype=np.complex128)
+    velocity = 0.0
+    for i in range(p - 3, q + 4):
+        weight = 1.0 if p <= i <= q else 0.0
+        if i <= p + 2:
+            weight += left[i - p + 3]
+        if i >= q - 2:
+            weight += right[q + 3 - i]
+        x = (i - start) / length
+        turn = x + x * (1.0 - x) * (c_start * (1.0 - x) - c_stop * x)
+        rate = 1.0 + (1.0 - 2.0 * x) * (c_start * (1.0 - x) - c_stop * x) - x * (1.0 - x) * (c_start + c_stop)
+        half_angle = np.pi * turn
+        half = np.cos(half_angle) - 1j * np.sin(half_angle)
+        unit = half * half
+        f, a = float(force[i]), float(motion[i])
+        v = a if motion_is_velocity else velocity
+        t = (x - 0.5) * duration
+        w = weight * step_s
+        w_phase = w * rate
+        work += w * f * v
+        sum_force += w * f
+        sum_force_time += w * f * t
+        sum_velocity += w * v
+        sum_motion += w * a
+        velocity_1 += w_phase * v * unit
+        time_1 += w_phase * t * unit
+        turning = unit
+        for k in range(N_HARMONICS):
+            force_k[k] += w_phase * f * turning
+            motion_k[k] += w_phase * a * turning
+            turning *= unit
+        if not motion_is_velocity:
+            velocity += step_s * (
+                STEP_WEIGHTS[2] * (motion[i] + motion[i + 1])
+                + STEP_WEIGHTS[1] * (motion[i - 1] + motion[i + 2])
+                + STEP_WEIGHTS[0] * (motion[i - 2] + motion[i + 3])
+            )
+        d = inertia_kg * a - f if not motion_is_velocity else -f
+        sum_d += w * d
+        sum_d2 += w * d * d
+        half_1 += w_phase * d * half
+        half_3 += w_phase * d * half * unit
+        if p <= i <= q and abs(d) > peak:
+            peak = abs(d)
+    two_per_duration = 2.0 / duration
+    mean_force = sum_force / duration
+    drift = 0.0 if motion_is_velocity else sum_motion / duration
+    mean_velocity = sum_velocity / duration
+    scalars[_WORK] = work - mean_velocity * sum_force - drift * sum_force_time
+    scalars[_MEAN_FORCE] = mean_force
+    scalars[_POWER] = max(0.0, sum_d2 / duration - (sum_d / duration) ** 2)
+    scalars[_PEAK] = peak
+    velocity_1 = two_per_duration * (velocity_1 - drift * time_1)
+    omega = 2.0 * np.pi / duration
+    for k in range(N_HARMONICS):
+        phasors[k] = two_per_duration * force_k[k]
+        factor = 1j * omega * (k + 1) if motion_is_velocity else 1.0 + 0.0j
+        phasors[N_HARMONICS + k] = two_per_duration * motion_k[k] * factor
+    phasors[2 * N_HARMONICS] = velocity_1
+    sign = 1.0 - 2.0 * parity
+    phasors[2 * N_HARMONICS + 1] = sign * two_per_duration * half_1
+    phasors[2 * N_HARMONICS + 2] = sign * two_per_duration * half_3

@@ -1,0 +1,285 @@
+"""What a sweep did: the phase of the measured motion.
+
+The phase φ is that of the fundamental of the tank's acceleration, ü = a₀ cos φ. It is found in
+three steps, none of which needs the sweep law: the dominant frequency of short blocks; complex
+demodulation about it over two cycles, which rejects the mean, the harmonics and the
+subharmonics; a cubic spline through the demodulated phases. Demodulation is symmetric in time
+and therefore has no delay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from scipy.interpolate import CubicSpline
+
+from sloshlab.errors import AnalysisError
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+_DEMODULATION_RATE_HZ = 1000.0
+"""The motion is averaged down to about this rate before its phase is taken."""
+_KNOTS_PER_CYCLE = 1.0
+_CYCLES_PER_BLOCK = 8.0
+_WINDOW_CYCLES = 2.0
+_SMALLEST_RELATIVE_AMPLITUDE = 2e-3
+_LARGEST_PHASE_JUMP_RAD = 0.7
+
+
+@dataclass(frozen=True)
+class MotionPhase:
+    """Phase of the measured motion, ü = a₀ cos φ.
+
+    Attributes
+    ----------
+    phase : scipy.interpolate.CubicSpline
+        φ(t) [rad].
+    moving : ndarray of bool, shape (n_knots,)
+        Where the motion has a coherent phase; between two knots that have not, there is no sweep.
+    knot_s, amplitude : ndarray, shape (n_knots,)
+        Times [s] and amplitudes of the fundamental in the units of the motion.
+    """
+
+    phase: CubicSpline
+    knot_s: FloatArray
+    amplitude: FloatArray
+    moving: BoolArray
+
+    def moving_interval_s(self) -> tuple[float, float]:
+        """First and last time with motion [s]."""
+        at = np.flatnonzero(self.moving)
+        return float(self.knot_s[at[0]]), float(self.knot_s[at[-1]])
+
+    def cycle_boundaries_s(self) -> FloatArray:
+        """Times with φ = 2πn within the interval that moves [s].
+
+        Raises
+        ------
+        AnalysisError
+            If the phase does not increase, which means that no sweep was recorded.
+        """
+        start, stop = self.moving_interval_s()
+        fine = np.unique(np.concatenate([self.knot_s[(self.knot_s >= start) & (self.knot_s <= stop)]]))
+        cycles = self.phase(fine) / (2 * np.pi)
+        rising = np.concatenate([[True], np.diff(np.maximum.accumulate(cycles)) > 0])
+        fine, cycles = fine[rising], cycles[rising]
+        n = np.arange(np.ceil(cycles[0]), np.floor(cycles[-1]) + 1)
+        times = np.interp(n, cycles, fine)
+        frequency = self.phase.derivative()
+        for _ in range(4):
+            times = times - (self.phase(times) - 2 * np.pi * n) / np.maximum(frequency(times), 1e-9)
+        times = times[(times >= start) & (times <= stop)]
+        if times.size < 3 or not (np.diff(times) > 0).all():
+            raise AnalysisError(
+                "motion phase",
+                got="a motion without a dominant frequency",
+                allowed="a harmonic motion whose frequency changes slowly",
+                remedy="check that the channel is the tank's motion",
+            )
+        return np.asarray(times)
+
+
+def measured_phase(
+    motion: FloatArray, usable: BoolArray | None, sampling_rate_hz: float, *, lead_rad: float = 0.0
+) -> MotionPhase:
+    """Phase of the fundamental of a measured motion.
+
+    Parameters
+    ----------
+    motion : ndarray, shape (n,)
+        Acceleration or velocity of the tank; NaN where lost.
+    usable : ndarray of bool, shape (n,), optional
+        False where a sample must not be used; None means all that are finite.
+    sampling_rate_hz : float
+        Sampling rate [Hz].
+    lead_rad : float
+        Phase by which the acceleration leads the given motion: 0 for an acceleration, π/2 for a
+        velocity.
+
+    Returns
+    -------
+    MotionPhase
+        With times counted from the first sample [s].
+
+    Raises
+    ------
+    AnalysisError
+        If there is no motion, or too little of it.
+    """
+    decimated, weight, rate_hz, offset_s = _averaged_down(motion, usable, sampling_rate_hz)
+    knots, frequency = _dominant_frequency(decimated, weight, rate_hz)
+    times, phase = _phase_knots(knots, frequency, decimated.size / rate_hz)
+    amplitude = np.empty(0)
+    moving = np.empty(0, dtype=np.bool_)
+    for iteration in range(3):
+        spline = CubicSpline(times, phase)
+        window_s = _WINDOW_CYCLES * 2 * np.pi / np.maximum(spline(times, 1), 1e-6)
+        z, lost = _demodulated(decimated, weight, rate_hz, times, window_s, spline.c, spline.x)
+        amplitude = np.abs(z)
+        moving = (amplitude > _SMALLEST_RELATIVE_AMPLITUDE * amplitude.max()) & ~lost
+        correction = _unwrapped(np.angle(z), moving)
+        phase = spline(times) + correction
+        if iteration == 0:
+            times, phase, moving = _respaced(times, phase, moving)
+    moving = moving & _coherent(phase, moving)
+    if moving.sum() < 4:
+        raise AnalysisError(
+            "motion phase",
+            got="fewer than four cycles of coherent motion",
+            allowed="a shaken tank",
+            remedy="check that the channel is the tank's motion and that the run was not empty",
+        )
+    spline = CubicSpline(times[moving] + offset_s, phase[moving] + lead_rad)
+    return MotionPhase(spline, times + offset_s, amplitude, moving | _isolated_loss(moving))
+
+
+def _averaged_down(
+    motion: FloatArray, usable: BoolArray | None, sampling_rate_hz: float
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Block means at about `_DEMODULATION_RATE_HZ`, weight 0 for blocks with a lost sample."""
+    factor = max(1, int(sampling_rate_hz // _DEMODULATION_RATE_HZ))
+    n_blocks = motion.size // factor
+    trimmed = motion[: n_blocks * factor].reshape(n_blocks, factor)
+    mean = trimmed.mean(axis=1, dtype=np.float64)
+    good = np.isfinite(mean)
+    if usable is not None:
+        good &= usable[: n_blocks * factor].reshape(n_blocks, factor).all(axis=1)
+    if good.sum() < 16:
+        raise AnalysisError(
+            "motion", got=f"{int(good.sum())} usable samples", allowed="at least 16", remedy="record again"
+        )
+    mean = mean - mean[good].mean()
+    mean[~good] = 0.0
+    return mean, good.astype(np.float64), sampling_rate_hz / factor, (factor - 1) / (2 * sampling_rate_hz)
+
+
+def _dominant_frequency(motion: FloatArray, weight: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Centres [s] and dominant frequencies [Hz] of blocks of about eight cycles."""
+    overall = _block_peaks(motion, weight, rate_hz, min(motion.size, 1 << 14))
+    typical_hz = float(np.median(overall[1]))
+    n_block = int(min(motion.size, max(32, _CYCLES_PER_BLOCK / typical_hz * rate_hz)))
+    centres, frequency = _block_peaks(motion, weight, rate_hz, n_block)
+    padded = np.pad(frequency, 1, mode="edge")
+    return centres, np.median(np.stack([padded[:-2], frequency, padded[2:]]), axis=0)
+
+
+def _block_peaks(
+    motion: FloatArray, weight: FloatArray, rate_hz: float, n_block: int
+) -> tuple[FloatArray, FloatArray]:
+    starts = np.arange(0, max(1, motion.size - n_block + 1), max(1, n_block // 2))
+    blocks = np.lib.stride_tricks.sliding_window_view(motion, n_block)[starts]
+    complete = np.lib.stride_tricks.sliding_window_view(weight, n_block)[starts].mean(axis=1) > 0.9
+    blocks = (blocks - blocks.mean(axis=1, keepdims=True)) * np.hanning(n_block)
+    spectrum = np.abs(np.fft.rfft(blocks, 4 * n_block, axis=1))
+    frequency = np.fft.rfftfreq(4 * n_block, 1 / rate_hz)
+    lowest = 2.0 * rate_hz / n_block
+    candidate = (frequency > lowest) & (frequency < 0.4 * rate_hz)
+    # velocity, not acceleration: it weighs a harmonic less than the fundamental
+    velocity = np.where(candidate, spectrum / np.maximum(frequency, lowest), 0.0)
+    peak = velocity.argmax(axis=1)
+    height = velocity[np.arange(starts.size), peak]
+    good = complete & (height > _SMALLEST_RELATIVE_AMPLITUDE * height.max())
+    if not good.any() or height.max() <= 0:
+        raise AnalysisError(
+            "motion", got="no oscillation", allowed="a shaken tank", remedy="check the motion channel"
+        )
+    centres = (starts + 0.5 * (n_block - 1)) / rate_hz
+    return centres[good], frequency[peak[good]]
+
+
+def _phase_knots(centres: FloatArray, frequency: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
+    """One knot per cycle with the phase integrated from the block frequencies."""
+    step = 0.25 / float(frequency.max())
+    fine = np.arange(0.0, duration_s + step, step)
+    cycles = np.concatenate([[0.0], np.cumsum(np.interp(fine, centres, frequency))[:-1]]) * step
+    return _one_per_cycle(fine, 2 * np.pi * cycles)
+
+
+def _one_per_cycle(times: FloatArray, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+    cycles = phase / (2 * np.pi) * _KNOTS_PER_CYCLE
+    n = np.arange(np.ceil(cycles[0]), np.floor(cycles[-1]) + 1)
+    if n.size < 4:
+        raise AnalysisError("motion", got="fewer than four cycles", allowed="a sweep", remedy="record longer")
+    return np.interp(n, cycles, times), n / _KNOTS_PER_CYCLE * 2 * np.pi
+
+
+def _respaced(times: FloatArray, phase: FloatArray, moving: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Knots again one per cycle, now of the demodulated phase."""
+    smooth = np.interp(times, times[moving], phase[moving]) if moving.any() else phase
+    rising = np.maximum.accumulate(smooth) + 1e-6 * np.arange(smooth.size)
+    new_times, _ = _one_per_cycle(times, rising)
+    spline_phase = CubicSpline(times, smooth)(new_times)
+    return new_times, np.maximum.accumulate(spline_phase), np.interp(new_times, times, moving) > 0.5
+
+
+def _unwrapped(angle: FloatArray, moving: BoolArray) -> FloatArray:
+    """Angles unwrapped over the moving knots and held between them."""
+    at = np.flatnonzero(moving)
+    if at.size == 0:
+        return np.zeros_like(angle)
+    return np.interp(np.arange(angle.size), at, np.unwrap(angle[at]))
+
+
+def _coherent(phase: FloatArray, moving: BoolArray) -> BoolArray:
+    """False at knots whose phase jumps against both neighbours."""
+    second = np.zeros_like(phase)
+    second[1:-1] = phase[2:] - 2 * phase[1:-1] + phase[:-2]
+    second[[0, -1]] = second[[1, -2]]
+    near_moving = np.convolve(moving, np.ones(3), mode="same") >= 2
+    return near_moving & (np.abs(second) < _LARGEST_PHASE_JUMP_RAD)
+
+
+def _isolated_loss(moving: BoolArray) -> BoolArray:
+    """True where the motion stops for a moment only: the phase is carried across lost samples."""
+    at = np.flatnonzero(moving)
+    inside = np.zeros_like(moving)
+    inside[at[0] : at[-1] + 1] = True
+    return inside & ~moving
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _demodulated(
+    motion: FloatArray,
+    weight: FloatArray,
+    rate_hz: float,
+    times: FloatArray,
+    window_s: FloatArray,
+    coefficients: FloatArray,
+    breaks: FloatArray,
+) -> tuple[npt.NDArray[np.complex128], BoolArray]:
+    """Mean of motion·e^{-jφ} under a Hann window at each knot; True where samples were lost.
+
+    ``coefficients`` and ``breaks`` are those of the cubic spline φ(t).
+    """
+    result = np.zeros(times.size, dtype=np.complex128)
+    lost = np.zeros(times.size, dtype=np.bool_)
+    last_piece = breaks.size - 2
+    for k in range(times.size):
+        half = 0.5 * window_s[k]
+        first = max(0, int(np.ceil((times[k] - half) * rate_hz)))
+        last = min(motion.size - 1, int(np.floor((times[k] + half) * rate_hz)))
+        piece = max(0, min(last_piece, k))
+        total, norm, present = 0.0 + 0.0j, 0.0, 0.0
+        while piece > 0 and breaks[piece] > first / rate_hz:
+            piece -= 1
+        for i in range(first, last + 1):
+            t = i / rate_hz
+            while piece < last_piece and breaks[piece + 1] <= t:
+                piece += 1
+            x = t - breaks[piece]
+            phi = (
+                (coefficients[0, piece] * x + coefficients[1, piece]) * x + coefficients[2, piece]
+            ) * x + coefficients[3, piece]
+            w = 0.5 + 0.5 * np.cos(np.pi * (t - times[k]) / half)
+            total += w * weight[i] * motion[i] * (np.cos(phi) - 1j * np.sin(phi))
+            norm += w
+            present += w * weight[i]
+        expected = 0.5 * window_s[k] * rate_hz
+        lost[k] = norm == 0.0 or present < 0.999 * norm or norm < 0.98 * expected
+        if norm > 0.0:
+            result[k] = 2.0 * total / norm
+    return result, lost

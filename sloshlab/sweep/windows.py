@@ -1,0 +1,246 @@
+"""Averages over windows of 2P cycles whose centres are M cycles apart."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.quantities import described
+from sloshlab.rig import Rig
+from sloshlab.sweep.cycles import Cycles
+from sloshlab.sweep.law import SweepLaw
+from sloshlab.sweep.regime import classify
+
+FloatArray = npt.NDArray[np.float64]
+
+_LARGEST_CHANGE_PER_CYCLE = 0.02
+"""A frequency that changes by more than this from one cycle to the next starts a new step."""
+_SMALLEST_AMPLITUDE_RATIO = 0.5
+"""Cycles below this part of the median amplitude of their window are a start, a stop or a pause."""
+
+
+@dataclass(frozen=True)
+class WindowSettings:
+    """How cycles are put into windows.
+
+    Attributes
+    ----------
+    half_width_cycles : int
+        P: a window covers 2P cycles, t_{n-P} … t_{n+P} (1.15).
+    spacing_cycles : int
+        M: cycles between the centres of windows; M ≥ 2P means no overlap.
+    smallest_n_cycles : int
+        Windows with fewer usable cycles are left out.
+    """
+
+    half_width_cycles: int = 6
+    spacing_cycles: int = 24
+    smallest_n_cycles: int = 3
+
+
+def window_slices(cycles: Cycles, settings: WindowSettings) -> Iterator[slice]:
+    """Slices of cycles, one per window; none crosses a step of the frequency.
+
+    Examples
+    --------
+    With P = 6 and M = 24, a sweep of 60 cycles has windows 0–12, 24–36 and 48–60.
+    """
+    frequency = cycles.omega_rad_per_s
+    jumps = np.flatnonzero(np.abs(np.diff(frequency)) > _LARGEST_CHANGE_PER_CYCLE * frequency[:-1]) + 1
+    edges = np.concatenate([[0], jumps, [frequency.size]])
+    width = 2 * settings.half_width_cycles
+    for start, stop in itertools.pairwise(edges):
+        if settings.smallest_n_cycles <= stop - start < width:
+            yield slice(int(start), int(stop))
+        for first in range(int(start), int(stop) - width + 1, settings.spacing_cycles):
+            yield slice(first, first + width)
+
+
+def evaluate_windows(
+    cycles: Cycles,
+    *,
+    run_id: str,
+    law: SweepLaw | None,
+    start_time_s: float = 0.0,
+    rig: Rig | None = None,
+    settings: WindowSettings | None = None,
+    noise_power: float = 0.0,
+) -> xr.Dataset:
+    """Average the cycles of one run in windows.
+
+    Parameters
+    ----------
+    cycles : Cycles
+        Of one run; `inertia_kg` must be M_dry + m_l if `rig` is given.
+    run_id : str
+        Written to `run`.
+    law : SweepLaw, optional
+        For `phase_error_rad`; NaN without one.
+    start_time_s : float
+        Time of the first sample from the trigger [s].
+    rig : Rig, optional
+        With it, W̄, β, η and the non-dimensional coordinates are given.
+    settings : WindowSettings, optional
+        P, M and the smallest number of cycles.
+    noise_power : float
+        Mean square of the dynamic force that sensor noise alone gives [N²].
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``window``; variables as in `sloshlab.quantities`. Work is positive when dissipated.
+    """
+    chosen = settings or WindowSettings()
+    rows = []
+    for window in window_slices(cycles, chosen):
+        at = _moving(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
+        if at.size >= chosen.smallest_n_cycles:
+            rows.append(_row(cycles, at, law, start_time_s, rig, noise_power))
+    return described(_table(rows, run_id, rig))
+
+
+def _moving(cycles: Cycles, at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    if at.size == 0:
+        return at
+    amplitude = np.abs(cycles.acceleration_phasor[at, 0])
+    return np.asarray(at[amplitude > _SMALLEST_AMPLITUDE_RATIO * np.median(amplitude)])
+
+
+def _row(
+    cycles: Cycles,
+    at: npt.NDArray[np.intp],
+    law: SweepLaw | None,
+    start_time_s: float,
+    rig: Rig | None,
+    noise_power: float,
+) -> dict[str, object]:
+    omega = cycles.omega_rad_per_s[at]
+    middle = 0.5 * (cycles.start_s[at] + cycles.stop_s[at])
+    work, force, velocity = cycles.work_j[at], cycles.force_phasor[at, 0], cycles.velocity_phasor[at]
+    acceleration = cycles.acceleration_phasor[at, 0]
+    speed2, accel2 = np.abs(velocity) ** 2, np.abs(acceleration) ** 2
+    gamma = float((force * velocity.conj()).real.mean() / speed2.mean())
+    mass = float((force * acceleration.conj()).real.mean() / accel2.mean())
+    mass_scatter = (force * acceleration.conj()).real - mass * accel2
+    row: dict[str, object] = {
+        "time_s": start_time_s + float(middle.mean()),
+        "frequency_hz": float(omega.mean() / (2 * np.pi)),
+        "amplitude_m": float(np.sqrt((speed2 / omega**2).mean())),
+        "acceleration_g": float(np.sqrt(accel2.mean()) / GRAVITY_M_PER_S2),
+        "n_cycles": at.size,
+        "work_j": float(work.mean()),
+        "work_j_std": float(work.std(ddof=1)),
+        "work_harmonic_j": float(cycles.harmonic_work_j[at].mean()),
+        "phase_error_rad": _phase_error(cycles.start_s[at] + start_time_s, law),
+        "gamma_kg_per_s": gamma,
+        "apparent_mass_kg": mass,
+        "dissipated_mass_kg": float(work.mean() / speed2.mean()),
+        "dissipated_mass_kg_std": float(work.std(ddof=1) / np.sqrt(at.size) / speed2.mean()),
+        "harmonic_amplitude_n": np.abs(cycles.dynamic_phasor[at].mean(axis=0)),
+    }
+    row.update(_regime(cycles, at, row, rig, noise_power))
+    if rig is not None:
+        mass_std = float(mass_scatter.std(ddof=1) / np.sqrt(at.size) / accel2.mean())
+        row.update(_scaled(row, mass, mass_std, cycles.inertia_kg, rig))
+    return row
+
+
+def _scaled(
+    row: dict[str, object], mass: float, mass_std: float, inertia_kg: float, rig: Rig
+) -> dict[str, object]:
+    """The quantities that need the tank (1.16–1.18, 1.24); W̄ = W/(m_l u₀² Ω²)."""
+    liquid = rig.liquid_mass_kg
+    omega, amplitude = 2 * np.pi * _number(row, "frequency_hz"), _number(row, "amplitude_m")
+    w_bar = _number(row, "dissipated_mass_kg") / liquid
+    return {
+        "w_bar": w_bar,
+        "w_bar_std": _number(row, "dissipated_mass_kg_std") / liquid,
+        # F = (M_dry + m_l) ü − Δf and Δf = −β m_l ü − γ u̇: the mass beyond M_dry + m_l is β m_l
+        "beta": (mass - inertia_kg) / liquid,
+        "beta_std": mass_std / liquid,
+        "loss_factor": w_bar / np.pi,
+        "omega_bar": omega / rig.frequency_scale_rad_per_s,
+        "u_bar": amplitude / rig.tank.height_m,
+        "v_bar": omega * amplitude / rig.velocity_scale_m_per_s,
+        "fill_level": rig.liquid.fill_level,
+    }
+
+
+def _number(row: dict[str, object], name: str) -> float:
+    value = row[name]
+    assert isinstance(value, float)
+    return value
+
+
+def _regime(
+    cycles: Cycles, at: npt.NDArray[np.intp], row: dict[str, object], rig: Rig | None, noise_power: float
+) -> dict[str, object]:
+    pairs = at[:-1][np.diff(at) == 1][::2]
+    subharmonic = 0.5 * (cycles.subharmonic_phasor[pairs] + cycles.subharmonic_phasor[pairs + 1])
+    mass = rig.liquid_mass_kg if rig is not None else abs(_number(row, "apparent_mass_kg"))
+    regime = classify(
+        cycles.dynamic_phasor[at],
+        subharmonic,
+        cycles.dynamic_power[at],
+        cycles.dynamic_peak[at],
+        reference_force_n=mass * _number(row, "acceleration_g") * GRAVITY_M_PER_S2,
+        noise_power=noise_power,
+    )
+    return {
+        "subharmonic_amplitude_n": np.abs(subharmonic.mean(axis=0)) if pairs.size else np.full(2, np.nan),
+        "regime": regime.label,
+        "force_ratio": regime.force_ratio,
+        "subharmonic_share": regime.subharmonic_share,
+        "harmonic_share": regime.harmonic_share,
+        "unrepeated_share": regime.unrepeated_share,
+        "crest_factor": regime.crest_factor,
+    }
+
+
+def _phase_error(starts_s: FloatArray, law: SweepLaw | None) -> float:
+    """Measured minus law phase, wrapped to (-π, π]; the measured phase is a multiple of 2π at t_n."""
+    if law is None:
+        return float("nan")
+    turns = law.phase_rad(starts_s)
+    return float(np.angle(np.exp(-1j * turns).mean())) if np.isfinite(turns).all() else float("nan")
+
+
+def _table(rows: list[dict[str, object]], run_id: str, rig: Rig | None) -> xr.Dataset:
+    variables: dict[str, tuple[object, ...]] = {"run": ("window", np.array([run_id] * len(rows), dtype=object))}
+    two_dimensional = {"harmonic_amplitude_n": "harmonic", "subharmonic_amplitude_n": "subharmonic"}
+    for name in rows[0] if rows else _empty_names(rig):
+        column = [row[name] for row in rows]
+        if name in two_dimensional:
+            width = 5 if name.startswith("harmonic") else 2
+            variables[name] = (
+                ("window", two_dimensional[name]),
+                np.array(column, float).reshape(len(rows), width),
+            )
+        elif name == "regime":
+            variables[name] = ("window", np.array(column, dtype=object))
+        else:
+            variables[name] = ("window", np.array(column, dtype=np.int32 if name == "n_cycles" else np.float64))
+    table = xr.Dataset(variables)
+    table["phase_error_rad"] = ("window", _continuous(table["phase_error_rad"].values))
+    return table.assign_coords(harmonic=np.arange(1, 6), subharmonic=np.array([0.5, 1.5]))
+
+
+def _continuous(phase_error_rad: FloatArray) -> FloatArray:
+    return np.unwrap(phase_error_rad) if np.isfinite(phase_error_rad).all() else phase_error_rad
+
+
+def _empty_names(rig: Rig | None) -> list[str]:
+    names = [
+        "time_s", "frequency_hz", "amplitude_m", "acceleration_g", "n_cycles", "work_j", "work_j_std",
+        "work_harmonic_j", "phase_error_rad", "gamma_kg_per_s", "apparent_mass_kg", "dissipated_mass_kg",
+        "dissipated_mass_kg_std", "harmonic_amplitude_n", "subharmonic_amplitude_n", "regime", "force_ratio",
+        "subharmonic_share", "harmonic_share", "unrepeated_share", "crest_factor",
+    ]  # fmt: skip
+    scaled = ["w_bar", "w_bar_std", "beta", "beta_std", "loss_factor", "omega_bar", "u_bar", "v_bar", "fill_level"]
+    return names + (scaled if rig is not None else [])
