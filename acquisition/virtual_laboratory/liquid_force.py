@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 from acquisition.virtual_laboratory.liquid_law import LiquidLaw, liquid_law
-from acquisition.virtual_laboratory.shaker import IMPACT_PHASE_RAD, Motion
+from acquisition.virtual_laboratory.shaker import IMPACT_PHASE_RAD, Kinematics, Motion
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
@@ -26,11 +26,12 @@ REGIMES: Final = ("quiet", "faraday", "impacts", "chaotic")
 
 _CHAOTIC_ABOVE_G = 2.6
 _TRANSITION_WIDTH = 0.06
-_SCATTER_OF_WORK = np.array([0.01, 0.03, 0.08, 0.14])
+_SCATTER_OF_WORK = np.array([0.01, 0.03, 0.07, 0.12])
 _SCATTER_OF_MASS = np.array([0.002, 0.005, 0.02, 0.04])
 _CYCLE_MEMORY = 0.7
+_LARGEST_WORK = 1.65
 _POINTS_PER_CYCLE = 24
-_COMB_ORDERS = np.arange(2, 9)
+_COMB_ORDERS = range(2, 9)
 
 
 def regime_weights(omega_bar: ArrayLike, u_bar: ArrayLike, fill_level: float) -> FloatArray:
@@ -73,7 +74,7 @@ def regime(omega_bar: ArrayLike, u_bar: ArrayLike, fill_level: float) -> NDArray
     >>> regime([1.985, 1.985, 5.624], [0.5 / 1.985**2, 1.5 / 1.985**2, 0.5 / 5.624**2], 0.5).tolist()
     ['faraday', 'impacts', 'quiet']
     """
-    return np.asarray(REGIMES)[regime_weights(omega_bar, u_bar, fill_level).argmax(axis=0)]
+    return np.asarray(np.asarray(REGIMES)[regime_weights(omega_bar, u_bar, fill_level).argmax(axis=0)])
 
 
 @dataclass(frozen=True)
@@ -114,14 +115,23 @@ class LiquidForce:
         object.__setattr__(self, "_broad_band", make_interp_spline(grid, broad, k=3))
         object.__setattr__(self, "_angles", generator.uniform(0, 2 * np.pi, 4))
 
-    def dynamic_force_n(self, time_s: FloatArray) -> FloatArray:
-        """Δf [N], upward positive."""
+    def dynamic_force_n(self, time_s: FloatArray, kinematics: Kinematics | None = None) -> FloatArray:
+        """Δf [N], upward positive.
+
+        Parameters
+        ----------
+        time_s : ndarray
+            Times within the run.
+        kinematics : Kinematics, optional
+            ``motion.at(time_s)`` where it is known already.
+        """
         if self.frozen:
             return np.zeros(np.shape(time_s))
-        omega, u0 = self.motion.omega_rad_per_s(time_s), self.motion.amplitude_m(time_s)
+        moved = kinematics or self.motion.at(time_s)
+        omega, u0 = moved.omega_rad_per_s, moved.amplitude_m
         omega_bar, u_bar = omega / self.rig.frequency_scale_rad_per_s, u0 / self.rig.tank.height_m
         weights = regime_weights(omega_bar, u_bar, self.rig.liquid.fill_level)
-        cycle = np.asarray(self.motion.phase(time_s)) / (2 * np.pi)
+        cycle = moved.phase_rad / (2 * np.pi)
         centres, of_work, of_mass, of_impact = self._scatter
         work = self._law.dissipated_work(omega_bar, u_bar) * (
             1 + np.tensordot(_SCATTER_OF_WORK, weights, 1) * np.interp(cycle, centres, of_work)
@@ -129,17 +139,17 @@ class LiquidForce:
         mass = self._law.effective_mass(omega_bar, u_bar) + np.tensordot(_SCATTER_OF_MASS, weights, 1) * np.interp(
             cycle, centres, of_mass
         )
-        _, velocity, acceleration = self.motion.fundamental(time_s)
-        linear = -mass * acceleration - work * omega / np.pi * velocity
+        linear = -mass * moved.fundamental_acceleration - work * omega / np.pi * moved.fundamental_velocity
         impact = 1 + 0.15 * np.interp(cycle, centres, of_impact)
-        workless = self._faraday(cycle, weights) + self._impacts(cycle, omega_bar, impact, weights)
-        workless += (0.004 + 0.03 * weights[2] + 0.22 * weights[3]) * self._broad_band(cycle)
+        workless = self._faraday(cycle, weights) + self._impacts(moved.rotor, omega_bar, impact, weights)
+        violence = np.sqrt(self._law.work_peak / _LARGEST_WORK)
+        workless += (0.004 + violence * (0.03 * weights[2] + 0.20 * weights[3])) * self._broad_band(cycle)
         return np.asarray(self.rig.liquid_mass_kg * (linear + u0 * omega**2 * workless))
 
-    def force_n(self, time_s: FloatArray) -> FloatArray:
-        """F_S = −m_l ü + Δf [N], upward positive, without the weight."""
-        acceleration = self.motion.state(time_s)[2]
-        return self.dynamic_force_n(time_s) - self.rig.liquid_mass_kg * acceleration
+    def force_n(self, time_s: FloatArray, kinematics: Kinematics | None = None) -> FloatArray:
+        """F_S = −m_l ü + Δf [N], upward positive, without the weight; arguments as `dynamic_force_n`."""
+        moved = kinematics or self.motion.at(time_s)
+        return self.dynamic_force_n(time_s, moved) - self.rig.liquid_mass_kg * moved.acceleration
 
     def _faraday(self, cycle: FloatArray, weights: FloatArray) -> FloatArray:
         """Standing waves at 1/2 and 3/2 of the excitation, over m_l a₀."""
@@ -149,20 +159,19 @@ class LiquidForce:
         return np.asarray((weights[1] + 0.4 * weights[2]) * waves)
 
     def _impacts(
-        self, cycle: FloatArray, omega_bar: FloatArray, scatter: FloatArray, weights: FloatArray
+        self, rotor: NDArray[np.complex128], omega_bar: FloatArray, scatter: FloatArray, weights: FloatArray
     ) -> FloatArray:
         """Blows to the roof on the way down, half as strong to the floor on the way up, over m_l a₀."""
-        turn = 2 * np.pi * cycle
         strength = (0.02 * weights[1] + weights[2] + 0.25 * weights[3]) * 1.1 / (1 + (omega_bar / 4) ** 2)
-        comb = np.zeros(np.shape(cycle))
+        comb, turned = np.zeros(rotor.shape), rotor
         for order in _COMB_ORDERS:
-            size, angle = _comb_line(int(order), self.motion.harmonics)
-            comb += size * np.cos(order * turn + angle)
+            turned = turned * rotor
+            comb += (turned * _comb_line(order, self.motion.harmonics)).real
         return np.asarray(strength * scatter * comb)
 
 
-def _comb_line(order: int, harmonics: Sequence[tuple[int, float, float]]) -> tuple[float, float]:
-    """Size and phase of one line of the impact comb.
+def _comb_line(order: int, harmonics: Sequence[tuple[int, float, float]]) -> complex:
+    """Complex amplitude of one line of the impact comb.
 
     Where the motion itself has that harmonic only the part in phase with its acceleration is
     kept, which does no work on it.
@@ -172,7 +181,7 @@ def _comb_line(order: int, harmonics: Sequence[tuple[int, float, float]]) -> tup
     for its_order, _, angle in harmonics:
         if its_order == order:
             line = (line * np.exp(-1j * angle)).real * np.exp(1j * angle)
-    return float(abs(line)), float(np.angle(line))
+    return complex(line)
 
 
 def _cycle_scatter(n_cycles: int, generator: np.random.Generator) -> FloatArray:
@@ -186,7 +195,7 @@ def _broad_band_noise(n_cycles: int, generator: np.random.Generator) -> FloatArr
     n_points = n_cycles * _POINTS_PER_CYCLE
     order = np.fft.rfftfreq(n_points, 1 / _POINTS_PER_CYCLE)
     shape = 1 / (1 + (order / 2.0) ** 2) * (order > 0.2) * (order < 6)
-    shape *= 1 - np.exp(-((np.abs(order - 1) / 0.28) ** 4))
+    shape *= 1 - np.exp(-((np.abs(order - 1) / 0.33) ** 4))
     noise = np.fft.irfft(np.fft.rfft(generator.standard_normal(n_points)) * shape, n_points)
     return np.asarray(noise / noise.std())
 

@@ -225,5 +225,5 @@ def _onset(acceleration: ArrayLike, half: float, exponent: float) -> FloatArray:
 def _positive(values: ArrayLike) -> FloatArray:
     array = np.asarray(values, dtype=float)
     if not np.all(array >= 0):
-        raise InputError("ω̄ and ū of the liquid law", got=f"{np.nanmin(array):g}", allowed="≥ 0")
-    return np.maximum(array, _SMALLEST)
+        raise InputError("ω̄ and ū of the liquid law", got=f"{array.min():g}", allowed="≥ 0")
+    return np.asarray(np.maximum(array, _SMALLEST))

@@ -105,7 +105,7 @@ class Reading:
     def clipped(self) -> NDArray[np.bool_]:
         """Samples at the limit."""
         limit = round(self.half_scale / self.step)
-        return (np.abs(self.counts.astype(int)) >= limit) & (self.counts != LOST_COUNT)
+        return np.asarray((np.abs(self.counts.astype(int)) >= limit) & (self.counts != LOST_COUNT))
 
 
 def cell_forces(

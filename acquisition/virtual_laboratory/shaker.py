@@ -8,7 +8,7 @@ velocity and acceleration belong together at any time, sampled or not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -80,7 +80,7 @@ class SweepPlan:
         """φ(0): Ω_i/(R ln 2) for an octave sweep (1.13), 0 for the others."""
         if self.law != "octave" or self.start_hz == self.stop_hz:
             return 0.0
-        return 2 * np.pi * self.start_hz / (self.rate_octave_per_s * np.log(2))
+        return float(2 * np.pi * self.start_hz / (self.rate_octave_per_s * np.log(2)))
 
     def frequency_hz(self, time_s: FloatArray) -> FloatArray:
         """Nominal frequency."""
@@ -138,6 +138,33 @@ class Imperfections:
 
 
 @dataclass(frozen=True)
+class Kinematics:
+    """The true motion at given times, upward positive; all arrays of one shape.
+
+    Attributes
+    ----------
+    phase_rad, omega_rad_per_s, amplitude_m
+        φ, Ω = φ̇ and u₀ ≥ 0 of the fundamental.
+    rotor
+        exp(jφ).
+    fundamental_velocity, fundamental_acceleration
+        u̇₁ and ü₁ of the fundamental alone [m/s, m/s²].
+    displacement, velocity, acceleration
+        u, u̇ and ü with all harmonics [m, m/s, m/s²].
+    """
+
+    phase_rad: FloatArray
+    omega_rad_per_s: FloatArray
+    amplitude_m: FloatArray
+    rotor: NDArray[np.complex128]
+    fundamental_velocity: FloatArray
+    fundamental_acceleration: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+
+
+@dataclass(frozen=True)
 class Motion:
     """The true motion of the tank, upward positive, at any time.
 
@@ -145,6 +172,8 @@ class Motion:
     ----------
     phase, amplitude
         Splines of φ(t) [rad] and of the displacement amplitude of the fundamental A(t) [m].
+    duration_s
+        How long it lasts; nothing is known outside.
     harmonics
         (order h, ratio d_h of its acceleration to the fundamental's, phase θ_h [rad]): the
         acceleration holds d_h a₀ cos(hφ + θ_h).
@@ -154,42 +183,25 @@ class Motion:
     amplitude: BSpline
     duration_s: float
     harmonics: tuple[tuple[int, float, float], ...] = ()
-    _derivatives: tuple[BSpline, ...] = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        splines = tuple(spline.derivative(order) for spline in (self.phase, self.amplitude) for order in (1, 2))
-        object.__setattr__(self, "_derivatives", splines)
-
-    def omega_rad_per_s(self, time_s: FloatArray) -> FloatArray:
-        """Ω = φ̇."""
-        return np.asarray(self._derivatives[0](time_s))
-
-    def amplitude_m(self, time_s: FloatArray) -> FloatArray:
-        """u₀ = A ≥ 0."""
-        return np.maximum(self.amplitude(time_s), 0.0)
-
-    def fundamental(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """u, u̇ and ü of the fundamental alone [m, m/s, m/s²]."""
-        return self._component(time_s, 1, 1.0, 0.0)
-
-    def state(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """u, u̇ and ü with all harmonics [m, m/s, m/s²]."""
-        u, velocity, acceleration = self.fundamental(time_s)
-        for order, ratio, angle in self.harmonics:
-            more = self._component(time_s, order, ratio, angle)
-            u, velocity, acceleration = u + more[0], velocity + more[1], acceleration + more[2]
-        return u, velocity, acceleration
-
-    def _component(
-        self, time_s: FloatArray, order: int, ratio: float, angle: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        phi, phi1, phi2 = (np.asarray(f(time_s)) for f in (self.phase, *self._derivatives[:2]))
-        a, a1, a2 = (np.asarray(f(time_s)) for f in (self.amplitude, *self._derivatives[2:]))
-        rotor = -ratio / order**2 * np.exp(1j * (order * phi + angle))
-        turn = 1j * order * phi1
-        velocity = (a1 + turn * a) * rotor
-        acceleration = (a2 + 2 * turn * a1 + (1j * order * phi2 + turn**2) * a) * rotor
-        return (a * rotor).real, velocity.real, acceleration.real
+    def at(self, time_s: FloatArray) -> Kinematics:
+        """The motion at times within the run."""
+        phi, omega, turn = (np.asarray(self.phase(time_s, nu=order)) for order in (0, 1, 2))
+        size, size1, size2 = (np.asarray(self.amplitude(time_s, nu=order)) for order in (0, 1, 2))
+        rotor = np.exp(1j * phi)
+        fundamental: tuple[FloatArray, ...] = ()
+        total: list[FloatArray] = []
+        for order, ratio, angle in ((1, 1.0, 0.0), *self.harmonics):
+            turned = rotor**order * (-ratio / order**2 * np.exp(1j * angle))
+            parts = (
+                size * turned.real,
+                size1 * turned.real - order * omega * size * turned.imag,
+                (size2 - (order * omega) ** 2 * size) * turned.real
+                - order * (2 * omega * size1 + turn * size) * turned.imag,
+            )
+            fundamental = fundamental or parts
+            total = [known + more for known, more in zip(total, parts, strict=True)] if total else list(parts)
+        return Kinematics(phi, omega, np.maximum(size, 0.0), rotor, fundamental[1], fundamental[2], *total)
 
 
 def shaken(plan: SweepPlan, imperfections: Imperfections | None = None) -> Motion:
@@ -210,7 +222,7 @@ def shaken(plan: SweepPlan, imperfections: Imperfections | None = None) -> Motio
     Examples
     --------
     >>> motion = shaken(SweepPlan(acceleration_g=6.0))
-    >>> round(float(motion.amplitude_m(np.array([0.0]))[0]), 4)
+    >>> round(float(motion.at(np.array([0.0])).amplitude_m[0]), 4)
     0.0125
     """
     faults = imperfections or Imperfections()

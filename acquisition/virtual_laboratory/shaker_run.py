@@ -22,7 +22,7 @@ from acquisition.virtual_laboratory.sensors import (
     cell_forces,
     reading,
 )
-from acquisition.virtual_laboratory.shaker import Imperfections, Law, Motion, SweepPlan, shaken
+from acquisition.virtual_laboratory.shaker import Imperfections, Kinematics, Law, Motion, SweepPlan, shaken
 from sloshlab.errors import InputError
 from sloshlab.recording import CLIPPED, LOST, write_recording
 from sloshlab.rig import Rig
@@ -53,10 +53,14 @@ class VirtualShaker:
     liquid: LiquidForce | None
     dry_mass_kg: float
 
-    def external_force_n(self, time_s: FloatArray) -> FloatArray:
-        """F_ext = M_dry ü − F_S (1.6) [N], upward positive, without the weight."""
-        inertia = self.dry_mass_kg * self.motion.state(time_s)[2]
-        return inertia if self.liquid is None else inertia - self.liquid.force_n(time_s)
+    def external_force_n(self, time_s: FloatArray, kinematics: Kinematics | None = None) -> FloatArray:
+        """F_ext = M_dry ü − F_S (1.6) [N], upward positive, without the weight.
+
+        `kinematics` is ``motion.at(time_s)`` where it is known already.
+        """
+        moved = kinematics or self.motion.at(time_s)
+        inertia = self.dry_mass_kg * moved.acceleration
+        return inertia if self.liquid is None else inertia - self.liquid.force_n(time_s, moved)
 
 
 def virtual_shaker(
@@ -156,6 +160,8 @@ def virtual_shaker_run(
         raise InputError("experiment", got=repr(experiment), allowed="shaker_sweep, shaker_vfa")
     if direction not in ("up", "down"):
         raise InputError("direction", got=repr(direction), allowed="up, down")
+    if seed < 0 or not 0 <= n_clipped <= 1000:
+        raise InputError("seed and n_clipped", got=f"{seed}, {n_clipped}", allowed="≥ 0, at most 1000 clipped")
     first, last = (start_hz, stop_hz) if direction == "up" else (stop_hz, start_hz)
     plan = SweepPlan(
         acceleration_g=acceleration_g,
@@ -241,9 +247,10 @@ def _readings(
     noisy: bool,
     n_clipped: int,
 ) -> dict[str, Reading]:
-    acceleration = shaker.motion.state(time_s)[2]
-    truths = dict(zip(FORCE_CELLS, cell_forces(shaker.external_force_n(time_s), time_s, laboratory), strict=True))
-    truths.update(dict.fromkeys(ACCELEROMETERS, acceleration))
+    moved = shaker.motion.at(time_s)
+    forces = cell_forces(shaker.external_force_n(time_s, moved), time_s, laboratory)
+    truths = dict(zip(FORCE_CELLS, forces, strict=True))
+    truths.update(dict.fromkeys(ACCELEROMETERS, moved.acceleration))
     generator = np.random.default_rng([seed, 2])
     return {
         name: reading(
@@ -262,6 +269,10 @@ def _readings(
 def _lost_samples(time_s: FloatArray, lost: tuple[float, int] | None) -> NDArray[np.bool_]:
     flags = np.zeros(time_s.size, dtype=bool)
     if lost is not None:
+        if not (0 <= lost[0] <= time_s[-1] and lost[1] >= 0):
+            raise InputError(
+                "lost", got=f"{lost[1]} samples from {lost[0]:g} s", allowed=f"within 0 … {time_s[-1]:g} s"
+            )
         start = int(np.searchsorted(time_s, lost[0]))
         flags[start : start + int(lost[1])] = True
     return flags
