@@ -1,0 +1,188 @@
+"""Which reader reads a file: stated in the map, or found from the content, never from hope."""
+
+from __future__ import annotations
+
+import codecs
+import importlib
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from acquisition.files.channel_map import SourceSection
+from acquisition.files.reading_limits import checked_size
+from acquisition.files.table import Table
+from sloshlab.errors import FileFormatError
+
+READERS: Final[dict[str, str]] = {
+    "csv": "delimited_text",
+    "mat": "matlab5",
+    "mat73": "matlab73",
+    "uff": "universal58",
+    "tdms": "labview_tdms",
+    "lvm": "labview_text",
+    "mf4": "measurement_data",
+    "asc": "can_log",
+    "blf": "can_log",
+    "trc": "can_log",
+    "netcdf": "network_common_data",
+}
+"""Format → module with a function ``read(path, settings) -> Table``."""
+
+_BINARY_SUFFIXES: Final[dict[str, str]] = {
+    ".mat": "mat",
+    ".tdms": "tdms",
+    ".mf4": "mf4",
+    ".blf": "blf",
+    ".nc": "netcdf",
+    ".nc4": "netcdf",
+    ".cdf": "netcdf",
+}
+_TEXT_SUFFIXES: Final[dict[str, str]] = {
+    ".uff": "uff",
+    ".unv": "uff",
+    ".lvm": "lvm",
+    ".asc": "asc",
+    ".trc": "trc",
+}
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_REFUSED: Final[dict[bytes, str]] = {
+    b"\x93NUMPY": "a NumPy .npy array (it can carry pickled code, states no units and no rate)",
+    b"PK\x03\x04": "a zip archive",
+    b"\x1f\x8b": "a gzip archive",
+    b"TDSh": "a TDMS index file (give the .tdms file beside it)",
+    b"UnFinMF": "an MDF file that its recorder did not finish",
+    b"%PDF": "a PDF document",
+}
+_N_BYTES_LOOKED_AT = 4096
+
+
+def read_table(path: Path, settings: SourceSection) -> Table:
+    """Read one source file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    settings : SourceSection
+        The ``[source]`` section; `settings.format` chooses the reader, otherwise the content does.
+
+    Returns
+    -------
+    Table
+
+    Raises
+    ------
+    FileFormatError
+        If the file is not of a supported format, or is damaged.
+    MissingExtraError
+        If its reader is not installed.
+    """
+    checked_size(path)
+    chosen = file_format(path, settings.format)
+    module = importlib.import_module(f"acquisition.files.{READERS[chosen]}")
+    table: Table = module.read(path, settings.model_copy(update={"format": chosen}))
+    return replace(table, format=chosen)
+
+
+def file_format(path: Path, stated: str | None = None) -> str:
+    """Name of the format of a file, one of `READERS`.
+
+    Raises
+    ------
+    FileFormatError
+        If the content belongs to no supported format, or contradicts a stated one.
+    """
+    with path.open("rb") as stream:
+        start = stream.read(_N_BYTES_LOOKED_AT)
+        stream.seek(512)
+        has_hdf5_userblock = stream.read(8) == _HDF5
+    for magic, description in _REFUSED.items():
+        if start.startswith(magic):
+            raise FileFormatError(
+                f"source {path}",
+                got=description,
+                allowed="csv, mat, uff, tdms, lvm, mf4, asc, blf, trc, netcdf",
+                remedy="save the signals as CSV, MAT v5 or netCDF",
+            )
+    found = _by_magic(path, start, has_hdf5_userblock) or _by_text(start)
+    if stated is not None:
+        return _agreed(path, stated, found)
+    if found is not None:
+        return found
+    suffix = path.suffix.lower()
+    expected = _BINARY_SUFFIXES.get(suffix) or _TEXT_SUFFIXES.get(suffix)
+    if expected is not None:
+        raise FileFormatError(
+            f"source {path}",
+            got=f"a file that is named {suffix} but does not begin like {expected}",
+            allowed=f"a complete {expected} file",
+            remedy="it is damaged or of another format; state format in [source] if the name is wrong",
+        )
+    if not _looks_like_text(start):
+        raise FileFormatError(
+            f"source {path}",
+            got="binary content of an unknown format",
+            allowed="csv, mat, uff, tdms, lvm, mf4, asc, blf, trc, netcdf",
+        )
+    return "csv"
+
+
+def _by_magic(path: Path, start: bytes, has_hdf5_userblock: bool) -> str | None:
+    if start.startswith(b"TDSm"):
+        return "tdms"
+    if start.startswith(b"MDF     "):
+        if start[8:9] != b"4":
+            raise FileFormatError(
+                f"source {path}",
+                got=f"MDF version {start[8:12].decode('latin-1').strip()}",
+                allowed="MDF 4.x",
+                remedy="convert it to MF4",
+            )
+        return "mf4"
+    if start.startswith(b"LOGG"):
+        return "blf"
+    if has_hdf5_userblock and start.startswith(b"MATLAB 7.3"):
+        return "mat73"
+    if start.startswith(_HDF5):
+        return "mat73" if path.suffix.lower() == ".mat" else "netcdf"
+    if start[:3] == b"CDF" and start[3:4] in (b"\x01", b"\x02", b"\x05"):
+        return "netcdf"
+    if start[126:128] in (b"IM", b"MI") and start[124:126] in (b"\x00\x01", b"\x01\x00"):
+        return "mat"
+    return None
+
+
+def _by_text(start: bytes) -> str | None:
+    text = start.removeprefix(codecs.BOM_UTF8).decode("latin-1")
+    lines = [line.strip() for line in text.splitlines()[:12]]
+    filled = [line for line in lines if line]
+    if not filled:
+        return None
+    if filled[0].startswith("LabVIEW Measurement"):
+        return "lvm"
+    if filled[0] == "-1" and len(filled) > 1 and filled[1][:4].strip("b ").isdigit():
+        return "uff"
+    if filled[0].startswith((";$FILEVERSION", ";####")):
+        return "trc"
+    if filled[0].lower().startswith("date ") and len(filled) > 1 and filled[1].lower().startswith("base "):
+        return "asc"
+    return None
+
+
+def _agreed(path: Path, stated: str, found: str | None) -> str:
+    if stated == "mat" and found == "mat73":
+        return "mat73"
+    if stated == "netcdf" and found == "mat73":
+        return "netcdf"
+    if found not in (None, stated) and stated != "csv":
+        raise FileFormatError(
+            f"source {path}: format", got=f"format = '{stated}' for a {found} file", allowed=f"'{found}'"
+        )
+    return stated
+
+
+def _looks_like_text(start: bytes) -> bool:
+    if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return True
+    control = sum(byte < 9 or 13 < byte < 32 for byte in start)
+    return control == 0

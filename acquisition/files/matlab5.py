@@ -1,0 +1,227 @@
+"""MAT files of version 5 (`save -v6`, `-v7`), read by scipy after a walk over all declared sizes."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.files.channel_map import SourceSection
+from acquisition.files.reading_limits import LARGEST_DECODED_BYTES, ReaderGuard, check_declared, checked_size
+from acquisition.files.table import Column, Table, as_float64, rows_of
+from sloshlab.errors import FileFormatError
+
+_MATRIX, _COMPRESSED = 14, 15
+_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE = 1, 2, 3, 4, 5
+_NUMERIC = frozenset(range(6, 16))
+_CLASS_NAMES = {_OBJECT: "an object", _SPARSE: "a sparse matrix", 16: "a function", 17: "an opaque object"}
+_DEEPEST = 12
+_MOST_ELEMENTS = 1_000_000
+
+
+def read(path: Path, settings: SourceSection) -> Table:
+    """Read a version-5 MAT file.
+
+    Matrices become one column per row (or per column, whichever is shorter), members of structures
+    ``name.member``; single numbers are scalars.
+
+    Raises
+    ------
+    FileFormatError
+        If a declared size does not fit the file, or nothing in it is a series of numbers.
+    """
+    import scipy.io
+
+    checked_size(path)
+    unusable: dict[str, str] = {}
+    wanted: list[str] = []
+    for name, reason in _walked(path):
+        if reason:
+            unusable[name] = reason
+        else:
+            wanted.append(name)
+    with ReaderGuard(path, "MAT v5") as guard:
+        content = scipy.io.loadmat(
+            str(path), variable_names=wanted, struct_as_record=True, squeeze_me=False, appendmat=False
+        )
+    found = Found()
+    for name in wanted:
+        if name in content:
+            collect(name, content[name], found)
+    found.unusable.update(unusable)
+    return table_of(path, "mat", found, guard.traps)
+
+
+class Found:
+    """What has been collected from the variables of a file."""
+
+    def __init__(self) -> None:
+        self.columns: list[Column] = []
+        self.scalars: dict[str, float] = {}
+        self.unusable: dict[str, str] = {}
+
+
+def table_of(path: Path, format_name: str, found: Found, traps: list[str]) -> Table:
+    """The table of collected variables.
+
+    Raises
+    ------
+    FileFormatError
+        If none is a series of numbers.
+    """
+    if not found.columns:
+        raise FileFormatError(
+            f"source {path}",
+            got=f"no series of numbers (variables: {', '.join([*found.scalars, *found.unusable][:8]) or 'none'})",
+            allowed="numeric vectors or matrices",
+            remedy="save the signals as numeric arrays",
+        )
+    return Table(
+        format_name, tuple(found.columns), traps=tuple(traps), unusable=found.unusable, scalars=found.scalars
+    )
+
+
+def collect(name: str, value: Any, found: Found, depth: int = 0) -> None:
+    """Add the numeric series of one variable, structures and cells opened."""
+    if depth > _DEEPEST:
+        found.unusable[name] = "nested too deeply"
+        return
+    array = np.asarray(value)
+    if array.dtype.names:
+        for member in array.dtype.names:
+            for position, element in enumerate(array[member].flat, start=1):
+                suffix = f"({position})" if array.size > 1 else ""
+                collect(f"{name}{suffix}.{member}", element, found, depth + 1)
+    elif array.dtype == object:
+        for index in np.ndindex(array.shape):
+            label = ",".join(str(i + 1) for i in index)
+            collect(f"{name}{{{label}}}", array[index], found, depth + 1)
+    elif array.dtype.kind == "c":
+        found.unusable[name] = "complex numbers"
+    elif array.dtype.kind not in "fiub":
+        found.unusable[name] = "text"
+    elif array.size == 0:
+        found.unusable[name] = "empty"
+    elif array.size == 1:
+        found.scalars[name] = float(array.reshape(-1)[0])
+    else:
+        series = rows_of(name, array)
+        if not series:
+            found.unusable[name] = f"a matrix of shape {array.shape}: no side is clearly time"
+        found.columns.extend(Column(label, as_float64(row)) for label, row in series)
+
+
+@dataclass
+class _Budget:
+    """What may still be declared."""
+
+    n_elements: int = _MOST_ELEMENTS
+
+
+def _walked(path: Path) -> Iterator[tuple[str, str]]:
+    """Name and, where it is not usable, reason of every variable; declared sizes checked."""
+    content = path.read_bytes()
+    order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
+    if len(content) < 136 or order is None:
+        raise _damaged(path, "no MAT v5 header")
+    total = 0
+    budget = _Budget()
+    for kind, body in _elements(content[128:], order, path):
+        if kind == _COMPRESSED:
+            kind, body = _decompressed(body, order, path)
+        if kind != _MATRIX:
+            continue
+        total += len(body)
+        check_declared(path, "decompressed variables", total)
+        name, reason = _checked_matrix(body, order, path, 0, budget)
+        if name and not name.startswith("__"):
+            yield name, reason
+
+
+def _elements(content: bytes, order: str, path: Path) -> Iterator[tuple[int, bytes]]:
+    """Type and bytes of each element; every declared length must fit what is there."""
+    view = memoryview(content)
+    position = 0
+    while position + 8 <= len(content):
+        word, length = struct.unpack_from(order + "II", content, position)
+        if word >> 16:  # small element: type and length share one word
+            length, kind, start, step = word >> 16, word & 0xFFFF, position + 4, 8
+            if length > 4:
+                raise _damaged(path, "a small element longer than 4 bytes")
+        else:
+            padded = length if word == _COMPRESSED else -(-length // 8) * 8
+            kind, start, step = word, position + 8, 8 + padded
+        if start + length > len(content):
+            raise _damaged(path, f"an element of {length} bytes where {max(0, len(content) - start)} are left")
+        yield kind, bytes(view[start : start + length])
+        position += step
+    if any(content[position:]):
+        raise _damaged(path, "half an element at its end")
+
+
+def _decompressed(body: bytes, order: str, path: Path) -> tuple[int, bytes]:
+    try:
+        stream = zlib.decompressobj()
+        head = stream.decompress(body, 8)
+        if len(head) < 8:
+            raise _damaged(path, "a compressed variable without content")
+        kind, length = struct.unpack(order + "II", head)
+        check_declared(path, "a compressed variable", length, LARGEST_DECODED_BYTES)
+        inner = stream.decompress(stream.unconsumed_tail, length + 16) if length else b""
+    except zlib.error as error:
+        raise _damaged(path, f"a compressed variable that cannot be opened ({error})") from error
+    if len(inner) < length:
+        raise _damaged(path, f"a variable of {length} bytes of which {len(inner)} are there")
+    return kind, inner[:length]
+
+
+def _checked_matrix(body: bytes, order: str, path: Path, depth: int, budget: _Budget) -> tuple[str, str]:
+    if depth > _DEEPEST:
+        raise _damaged(path, "structures nested too deeply")
+    if not body:
+        return "", "empty"
+    parts = list(_elements(body, order, path))
+    if len(parts) < 2 or len(parts[0][1]) < 4 or len(parts[1][1]) % 4:
+        raise _damaged(path, "a variable without flags or shape")
+    kind = struct.unpack_from(order + "I", parts[0][1])[0] & 0xFF
+    name = parts[2][1].decode("latin-1")[:200] if len(parts) > 2 and kind != 17 else ""
+    if kind in _CLASS_NAMES:
+        return name or "(unnamed)", f"{_CLASS_NAMES[kind]}, not an array"
+    shape = struct.unpack(f"{order}{len(parts[1][1]) // 4}i", parts[1][1])
+    if len(shape) < 2 or len(shape) > 32 or min(shape) < 0:
+        raise _damaged(path, f"variable {name[:40]!r} of shape {shape[:4]}")
+    size = 1
+    for extent in shape:
+        size *= extent
+    if kind in _NUMERIC or kind == _CHAR:
+        available = sum(len(data) for _, data in parts[3:])
+        if size > available:
+            raise _damaged(path, f"variable {name[:40]!r} of {size} numbers in {available} bytes")
+    elif kind in (_CELL, _STRUCT):
+        inner = [data for element, data in parts[3:] if element == _MATRIX]
+        if kind == _CELL and size != len(inner):
+            raise _damaged(path, f"a cell array of {size} cells of which {len(inner)} are there")
+        if kind == _STRUCT and size > max(1, len(inner)):
+            raise _damaged(path, f"a structure array of {size} elements with {len(inner)} members")
+        budget.n_elements -= len(inner)
+        if budget.n_elements < 0:
+            raise _damaged(path, "more than a million cells and members")
+        for data in inner:
+            _checked_matrix(data, order, path, depth + 1, budget)
+    else:
+        return name, f"of unknown class {kind}"
+    return name, ""
+
+
+def _damaged(path: Path, what: str) -> FileFormatError:
+    return FileFormatError(
+        f"source {path}",
+        got=what,
+        allowed="a complete MAT v5 file",
+        remedy="save it again with -v7, or copy it again",
+    )

@@ -1,0 +1,201 @@
+"""From time stamps to a uniform grid: rounding is recognised, gaps stay gaps, jitter is an error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.files.table import FloatArray, simplest_decimal_between
+from sloshlab.errors import RecordingError
+
+LARGEST_LOST_FRACTION: Final = 0.5
+"""A grid of which a larger part than this would be gaps is refused."""
+
+_FINEST_DECIMALS = 12
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where samples lie on a uniform grid.
+
+    Attributes
+    ----------
+    start_s : float
+        Time of grid point 0 [s].
+    rate_hz : float
+        Points per second.
+    index : ndarray of int64, shape (n,)
+        Grid point of each sample, increasing.
+    worst_deviation_steps : float
+        Largest distance of a time stamp from its grid point [steps].
+    resolution_s : float
+        Coarseness of the time stamps [s].
+    """
+
+    start_s: float
+    rate_hz: float
+    index: NDArray[np.int64]
+    worst_deviation_steps: float = 0.0
+    resolution_s: float = 0.0
+
+    @property
+    def n_points(self) -> int:
+        """Grid points from the first sample to the last."""
+        return int(self.index[-1]) + 1
+
+    @property
+    def n_missing(self) -> int:
+        """Grid points without a sample."""
+        return self.n_points - self.index.size
+
+
+def stored_resolution(time_s: FloatArray) -> float:
+    """Coarseness of time stamps [s]: a power of ten if all are multiples of it, else float spacing.
+
+    Examples
+    --------
+    >>> stored_resolution(np.array([0.0, 0.333, 0.667, 1.0]))
+    0.001
+    """
+    largest = float(np.abs(time_s).max())
+    spacing = float(np.spacing(largest))
+    for decimals in range(_FINEST_DECIMALS + 1):
+        unit = 10.0**-decimals
+        if unit < 8 * spacing:
+            break
+        if np.abs(time_s - np.round(time_s, decimals)).max() <= 2 * spacing:
+            return unit
+    return 2 * spacing
+
+
+def uniform_grid(
+    time_s: FloatArray,
+    *,
+    name: str,
+    rate_hz: float | None = None,
+    resolution_s: float = 0.0,
+    jitter_allowed_steps: float = 1e-6,
+) -> Grid:
+    """Place time stamps on a uniform grid.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+        Time stamps [s].
+    name : str
+        Of the source, for messages.
+    rate_hz : float, optional
+        The rate, where it is known; otherwise the simplest decimal number that explains every
+        time stamp within its resolution.
+    resolution_s : float
+        Coarseness of the stamps [s]; 0 finds it from the numbers.
+    jitter_allowed_steps : float
+        Deviation that is accepted beyond the coarseness [steps].
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    RecordingError
+        If time is lost, runs backwards, or is not uniform.
+
+    Examples
+    --------
+    >>> grid = uniform_grid(np.array([0.0, 0.33, 0.67, 1.0, 1.67]), name="text")
+    >>> grid.rate_hz, grid.index.tolist()
+    (3.0, [0, 1, 2, 3, 5])
+    """
+    _check_stamps(time_s, name)
+    resolution = resolution_s or stored_resolution(time_s)
+    offset = time_s - time_s[0]
+    uniform = _all_samples_present(offset, rate_hz, resolution, jitter_allowed_steps)
+    rate, index = uniform or _with_gaps(offset, rate_hz, resolution, jitter_allowed_steps, name)
+    deviation = np.abs(offset - index / rate)
+    worst = float(deviation.max())
+    if worst > resolution * 1.01 + jitter_allowed_steps / rate:
+        at = int(deviation.argmax())
+        raise RecordingError(
+            f"{name}: time is not uniform",
+            got=f"jitter of {worst * rate:.3g} steps ({worst:.3g} s) at sample {at + 1} for {rate:.9g} Hz",
+            allowed=f"≤ {jitter_allowed_steps:g} steps beyond the {resolution:.1g} s to which time is written",
+            remedy="state sampling_rate_hz if it is known, or jitter_allowed_steps, or resample",
+        )
+    n_points = int(index[-1]) + 1
+    if n_points - index.size > LARGEST_LOST_FRACTION * n_points:
+        raise RecordingError(
+            f"{name}: gaps",
+            got=f"{n_points - index.size} of {n_points} samples missing at {rate:.6g} Hz",
+            allowed=f"at most {LARGEST_LOST_FRACTION:.0%}",
+            remedy="import the parts as separate runs, or state sampling_rate_hz",
+        )
+    return Grid(float(time_s[0]), rate, index, worst * rate, resolution)
+
+
+def _check_stamps(time_s: FloatArray, name: str) -> None:
+    if time_s.size < 2:
+        raise RecordingError(f"{name}: time", got=f"{time_s.size} samples", allowed="≥ 2 samples")
+    if not np.isfinite(time_s).all():
+        at = int(np.argmin(np.isfinite(time_s)))
+        raise RecordingError(
+            f"{name}: time",
+            got=f"no number at sample {at + 1}",
+            allowed="a time for every sample",
+            remedy="use sampling_rate_hz in [source] if the samples are uniform",
+        )
+    steps = np.diff(time_s)
+    if (steps < 0).any():
+        at = int(np.argmax(steps < 0))
+        raise RecordingError(
+            f"{name}: time",
+            got=f"a step back from {time_s[at]:.9g} s to {time_s[at + 1]:.9g} s after sample {at + 1}",
+            allowed="increasing time",
+            remedy="two records may follow each other in one file: import them as separate runs",
+        )
+    if time_s[-1] == time_s[0]:
+        raise RecordingError(f"{name}: time", got="one time for all samples", allowed="increasing time")
+
+
+def _all_samples_present(
+    offset: FloatArray, rate_hz: float | None, resolution: float, jitter: float
+) -> tuple[float, NDArray[np.int64]] | None:
+    index = np.arange(offset.size, dtype=np.int64)
+    rate = rate_hz or _simplest_rate(offset, index, resolution)
+    fits = np.abs(offset - index / rate).max() <= resolution * 1.01 + jitter / rate
+    return (rate, index) if fits else None
+
+
+def _with_gaps(
+    offset: FloatArray, rate_hz: float | None, resolution: float, jitter: float, name: str
+) -> tuple[float, NDArray[np.int64]]:
+    steps = np.diff(offset)
+    step = 1 / rate_hz if rate_hz else float(np.median(steps[steps > 0]))
+    counts = np.rint(steps / step) if rate_hz is None else np.diff(np.rint(offset / step))
+    if counts.max() > 2**40:
+        raise RecordingError(f"{name}: time", got=f"a gap of {steps.max():.3g} s", allowed="a shorter gap")
+    if (counts < 1).any():
+        at = int(np.argmax(counts < 1))
+        raise RecordingError(
+            f"{name}: time",
+            got=f"two samples {steps[at]:.3g} s apart after sample {at + 1}, on one grid point of {step:.6g} s",
+            allowed="one sample per time",
+            remedy="state the right sampling_rate_hz; samples out of order or sent twice must be sorted out first",
+        )
+    index = np.concatenate([[0], np.cumsum(counts.astype(np.int64))])
+    return rate_hz or _simplest_rate(offset, index, resolution), index
+
+
+def _simplest_rate(offset: FloatArray, index: NDArray[np.int64], resolution: float) -> float:
+    """The simplest rate that agrees with the last time stamp within the resolution."""
+    duration, n_steps = float(offset[-1]), int(index[-1])
+    mean = n_steps / duration
+    if not 0 < resolution < duration:
+        return mean
+    simplest = simplest_decimal_between(n_steps / (duration + resolution), n_steps / (duration - resolution))
+    before = np.abs(offset - index / mean).max()
+    after = np.abs(offset - index / simplest).max()
+    return simplest if after <= max(before, resolution * 1.01) else mean
