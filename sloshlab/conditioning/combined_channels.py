@@ -1,0 +1,143 @@
+"""Channels that belong together: the total force on the tank and its mean acceleration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from sloshlab.conditioning.gaps import require_channels
+from sloshlab.errors import AnalysisError
+from sloshlab.recording import channels
+from sloshlab.units import SI_UNITS
+
+
+def force_channels(recording: xr.Dataset) -> list[str]:
+    """Channels whose sum is the external force on the tank: the cells, or the interface force.
+
+    Raises
+    ------
+    AnalysisError
+        If there is neither a ``force_cell_*`` nor a ``force_interface``.
+    """
+    forces = channels(recording, "force")
+    cells = [name for name in forces if name.startswith("force_cell")]
+    chosen = cells or [name for name in forces if name == "force_interface"]
+    if not chosen:
+        raise AnalysisError(
+            "force on the tank",
+            got=f"force channels {', '.join(forces) or 'none'}",
+            allowed="force_cell_1, force_cell_2, … or force_interface",
+            remedy="name the force cells in the channel map, or name the channel with --force",
+        )
+    return chosen
+
+
+def acceleration_channels(recording: xr.Dataset) -> list[str]:
+    """Channels whose mean is the tank's acceleration.
+
+    They are the roof accelerometers; without them the tip's, else the control accelerometer, else
+    the only acceleration there is. With roof accelerometers the control is left for checking.
+
+    Raises
+    ------
+    AnalysisError
+        If none of these is there, or several unknown ones are.
+    """
+    accelerations = channels(recording, "acceleration")
+    for prefix in ("acceleration_roof", "acceleration_tip", "acceleration_control"):
+        chosen = [name for name in accelerations if name.startswith(prefix)]
+        if chosen:
+            return chosen
+    if len(accelerations) == 1:
+        return accelerations
+    raise AnalysisError(
+        "acceleration of the tank",
+        got=f"acceleration channels {', '.join(accelerations) or 'none'}",
+        allowed="acceleration_roof_1, acceleration_roof_2, … or acceleration_tip or acceleration_control",
+        remedy="name the tank's accelerometers in the channel map, or name the channel with --acceleration",
+    )
+
+
+def force_sign(channel: xr.DataArray) -> float:
+    """+1 for a force on the tank, −1 for one stated as the force of the tank on something else."""
+    return -1.0 if channel.attrs.get("block_from") == "tank" else 1.0
+
+
+def total_force(recording: xr.Dataset, names: Sequence[str] | None = None) -> xr.DataArray:
+    """External force F_ext on the tank: the sum of its force channels.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A recording in SI units.
+    names : sequence of str, optional
+        Force channels to add up; by default `force_channels`.
+
+    Returns
+    -------
+    xarray.DataArray
+        ``force_total(time)`` [N], float64, upward positive, NaN where any of them is lost. The static
+        mean is not removed. A channel stated as the force *of* the tank (`block_from` = "tank")
+        enters with a minus, because F_ext acts on the tank (1.6).
+
+    Raises
+    ------
+    AnalysisError
+        If a channel is missing or is not a force.
+    """
+    chosen = force_channels(recording) if names is None else list(names)
+    _require_quantity(recording, chosen, "force")
+    signs = [force_sign(recording[name]) for name in chosen]
+    return _combined(recording, chosen, signs, "force_total", "force")
+
+
+def mean_acceleration(recording: xr.Dataset, names: Sequence[str] | None = None) -> xr.DataArray:
+    """Acceleration ü of the tank: the mean of its accelerometers.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A recording in SI units.
+    names : sequence of str, optional
+        Accelerations to average; by default `acceleration_channels`.
+
+    Returns
+    -------
+    xarray.DataArray
+        ``acceleration_mean(time)`` [m/s²], float64, upward positive, NaN where any of them is lost.
+
+    Raises
+    ------
+    AnalysisError
+        If a channel is missing or is not an acceleration.
+    """
+    chosen = acceleration_channels(recording) if names is None else list(names)
+    _require_quantity(recording, chosen, "acceleration")
+    return _combined(recording, chosen, [1.0 / len(chosen)] * len(chosen), "acceleration_mean", "acceleration")
+
+
+def _require_quantity(recording: xr.Dataset, names: Sequence[str], quantity: str) -> None:
+    if not names:
+        raise AnalysisError(f"{quantity} channels", got="an empty list", allowed="at least one")
+    require_channels(recording, names)
+    for name in names:
+        got = recording[name].attrs.get("quantity")
+        if got != quantity:
+            raise AnalysisError(f"channel {name}", got=f"quantity {got!r}", allowed=repr(quantity))
+
+
+def _combined(
+    recording: xr.Dataset, names: Sequence[str], factors: Sequence[float], name: str, quantity: str
+) -> xr.DataArray:
+    """Σ factor × channel in float64, in place after the first product."""
+    equal = len(set(factors)) == 1
+    total = np.multiply(recording[names[0]].values, 1.0 if equal else factors[0], dtype=np.float64)
+    for channel, factor in zip(names[1:], factors[1:], strict=True):
+        values = recording[channel].values
+        np.add(total, values if equal else factor * values, out=total)
+    if equal and factors[0] != 1.0:
+        total *= factors[0]
+    attributes = {"units": SI_UNITS[quantity], "quantity": quantity, "combined_from": ", ".join(names)}
+    return xr.DataArray(total, dims="time", coords={"time": recording["time"]}, name=name, attrs=attributes)

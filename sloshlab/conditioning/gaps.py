@@ -1,0 +1,177 @@
+"""Lost samples: where they are, and which samples may be used.
+
+A sample of a channel is lost where its value is NaN. Where `quality` says "lost" but no channel is
+NaN, it is not known which value is wrong, and all channels are taken as lost there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from numba import njit
+
+from sloshlab.errors import AnalysisError
+from sloshlab.recording import LOST, channels
+
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A run of lost samples.
+
+    Attributes
+    ----------
+    start_s, stop_s : float
+        Times of the first and the last lost sample.
+    n_samples : int
+        Number of lost samples.
+    """
+
+    start_s: float
+    stop_s: float
+    n_samples: int
+
+
+def sampling_step_s(data: xr.Dataset | xr.DataArray) -> float:
+    """Mean step of the (uniform) time coordinate [s].
+
+    Raises
+    ------
+    AnalysisError
+        If there are fewer than two samples.
+    """
+    time = data["time"].values
+    if time.size < 2:
+        raise AnalysisError("number of samples", got=str(time.size), allowed="≥ 2", remedy="record again")
+    return float((time[-1] - time[0]) / (time.size - 1))
+
+
+def sample_is_usable(recording: xr.Dataset, names: Sequence[str] | None = None) -> BoolArray:
+    """True where every named channel has a value that was really measured.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A recording; `quality(time)` is used where present.
+    names : sequence of str, optional
+        Channels to ask for; all channels if not given. A sample lost in one channel only does not
+        cost the others.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_samples,)
+
+    Raises
+    ------
+    AnalysisError
+        If a named channel is not in the recording.
+    """
+    everything = channels(recording)
+    wanted = everything if names is None else list(names)
+    require_channels(recording, wanted)
+    usable = np.ones(recording.sizes["time"], dtype=np.bool_)
+    for name in wanted:
+        mark_nan(recording[name].values, usable)
+    usable[_flagged_without_nan(recording, everything)] = False
+    return usable
+
+
+def gaps(recording: xr.Dataset, names: Sequence[str] | None = None) -> tuple[Gap, ...]:
+    """Runs of samples that are lost in at least one of the named channels, in order of time."""
+    usable = sample_is_usable(recording, names)
+    time = recording["time"].values
+    return tuple(
+        Gap(float(time[start]), float(time[stop - 1]), int(stop - start)) for start, stop in runs(usable, False)
+    )
+
+
+def lost_fraction(recording: xr.Dataset, names: Sequence[str] | None = None) -> float:
+    """Share of the samples that are lost in at least one of the named channels, 0 … 1."""
+    usable = sample_is_usable(recording, names)
+    return 1.0 - np.count_nonzero(usable) / usable.size if usable.size else 0.0
+
+
+def bridged_for_coarse_phase(values: npt.ArrayLike, *, longest_samples: int) -> npt.NDArray[np.float64]:
+    """A copy with short gaps bridged by straight lines; only for finding which cycle is which.
+
+    Bridged values are not measurements: no work, force or amplitude may be computed from them.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        NaN where lost.
+    longest_samples : int
+        Longer gaps, and gaps at either end, stay NaN.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Examples
+    --------
+    >>> bridged_for_coarse_phase([0.0, np.nan, 2.0, np.nan, np.nan, 5.0], longest_samples=1)
+    array([ 0.,  1.,  2., nan, nan,  5.])
+    """
+    bridged = np.array(values, dtype=np.float64)
+    usable = np.ones(bridged.size, dtype=np.bool_)
+    mark_nan(bridged, usable)
+    for start, stop in runs(usable, False):
+        if start == 0 or stop == bridged.size or stop - start > longest_samples:
+            continue
+        line = np.linspace(bridged[start - 1], bridged[stop], stop - start + 2)
+        bridged[start:stop] = line[1:-1]
+    return bridged
+
+
+def runs(mask: BoolArray, value: bool) -> list[tuple[int, int]]:
+    """(start, stop) of the stretches where `mask` equals `value`, stop exclusive.
+
+    Examples
+    --------
+    >>> runs(np.array([True, False, False, True]), False)
+    [(1, 3)]
+    """
+    if mask.size == 0:
+        return []
+    changes = np.flatnonzero(mask[1:] != mask[:-1]) + 1
+    bounds = [0, *changes.tolist(), int(mask.size)]
+    first = 0 if bool(mask[0]) == value else 1
+    return list(zip(bounds[first:-1:2], bounds[first + 1 :: 2], strict=True))
+
+
+def require_channels(recording: xr.Dataset, names: Sequence[str]) -> None:
+    """Refuse to go on when a channel is missing, naming it and those there are."""
+    missing = [name for name in names if name not in recording.data_vars]
+    if missing:
+        raise AnalysisError(
+            f"channel {', '.join(missing)}",
+            got="not in the recording",
+            allowed=", ".join(channels(recording)) or "none is there",
+            remedy="correct the name, or the channel map of the import",
+        )
+
+
+def _flagged_without_nan(recording: xr.Dataset, names: Sequence[str]) -> Any:
+    """Indices flagged as lost where no channel is NaN."""
+    if "quality" not in recording:
+        return np.empty(0, dtype=np.intp)
+    flagged = np.flatnonzero(recording["quality"].values & LOST)
+    for name in names:
+        if flagged.size == 0:
+            break
+        flagged = flagged[~np.isnan(recording[name].values[flagged])]
+    return flagged
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def mark_nan(values: npt.NDArray[np.float64], usable: BoolArray) -> None:
+    """Set `usable` to False where `values` is NaN; one pass, nothing allocated."""
+    for i in range(values.size):
+        if values[i] != values[i]:
+            usable[i] = False
