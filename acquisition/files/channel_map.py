@@ -20,8 +20,21 @@ from sloshlab.units import SI_UNITS
 _LARGEST_MAP_BYTES = 1_000_000
 _CHANNEL_NAME = re.compile(rf"({'|'.join(SI_UNITS)})_[A-Za-z0-9_]{{1,100}}")
 _RECORDING_KEYS = frozenset(
-    "units quantity scale_factor add_offset _FillValue missing_value dtype calendar sloshlab_format "
-    "sampling_rate_hz valid_min valid_max valid_range".split()
+    [
+        "units",
+        "quantity",
+        "scale_factor",
+        "add_offset",
+        "_FillValue",
+        "missing_value",
+        "dtype",
+        "calendar",
+        "sloshlab_format",
+        "sampling_rate_hz",
+        "valid_min",
+        "valid_max",
+        "valid_range",
+    ]
 )
 
 FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]
@@ -141,7 +154,7 @@ class ChannelMap(_Section):
         for name, channel in value.items():
             if not _CHANNEL_NAME.fullmatch(name):
                 raise ValueError(
-                    f"channel {name[:60]!r} must be named <quantity>_<place> with quantity one of {', '.join(SI_UNITS)}"
+                    f"channel {name[:60]!r} must be <quantity>_<place>, quantity one of {', '.join(SI_UNITS)}"
                 )
             if channel.quantity not in (None, quantity_of(name)):
                 raise ValueError(f"channel {name!r} says quantity {channel.quantity!r}; rename it or correct it")

@@ -255,7 +255,7 @@ def column_grid(named: NamedTable, column: Column, settings: SourceSection, trap
     if column.step_s is not None:
         _check_step(label, column, rate)
         if rate is None:
-            trap = rounded_step_trap(label, column.step_s, column.step_rounding_s)
+            trap = rounded_step_trap(named.name, column.step_s, column.step_rounding_s)
             traps.extend([trap] if trap else [])
             rate = float(f"{1 / column.step_s:.12g}")
     assert rate is not None
@@ -305,13 +305,14 @@ def _grid_traps(name: str, grid: Grid, stated_rate: float | None) -> list[str]:
     traps = []
     step = 1 / grid.rate_hz
     if grid.worst_deviation_steps > 1e-6:
-        rounded = grid.worst_deviation_steps * step <= 1.01 * grid.resolution_s
-        cause = f"times written to {grid.resolution_s:.1g} s" if rounded else "jitter"
+        off_s = grid.worst_deviation_steps * step
+        cause = "jittering time stamps"
+        if off_s <= 1.01 * grid.resolution_s:
+            cause = f"rounded steps: times are written to {grid.resolution_s:.1g} s"
         origin = "stated" if stated_rate else "found"
         traps.append(
-            f"{name}: rounded steps ({cause}): time stamps lie up to {grid.worst_deviation_steps:.2g} steps "
-            f"({grid.worst_deviation_steps * step:.2g} s) off the uniform grid of {grid.rate_hz:.9g} Hz ({origin}); "
-            "the sample index is used"
+            f"{name}: {cause}; they lie up to {grid.worst_deviation_steps:.2g} steps ({off_s:.2g} s) off the "
+            f"uniform grid of {grid.rate_hz:.9g} Hz ({origin}); the sample index is used"
         )
     if grid.n_missing:
         traps.append(

@@ -54,7 +54,8 @@ class SourceDescription:
             also = f" (also {', '.join(map(repr, column.aliases))})" if column.aliases else ""
             units = column.units if column.units is not None else "units not stated"
             text.append(
-                f"column {column.number}: {column.name!r}{also}: {column.n_samples} samples{lost}, {units}, {rate}, {span}"
+                f"column {column.number}: {column.name!r}{also}: {column.n_samples} samples{lost}, "
+                f"{units}, {rate}, {span}"
             )
         text.extend(f"single number: {name} = {value:.9g}" for name, value in self.scalars.items())
         text.extend(f"not a column: {name} ({reason})" for name, reason in self.unusable.items())
@@ -94,8 +95,16 @@ def describe_source(path: Path, settings: SourceSection | None = None) -> Source
     if table.truncated:
         traps.insert(0, table.truncated)
     named = NamedTable(path.name, table)
+    rates: dict[int, float | None] = {}
+    grams = [column.name for column in table.columns if column.units == "g"]
+    if grams:
+        traps.append(
+            f"labelled 'g': {', '.join(grams[:6])}: in UDUNITS that is the gram; state units = 'gravity' for an "
+            "acceleration, and what it really is, with units_override = true, for a force"
+        )
     columns = tuple(
-        _described(number, column, named, settings, traps) for number, column in enumerate(table.columns, start=1)
+        _described(number, column, _rate(column, named, settings, traps, rates))
+        for number, column in enumerate(table.columns, start=1)
     )
     return SourceDescription(
         path=str(path),
@@ -108,23 +117,34 @@ def describe_source(path: Path, settings: SourceSection | None = None) -> Source
     )
 
 
-def _described(
-    number: int, column: Column, named: NamedTable, settings: SourceSection, traps: list[str]
-) -> ColumnDescription:
+def _rate(
+    column: Column, named: NamedTable, settings: SourceSection, traps: list[str], rates: dict[int, float | None]
+) -> float | None:
+    """Rate of a column [Hz], None where the file does not tell; columns of one clock share the work."""
+    if column.time_s is None and column.step_s is None:
+        return None
+    key = id(column.time_s)
+    if column.time_s is not None and key in rates:
+        return rates[key]
+    try:
+        rate = column_grid(named, column, settings, traps).rate_hz
+    except InputError as error:
+        traps.append(str(error))
+        rate = None
+    if column.time_s is not None:
+        rates[key] = rate
+    return rate
+
+
+def _described(number: int, column: Column, rate_hz: float | None) -> ColumnDescription:
     finite = column.values[np.isfinite(column.values)]
-    rate = None
-    if column.time_s is not None or column.step_s is not None:
-        try:
-            rate = column_grid(named, column, settings, traps).rate_hz
-        except InputError as error:
-            traps.append(str(error))
     return ColumnDescription(
         number=number,
         name=column.name,
         units=column.units,
         n_samples=int(column.values.size),
         n_not_a_number=int(column.values.size - finite.size),
-        rate_hz=rate,
+        rate_hz=rate_hz,
         minimum=float(finite.min()) if finite.size else None,
         maximum=float(finite.max()) if finite.size else None,
         aliases=column.aliases,

@@ -327,7 +327,11 @@ def _report(
             if (named.name, column.name) not in used and column.name != channel_map.source.quality
         ]
         left_out += [f"{prefix}{name} ({reason})" for name, reason in named.table.unusable.items()]
-        left_out += [f"{prefix}{name} = {value:g} (single number)" for name, value in named.table.scalars.items()]
+        left_out += [
+            f"{prefix}{name} = {value:g} (single number)"
+            for name, value in named.table.scalars.items()
+            if name != channel_map.source.sampling_rate_variable
+        ]
     truncated = [f"{named.name}: {named.table.truncated}" for named in tables if named.table.truncated]
     sources = tuple(
         {

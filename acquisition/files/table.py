@@ -99,7 +99,7 @@ class Table:
 def as_float64(values: object) -> FloatArray:
     """One-dimensional float64 copy-or-view of numbers; masked ones become NaN."""
     if isinstance(values, np.ma.MaskedArray):
-        values = values.astype(np.float64).filled(np.nan)
+        values = np.ma.filled(values.astype(np.float64), np.nan)
     return np.ascontiguousarray(np.asarray(values, dtype=np.float64).reshape(-1))
 
 
@@ -158,8 +158,8 @@ def written_rounding(text: str) -> float:
     --------
     >>> written_rounding("0.000977")
     5e-07
-    >>> written_rounding("1.52588E-05")
-    5e-11
+    >>> written_rounding("1.5E-05")
+    5e-07
     """
     exponent = Decimal(text.strip()).as_tuple().exponent
     return 5.0 * 10.0 ** (exponent - 1) if isinstance(exponent, int) and abs(exponent) < 300 else 0.0

@@ -178,15 +178,34 @@ def _with_gaps(
     if counts.max() > 2**40:
         raise RecordingError(f"{name}: time", got=f"a gap of {steps.max():.3g} s", allowed="a shorter gap")
     if (counts < 1).any():
-        at = int(np.argmax(counts < 1))
         raise RecordingError(
-            f"{name}: time",
-            got=f"two samples {steps[at]:.3g} s apart after sample {at + 1}, on one grid point of {step:.6g} s",
-            allowed="one sample per time",
+            f"{name}: time is not uniform",
+            got=f"steps between {steps.min():.3g} and {steps.max():.3g} s; two samples fall on one grid point of "
+            f"{step:.6g} s after sample {int(np.argmax(counts < 1)) + 1}",
+            allowed="uniform time, with gaps of whole steps",
             remedy="state the right sampling_rate_hz; samples out of order or sent twice must be sorted out first",
         )
     index = np.concatenate([[0], np.cumsum(counts.astype(np.int64))])
-    return rate_hz or _simplest_rate(offset, index, resolution), index
+    if rate_hz is not None:
+        return rate_hz, index
+    rate = _simplest_rate(offset, index, resolution)
+    if np.abs(offset - index / rate).max() <= resolution * 1.01 + jitter / rate:
+        return rate, index
+    rate = _rate_of_longest_run(offset, counts, resolution)
+    again = np.rint(offset * rate).astype(np.int64)
+    if not (np.diff(again) > 0).all():
+        return rate, index
+    return _simplest_rate(offset, again, resolution), again
+
+
+def _rate_of_longest_run(offset: FloatArray, counts: FloatArray, resolution: float) -> float:
+    """Rate between the two gaps that lie furthest apart."""
+    edges = np.concatenate([[0], np.flatnonzero(counts != 1) + 1, [offset.size]])
+    longest = int(np.diff(edges).argmax())
+    run = offset[edges[longest] : edges[longest + 1]]
+    if run.size < 2:
+        return float(offset.size - 1) / float(offset[-1])
+    return _simplest_rate(run - run[0], np.arange(run.size), resolution)
 
 
 def _simplest_rate(offset: FloatArray, index: NDArray[np.int64], resolution: float) -> float:

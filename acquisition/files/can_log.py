@@ -1,0 +1,275 @@
+"""CAN logs (.asc, .blf, .trc), read by python-can and decoded with a DBC by cantools.
+
+Error frames, remote frames and frames without a description are counted, never passed over.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.files.channel_map import SourceSection
+from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
+from acquisition.files.table import Column, Table
+from sloshlab.errors import FileFormatError
+
+_LARGEST_LOG_BYTES = 1 << 30
+_LARGEST_DATABASE_BYTES = 32 << 20
+_MOST_FRAMES = 50_000_000
+_JITTER_ALLOWED_STEPS = 0.4
+_BLF_RESOLUTION_S = 5e-7
+"""python-can gives BLF times as seconds since 1970 in float64."""
+
+_LOG_CONTAINER = 10
+_OBJECT_HEADER = struct.Struct("<4sHHII")
+
+
+_Key = tuple[str, str, Any]
+"""Message (or identifier), signal (or number of the byte), bus."""
+
+
+@dataclass
+class _Log:
+    """What is collected while frames are read."""
+
+    n_frames: int = 0
+    n_error: int = 0
+    n_remote: int = 0
+    n_backwards: int = 0
+    unknown: Counter[str] = field(default_factory=Counter)
+    undecodable: Counter[str] = field(default_factory=Counter)
+    first_time_s: float | None = None
+    buses: dict[str, set[Any]] = field(default_factory=lambda: defaultdict(set))
+    times: dict[_Key, list[float]] = field(default_factory=lambda: defaultdict(list))
+    values: dict[_Key, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+
+def read(path: Path, settings: SourceSection) -> Table:
+    """Read a CAN log.
+
+    With ``database`` in the map the signals of each message become columns ``message.signal``;
+    without, the bytes of each frame become columns ``0x123[1]`` … so that a file can be looked at.
+
+    Raises
+    ------
+    FileFormatError
+        If log or database are damaged, or hold no data frames.
+    MissingExtraError
+        If cantools is not installed.
+    """
+    kind = settings.format or path.suffix.lower().lstrip(".")
+    checked_size(path, _LARGEST_LOG_BYTES)
+    if kind == "blf":
+        _check_blf(path)
+    database = _database(Path(settings.database)) if settings.database else None
+    log = _Log()
+    with ReaderGuard(
+        path, f"CAN {kind}", loggers=("can", "can.io", "can.io.asc", "can.io.blf", "can.io.trc")
+    ) as guard:
+        for message in _messages(path, kind):
+            _take(message, log, database, settings.can_channel)
+    if not log.times:
+        raise FileFormatError(
+            f"source {path}",
+            got=_counts(log),
+            allowed="data frames" + (" that the database describes" if database is not None else ""),
+            remedy="check the log, database and can_channel",
+        )
+    return Table(
+        kind,
+        tuple(_columns(log, database, kind)),
+        traps=tuple(_traps(log, database, kind, guard.traps)),
+        unusable={f"frame {name}": f"{n} frames, not in the database" for name, n in log.unknown.items()},
+        jitter_allowed_steps=_JITTER_ALLOWED_STEPS,
+        hint="" if database is not None else "state database = 'FILE.dbc' in [source] to decode signals",
+    )
+
+
+def _messages(path: Path, kind: str) -> Iterator[Any]:
+    import can
+
+    if kind == "blf":
+        with can.BLFReader(str(path)) as reader:
+            yield from reader
+        return
+    with path.open(encoding="utf-8", errors="replace") as stream:
+        yield from can.ASCReader(stream) if kind == "asc" else can.TRCReader(stream)
+
+
+def _take(message: Any, log: _Log, database: Any, wanted_bus: int | None) -> None:
+    log.n_frames += 1
+    if log.first_time_s is None:
+        log.first_time_s = float(message.timestamp)
+    if log.n_frames > _MOST_FRAMES:
+        raise ValueError(f"more than {_MOST_FRAMES} frames")
+    if message.is_error_frame:
+        log.n_error += 1
+        return
+    if message.is_remote_frame:
+        log.n_remote += 1
+        return
+    if wanted_bus is not None and message.channel != wanted_bus:
+        return
+    identifier = f"0x{message.arbitration_id:X}{'x' if message.is_extended_id else ''}"
+    if database is None:
+        name, decoded = identifier, {str(n): float(byte) for n, byte in enumerate(message.data, start=1)}
+    else:
+        found = database.get((message.arbitration_id, bool(message.is_extended_id)))
+        if found is None:
+            log.unknown[identifier] += 1
+            return
+        name, decoded = found.name, _decoded(found, bytes(message.data), log)
+    log.buses[name].add(message.channel)
+    for signal, value in decoded.items():
+        key = (name, signal, message.channel)
+        stamps = log.times[key]
+        if stamps and message.timestamp < stamps[-1]:
+            log.n_backwards += 1
+        stamps.append(float(message.timestamp))
+        log.values[key].append(value)
+
+
+def _decoded(found: Any, data: bytes, log: _Log) -> dict[str, float]:
+    try:
+        signals = found.decode(data, decode_choices=False, scaling=True, allow_truncated=False)
+    except (ValueError, KeyError, TypeError, ArithmeticError, struct.error) as error:
+        log.undecodable[f"{found.name}: {type(error).__name__}: {error}"[:120]] += 1
+        return {}
+    except Exception as error:
+        if not type(error).__module__.startswith("cantools"):
+            raise
+        log.undecodable[f"{found.name}: {error}"[:120]] += 1
+        return {}
+    return {name: float(value) for name, value in signals.items() if isinstance(value, (int, float, np.number))}
+
+
+def _database(path: Path) -> dict[tuple[int, bool], Any]:
+    cantools = library("cantools", "decoding CAN logs")
+    checked_size(path, _LARGEST_DATABASE_BYTES)
+    with ReaderGuard(path, "DBC", loggers=("cantools",)):
+        loaded = cantools.database.load_file(str(path), database_format="dbc", strict=True)
+        return {(message.frame_id, bool(message.is_extended_frame)): message for message in loaded.messages}
+
+
+def _columns(log: _Log, database: Any, kind: str) -> list[Column]:
+    units: dict[tuple[str, str], str | None] = {}
+    if database is not None:
+        units = {(m.name, s.name): s.unit for m in database.values() for s in m.signals}
+    origin = log.first_time_s if kind == "blf" and log.first_time_s is not None else 0.0
+    clocks: dict[bytes, np.ndarray] = {}
+    n_called = Counter(signal for _, signal, _ in log.times)
+    columns = []
+    for key in sorted(
+        log.times, key=lambda key: (key[0], len(key[1]) if database is None else 0, key[1], str(key[2]))
+    ):
+        message, signal, bus = key
+        stamps = np.asarray(log.times[key]) - origin
+        name = f"{message}.{signal}" if database is not None else f"{message}[{signal}]"
+        if len(log.buses[message]) > 1:
+            name += f" [channel {bus}]"
+        columns.append(
+            Column(
+                name,
+                np.asarray(log.values[key]),
+                units=(units.get((message, signal)) or "").strip() or None,
+                time_s=clocks.setdefault(stamps.tobytes(), stamps),
+                time_resolution_s=_BLF_RESOLUTION_S if kind == "blf" else 0.0,
+                aliases=(signal,) if database is not None and n_called[signal] == 1 else (),
+            )
+        )
+    return columns
+
+
+def _counts(log: _Log) -> str:
+    return (
+        f"{log.n_frames} frames: {log.n_error} error frames, {log.n_remote} remote frames, "
+        f"{sum(log.unknown.values())} not in the database, {sum(log.undecodable.values())} not decodable"
+    )
+
+
+def _traps(log: _Log, database: Any, kind: str, reader_traps: list[str]) -> list[str]:
+    traps = [f"python-can: {trap}" for trap in reader_traps]
+    if log.n_error or log.n_remote:
+        traps.append(f"{log.n_error} error frames and {log.n_remote} remote frames carry no data")
+    traps += [f"{count} frames not decoded: {reason}" for reason, count in log.undecodable.items()]
+    traps += [
+        f"{name} is on channels {', '.join(sorted(map(str, buses)))}: name the channel, or state can_channel"
+        for name, buses in log.buses.items()
+        if len(buses) > 1
+    ]
+    if log.n_backwards:
+        traps.append(f"{log.n_backwards} frames have an earlier time stamp than the one before")
+    if log.first_time_s is not None and kind == "blf":
+        traps.append("time counts from the first frame")
+    if database is None:
+        traps.append("no database: bytes of frames are listed, not signals")
+    return traps
+
+
+def _check_blf(path: Path) -> None:
+    """Walk over all objects of a BLF file, so that no declared size can stall or swamp its reader."""
+    content = path.read_bytes()
+    if len(content) < 144 or content[:4] != b"LOGG":
+        raise _damaged(path, "no BLF header")
+    header_size = struct.unpack_from("<I", content, 4)[0]
+    if not 72 <= header_size <= 4096:
+        raise _damaged(path, f"a header of {header_size} bytes")
+    inner = bytearray()
+    position = header_size
+    while position + _OBJECT_HEADER.size <= len(content):
+        signature, _, _, size, kind = _OBJECT_HEADER.unpack_from(content, position)
+        if signature != b"LOBJ" or size < _OBJECT_HEADER.size or position + size > len(content):
+            raise _damaged(path, f"a broken object at byte {position}")
+        if kind == _LOG_CONTAINER:
+            inner += _container(path, content[position + _OBJECT_HEADER.size : position + size])
+            check_declared(path, "log containers", len(inner), _LARGEST_LOG_BYTES)
+        position += size + size % 4
+    _check_objects(path, bytes(inner))
+
+
+def _container(path: Path, body: bytes) -> bytes:
+    if len(body) < 16:
+        raise _damaged(path, "a log container without content")
+    method = struct.unpack_from("<H", body)[0]
+    if method == 0:
+        return body[16:]
+    if method != 2:
+        raise _damaged(path, f"compression method {method}")
+    try:
+        stream = zlib.decompressobj()
+        data = stream.decompress(body[16:], _LARGEST_LOG_BYTES)
+    except zlib.error as error:
+        raise _damaged(path, f"a log container that cannot be opened ({error})") from error
+    if stream.unconsumed_tail:
+        check_declared(path, "log containers", _LARGEST_LOG_BYTES + 1, _LARGEST_LOG_BYTES)
+    return data
+
+
+def _check_objects(path: Path, data: bytes) -> None:
+    position = 0
+    while position + 32 <= len(data):
+        at = data.find(b"LOBJ", position, position + 8)
+        if at < 0:
+            raise _damaged(path, "an object where none begins")
+        _, _, version, size, _ = _OBJECT_HEADER.unpack_from(data, at)
+        if size < 32 or version not in (1, 2):
+            raise _damaged(path, f"an object of {size} bytes, version {version}")
+        if at + size > len(data):
+            raise _damaged(path, "half an object at its end")
+        position = at + size
+
+
+def _damaged(path: Path, what: str) -> FileFormatError:
+    return FileFormatError(
+        f"source {path}",
+        got=what,
+        allowed="a complete BLF file",
+        remedy="the log is cut short or damaged; copy it again",
+    )

@@ -1,0 +1,104 @@
+"""MDF version 4 (.mf4), read by asammdf; conversions given as formulas are not evaluated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.files.channel_map import SourceSection
+from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
+from acquisition.files.table import Column, Table, as_float64, unique_names
+from sloshlab.errors import FileFormatError
+
+_NUMERIC_CONVERSIONS = frozenset({0, 1, 2, 4, 5})
+"""None, linear, rational, and tables from number to number."""
+
+_MASTER_TYPES = (2, 3)
+
+
+def read(path: Path, settings: SourceSection) -> Table:
+    """Read the numeric channels of all groups, of one if the map names it.
+
+    A column has the time stamps of its group; of several groups with the same channel the later
+    ones are called ``name (2)`` and so on.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, or holds no numeric channel.
+    MissingExtraError
+        If asammdf is not installed.
+    """
+    asammdf = library("asammdf", "reading MF4 files")
+    size = checked_size(path)
+    found: list[Column] = []
+    unusable: dict[str, str] = {}
+    start: str | None = None
+    with ReaderGuard(path, "MF4", loggers=("asammdf",)) as guard, asammdf.MDF(str(path)) as source:
+        total = 0
+        for group in source.groups:
+            described = group.channel_group
+            total += described.cycles_nr * (described.samples_byte_nr + described.invalidation_bytes_nr + 8)
+            check_declared(path, "channel groups", total, max(1100 * size, 1 << 20))
+            check_declared(path, "channel groups", total)
+        for number in range(len(source.groups)):
+            found += _group(source, number, settings, unusable)
+        if source.header.start_time.tzinfo is not None and source.header.start_time.year > 1970:
+            start = source.header.start_time.isoformat()
+    if not found:
+        raise FileFormatError(
+            f"source {path}",
+            got=f"no channel of numbers ({', '.join(list(unusable)[:6])})" if unusable else "no channels",
+            allowed="numeric channels over time",
+        )
+    names = unique_names([column.name for column in found])
+    columns = tuple(Column(**{**column.__dict__, "name": name}) for column, name in zip(found, names, strict=True))
+    traps = tuple(f"asammdf: {trap}" for trap in guard.traps)
+    return Table("mf4", columns, traps=traps, unusable=unusable, start_time_utc=start)
+
+
+def _group(source: Any, number: int, settings: SourceSection, unusable: dict[str, str]) -> list[Column]:
+    group = source.groups[number]
+    group_name = str(getattr(group.channel_group, "acq_name", "") or f"group {number + 1}")
+    columns = []
+    for index, channel in enumerate(group.channels):
+        if channel.channel_type in _MASTER_TYPES:
+            continue
+        name = str(channel.name)
+        if settings.group not in (None, group_name, f"group {number + 1}"):
+            unusable[f"{group_name}/{name}"] = "of another group"
+            continue
+        conversion = channel.conversion
+        if conversion is not None and conversion.conversion_type not in _NUMERIC_CONVERSIONS:
+            unusable[name] = "converted by a formula or to text, which is not evaluated"
+            continue
+        if group.channel_group.cycles_nr == 0:
+            unusable[name] = "empty"
+            continue
+        signal = source.get(group=number, index=index, raw=False)
+        values = np.asarray(signal.samples)
+        if values.dtype.names or values.ndim != 1 or values.dtype.kind not in "fiub":
+            unusable[name] = "not real numbers"
+            continue
+        columns.append(_column(name, group_name, signal, values))
+    return columns
+
+
+def _column(name: str, group_name: str, signal: Any, values: np.ndarray) -> Column:
+    numbers = as_float64(values)
+    invalid = getattr(signal, "invalidation_bits", None)
+    if invalid is not None:
+        numbers = np.where(np.asarray(invalid, dtype=bool), np.nan, numbers)
+    stamps = np.asarray(signal.timestamps)
+    resolution = float(np.spacing(np.abs(stamps).max())) if stamps.dtype == np.float32 and stamps.size else 0.0
+    units = str(signal.unit or "").strip()
+    return Column(
+        name,
+        numbers,
+        units=units or None,
+        time_s=as_float64(stamps),
+        time_resolution_s=resolution,
+        aliases=(f"{group_name}/{name}",),
+    )

@@ -1,0 +1,101 @@
+"""netCDF files of any layout: one-dimensional numeric variables become columns."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.files.channel_map import SourceSection
+from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
+from acquisition.files.table import Column, Table, as_float64, rows_of
+from sloshlab.errors import FileFormatError
+
+_TIME_UNITS = re.compile(r"^(?P<unit>[a-zA-Zµ]+)(\s+since\s+(?P<epoch>.+))?$")
+_SECONDS = {
+    "s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "millisecond": 1e-3, "milliseconds": 1e-3,
+    "us": 1e-6, "microsecond": 1e-6, "microseconds": 1e-6, 
+    "min": 60.0, "minutes": 60.0, "h": 3600.0, "hours": 3600.0,
+}  # fmt: skip
+
+
+def read(path: Path, settings: SourceSection) -> Table:
+    """Read the numeric variables of the root group, or of the group that the map names.
+
+    A variable takes its time stamps from the coordinate variable of its dimension, if that has
+    units of time. Packed integers are unpacked; fill values become NaN.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, too large once decoded, or holds no series of numbers.
+    """
+    netcdf4 = library("netCDF4", "reading netCDF files")
+    checked_size(path)
+    columns: list[Column] = []
+    unusable: dict[str, str] = {}
+    scalars: dict[str, float] = {}
+    with ReaderGuard(path, "netCDF") as guard, netcdf4.Dataset(str(path), mode="r") as source:
+        group = source[settings.group] if settings.group else source
+        for name in source.groups if not settings.group else ():
+            unusable[name] = f"a group; state group = {name!r} to read it"
+        total = 0
+        for variable in group.variables.values():
+            total += 8 * int(np.prod([len(d) for d in variable.get_dims()], dtype=object))
+            check_declared(path, f"variable {variable.name!r}", total)
+        clocks = {
+            name: _clock(variable) for name, variable in group.variables.items() if variable.dimensions == (name,)
+        }
+        for name, variable in group.variables.items():
+            _read_variable(name, variable, clocks, columns, unusable, scalars)
+    if not columns:
+        raise FileFormatError(
+            f"source {path}",
+            got=f"no series of numbers ({', '.join([*scalars, *unusable][:8]) or 'no variables'})",
+            allowed="numeric variables over a time dimension",
+        )
+    return Table("netcdf", tuple(columns), traps=tuple(guard.traps), unusable=unusable, scalars=scalars)
+
+
+def _clock(variable: Any) -> np.ndarray | None:
+    match = _TIME_UNITS.match(str(getattr(variable, "units", "")).strip())
+    factor = _SECONDS.get(match["unit"]) if match else None
+    if factor is None or np.dtype(variable.dtype).kind not in "fiu":
+        return None
+    values = as_float64(variable[...])
+    return values if factor == 1.0 else values * factor
+
+
+def _read_variable(
+    name: str,
+    variable: Any,
+    clocks: dict[str, np.ndarray | None],
+    columns: list[Column],
+    unusable: dict[str, str],
+    scalars: dict[str, float],
+) -> None:
+    if variable.dtype is str or np.dtype(variable.dtype).kind not in "fiu":
+        unusable[name] = "text or a compound, not numbers"
+        return
+    size = int(np.prod(variable.shape, dtype=object))
+    if size <= 1:
+        if size == 1:
+            scalars[name] = float(as_float64(variable[...])[0])
+        else:
+            unusable[name] = "empty"
+        return
+    if clocks.get(name) is not None and variable.dimensions == (name,):
+        unusable[name] = "the time coordinate"
+        return
+    values = np.ma.filled(np.ma.asarray(variable[...]).astype(np.float64), np.nan)
+    series = rows_of(name, values)
+    if not series:
+        unusable[name] = f"shape {variable.shape}: no side is clearly time"
+    units = str(getattr(variable, "units", "")).strip() or None
+    longest = int(np.argmax(variable.shape))
+    clock = clocks.get(variable.dimensions[longest])
+    for label, row in series:
+        usable = clock is not None and clock.size == row.size
+        columns.append(Column(label, as_float64(row), units=units, time_s=clock if usable else None))
