@@ -88,7 +88,7 @@ def _columns_called(table: Table, reference: ColumnReference) -> list[Column]:
     if isinstance(reference, bool):
         return []
     if isinstance(reference, int):
-        return [table.columns[reference - 1]] if 1 <= reference <= len(table.columns) else []
+        return [column for column in table.columns if column.number == reference]
     wanted = f"{reference[0]}[{reference[1]}]" if isinstance(reference, tuple) else reference
     exact = [column for column in table.columns if column.name == wanted]
     return exact or [column for column in table.columns if wanted in column.aliases]

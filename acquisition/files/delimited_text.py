@@ -58,7 +58,7 @@ def read(path: Path, settings: SourceSection) -> Table:
         if values is None:
             unusable[name] = reason
         else:
-            columns.append(Column(name, values, units=layout.units[position]))
+            columns.append(Column(name, values, units=layout.units[position], number=position + 1))
     if not columns:
         raise FileFormatError(
             f"source {path}",
@@ -99,7 +99,7 @@ def _layout(text: str, settings: SourceSection, path: Path) -> Layout:
     if max(map(len, lines)) > _LONGEST_LINE:
         raise FileFormatError(f"source {path}", got="a line of more than 1 MiB", allowed="delimited text")
     delimiter, decimal = _separators(lines, settings, path)
-    rows = [_split(line, delimiter) for line in lines]
+    rows = [_split(_uncommented(line), delimiter) for line in lines]
     numeric = [
         _is_numeric_row(row, decimal) and not _is_comment(line) for row, line in zip(rows, lines, strict=True)
     ]
@@ -130,22 +130,19 @@ def _layout(text: str, settings: SourceSection, path: Path) -> Layout:
 def _separators(lines: list[str], settings: SourceSection, path: Path) -> tuple[str, str]:
     delimiters = [settings.delimiter] if settings.delimiter else ["\t", ";", ",", "|", " "]
     decimals = [settings.decimal] if settings.decimal else [".", ","]
-    best: tuple[int, int, str, str] | None = None
+    filled = [line for line in lines if line.strip()]
+    best: tuple[tuple[int, int, int], str, str] | None = None
     for delimiter in delimiters:
+        rows = [_split(line, delimiter) for line in filled]
         for decimal in decimals:
-            if delimiter == decimal:
+            widths = [len(row) for row in rows if _is_numeric_row(row, decimal)]
+            if delimiter == decimal or not widths:
                 continue
-            widths = [
-                len(row)
-                for row in (_split(line, delimiter) for line in lines if line.strip())
-                if _is_numeric_row(row, decimal)
-            ]
-            if not widths:
-                continue
+            n_pure = sum(_is_pure_row(row, decimal) for row in rows)
             width = max(set(widths), key=lambda w: (widths.count(w), w))
-            score = (widths.count(width), width if width > 1 else 0, delimiter, decimal)
-            if best is None or score[:2] > best[:2]:
-                best = score
+            score = (n_pure, widths.count(width), width)
+            if best is None or score > best[0]:
+                best = (score, delimiter, decimal)
     if best is None:
         raise FileFormatError(
             f"source {path}",
@@ -153,7 +150,7 @@ def _separators(lines: list[str], settings: SourceSection, path: Path) -> tuple[
             allowed="delimited text with numbers",
             remedy="state delimiter and decimal in [source], or the right format",
         )
-    return best[2], best[3]
+    return best[1], best[2]
 
 
 def _split(line: str, delimiter: str) -> list[str]:
@@ -168,6 +165,10 @@ def _is_numeric_row(row: list[str], decimal: str) -> bool:
     return n_numbers > 0 and 2 * (n_numbers + n_missing) >= len(row) and n_numbers >= (len(row) - n_missing) / 2
 
 
+def _is_pure_row(row: list[str], decimal: str) -> bool:
+    return all(_is_number(cell, decimal) or cell.lower() in _MISSING for cell in row) and any(row)
+
+
 def _is_number(cell: str, decimal: str) -> bool:
     other = "," if decimal == "." else "."
     return other not in cell and _NUMBER.fullmatch(cell) is not None
@@ -175,6 +176,11 @@ def _is_number(cell: str, decimal: str) -> bool:
 
 def _is_comment(line: str) -> bool:
     return line.lstrip().startswith(_COMMENT_MARKS)
+
+
+def _uncommented(line: str) -> str:
+    bare = line.lstrip()
+    return bare.lstrip("#%/").lstrip(" ") if bare.startswith(_COMMENT_MARKS) else line
 
 
 def _first_table_row(rows: list[list[str]], numeric: list[bool]) -> int:
@@ -197,7 +203,6 @@ def _named(
         if settings.units_row is not None:
             others = [row for row in header[: settings.units_row - 1] if len(row) >= n_columns and any(row)]
             names_row = others[-1] if others else []
-    names_row = [cell.lstrip("#%/ ") if i == 0 else cell for i, cell in enumerate(names_row)]
     units_row: list[str] = []
     if settings.units_row is not None and settings.units_row <= len(header):
         units_row = [cell.strip("[]() ") for cell in header[settings.units_row - 1]]

@@ -102,10 +102,7 @@ def describe_source(path: Path, settings: SourceSection | None = None) -> Source
             f"labelled 'g': {', '.join(grams[:6])}: in UDUNITS that is the gram; state units = 'gravity' for an "
             "acceleration, and what it really is, with units_override = true, for a force"
         )
-    columns = tuple(
-        _described(number, column, _rate(column, named, settings, traps, rates))
-        for number, column in enumerate(table.columns, start=1)
-    )
+    columns = tuple(_described(column, _rate(column, named, settings, traps, rates)) for column in table.columns)
     return SourceDescription(
         path=str(path),
         format=table.format,
@@ -136,10 +133,10 @@ def _rate(
     return rate
 
 
-def _described(number: int, column: Column, rate_hz: float | None) -> ColumnDescription:
+def _described(column: Column, rate_hz: float | None) -> ColumnDescription:
     finite = column.values[np.isfinite(column.values)]
     return ColumnDescription(
-        number=number,
+        number=column.number,
         name=column.name,
         units=column.units,
         n_samples=int(column.values.size),

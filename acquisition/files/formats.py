@@ -81,7 +81,11 @@ def read_table(path: Path, settings: SourceSection) -> Table:
     chosen = file_format(path, settings.format)
     module = importlib.import_module(f"acquisition.files.{READERS[chosen]}")
     table: Table = module.read(path, settings.model_copy(update={"format": chosen}))
-    return replace(table, format=chosen)
+    columns = tuple(
+        column if column.number else replace(column, number=number)
+        for number, column in enumerate(table.columns, start=1)
+    )
+    return replace(table, format=chosen, columns=columns)
 
 
 def file_format(path: Path, stated: str | None = None) -> str:

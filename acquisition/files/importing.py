@@ -215,11 +215,15 @@ def _raw_encoding(column: Column, scaling: Scaling, values: FloatArray, compensa
         return {}
     if np.isnan(values).any() or raw.scale_factor * scaling.factor == 0:
         return {}
+    limits = np.iinfo(raw.counts.dtype)
+    unused = [code for code in (limits.min, limits.max) if not (raw.counts == code).any()]
+    if not unused:
+        return {}
     return {
         "dtype": raw.counts.dtype.newbyteorder("=").name,
         "scale_factor": raw.scale_factor * scaling.factor,
         "add_offset": raw.add_offset * scaling.factor + scaling.offset,
-        "_FillValue": None,
+        "_FillValue": raw.counts.dtype.newbyteorder("=").type(unused[0]),
     }
 
 

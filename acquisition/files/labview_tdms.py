@@ -97,7 +97,9 @@ def _raw(channel: Any, values: np.ndarray) -> RawCounts | None:
     """Counts and linear scaling, only where they reproduce the scaled values."""
     counts = channel.read_data(scaled=False)
     properties = channel.properties
-    if not isinstance(counts, Mapping) or list(counts) != [0]:
+    if isinstance(counts, np.ndarray):
+        counts = {0: counts}
+    if list(counts) != [0]:
         return None
     n_scales = properties.get("NI_Number_Of_Scales")
     slope = _number(properties, f"NI_Scale[{n_scales - 1}]_Linear_Slope") if isinstance(n_scales, int) else None

@@ -46,6 +46,8 @@ class Column:
         Counts and scaling, where the format keeps them apart.
     aliases : tuple of str
         Other names by which a map may call the column.
+    number : int
+        Place in the file, from 1; 0 where the reader leaves it to the order of columns.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Column:
     time_resolution_s: float = 0.0
     raw: RawCounts | None = None
     aliases: tuple[str, ...] = ()
+    number: int = 0
 
 
 @dataclass(frozen=True)
