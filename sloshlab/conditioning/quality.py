@@ -1,0 +1,282 @@
+"""How good a recording is, in numbers, and whether an analysis may rest on it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from numba import njit
+
+from sloshlab.conditioning.clipping import Clipping, clipping
+from sloshlab.conditioning.gaps import Gap, gaps, sampling_step_s
+from sloshlab.conditioning.redundancy import SensorAgreement, agreement, redundant_accelerometers
+from sloshlab.errors import AnalysisError
+from sloshlab.recording import CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, channels
+
+LARGEST_LOST_FRACTION = 0.5
+"""A channel with more lost samples than this share makes the run unusable."""
+
+LARGEST_CLIPPED_FRACTION = 0.01
+"""A channel with more clipped samples than this share makes the run unusable."""
+
+LARGEST_GAIN_DISAGREEMENT = 0.05
+"""Redundant sensors further apart than this share are remarked on."""
+
+
+@dataclass(frozen=True)
+class ChannelQuality:
+    """One channel in numbers.
+
+    Attributes
+    ----------
+    name, quantity, units : str
+        What it is.
+    minimum, maximum, mean, rms : float
+        Of the samples that are not lost, in `units`; `rms` about the mean. NaN if all are lost.
+    n_samples, n_lost : int
+        All samples, and those that are NaN.
+    clipping : Clipping
+        Samples at the limits.
+    """
+
+    name: str
+    quantity: str
+    units: str
+    minimum: float
+    maximum: float
+    mean: float
+    rms: float
+    n_samples: int
+    n_lost: int
+    clipping: Clipping
+
+    @property
+    def is_constant(self) -> bool:
+        """The value never changes: a dead or unplugged sensor."""
+        return self.n_lost < self.n_samples and self.minimum == self.maximum
+
+
+@dataclass(frozen=True)
+class RunQuality:
+    """A whole recording in numbers.
+
+    Attributes
+    ----------
+    run_id : str
+        Which run.
+    sampling_rate_hz, duration_s : float
+        Of the time coordinate.
+    n_samples : int
+        Samples per channel.
+    channels : tuple of ChannelQuality
+        By name.
+    gaps : tuple of Gap
+        Where any channel is lost.
+    n_flagged_clipped, n_crc_repaired, n_out_of_order : int
+        Samples with these bits in `quality`.
+    accelerometers : SensorAgreement or None
+        Agreement of the redundant accelerometers; None where there are fewer than two or they cannot be
+        compared.
+    reasons : tuple of str
+        Why the run is unusable; empty if it is usable.
+    remarks : tuple of str
+        What a reader should know although the run is usable.
+    """
+
+    run_id: str
+    sampling_rate_hz: float
+    duration_s: float
+    n_samples: int
+    channels: tuple[ChannelQuality, ...]
+    gaps: tuple[Gap, ...]
+    n_flagged_clipped: int
+    n_crc_repaired: int
+    n_out_of_order: int
+    accelerometers: SensorAgreement | None
+    reasons: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def usable(self) -> bool:
+        """Whether an analysis may rest on the run."""
+        return not self.reasons
+
+    @property
+    def n_lost(self) -> int:
+        """Samples lost in at least one channel."""
+        return sum(gap.n_samples for gap in self.gaps)
+
+
+def quality_of(recording: xr.Dataset) -> RunQuality:
+    """Everything that is checked about a recording, channel by channel and across channels.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A recording in SI units; it is not changed.
+
+    Returns
+    -------
+    RunQuality
+
+    Raises
+    ------
+    AnalysisError
+        If it has fewer than two samples.
+    """
+    step_s = sampling_step_s(recording)
+    each = tuple(channel_quality(recording[name]) for name in channels(recording))
+    lost = gaps(recording)
+    flags = _flag_counts(recording)
+    agreed, failure = _accelerometer_agreement(recording, each)
+    reasons = [*_channel_reasons(each), *_sign_reasons(agreed)]
+    remarks = [*_channel_remarks(each), *_gap_remarks(lost, flags), *_gain_remarks(agreed), *failure]
+    return RunQuality(
+        run_id=str(recording.attrs.get("run_id", "unnamed")),
+        sampling_rate_hz=1.0 / step_s,
+        duration_s=step_s * (recording.sizes["time"] - 1),
+        n_samples=int(recording.sizes["time"]),
+        channels=each,
+        gaps=lost,
+        n_flagged_clipped=flags[CLIPPED],
+        n_crc_repaired=flags[CRC_REPAIRED],
+        n_out_of_order=flags[OUT_OF_ORDER],
+        accelerometers=agreed,
+        reasons=tuple(reasons),
+        remarks=tuple(remarks),
+    )
+
+
+def channel_quality(channel: xr.DataArray) -> ChannelQuality:
+    """Range, mean, RMS, lost and clipped samples of one channel."""
+    n, minimum, maximum, mean, rms = _statistics(channel.values)
+    return ChannelQuality(
+        name=str(channel.name),
+        quantity=str(channel.attrs.get("quantity", "")),
+        units=str(channel.attrs.get("units", "")),
+        minimum=float(minimum),
+        maximum=float(maximum),
+        mean=float(mean),
+        rms=float(rms),
+        n_samples=int(channel.size),
+        n_lost=int(channel.size - n),
+        clipping=clipping(channel),
+    )
+
+
+def _flag_counts(recording: xr.Dataset) -> dict[int, int]:
+    bits = (CLIPPED, CRC_REPAIRED, OUT_OF_ORDER)
+    if "quality" not in recording:
+        return dict.fromkeys(bits, 0)
+    flags = recording["quality"].values
+    if not flags.any():
+        return dict.fromkeys(bits, 0)
+    return {bit: int(np.count_nonzero(flags & bit)) for bit in bits}
+
+
+def _accelerometer_agreement(
+    recording: xr.Dataset, each: tuple[ChannelQuality, ...]
+) -> tuple[SensorAgreement | None, list[str]]:
+    """The agreement, or None with the reason why it could not be had."""
+    alive = {one.name for one in each if one.n_lost < one.n_samples and not one.is_constant}
+    names = [name for name in redundant_accelerometers(recording) if name in alive]
+    if len(names) < 2:
+        return None, []
+    try:
+        return agreement(recording, names), []
+    except AnalysisError as error:
+        return None, [f"redundant accelerometers were not compared: {error}"]
+
+
+def _channel_reasons(each: tuple[ChannelQuality, ...]) -> list[str]:
+    reasons = []
+    for one in each:
+        lost, clipped = one.n_lost / one.n_samples, one.clipping.n_clipped / one.n_samples
+        if one.is_constant:
+            reasons.append(f"{one.name}: constant at {one.minimum:.6g} {one.units}")
+        elif lost > LARGEST_LOST_FRACTION:
+            reasons.append(f"{one.name}: {100 * lost:.3g} % of the samples are lost")
+        elif clipped > LARGEST_CLIPPED_FRACTION:
+            reasons.append(f"{one.name}: {100 * clipped:.3g} % of the samples are clipped")
+    return reasons
+
+
+def _channel_remarks(each: tuple[ChannelQuality, ...]) -> list[str]:
+    remarks = []
+    for one in each:
+        if one.clipping.n_clipped:
+            remarks.append(
+                f"{one.name}: {one.clipping.n_clipped} clipped samples in {one.clipping.n_runs} runs, "
+                f"the first at {one.clipping.first_s:.6g} s"
+            )
+        if one.clipping.is_suspected:
+            remarks.append(
+                f"{one.name}: {one.clipping.n_suspected} samples look cut off at the channel's own extreme"
+            )
+        if one.n_lost:
+            remarks.append(f"{one.name}: {one.n_lost} lost samples")
+    return remarks
+
+
+def _gap_remarks(lost: tuple[Gap, ...], flags: dict[int, int]) -> list[str]:
+    remarks = []
+    if lost:
+        longest = max(lost, key=lambda gap: gap.n_samples)
+        remarks.append(f"{len(lost)} gaps, the longest {longest.n_samples} samples from {longest.start_s:.6g} s")
+    texts = {
+        CLIPPED: "flagged as clipped",
+        CRC_REPAIRED: "repaired after a CRC error",
+        OUT_OF_ORDER: "out of order",
+    }
+    remarks += [f"{flags[bit]} samples {text}" for bit, text in texts.items() if flags[bit]]
+    return remarks
+
+
+def _sign_reasons(agreed: SensorAgreement | None) -> list[str]:
+    if agreed is None or not agreed.wrong_sign:
+        return []
+    return [f"{' or '.join(agreed.wrong_sign)}: sign is against the redundant accelerometers"]
+
+
+def _gain_remarks(agreed: SensorAgreement | None) -> list[str]:
+    if agreed is None:
+        return []
+    return [
+        f"{pair.name}: gain {pair.gain_ratio:.4g} of {pair.reference}"
+        for pair in agreed.pairs
+        if abs(pair.gain_ratio - 1) > LARGEST_GAIN_DISAGREEMENT
+    ]
+
+
+def _statistics(values: npt.NDArray[Any]) -> tuple[int, float, float, float, float]:
+    """n, minimum, maximum, mean and RMS about the mean of the values that are not NaN."""
+    n, minimum, maximum, origin, total, squares = _sums(values)
+    if n == 0:
+        return 0, math.nan, math.nan, math.nan, math.nan
+    mean = total / n
+    return n, minimum, maximum, origin + mean, math.sqrt(max(squares / n - mean**2, 0.0))
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _sums(values: npt.NDArray[np.float64]) -> tuple[int, float, float, float, float, float]:
+    """n, min, max, origin, Σ(x − origin), Σ(x − origin)²; the origin is the first value."""
+    n = 0
+    minimum, maximum, origin = np.inf, -np.inf, 0.0
+    total, squares = 0.0, 0.0
+    for i in range(values.size):
+        value = float(values[i])
+        if value != value:
+            continue
+        if n == 0:
+            origin = value
+        n += 1
+        minimum = min(minimum, value)
+        maximum = max(maximum, value)
+        value -= origin
+        total += value
+        squares += value * value
+    return n, minimum, maximum, origin, total, squares
