@@ -1,5 +1,218 @@
-"""The command line."""
+"""The command line: what to read, what to write, and how it ends.
+
+Exit codes: 0 done; 1 the input is bad, one line on stderr; 2 usage; 3 done, but data were lost or a
+result is flagged; 130 interrupted, nothing half-written. Commands import what they need when they
+run, so that ``sloshlab --help`` stays quick.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from sloshlab import __version__
+from sloshlab.errors import SloshlabError
+
+INPUT_IS_BAD, DONE_BUT_FLAGGED, INTERRUPTED = 1, 3, 130
+
+app = typer.Typer(
+    name="sloshlab",
+    help="Energy, effective mass and damping of shaken, partly filled tanks.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Recordings = Annotated[list[Path], typer.Argument(metavar="RUN.nc...", help="Recordings.", show_default=False)]
+RigOption = Annotated[
+    list[Path],
+    typer.Option("--rig", metavar="RIG.toml", help="Rig description; once per fill level.", show_default=False),
+]
+OutputFolder = Annotated[
+    Path, typer.Option("-o", "--output", metavar="OUT", help="Folder for results.", show_default=False)
+]
+OutputFile = Annotated[
+    Path, typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False)
+]
+Json = Annotated[bool, typer.Option("--json", help="Print a machine-readable summary as the last line.")]
+HalfWidth = Annotated[int, typer.Option("--p", min=1, help="P: a window averages 2P cycles.")]
+Spacing = Annotated[int, typer.Option("--m", min=1, help="M: cycles between the centres of windows.")]
+NoReport = Annotated[bool, typer.Option("--no-report", help="Write windows.nc and maps.nc only.")]
 
 
-def main() -> None:
-    """Entry point."""
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    if version:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.command()
+def shaker(
+    runs: Recordings,
+    rig: RigOption,
+    output: OutputFolder,
+    p: HalfWidth = 6,
+    m: Spacing = 24,
+    boundaries: Annotated[
+        str, typer.Option(help="Cycle boundaries from the 'measured' phase or from the sweep 'law'.")
+    ] = "measured",
+    allow_incomplete: Annotated[
+        bool, typer.Option("--allow-incomplete", help="Analyse a sweep that stops early up to where it stops.")
+    ] = False,
+    no_report: NoReport = False,
+    as_json: Json = False,
+) -> None:
+    """Sweeps or VFA runs of a tank on the shaker: windows, maps and a report."""
+    from pipelines.outputs import write_experiment
+    from pipelines.shaker import ShakerSettings, analyse_shaker
+
+    settings = ShakerSettings.checked(p=p, m=m, boundaries=boundaries, allow_incomplete=allow_incomplete)
+    experiment = analyse_shaker(runs, rig, settings)
+    _finish(write_experiment(experiment, output, command=_command(), report=not no_report), as_json)
+
+
+@app.command()
+def work(
+    runs: Recordings,
+    output: OutputFolder,
+    force: Annotated[str, typer.Option(help="Channel of the force on the structure.", show_default=False)],
+    acceleration: Annotated[str, typer.Option(help="Channel of the motion, as acceleration.")] = "",
+    velocity: Annotated[str, typer.Option(help="Channel of the motion, as velocity.")] = "",
+    displacement: Annotated[str, typer.Option(help="Channel of the motion, as displacement.")] = "",
+    phase_reference: Annotated[
+        str, typer.Option(help="Channel whose phase counts the cycles; the motion if not given.")
+    ] = "",
+    p: HalfWidth = 6,
+    m: Spacing = 24,
+    no_report: NoReport = False,
+    as_json: Json = False,
+) -> None:
+    """Any sweep with one force and one motion channel, no tank needed."""
+    from pipelines.outputs import write_experiment
+    from pipelines.work import WorkSettings, analyse_work
+
+    motions = {"acceleration": acceleration, "velocity": velocity, "displacement": displacement}
+    settings = WorkSettings.checked(p=p, m=m, force=force, motions=motions, phase_reference=phase_reference)
+    experiment = analyse_work(runs, settings)
+    _finish(write_experiment(experiment, output, command=_command(), report=not no_report), as_json)
+
+
+@app.command("import")
+def import_(
+    sources: Annotated[list[Path], typer.Argument(metavar="SRC...", help="Files of one run.", show_default=False)],
+    channel_map: Annotated[
+        Path | None, typer.Option("--map", metavar="MAP.toml", help="Columns to channels.", show_default=False)
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="RUN.nc", help="Recording to write.", show_default=False),
+    ] = None,
+    rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig the run belongs to.")] = None,
+    describe: Annotated[
+        bool, typer.Option("--describe", help="List columns, units, rates and traps; no map needed.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """CSV, MAT, UFF-58, TDMS, LVM, MF4, CAN logs or netCDF to one recording."""
+    from pipelines.importing import describe_sources, import_run
+
+    if describe:
+        _finish(describe_sources(sources), as_json)
+        return
+    if channel_map is None or output is None:
+        raise typer.BadParameter("--map and -o are needed, unless --describe is given")
+    _finish(import_run(sources, channel_map, output, rig), as_json)
+
+
+@app.command()
+def check(runs: Recordings, as_json: Json = False) -> None:
+    """Channels, rates, gaps, clipping and the agreement of redundant sensors."""
+    from pipelines.checking import check_runs
+
+    _finish(check_runs(runs), as_json)
+
+
+@app.command()
+def virtual(
+    experiment: Annotated[
+        str, typer.Argument(help="shaker_sweep, shaker_vfa, or campaign for the whole of raw_data/shaker.")
+    ],
+    output: OutputFile,
+    rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig to shake.")] = None,
+    configuration: Annotated[str, typer.Option(help="sloshing, frozen or empty.")] = "sloshing",
+    acceleration_g: Annotated[float, typer.Option(help="Level of the sweep in g.")] = 3.0,
+    direction: Annotated[str, typer.Option(help="up or down.")] = "up",
+    law: Annotated[str, typer.Option(help="octave, linear or stepped.")] = "octave",
+    duration_s: Annotated[float, typer.Option(help="Duration in seconds.")] = 240.0,
+    sampling_rate_hz: Annotated[float, typer.Option(help="Sampling rate in Hz.")] = 512.0,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """A run of the virtual laboratory."""
+    from pipelines.virtual import VirtualRun, make_campaign_folder, make_virtual_run
+
+    if experiment == "campaign":
+        _finish(make_campaign_folder(output, seed=seed), as_json)
+        return
+    run = VirtualRun(experiment, configuration, acceleration_g, direction, law, duration_s, sampling_rate_hz, seed)
+    _finish(make_virtual_run(run, rig, output), as_json)
+
+
+class Summary(dict[str, Any]):
+    """What a command says at its end: ``lines`` for people, ``flags`` that make the exit code 3."""
+
+
+def _finish(summary: dict[str, Any], as_json: bool) -> None:
+    for line in summary.pop("lines", []):
+        typer.echo(line)
+    flags = summary.get("flags", [])
+    for flag in flags:
+        typer.echo(f"flagged: {flag}", err=True)
+    if as_json:
+        typer.echo(json.dumps(summary, sort_keys=True, default=str))
+    if flags:
+        raise typer.Exit(DONE_BUT_FLAGGED)
+
+
+def _command() -> str:
+    return " ".join(["sloshlab", *(Path(word).name if os.sep in word else word for word in sys.argv[1:])])
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    from click.exceptions import Abort, ClickException
+
+    try:
+        code = app(args=list(arguments) if arguments is not None else None, standalone_mode=False)
+        return int(code or 0)
+    except SloshlabError as error:
+        print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
+        return INPUT_IS_BAD
+    except ClickException as error:
+        error.show()
+        return error.exit_code
+    except (KeyboardInterrupt, Abort):
+        print("sloshlab: interrupted; nothing half-written", file=sys.stderr)  # noqa: T201
+        return INTERRUPTED
+    except OSError as error:
+        print(f"sloshlab: {error.strerror or error}: {error.filename or ''}", file=sys.stderr)  # noqa: T201
+        return INPUT_IS_BAD
+
+
+def main() -> NoReturn:
+    """Entry point of the ``sloshlab`` command."""
+    sys.exit(run())
+
+
+if __name__ == "__main__":
+    main()

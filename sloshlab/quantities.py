@@ -50,11 +50,14 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "apparent_mass_kg": Quantity("kg", "in-phase force over acceleration", "Re F/ü"),
     "dissipated_mass_kg": Quantity("kg", "dissipated work per cycle over u₀² Ω²", "W/(u₀Ω)²"),
     "dissipated_mass_kg_std": Quantity("kg", "standard error of W/(u₀Ω)² from the cycle scatter", "σ(W/(u₀Ω)²)"),
+    "change_of_squared_amplitude_m2": Quantity("m2", "change of u₀² from one cycle to the next", "Δ(u₀²)"),
+    "change_of_log_omega": Quantity("1", "change of ln Ω from one cycle to the next", "Δ(ln Ω)"),
+    "stored_work_j": Quantity("J", "change of elastic energy per cycle, taken out of the work of the force"),
     "harmonic_amplitude_n": Quantity("N", "amplitude of the repeated dynamic force at Ω … 5Ω"),
     "subharmonic_amplitude_n": Quantity("N", "amplitude of the repeated dynamic force at Ω/2 and 3Ω/2"),
     "regime": Quantity("1", "regime of the liquid: quiet, Faraday, impacts, chaotic"),
     "force_ratio": Quantity(
-        "1", "RMS of the dynamic force without its fundamental over that of the liquid's inertia"
+        "1", "RMS of the dynamic force without its inertial part over that of the liquid's inertia"
     ),
     "subharmonic_share": Quantity(
         "1", "share of the power beside the fundamental that repeats every second cycle"

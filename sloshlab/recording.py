@@ -6,8 +6,9 @@ are converted to SI once, on reading. Sizes are checked before anything is alloc
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
@@ -138,15 +139,22 @@ def read_recording(
     RecordingError
         If the file is not a recording, or holds what no analysis can use.
     """
+    file = Path(path)
+    with _opened(file) as source:
+        return _decoded(source, str(file), maximum_decoded_bytes)
+
+
+@contextlib.contextmanager
+def _opened(file: Path) -> Iterator[Any]:
+    """Open a netCDF file for reading; whatever the reader stumbles over becomes one `RecordingError`."""
     import netCDF4
 
-    file = Path(path)
     if not file.is_file():
         raise RecordingError(f"recording {file}", got="no such file", allowed="a netCDF-4 file")
     try:
         with netCDF4.Dataset(file, mode="r") as source:
             source.set_auto_maskandscale(False)
-            return _decoded(source, str(file), maximum_decoded_bytes)
+            yield source
     except RecordingError:
         raise
     except (
@@ -154,8 +162,7 @@ def read_recording(
         RuntimeError,
         UnicodeError,
         AttributeError,
-        KeyError,
-        IndexError,
+        LookupError,
         TypeError,
         ValueError,
         MemoryError,
@@ -167,6 +174,18 @@ def read_recording(
             allowed="a complete netCDF-4 file",
             remedy="the file is cut short, damaged or of another format; copy it again or use `sloshlab import`",
         ) from error
+
+
+def read_attributes(path: str | os.PathLike[str]) -> RunAttributes:
+    """Read and validate only the global attributes of a recording.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be opened, or an attribute is missing or of a wrong type.
+    """
+    with _opened(Path(path)) as source:
+        return _validated(RunAttributes, _attributes_of(source), what=str(path))
 
 
 def write_recording(

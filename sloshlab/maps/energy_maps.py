@@ -46,7 +46,9 @@ class EnergyMaps:
     validation: dict[str, CrossValidation]
 
 
-def energy_maps(windows: xr.Dataset, rig: Rig | None = None, *, n_grid: int = N_GRID) -> EnergyMaps:
+def energy_maps(
+    windows: xr.Dataset, rig: Rig | None = None, *, extent: xr.Dataset | None = None, n_grid: int = N_GRID
+) -> EnergyMaps:
     """Interpolate windows to maps.
 
     Parameters
@@ -55,6 +57,8 @@ def energy_maps(windows: xr.Dataset, rig: Rig | None = None, *, n_grid: int = N_
         From `sloshlab.sweep.windows.evaluate_windows`, runs of one rig concatenated.
     rig : Rig, optional
         Gives the liquid's scales; without it only W(f, u₀) is mapped.
+    extent : xarray.Dataset, optional
+        Windows whose range the grids cover; the same for several fill levels makes their maps comparable.
     n_grid : int
         Points along each axis.
 
@@ -76,7 +80,8 @@ def energy_maps(windows: xr.Dataset, rig: Rig | None = None, *, n_grid: int = N_
     points = _coordinates(frequency, amplitude)
     group = np.unique(used["run"].values.astype(str), return_inverse=True)[1]
     work = ScatteredField(points, used["dissipated_mass_kg"].values, used["dissipated_mass_kg_std"].values, group)
-    builder = _Builder(points, group, n_grid, frequency, amplitude)
+    covered = used if extent is None else extent
+    builder = _Builder(points, group, n_grid, covered["frequency_hz"].values, covered["amplitude_m"].values)
     validations = {"work_j": cross_validation(work)}
     variables = _work_map(builder, work, validations["work_j"].smoothing)
     if rig is not None:
@@ -108,7 +113,7 @@ def _divided(validation: CrossValidation, by: float) -> CrossValidation:
 
 @dataclass(frozen=True)
 class _Builder:
-    """The measured region and the grids over it."""
+    """The measured region, and the grids over the range of frequencies and amplitudes."""
 
     points: FloatArray
     group: npt.NDArray[np.intp]

@@ -3,7 +3,8 @@
 The dynamic force d of a window is split by power into what repeats every cycle at Ω, what repeats
 at the harmonics 2Ω … 5Ω, what repeats every second cycle (Ω/2 and 3Ω/2), and the rest, which does
 not repeat. The label is the largest of the last three shares; no threshold is needed between them.
-A window is quiet if what is not the fundamental is small against the inertia of the liquid.
+A window is quiet if everything in d but its inertial part, which is in phase with the acceleration,
+is small against the inertia of the liquid.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ ComplexArray = npt.NDArray[np.complex128]
 QUIET, FARADAY, IMPACTS, CHAOTIC = "quiet", "Faraday", "impacts", "chaotic"
 REGIMES = (QUIET, FARADAY, IMPACTS, CHAOTIC)
 
-QUIET_FORCE_RATIO = 0.1
-"""A window is quiet if the RMS of d without its fundamental is below this part of the liquid's inertia."""
+QUIET_FORCE_RATIO = 0.05
+"""A window is quiet if the RMS of d without its inertial part is below this part of the liquid's inertia."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class Regime:
     label : str
         One of `REGIMES`.
     force_ratio : float
-        RMS of d without its fundamental, over the RMS of the reference force.
+        RMS of d without its inertial part (at Ω in phase with the acceleration), over the RMS of the
+        reference force.
     subharmonic_share, harmonic_share, unrepeated_share : float
         Shares of the power of d without its fundamental; they add up to one.
     crest_factor : float
@@ -61,7 +63,7 @@ def classify(
     Parameters
     ----------
     dynamic_phasor : ndarray, shape (n_cycles, 5)
-        Amplitudes of d at Ω … 5Ω [N].
+        Amplitudes of d at Ω … 5Ω relative to the phase of the acceleration [N].
     subharmonic_phasor : ndarray, shape (n_pairs, 2)
         Amplitudes of d at Ω/2 and 3Ω/2, each the mean over two consecutive cycles [N].
     dynamic_power : ndarray, shape (n_cycles,)
@@ -87,7 +89,10 @@ def classify(
     explained = harmonic + subharmonic
     scale = max(others, explained, np.finfo(float).tiny)
     shares = (subharmonic / scale, harmonic / scale, max(scale - explained, 0.0) / scale)
-    force_ratio = float(np.sqrt(others) / (reference_force_n / np.sqrt(2))) if reference_force_n > 0 else np.nan
+    not_inertial = max(total - 0.5 * float(repeated[0].real) ** 2, 0.0)
+    force_ratio = (
+        float(np.sqrt(not_inertial) / (reference_force_n / np.sqrt(2))) if reference_force_n > 0 else np.nan
+    )
     rms = np.sqrt(np.maximum(dynamic_power, np.finfo(float).tiny))
     label = QUIET if force_ratio < QUIET_FORCE_RATIO else (FARADAY, IMPACTS, CHAOTIC)[int(np.argmax(shares))]
     return Regime(label, force_ratio, *shares, crest_factor=float((dynamic_peak / rms).mean()))

@@ -16,11 +16,17 @@ from sloshlab.rig import Rig
 from sloshlab.sweep.cycles import Cycles
 from sloshlab.sweep.law import SweepLaw
 from sloshlab.sweep.regime import classify
+from sloshlab.sweep.stored_energy import stored_work
 
 FloatArray = npt.NDArray[np.float64]
 
 _LARGEST_CHANGE_PER_CYCLE = 0.02
 """A frequency that changes by more than this from one cycle to the next starts a new step."""
+_SETTLING_CYCLES = 4
+"""Cycles left out on each side of a step: the phase is smoothed over two cycles and a spline."""
+_OUTLIER_SIGMA, _SMALLEST_OUTLIER = 5.0, 5e-4
+"""Cycles whose frequency leaves the trend of their window by more than five times its scatter, and by more
+than this part, are a transition between steps."""
 _SMALLEST_AMPLITUDE_RATIO = 0.5
 """Cycles below this part of the median amplitude of their window are a start, a stop or a pause."""
 
@@ -55,7 +61,9 @@ def window_slices(cycles: Cycles, settings: WindowSettings) -> Iterator[slice]:
     jumps = np.flatnonzero(np.abs(np.diff(frequency)) > _LARGEST_CHANGE_PER_CYCLE * frequency[:-1]) + 1
     edges = np.concatenate([[0], jumps, [frequency.size]])
     width = 2 * settings.half_width_cycles
-    for start, stop in itertools.pairwise(edges):
+    for left, right in itertools.pairwise(edges):
+        start = left + _SETTLING_CYCLES if left > 0 else left
+        stop = right - _SETTLING_CYCLES if right < frequency.size else right
         if settings.smallest_n_cycles <= stop - start < width:
             yield slice(int(start), int(stop))
         for first in range(int(start), int(stop) - width + 1, settings.spacing_cycles):
@@ -99,17 +107,50 @@ def evaluate_windows(
     chosen = settings or WindowSettings()
     rows = []
     for window in window_slices(cycles, chosen):
-        at = _moving(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
+        at = _steady(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
         if at.size >= chosen.smallest_n_cycles:
             rows.append(_row(cycles, at, law, start_time_s, rig, noise_power))
+    _take_out_stored_energy(rows)
+    if rig is not None:
+        for row in rows:
+            row.update(_scaled(row, cycles.inertia_kg, rig))
     return described(_table(rows, run_id, rig))
 
 
-def _moving(cycles: Cycles, at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    if at.size == 0:
+def _take_out_stored_energy(rows: list[dict[str, object]]) -> None:
+    """Turn the work of the force into the dissipated work, in place."""
+    names = (
+        "frequency_hz",
+        "apparent_mass_kg",
+        "amplitude_m",
+        "change_of_squared_amplitude_m2",
+        "change_of_log_omega",
+    )
+    frequency, *others = (np.array([_number(row, name) for row in rows]) for name in names)
+    stored = stored_work(2 * np.pi * frequency, *others)
+    for row, in_loop, in_phasors in zip(rows, stored.in_loop, stored.in_phasors, strict=True):
+        omega = 2 * np.pi * _number(row, "frequency_hz")
+        speed2 = (omega * _number(row, "amplitude_m")) ** 2
+        row["stored_work_j"] = float(in_loop)
+        row["work_j"] = _number(row, "work_j") - float(in_loop)
+        row["dissipated_mass_kg"] = _number(row, "dissipated_mass_kg") - float(in_loop) / speed2
+        row["work_harmonic_j"] = _number(row, "work_harmonic_j") - float(in_phasors)
+        row["gamma_kg_per_s"] = _number(row, "gamma_kg_per_s") - float(in_phasors) * omega / (np.pi * speed2)
+
+
+def _steady(cycles: Cycles, at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Those cycles of a window that belong to one sweep: no pause, no transition between steps."""
+    if at.size < 3:
         return at
     amplitude = np.abs(cycles.acceleration_phasor[at, 0])
-    return np.asarray(at[amplitude > _SMALLEST_AMPLITUDE_RATIO * np.median(amplitude)])
+    frequency = np.log(cycles.omega_rad_per_s[at])
+    trend = np.median(np.diff(frequency) / np.diff(at)) * (at - at.mean())
+    deviation = np.abs(frequency - trend - np.median(frequency - trend))
+    moving = amplitude > _SMALLEST_AMPLITUDE_RATIO * np.median(amplitude)
+    limit = max(_SMALLEST_OUTLIER, _OUTLIER_SIGMA * 1.4826 * float(np.median(deviation)))
+    transition = ~moving | (deviation >= limit)
+    beside = np.convolve(transition, np.ones(3), mode="same") > 0
+    return np.asarray(at[~beside])
 
 
 def _row(
@@ -127,7 +168,6 @@ def _row(
     speed2, accel2 = np.abs(velocity) ** 2, np.abs(acceleration) ** 2
     gamma = float((force * velocity.conj()).real.mean() / speed2.mean())
     mass = float((force * acceleration.conj()).real.mean() / accel2.mean())
-    mass_scatter = (force * acceleration.conj()).real - mass * accel2
     row: dict[str, object] = {
         "time_s": start_time_s + float(middle.mean()),
         "frequency_hz": float(omega.mean() / (2 * np.pi)),
@@ -141,19 +181,43 @@ def _row(
         "gamma_kg_per_s": gamma,
         "apparent_mass_kg": mass,
         "dissipated_mass_kg": float(work.mean() / speed2.mean()),
-        "dissipated_mass_kg_std": float(work.std(ddof=1) / np.sqrt(at.size) / speed2.mean()),
+        "dissipated_mass_kg_std": _standard_error(work, at) / float(speed2.mean()),
         "harmonic_amplitude_n": np.abs(cycles.dynamic_phasor[at].mean(axis=0)),
+        "change_of_squared_amplitude_m2": float(np.polyfit(at, speed2 / omega**2, 1)[0]),
+        "change_of_log_omega": float(np.polyfit(at, np.log(omega), 1)[0]),
+        "stored_work_j": 0.0,
     }
     row.update(_regime(cycles, at, row, rig, noise_power))
     if rig is not None:
-        mass_std = float(mass_scatter.std(ddof=1) / np.sqrt(at.size) / accel2.mean())
-        row.update(_scaled(row, mass, mass_std, cycles.inertia_kg, rig))
+        scatter = (force * acceleration.conj()).real - mass * accel2
+        row["beta_std"] = _standard_error(scatter, at) / float(accel2.mean()) / rig.liquid_mass_kg
     return row
 
 
-def _scaled(
-    row: dict[str, object], mass: float, mass_std: float, inertia_kg: float, rig: Rig
-) -> dict[str, object]:
+def _pair_starts(at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Positions in `at` of the first of disjoint pairs of consecutive cycles."""
+    starts, position = [], 0
+    while position + 1 < at.size:
+        consecutive = at[position + 1] == at[position] + 1
+        if consecutive:
+            starts.append(position)
+        position += 2 if consecutive else 1
+    return np.array(starts, dtype=np.intp)
+
+
+def _standard_error(values: FloatArray, at: npt.NDArray[np.intp]) -> float:
+    """Standard error of the mean from the means of consecutive pairs of cycles.
+
+    What alternates from one cycle to the next, as a subharmonic does, cancels in a pair and in the mean.
+    """
+    first = _pair_starts(at)
+    if first.size < 2:
+        return float(values.std(ddof=1) / np.sqrt(values.size))
+    pairs = 0.5 * (values[first] + values[first + 1])
+    return float(pairs.std(ddof=1) / np.sqrt(pairs.size))
+
+
+def _scaled(row: dict[str, object], inertia_kg: float, rig: Rig) -> dict[str, object]:
     """The quantities that need the tank (1.16–1.18, 1.24); W̄ = W/(m_l u₀² Ω²)."""
     liquid = rig.liquid_mass_kg
     omega, amplitude = 2 * np.pi * _number(row, "frequency_hz"), _number(row, "amplitude_m")
@@ -162,8 +226,7 @@ def _scaled(
         "w_bar": w_bar,
         "w_bar_std": _number(row, "dissipated_mass_kg_std") / liquid,
         # F = (M_dry + m_l) ü − Δf and Δf = −β m_l ü − γ u̇: the mass beyond M_dry + m_l is β m_l
-        "beta": (mass - inertia_kg) / liquid,
-        "beta_std": mass_std / liquid,
+        "beta": (_number(row, "apparent_mass_kg") - inertia_kg) / liquid,
         "loss_factor": w_bar / np.pi,
         "omega_bar": omega / rig.frequency_scale_rad_per_s,
         "u_bar": amplitude / rig.tank.height_m,
@@ -181,7 +244,7 @@ def _number(row: dict[str, object], name: str) -> float:
 def _regime(
     cycles: Cycles, at: npt.NDArray[np.intp], row: dict[str, object], rig: Rig | None, noise_power: float
 ) -> dict[str, object]:
-    pairs = at[:-1][np.diff(at) == 1][::2]
+    pairs = at[_pair_starts(at)]
     subharmonic = 0.5 * (cycles.subharmonic_phasor[pairs] + cycles.subharmonic_phasor[pairs + 1])
     mass = rig.liquid_mass_kg if rig is not None else abs(_number(row, "apparent_mass_kg"))
     regime = classify(
@@ -241,6 +304,7 @@ def _empty_names(rig: Rig | None) -> list[str]:
         "work_harmonic_j", "phase_error_rad", "gamma_kg_per_s", "apparent_mass_kg", "dissipated_mass_kg",
         "dissipated_mass_kg_std", "harmonic_amplitude_n", "subharmonic_amplitude_n", "regime", "force_ratio",
         "subharmonic_share", "harmonic_share", "unrepeated_share", "crest_factor",
+        "change_of_squared_amplitude_m2", "change_of_log_omega", "stored_work_j",
     ]  # fmt: skip
     scaled = ["w_bar", "w_bar_std", "beta", "beta_std", "loss_factor", "omega_bar", "u_bar", "v_bar", "fill_level"]
     return names + (scaled if rig is not None else [])

@@ -1,0 +1,136 @@
+"""What the experiments hand to the writers and to the report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from sloshlab.conditioning.calibration import DryMass
+from sloshlab.conditioning.quality import RunQuality
+from sloshlab.maps.energy_maps import EnergyMaps
+from sloshlab.recording import RunAttributes
+from sloshlab.rig import Rig
+from sloshlab.sweep.law import SweepLaw
+from sloshlab.sweep.windows import WindowSettings
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Excerpt:
+    """Signals of one window, for the time histories and hysteresis loops.
+
+    Attributes
+    ----------
+    frequency_hz, acceleration_g : float
+        Of the window.
+    time_s, force_n, displacement_m : ndarray, shape (n,)
+        With a tank, `force_n` is the sloshing force F_S = M_dry ü − F_ext on the tank; without one
+        the measured force. Upward positive, mean removed.
+    """
+
+    frequency_hz: float
+    acceleration_g: float
+    time_s: FloatArray
+    force_n: FloatArray
+    displacement_m: FloatArray
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """One run, analysed.
+
+    Attributes
+    ----------
+    path, sha256 : Path, str
+        The recording and the hash of its bytes.
+    attributes : RunAttributes
+        Its global attributes.
+    rig_name : str
+        File name of the rig it belongs to; empty without a rig.
+    windows : xarray.Dataset
+        See `sloshlab.sweep.windows.evaluate_windows`.
+    law, stated : SweepLaw
+        The law identified from the motion, and the one that the recording states (None if none).
+    boundary_error_s : float
+        Largest difference between measured cycle boundaries and those of the stated law, constant
+        offset removed [s]; NaN without a stated law.
+    quality : RunQuality
+        Channels, gaps, clipping, agreement of redundant sensors.
+    n_cycles, n_cycles_lost : int
+        All cycles, and those that a lost or clipped sample cost.
+    excerpts : tuple of Excerpt
+        At the windows nearest 9, 13 and 17 Hz, or a quarter, half and three quarters of the sweep.
+    flags : tuple of str
+        What a reader must know before using the numbers; empty is good.
+    """
+
+    path: Path
+    sha256: str
+    attributes: RunAttributes
+    rig_name: str
+    windows: xr.Dataset
+    law: SweepLaw
+    stated: SweepLaw | None
+    boundary_error_s: float
+    quality: RunQuality
+    n_cycles: int
+    n_cycles_lost: int
+    excerpts: tuple[Excerpt, ...] = ()
+    flags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class RigResult:
+    """All runs of one rig: its fill level, its dry mass and its maps."""
+
+    name: str
+    rig: Rig
+    dry_mass: DryMass | None
+    windows: xr.Dataset
+    maps: EnergyMaps
+
+
+@dataclass(frozen=True)
+class SweepExperiment:
+    """A whole experiment: what `windows.nc`, `maps.nc` and the report are made of.
+
+    Attributes
+    ----------
+    title : str
+        Headline of the report.
+    kind : str
+        ``"shaker"`` (with tank and liquid) or ``"work"`` (force and motion only).
+    runs : tuple of RunResult
+        In the order given, sloshing runs only for ``"shaker"``.
+    rigs : tuple of RigResult
+        One per rig file; empty for ``"work"``.
+    windows : xarray.Dataset
+        All windows of all runs.
+    maps : xarray.Dataset
+        The contents of `maps.nc`.
+    work_maps : EnergyMaps, optional
+        For ``"work"``: the map without a tank.
+    settings : WindowSettings
+        P and M.
+    provenance : dict
+        Input hashes, versions and the command.
+    flags : tuple of str
+        Of all runs and of the experiment; if not empty the exit code is 3.
+    """
+
+    title: str
+    kind: str
+    runs: tuple[RunResult, ...]
+    rigs: tuple[RigResult, ...]
+    windows: xr.Dataset
+    maps: xr.Dataset
+    settings: WindowSettings
+    work_maps: EnergyMaps | None = None
+    provenance: dict[str, Any] = field(default_factory=dict)
+    flags: tuple[str, ...] = ()

@@ -1,0 +1,25 @@
+"""Fixtures for all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """Root of the checkout."""
+    return REPOSITORY
+
+
+@pytest.fixture(scope="session")
+def external_data() -> Path:
+    """Folder with the recordings of other laboratories; tests that need it skip without it."""
+    folder = Path(os.environ.get("SLOSHLAB_EXTERNAL_DATA", REPOSITORY.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip("no recordings of other laboratories: set SLOSHLAB_EXTERNAL_DATA to their folder")
+    return folder
