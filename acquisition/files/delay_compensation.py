@@ -11,7 +11,7 @@ from acquisition.files.table import FloatArray
 HALF_LENGTH: Final = 32
 """Samples on each side that a fractional shift needs."""
 
-_KAISER_BETA = 9.0
+_KAISER_BETA = 12.0
 _WHOLE_STEP_TOLERANCE = 1e-6
 
 

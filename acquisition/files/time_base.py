@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,6 +16,8 @@ LARGEST_LOST_FRACTION: Final = 0.5
 """A grid of which a larger part than this would be gaps is refused."""
 
 _FINEST_DECIMALS = 12
+_LARGEST_INDEX = 2**40
+_MOST_GAPS = 200_000
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,7 @@ def uniform_grid(
     resolution = resolution_s or stored_resolution(time_s)
     offset = time_s - time_s[0]
     uniform = _all_samples_present(offset, rate_hz, resolution, jitter_allowed_steps)
-    rate, index = uniform or _with_gaps(offset, rate_hz, resolution, jitter_allowed_steps, name)
+    rate, index = uniform or _with_gaps(offset, rate_hz, resolution, name)
     deviation = np.abs(offset - index / rate)
     worst = float(deviation.max())
     if worst > resolution * 1.01 + jitter_allowed_steps / rate:
@@ -170,42 +173,41 @@ def _all_samples_present(
 
 
 def _with_gaps(
-    offset: FloatArray, rate_hz: float | None, resolution: float, jitter: float, name: str
+    offset: FloatArray, rate_hz: float | None, resolution: float, name: str
 ) -> tuple[float, NDArray[np.int64]]:
+    """Runs without a gap are consecutive; each run starts where the mean of its stamps says."""
     steps = np.diff(offset)
-    step = 1 / rate_hz if rate_hz else float(np.median(steps[steps > 0]))
-    counts = np.rint(steps / step) if rate_hz is None else np.diff(np.rint(offset / step))
-    if counts.max() > 2**40:
+    typical = 1 / rate_hz if rate_hz else _typical_step(steps, resolution)
+    edges = np.concatenate([[0], np.flatnonzero(steps > 1.5 * typical + resolution) + 1, [offset.size]])
+    if edges.size > _MOST_GAPS:
+        raise RecordingError(
+            f"{name}: time is not uniform", got=f"{edges.size - 2} gaps", allowed=f"≤ {_MOST_GAPS}"
+        )
+    if offset[-1] / typical > _LARGEST_INDEX:
         raise RecordingError(f"{name}: time", got=f"a gap of {steps.max():.3g} s", allowed="a shorter gap")
-    if (counts < 1).any():
+    longest = int(np.diff(edges).argmax())
+    run = offset[edges[longest] : edges[longest + 1]]
+    rate = rate_hz or 1 / typical
+    if rate_hz is None and run.size > 2:
+        rate = _simplest_rate(run - run[0], np.arange(run.size), resolution)
+    index = np.arange(offset.size, dtype=np.int64)
+    for first, last in itertools.pairwise(edges):
+        phase = float(np.mean(offset[first:last] - np.arange(last - first) / rate)) * rate
+        index[first:last] += round(phase) - first
+    index -= index[0]
+    if (np.diff(index) < 1).any():
         raise RecordingError(
             f"{name}: time is not uniform",
-            got=f"steps between {steps.min():.3g} and {steps.max():.3g} s; two samples fall on one grid point of "
-            f"{step:.6g} s after sample {int(np.argmax(counts < 1)) + 1}",
+            got=f"steps between {steps.min():.3g} and {steps.max():.3g} s",
             allowed="uniform time, with gaps of whole steps",
             remedy="state the right sampling_rate_hz; samples out of order or sent twice must be sorted out first",
         )
-    index = np.concatenate([[0], np.cumsum(counts.astype(np.int64))])
-    if rate_hz is not None:
-        return rate_hz, index
-    rate = _simplest_rate(offset, index, resolution)
-    if np.abs(offset - index / rate).max() <= resolution * 1.01 + jitter / rate:
-        return rate, index
-    rate = _rate_of_longest_run(offset, counts, resolution)
-    again = np.rint(offset * rate).astype(np.int64)
-    if not (np.diff(again) > 0).all():
-        return rate, index
-    return _simplest_rate(offset, again, resolution), again
+    return rate_hz or _simplest_rate(offset, index, resolution), index
 
 
-def _rate_of_longest_run(offset: FloatArray, counts: FloatArray, resolution: float) -> float:
-    """Rate between the two gaps that lie furthest apart."""
-    edges = np.concatenate([[0], np.flatnonzero(counts != 1) + 1, [offset.size]])
-    longest = int(np.diff(edges).argmax())
-    run = offset[edges[longest] : edges[longest + 1]]
-    if run.size < 2:
-        return float(offset.size - 1) / float(offset[-1])
-    return _simplest_rate(run - run[0], np.arange(run.size), resolution)
+def _typical_step(steps: FloatArray, resolution: float) -> float:
+    median = float(np.median(steps[steps > 0]))
+    return float(np.mean(steps[steps <= 1.5 * median + 1.01 * resolution]))
 
 
 def _simplest_rate(offset: FloatArray, index: NDArray[np.int64], resolution: float) -> float:

@@ -57,7 +57,10 @@ class Scenario:
 
 
 def _csv(path: Path) -> None:
-    rows = [f"{t!r},{f!r},{a!r}" for t, f, a in zip(TIME_S.tolist(), FORCE_KN.tolist(), ACCELERATION.tolist())]
+    rows = [
+        f"{t!r},{f!r},{a!r}"
+        for t, f, a in zip(TIME_S.tolist(), FORCE_KN.tolist(), ACCELERATION.tolist(), strict=True)
+    ]
     path.write_text("time,F,a\n" + "\n".join(rows) + "\n", encoding="utf-8")
 
 
@@ -67,14 +70,14 @@ def _german_csv(path: Path) -> None:
 
     rows = [
         f"{comma(t)};{comma(f)};{comma(a)}"
-        for t, f, a in zip(TIME_S.tolist(), FORCE_KN.tolist(), ACCELERATION.tolist())
+        for t, f, a in zip(TIME_S.tolist(), FORCE_KN.tolist(), ACCELERATION.tolist(), strict=True)
     ]
     text = "Prüfstand 7\r\nZeit;Kraft;Beschleunigung\r\ns;kN;m/s²\r\n" + "\r\n".join(rows) + "\r\n"
     path.write_bytes(b"\xef\xbb\xbf" + text.encode())
 
 
 def _rounded_csv(path: Path) -> None:
-    rows = [f"{t:.4f} {f:.2f} {a:.1f}" for t, f, a in zip(TIME_S, FORCE_KN, ACCELERATION)]
+    rows = [f"{t:.4f} {f:.2f} {a:.1f}" for t, f, a in zip(TIME_S, FORCE_KN, ACCELERATION, strict=True)]
     path.write_text("% t F a\n" + "\n".join(rows), encoding="utf-8")
 
 
@@ -189,7 +192,7 @@ def lvm_text(force: np.ndarray, acceleration: np.ndarray, *, declared: int = N_S
         f"Delta_X\t{1 / RATE_HZ:.9f}\t{1 / RATE_HZ:.9f}\t".replace(".", decimal),
         "***End_of_Header***\t\t\t", "X_Value\tF\ta\tComment",
     ]  # fmt: skip
-    rows = [f"\t{f:.6f}\t{a:.6f}".replace(".", decimal) for f, a in zip(force, acceleration)]
+    rows = [f"\t{f:.6f}\t{a:.6f}".replace(".", decimal) for f, a in zip(force, acceleration, strict=True)]
     return "\n".join(head + rows) + "\n"
 
 
@@ -236,7 +239,7 @@ def can_frames() -> list[object]:
             data=struct.pack("<hh", int(f), int(a)),
             channel=0,
         )
-        for t, f, a in zip(TIME_S, COUNTS, COUNTS[::-1])
+        for t, f, a in zip(TIME_S, COUNTS, COUNTS[::-1], strict=True)
     ]
     last = float(TIME_S[-1])
     frames.append(can.Message(timestamp=last, is_error_frame=True, channel=0))
@@ -249,7 +252,7 @@ def can_frames() -> list[object]:
 def _can_asc(path: Path) -> None:
     lines = ["date Sat Jan 31 12:00:00.000 2026", "base hex  timestamps absolute", "internal events logged"]
     lines += ["Begin Triggerblock Sat Jan 31 12:00:00.000 2026", "   0.000000 Start of measurement"]
-    for t, f, a in zip(TIME_S, COUNTS, COUNTS[::-1]):
+    for t, f, a in zip(TIME_S, COUNTS, COUNTS[::-1], strict=True):
         data = " ".join(f"{byte:02X}" for byte in struct.pack("<hh", int(f), int(a)))
         lines.append(f"{t:11.9f} 1  123             Rx   d 4 {data}")
     lines += [f"{TIME_S[-1]:11.9f} 1 ErrorFrame", f"{TIME_S[-1]:11.9f} 1 124 Rx r", "End TriggerBlock"]
@@ -269,7 +272,7 @@ def _can_blf(path: Path) -> None:
 
 def _can_trc(path: Path) -> None:
     lines = [";$FILEVERSION=1.1", ";$STARTTIME=44548.6028595139", ";"]
-    for number, (t, f, a) in enumerate(zip(TIME_S, COUNTS, COUNTS[::-1]), start=1):
+    for number, (t, f, a) in enumerate(zip(TIME_S, COUNTS, COUNTS[::-1], strict=True), start=1):
         data = " ".join(f"{byte:02X}" for byte in struct.pack("<hh", int(f), int(a)))
         lines.append(f"{number:6d})  {t * 1e3:11.1f}  Rx         0123  4  {data} ")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
