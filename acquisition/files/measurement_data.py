@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,12 @@ _NUMERIC_CONVERSIONS = frozenset({0, 1, 2, 4, 5})
 """None, linear, rational, and tables from number to number."""
 
 _MASTER_TYPES = (2, 3)
+_CHAINED = (b"##DG", b"##CG", b"##CN", b"##DL", b"##FH", b"##CH", b"##AT", b"##EV")
+"""Blocks whose first link is the next of their kind."""
+
+_BLOCK = struct.Struct("<4s4xQQ")
+_FIRST_BLOCK = 64
+_MOST_BLOCKS = 5_000_000
 
 
 def read(path: Path, settings: SourceSection) -> Table:
@@ -36,7 +43,10 @@ def read(path: Path, settings: SourceSection) -> Table:
     found: list[Column] = []
     unusable: dict[str, str] = {}
     start: str | None = None
-    with ReaderGuard(path, "MF4", loggers=("asammdf",)) as guard, asammdf.MDF(str(path)) as source:
+    _check_links(path)
+    guard = ReaderGuard(path, "MF4", loggers=("asammdf",))
+    # given a stream, asammdf neither copies nor finishes the file
+    with guard, path.open("rb") as stream, asammdf.MDF(stream) as source:
         total = 0
         for group in source.groups:
             described = group.channel_group
@@ -101,4 +111,51 @@ def _column(name: str, group_name: str, signal: Any, values: np.ndarray) -> Colu
         time_s=as_float64(stamps),
         time_resolution_s=resolution,
         aliases=(f"{group_name}/{name}",),
+    )
+
+
+def _check_links(path: Path) -> None:
+    """Follow every link once: they must lie in the file, and no chain of blocks may bite its tail."""
+    content = path.read_bytes()
+    if len(content) < _FIRST_BLOCK + _BLOCK.size or any(content[60:64]):
+        raise _damaged(path, "an MDF file that its recorder did not finish")
+    following: dict[int, int] = {}
+    seen: set[int] = set()
+    waiting = [_FIRST_BLOCK]
+    while waiting:
+        address = waiting.pop()
+        if address in seen:
+            continue
+        seen.add(address)
+        if address + _BLOCK.size > len(content) or len(seen) > _MOST_BLOCKS:
+            raise _damaged(path, f"a link to byte {address} of {len(content)}")
+        kind, length, n_links = _BLOCK.unpack_from(content, address)
+        if not kind.startswith(b"##") or _BLOCK.size + 8 * n_links > length or address + length > len(content):
+            raise _damaged(path, f"a broken block at byte {address}")
+        links = struct.unpack_from(f"<{n_links}Q", content, address + _BLOCK.size)
+        waiting.extend(link for link in links if link)
+        if kind in _CHAINED and links and links[0]:
+            following[address] = links[0]
+    _check_chains(path, following)
+
+
+def _check_chains(path: Path, following: dict[int, int]) -> None:
+    finished: set[int] = set()
+    for start in following:
+        chain: set[int] = set()
+        address = start
+        while address in following and address not in finished:
+            if address in chain:
+                raise _damaged(path, f"a chain of blocks that returns to byte {address}")
+            chain.add(address)
+            address = following[address]
+        finished |= chain
+
+
+def _damaged(path: Path, what: str) -> FileFormatError:
+    return FileFormatError(
+        f"source {path}",
+        got=what,
+        allowed="a complete MF4 file",
+        remedy="it is cut short or damaged; copy it again",
     )
