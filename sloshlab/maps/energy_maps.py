@@ -1,13 +1,14 @@
 """Maps of work, W̄ and β over frequency and amplitude.
 
-All maps come from two fields, W/(u₀Ω)² and the effective mass, interpolated over the logarithms of
-frequency and acceleration: in these coordinates the runs of a campaign are straight lines and the
-fields are smooth, while W itself spans decades. W(f, u₀), W̄(ω̄, ū) and W̄(ω̄, v̄) are then one map
-on three grids.
+All maps come from two fields, W/(u₀Ω)² and the effective mass, which are smooth while W itself spans
+decades. W(f, u₀), W̄(ω̄, ū) and W̄(ω̄, v̄) are one map on three grids. Distances are taken either over
+frequency and displacement, as in the source, or over the logarithms of frequency and acceleration;
+cross-validation decides.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -77,49 +78,80 @@ def energy_maps(
             "map", got=f"{used.sizes['window']} windows", allowed="at least 3", remedy="give longer or more runs"
         )
     frequency, amplitude = used["frequency_hz"].values, used["amplitude_m"].values
-    points = _coordinates(frequency, amplitude)
+    plane = _Plane.spanned_by(frequency, amplitude)
     group = np.unique(used["run"].values.astype(str), return_inverse=True)[1]
-    work = ScatteredField(points, used["dissipated_mass_kg"].values, used["dissipated_mass_kg_std"].values, group)
+
+    def field(name: str) -> ScatteredField:
+        return ScatteredField(plane.at(frequency, amplitude), used[name].values, used[f"{name}_std"].values, group)
+
     covered = used if extent is None else extent
-    builder = _Builder(points, group, n_grid, covered["frequency_hz"].values, covered["amplitude_m"].values)
-    validations = {"work_j": cross_validation(work)}
-    variables = _work_map(builder, work, validations["work_j"].smoothing)
+    builder = _Builder(
+        plane, used, group, n_grid, covered["frequency_hz"].values, covered["amplitude_m"].values
+    )  # fmt: skip
+    work = field("dissipated_mass_kg")
+    chosen = {"work_j": cross_validation(work)}
+    variables = _work_map(builder, work, chosen["work_j"])
     if rig is not None:
-        beta = ScatteredField(points, used["beta"].values, used["beta_std"].values, group)
-        validations["w_bar"] = _divided(validations["work_j"], rig.liquid_mass_kg)
-        validations["beta"] = cross_validation(beta)
-        variables |= _liquid_maps(builder, rig, work, beta, validations)
+        beta = field("beta")
+        chosen |= {"w_bar": _divided(chosen["work_j"], rig.liquid_mass_kg), "beta": cross_validation(beta)}
+        variables |= _liquid_maps(builder, rig, work, beta, chosen)
     dataset = described(xr.Dataset(variables))
     dataset.attrs = {
         f"{name}_left_out_{kind}_rms": getattr(result, f"left_out_{kind}_rms")
-        for name, result in validations.items()
+        for name, result in chosen.items()
         for kind in ("windows", "runs")
         if name != "work_j" or rig is None
     }
-    return EnergyMaps(dataset, validations)
-
-
-def _coordinates(frequency_hz: FloatArray, amplitude_m: FloatArray) -> FloatArray:
-    """log₂ of frequency and of acceleration; shape (n, 2)."""
-    acceleration = np.maximum(amplitude_m * (2 * np.pi * frequency_hz) ** 2, 1e-12)
-    return np.column_stack([np.log2(frequency_hz), np.log2(acceleration / GRAVITY_M_PER_S2)])
+    return EnergyMaps(dataset, chosen)
 
 
 def _divided(validation: CrossValidation, by: float) -> CrossValidation:
-    return CrossValidation(
-        validation.left_out_windows_rms / by, validation.left_out_runs_rms / by, validation.smoothing
+    return dataclasses.replace(
+        validation,
+        left_out_windows_rms=validation.left_out_windows_rms / by,
+        left_out_runs_rms=validation.left_out_runs_rms / by,
     )
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """Coordinates of the plane of frequency and amplitude."""
+
+    frequency_span_hz: float
+    amplitude_span_m: float
+
+    @classmethod
+    def spanned_by(cls, frequency_hz: FloatArray, amplitude_m: FloatArray) -> _Plane:
+        return cls(max(float(np.ptp(frequency_hz)), 1e-9), max(float(np.ptp(amplitude_m)), 1e-12))
+
+    def at(self, frequency_hz: FloatArray, amplitude_m: FloatArray) -> dict[str, FloatArray]:
+        """Both kinds of coordinates, shape (n, 2); the logarithmic ones come first."""
+        acceleration = np.maximum(amplitude_m * (2 * np.pi * frequency_hz) ** 2, 1e-12)
+        return {
+            "logarithms of frequency and acceleration": np.column_stack(
+                [np.log2(frequency_hz), np.log2(acceleration / GRAVITY_M_PER_S2)]
+            ),
+            "frequency and displacement": np.column_stack(
+                [frequency_hz / self.frequency_span_hz, amplitude_m / self.amplitude_span_m]
+            ),
+        }
 
 
 @dataclass(frozen=True)
 class _Builder:
     """The measured region, and the grids over the range of frequencies and amplitudes."""
 
-    points: FloatArray
+    plane: _Plane
+    windows: xr.Dataset
     group: npt.NDArray[np.intp]
     n_grid: int
     frequency_hz: FloatArray
     amplitude_m: FloatArray
+
+    def measured(self, at: dict[str, FloatArray]) -> npt.NDArray[np.bool_]:
+        """Where the windows lie around, judged in the logarithms."""
+        own = self.plane.at(self.windows["frequency_hz"].values, self.windows["amplitude_m"].values)
+        return inside_measured_region(next(iter(own.values())), self.group, next(iter(at.values())))
 
     def frequencies(self) -> FloatArray:
         return np.linspace(self.frequency_hz.min(), self.frequency_hz.max(), self.n_grid)
@@ -131,25 +163,26 @@ class _Builder:
         self,
         amplitudes: FloatArray,
         displacement: Callable[[FloatArray, FloatArray], FloatArray],
-        fields: list[tuple[ScatteredField, float]],
+        fields: list[tuple[ScatteredField, CrossValidation]],
     ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_], list[tuple[FloatArray, FloatArray]]]:
         """Frequencies, displacements and mask on the grid, and values with errors of each field."""
         frequency, amplitude = np.meshgrid(self.frequencies(), amplitudes, indexing="ij")
         u0 = displacement(frequency, amplitude)
-        at = _coordinates(frequency.ravel(), u0.ravel())
-        mask = inside_measured_region(self.points, self.group, at)
+        at = self.plane.at(frequency.ravel(), u0.ravel())
+        mask = self.measured(at)
+        inside = {name: points[mask] for name, points in at.items()}
         results = []
-        for field, smoothing in fields:
-            value, std = np.full(at.shape[0], np.nan), np.full(at.shape[0], np.nan)
+        for field, chosen in fields:
+            value, std = np.full(mask.size, np.nan), np.full(mask.size, np.nan)
             if mask.any():
-                value[mask], std[mask] = interpolated(field, at[mask], smoothing)
+                value[mask], std[mask] = interpolated(field, inside, chosen)
             results.append((value.reshape(frequency.shape), std.reshape(frequency.shape)))
         return frequency, u0, mask.reshape(frequency.shape), results
 
 
-def _work_map(builder: _Builder, work: ScatteredField, smoothing: float) -> dict[str, tuple[object, ...]]:
+def _work_map(builder: _Builder, work: ScatteredField, chosen: CrossValidation) -> dict[str, tuple[object, ...]]:
     amplitudes = builder.amplitudes(float(builder.amplitude_m.max()))
-    frequency, u0, mask, [(value, std)] = builder.on_grid(amplitudes, lambda f, a: a, [(work, smoothing)])
+    frequency, u0, mask, [(value, std)] = builder.on_grid(amplitudes, lambda f, a: a, [(work, chosen)])
     speed2 = (2 * np.pi * frequency * u0) ** 2
     dimensions = ("frequency_hz", "amplitude_m")
     return {
@@ -166,10 +199,10 @@ def _liquid_maps(
     rig: Rig,
     work: ScatteredField,
     beta: ScatteredField,
-    validations: dict[str, CrossValidation],
+    chosen: dict[str, CrossValidation],
 ) -> dict[str, tuple[object, ...]]:
     height, omega_scale = rig.tank.height_m, rig.frequency_scale_rad_per_s
-    fields = [(work, validations["work_j"].smoothing), (beta, validations["beta"].smoothing)]
+    fields = [(work, chosen["work_j"]), (beta, chosen["beta"])]
     u_bar = builder.amplitudes(float(builder.amplitude_m.max()) / height)
     speed = 2 * np.pi * builder.frequency_hz * builder.amplitude_m / rig.velocity_scale_m_per_s
     v_bar = builder.amplitudes(float(speed.max()))

@@ -1,7 +1,9 @@
 """Radial basis functions through scattered windows, with uncertainty and cross-validation.
 
 SciPy's interpolator is linear in the data. It is therefore applied once to the unit vectors, and
-the weights so obtained give the values, their standard errors and every cross-validation.
+the weights so obtained give the values and their standard errors. Points are smoothed in proportion to
+the square of their standard error. How much, and in which coordinates distances are taken, is chosen by
+leaving whole runs out.
 """
 
 from __future__ import annotations
@@ -18,8 +20,11 @@ FloatArray = npt.NDArray[np.float64]
 
 KERNEL = "thin_plate_spline"
 SMOOTHINGS = (0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
-"""Candidates for the smoothing; the one with the smallest cross-validated error is taken."""
+"""Candidates for the smoothing of a point with the median standard error."""
+_SMALLEST_RELATIVE_STD = 0.25
+"""Standard errors below this part of the median are raised to it: a few cycles may agree by chance."""
 _LARGEST_NUMBER_OF_POINTS = 20_000
+_LARGEST_NUMBER_TO_CHOOSE_BY = 400
 
 
 @dataclass(frozen=True)
@@ -28,15 +33,16 @@ class ScatteredField:
 
     Parameters
     ----------
-    points : ndarray, shape (n, 2)
-        Coordinates, scaled so that one unit means about the same in both.
+    coordinates : dict of str to ndarray, shape (n, 2)
+        Candidates for the coordinates of the points; each scaled so that one unit means about the same
+        in both directions.
     values, std : ndarray, shape (n,)
         Values and their standard errors.
     group : ndarray of int, shape (n,)
         Points of one group come from one run; cross-validation leaves whole runs out.
     """
 
-    points: FloatArray
+    coordinates: dict[str, FloatArray]
     values: FloatArray
     std: FloatArray
     group: npt.NDArray[np.intp]
@@ -50,10 +56,17 @@ class ScatteredField:
                 remedy="give more runs, or fewer windows (--m)",
             )
 
+    def weights(self, smoothing: float) -> FloatArray:
+        """Smoothing of every point, shape (n,)."""
+        typical = float(np.median(self.std))
+        if smoothing == 0.0 or not typical > 0:
+            return np.full(self.values.size, smoothing)
+        return np.asarray(smoothing * np.maximum(self.std / typical, _SMALLEST_RELATIVE_STD) ** 2)
+
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Errors of a map at points that were left out.
+    """What a map was interpolated with, and its errors at points that were left out.
 
     Attributes
     ----------
@@ -61,26 +74,31 @@ class CrossValidation:
         RMS error when every tenth window is left out, in the units of the map.
     left_out_runs_rms : float
         RMS error when whole runs are left out and their surroundings must predict them; NaN for one run.
+    coordinates : str
+        The coordinates that were chosen.
     smoothing : float
         The smoothing that was chosen.
     """
 
     left_out_windows_rms: float
     left_out_runs_rms: float
+    coordinates: str
     smoothing: float
 
 
-def interpolated(field: ScatteredField, at: FloatArray, smoothing: float) -> tuple[FloatArray, FloatArray]:
+def interpolated(
+    field: ScatteredField, at: dict[str, FloatArray], chosen: CrossValidation
+) -> tuple[FloatArray, FloatArray]:
     """Values and standard errors of a field at other points.
 
     Parameters
     ----------
     field : ScatteredField
         The data.
-    at : ndarray, shape (m, 2)
-        Where to evaluate, in the coordinates of the field.
-    smoothing : float
-        0 passes through every point.
+    at : dict of str to ndarray, shape (m, 2)
+        Where to evaluate, in the same coordinates as the field.
+    chosen : CrossValidation
+        Coordinates and smoothing to use.
 
     Returns
     -------
@@ -88,27 +106,44 @@ def interpolated(field: ScatteredField, at: FloatArray, smoothing: float) -> tup
         The standard errors are those of the data carried through the weights; they do not contain the
         error of the interpolation itself, which `cross_validation` estimates.
     """
-    weights = _weights(field.points, at, smoothing)
-    return weights @ field.values, np.sqrt(weights**2 @ field.std**2)
+    points = field.coordinates[chosen.coordinates]
+    unit_vectors = np.eye(points.shape[0])
+    operator = _interpolator(points, unit_vectors, field.weights(chosen.smoothing))(at[chosen.coordinates])
+    return operator @ field.values, np.sqrt(operator**2 @ field.std**2)
 
 
 def cross_validation(field: ScatteredField, *, n_folds: int = 10) -> CrossValidation:
-    """Choose the smoothing and estimate the error of the map at points not measured.
+    """Choose coordinates and smoothing, and estimate the error of the map at points not measured.
 
     Whole runs are left out where there are at least three, otherwise every tenth window. The error
-    reported belongs to the smoothing chosen by it and is therefore slightly optimistic; six
+    reported belongs to the choice made by it and is therefore slightly optimistic; twelve
     candidates leave little to choose from.
     """
-    window_folds = [np.arange(field.values.size) % n_folds == fold for fold in range(n_folds)]
-    run_folds = _inner_runs(field)
-    judging = run_folds or window_folds
-    errors = [_left_out_rms(field, judging, smoothing) for smoothing in SMOOTHINGS]
-    smoothing = SMOOTHINGS[int(np.nanargmin(errors))]
+    thinned = _thinned(field)
+    folds = _inner_runs(thinned) or _every(thinned, n_folds)
+    candidates = [(name, smoothing) for name in field.coordinates for smoothing in SMOOTHINGS]
+    errors = [_left_out_rms(thinned, folds, *candidate) for candidate in candidates]
+    coordinates, smoothing = candidates[int(np.nanargmin([*errors, np.inf])) % len(candidates)]
+    runs = _inner_runs(field)
     return CrossValidation(
-        left_out_windows_rms=_left_out_rms(field, window_folds, smoothing),
-        left_out_runs_rms=min(errors) if run_folds else float("nan"),
+        left_out_windows_rms=_left_out_rms(field, _every(field, n_folds), coordinates, smoothing),
+        left_out_runs_rms=_left_out_rms(field, runs, coordinates, smoothing),
+        coordinates=coordinates,
         smoothing=smoothing,
     )
+
+
+def _thinned(field: ScatteredField) -> ScatteredField:
+    """Every k-th point, so that choosing among candidates stays quick."""
+    step = -(-field.values.size // _LARGEST_NUMBER_TO_CHOOSE_BY)
+    if step == 1:
+        return field
+    coordinates = {name: points[::step] for name, points in field.coordinates.items()}
+    return ScatteredField(coordinates, field.values[::step], field.std[::step], field.group[::step])
+
+
+def _every(field: ScatteredField, n_folds: int) -> list[npt.NDArray[np.bool_]]:
+    return [np.arange(field.values.size) % n_folds == fold for fold in range(n_folds)]
 
 
 def _inner_runs(field: ScatteredField) -> list[npt.NDArray[np.bool_]]:
@@ -116,30 +151,28 @@ def _inner_runs(field: ScatteredField) -> list[npt.NDArray[np.bool_]]:
     groups = np.unique(field.group)
     if groups.size < 3:
         return []
-    level = np.array([np.median(field.points[field.group == group, 1]) for group in groups])
+    second = next(iter(field.coordinates.values()))[:, 1]
+    level = np.array([np.median(second[field.group == group]) for group in groups])
     inner = groups[(level > level.min()) & (level < level.max())]
     return [field.group == group for group in inner]
 
 
-def _left_out_rms(field: ScatteredField, folds: list[npt.NDArray[np.bool_]], smoothing: float) -> float:
+def _left_out_rms(
+    field: ScatteredField, folds: list[npt.NDArray[np.bool_]], coordinates: str, smoothing: float
+) -> float:
+    points, weights = field.coordinates[coordinates], field.weights(smoothing)
     squares, count = 0.0, 0
     for left_out in folds:
         kept = ~left_out
         if kept.sum() < 3 or not left_out.any():
             continue
-        interpolator = _interpolator(field.points[kept], field.values[kept], smoothing)
-        error = interpolator(field.points[left_out]) - field.values[left_out]
+        interpolator = _interpolator(points[kept], field.values[kept], weights[kept])
+        error = interpolator(points[left_out]) - field.values[left_out]
         squares, count = squares + float(error @ error), count + int(left_out.sum())
     return float(np.sqrt(squares / count)) if count else float("nan")
 
 
-def _weights(points: FloatArray, at: FloatArray, smoothing: float) -> FloatArray:
-    """Matrix that turns the values at `points` into the values at `at`; shape (len(at), len(points))."""
-    return np.asarray(_interpolator(points, np.eye(points.shape[0]), smoothing)(at))
-
-
-def _interpolator(points: FloatArray, values: FloatArray, smoothing: float) -> RBFInterpolator:
-    distinct = np.ptp(points, axis=0) > 1e-12
-    degree = 1 if distinct.all() and np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6) == 2 else 0
-    kernel, epsilon = (KERNEL, None) if degree else ("linear", None)
-    return RBFInterpolator(points, values, kernel=kernel, epsilon=epsilon, degree=degree, smoothing=smoothing)
+def _interpolator(points: FloatArray, values: FloatArray, smoothing: FloatArray) -> RBFInterpolator:
+    in_the_plane = np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6) == 2
+    kernel, degree = (KERNEL, 1) if in_the_plane else ("linear", 0)
+    return RBFInterpolator(points, values, kernel=kernel, degree=degree, smoothing=smoothing)

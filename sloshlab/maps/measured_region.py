@@ -15,6 +15,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 _RADIUS_OVER_SPACING = 0.75
 """Largest circumradius of a triangle over the largest spacing of neighbouring runs; ½ just spans it."""
+_SAME_FIRST_COORDINATE = 0.1
+"""Windows of two runs are compared if their first coordinates differ by less than this."""
 _STRIP_OVER_SPACING = 0.75
 """Half width of the strip along a run over the spacing of its windows."""
 
@@ -65,13 +67,19 @@ def _window_spacing(points: FloatArray, group: npt.NDArray[np.intp]) -> float:
 
 
 def _run_spacing(points: FloatArray, group: npt.NDArray[np.intp]) -> float:
-    """Largest distance from a run to the nearest other run (median along the run), inf for one run."""
-    nearest = []
+    """Largest gap, along the second coordinate, from a run to the next one above it; inf for one run.
+
+    A gap is the median along the run, so that runs which cross others do not hide it.
+    """
+    gaps = []
     for member in np.unique(group):
         own, others = points[group == member], points[group != member]
-        if others.size:
-            nearest.append(float(np.median(cKDTree(others).query(own)[0])))
-    return max(nearest) if nearest else float("inf")
+        above = others[None, :, 1] - own[:, 1, None]
+        beside = np.abs(others[None, :, 0] - own[:, 0, None]) < _SAME_FIRST_COORDINATE
+        nearest = np.where(beside & (above > 0), above, np.inf).min(axis=1, initial=np.inf)
+        if np.isfinite(nearest).any():
+            gaps.append(float(np.median(nearest[np.isfinite(nearest)])))
+    return max(gaps) if gaps else float("inf")
 
 
 def _circumradius(triangles: FloatArray) -> FloatArray:
