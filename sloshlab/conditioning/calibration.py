@@ -19,6 +19,7 @@ import xarray as xr
 from sloshlab.conditioning.block_spectra import block_spectra, delay_s
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
+    derived_channel,
     force_channels,
     force_sign,
     mean_acceleration,
@@ -111,7 +112,7 @@ def apparent_mass(
     force = total_force(recording, force_names)
     acceleration = mean_acceleration(recording, acceleration_names)
     run_id = str(recording.attrs.get("run_id", "unnamed"))
-    spectra = block_spectra(xr.Dataset({"force": force}), ["force"], acceleration.values)
+    spectra = block_spectra(force.to_dataset(), [str(force.name)], acceleration.values)
     delay, delay_std = delay_s(spectra, 0)
     mass = spectra.ratio(0, delay)
     if not math.isfinite(mass):
@@ -212,8 +213,7 @@ def inertia_removed(force: xr.DataArray, acceleration: xr.DataArray, mass_kg: fl
     values = np.multiply(acceleration.values, -mass_kg, dtype=np.float64)
     values += force.values
     attributes = {"units": "N", "quantity": "force", "inertia_removed_kg": mass_kg}
-    coordinates = {"time": force["time"]}
-    return xr.DataArray(values, dims="time", coords=coordinates, name="force_without_inertia", attrs=attributes)
+    return derived_channel(force, values, "force_without_inertia", attributes)
 
 
 def check_signs(recording: xr.Dataset, rig: Rig | None = None) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from sloshlab.conditioning.gaps import require_channels
@@ -63,6 +65,16 @@ def acceleration_channels(recording: xr.Dataset) -> list[str]:
 def force_sign(channel: xr.DataArray) -> float:
     """+1 for a force on the tank, −1 for one stated as the force of the tank on something else."""
     return -1.0 if channel.attrs.get("block_from") == "tank" else 1.0
+
+
+def derived_channel(
+    source: xr.DataArray, values: npt.NDArray[np.float64], name: str, attributes: Mapping[str, Any]
+) -> xr.DataArray:
+    """New values on the time of `source`, which is shared; attributes start from empty."""
+    derived = source.copy(deep=False, data=values).rename(name)
+    derived.attrs = dict(attributes)
+    derived.encoding = {}
+    return derived
 
 
 def total_force(recording: xr.Dataset, names: Sequence[str] | None = None) -> xr.DataArray:
@@ -140,4 +152,4 @@ def _combined(
     if equal and factors[0] != 1.0:
         total *= factors[0]
     attributes = {"units": SI_UNITS[quantity], "quantity": quantity, "combined_from": ", ".join(names)}
-    return xr.DataArray(total, dims="time", coords={"time": recording["time"]}, name=name, attrs=attributes)
+    return derived_channel(recording[names[0]], total, name, attributes)

@@ -20,6 +20,7 @@ import xarray as xr
 from numba import njit
 from scipy.linalg import solveh_banded
 
+from sloshlab.conditioning.combined_channels import derived_channel
 from sloshlab.conditioning.gaps import BoolArray, mark_nan, runs, sampling_step_s
 from sloshlab.errors import AnalysisError
 from sloshlab.quadrature import STEP_WEIGHTS
@@ -202,7 +203,7 @@ def _integrated_channel(
         "high_pass_corner_hz": corner_hz,
         "high_pass_order": order,
     }
-    return xr.DataArray(values, dims="time", coords={"time": data["time"]}, name=quantity_out, attrs=attributes)
+    return derived_channel(data, values, quantity_out, attributes)
 
 
 def _check_settings(corner_hz: float, order: int, sampling_rate_hz: float) -> None:

@@ -54,7 +54,10 @@ def test_noise_does_not_bias_the_mass():
     each = np.array([apparent_mass(run).mass_kg for run in runs])
     stated = np.mean([apparent_mass(run).mass_std_kg for run in runs])
     assert stated == pytest.approx(each.std(ddof=1), rel=0.5)
-    assert abs(found.delay_s) < 4 * found.delay_std_s
+    delays = np.array([apparent_mass(run).delay_s for run in runs])
+    assert found.delay_s == pytest.approx(0.0, abs=4 * delays.std(ddof=1) / math.sqrt(20))
+    stated = np.mean([apparent_mass(run).delay_std_s for run in runs])
+    assert stated == pytest.approx(delays.std(ddof=1), rel=0.5)
 
 
 def test_empty_and_frozen_tell_the_gain_from_the_mass():
@@ -92,6 +95,16 @@ def test_static_weight_and_lost_samples_do_not_matter():
     run["force_cell_1"] += 50.0
     run["acceleration_roof_2"][20000:20050] = np.nan
     assert apparent_mass(run).mass_kg == pytest.approx(M_DRY, rel=1e-8)
+
+
+def test_static_weight_does_not_matter_in_blocks_of_one_cycle_either():
+    """Two seconds give blocks of a quarter of a second, whose lowest line lies beside the zeroth."""
+    run = swept_tank(duration_s=2.0)
+    without = apparent_mass(run).mass_kg
+    run["force_cell_1"] += 50.0
+    run["acceleration_roof_1"] += 9.81
+    assert apparent_mass(run).mass_kg == pytest.approx(without, rel=1e-9)
+    assert without == pytest.approx(M_DRY, rel=1e-9)
 
 
 def test_inertia_removed_leaves_the_rest_with_its_sign():

@@ -34,6 +34,8 @@ def test_cells_add_up_and_roof_accelerometers_average():
     assert (force.attrs["units"], force.attrs["quantity"]) == ("N", "force")
     assert (acceleration.attrs["units"], acceleration.attrs["quantity"]) == ("m s-2", "acceleration")
     assert run["force_cell_1"].values.tolist() == [1, 2, 3]
+    assert run["force_cell_1"].attrs == {"quantity": "force"}
+    assert np.array_equal(force["time"], run["time"])
 
 
 def test_single_channels_are_copied_not_shared():

@@ -72,6 +72,11 @@ def test_bridging_is_linear_for_short_inner_gaps_only_and_copies():
     assert np.array_equal(values, before, equal_nan=True)
 
 
+def test_a_gap_at_the_start_is_not_bridged_from_the_end():
+    bridged = bridged_for_coarse_phase([NAN, 1.0, 2.0], longest_samples=5)
+    assert bridged == pytest.approx([NAN, 1, 2], nan_ok=True)
+
+
 @given(st.lists(st.booleans(), max_size=60), st.booleans())
 def test_runs_rebuild_the_mask(mask, value):
     rebuilt = [not value] * len(mask)
