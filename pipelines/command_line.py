@@ -19,7 +19,10 @@ import typer
 from sloshlab import __version__
 from sloshlab.errors import SloshlabError
 
-INPUT_IS_BAD, DONE_BUT_FLAGGED, INTERRUPTED = 1, 3, 130
+INPUT_IS_BAD, USAGE, DONE_BUT_FLAGGED, INTERRUPTED = 1, 2, 3, 130
+
+# typer brings its own click or uses the installed one; either way this is the root of its usage errors
+_UsageError = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
 
 app = typer.Typer(
     name="sloshlab",
@@ -168,11 +171,8 @@ def virtual(
     _finish(make_virtual_run(run, rig, output), as_json)
 
 
-class Summary(dict[str, Any]):
-    """What a command says at its end: ``lines`` for people, ``flags`` that make the exit code 3."""
-
-
 def _finish(summary: dict[str, Any], as_json: bool) -> None:
+    """Say what a command has to say: ``lines`` for people; ``flags`` make the exit code 3."""
     for line in summary.pop("lines", []):
         typer.echo(line)
     flags = summary.get("flags", [])
@@ -190,18 +190,16 @@ def _command() -> str:
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    from click.exceptions import Abort, ClickException
-
     try:
         code = app(args=list(arguments) if arguments is not None else None, standalone_mode=False)
         return int(code or 0)
     except SloshlabError as error:
         print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
         return INPUT_IS_BAD
-    except ClickException as error:
+    except _UsageError as error:
         error.show()
-        return error.exit_code
-    except (KeyboardInterrupt, Abort):
+        return USAGE
+    except (KeyboardInterrupt, typer.Abort):
         print("sloshlab: interrupted; nothing half-written", file=sys.stderr)  # noqa: T201
         return INTERRUPTED
     except OSError as error:

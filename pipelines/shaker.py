@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ import xarray as xr
 
 from pipelines.progress import progress
 from pipelines.results import RigResult, RunResult, SweepExperiment
-from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in
+from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in, require_usable
 from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
@@ -27,6 +28,7 @@ from sloshlab.sweep.windows import WindowSettings
 
 _SHAKER_EXPERIMENTS = ("shaker_sweep", "shaker_vfa")
 _LARGEST_PLAUSIBLE_GAIN_ERROR = 0.05
+_LARGEST_BIAS_OF_W_BAR = 0.02
 
 
 @dataclass(frozen=True)
@@ -163,6 +165,7 @@ def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
 
 def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings) -> RunResult:
     recording = read_recording(run.path)
+    require_usable(recording, run.path)
     check_signs(recording, rig)
     forces, accelerations = force_channels(recording), acceleration_channels(recording)
     gain = 1.0 if dry is None else dry.gain_ratio
@@ -220,16 +223,32 @@ def _experiment(
         windows=everything,
         maps=_joined(rig_results),
         settings=settings.windows,
-        flags=tuple([flag for run in runs for flag in run.flags] + _gain_flags(dry)),
+        flags=tuple([flag for run in runs for flag in run.flags] + _calibration_flags(dry, rigs)),
     )
 
 
-def _gain_flags(dry: Mapping[str, DryMass | None]) -> list[str]:
-    return [
-        f"{name}: the gain of force over acceleration is {mass.gain_ratio:.3f}; check the calibration"
-        for name, mass in dry.items()
-        if mass is not None and abs(mass.gain_ratio - 1) > _LARGEST_PLAUSIBLE_GAIN_ERROR
-    ]
+def _calibration_flags(dry: Mapping[str, DryMass | None], rigs: Mapping[str, Rig]) -> list[str]:
+    flags = []
+    for name, mass in dry.items():
+        if mass is None:
+            continue
+        if abs(mass.gain_ratio - 1) > _LARGEST_PLAUSIBLE_GAIN_ERROR:
+            flags.append(
+                f"{name}: the gain of force over acceleration is {mass.gain_ratio:.3f}; check the calibration"
+            )
+        bias = w_bar_bias_of_delay(mass, rigs[name])
+        if abs(mass.delay_s) > 3 * mass.delay_std_s and abs(bias) > _LARGEST_BIAS_OF_W_BAR:
+            flags.append(
+                f"{name}: force lags acceleration by {1e6 * mass.delay_s:.0f} µs, which shifts W̄ at 20 Hz by "
+                f"{bias:+.3f}; compensate it with delay_s in the channel map"
+            )
+    return flags
+
+
+def w_bar_bias_of_delay(dry: DryMass, rig: Rig, *, frequency_hz: float = 20.0) -> float:
+    """W̄ that a delay of force behind acceleration feigns: −π Ωτ (M_dry + m_l)/m_l, to first order in Ωτ."""
+    total = dry.mass_kg + rig.liquid_mass_kg
+    return -math.pi * 2 * math.pi * frequency_hz * dry.delay_s * total / rig.liquid_mass_kg
 
 
 def _joined(rigs: Sequence[RigResult]) -> xr.Dataset:

@@ -72,6 +72,19 @@ class SweepOptions:
     allow_incomplete: bool = False
 
 
+def require_usable(recording: xr.Dataset, path: Path) -> None:
+    """Refuse a recording that no analysis may rest on.
+
+    Raises
+    ------
+    AnalysisError
+        With every reason.
+    """
+    quality = quality_of(recording)
+    if not quality.usable:
+        raise AnalysisError(f"recording {path}", got="; ".join(quality.reasons), allowed="working sensors")
+
+
 def clipped_in(recording: xr.Dataset, names: list[str]) -> BoolArray | None:
     """True where one of the channels is clipped; None if nothing is."""
     mask: BoolArray | None = None

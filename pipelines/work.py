@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipelines.progress import progress
 from pipelines.results import RunResult, SweepExperiment
-from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in
+from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in, require_usable
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.recording import channels, read_recording
@@ -96,6 +96,7 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
 
 def _analysed(path: Path, settings: WorkSettings) -> RunResult:
     recording = read_recording(path)
+    require_usable(recording, path)
     force = _channel(recording, path, settings.force, "force")
     motion = _channel(recording, path, settings.motion, settings.motion_quantity)
     reference = None

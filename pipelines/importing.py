@@ -1,0 +1,29 @@
+"""The commands around foreign files: import one run, or describe what a file holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from acquisition.files.description import describe_source
+from acquisition.files.importing import import_recording
+from sloshlab.recording import write_recording
+
+
+def import_run(sources: Sequence[Path], channel_map: Path, output: Path, rig: Path | None) -> dict[str, Any]:
+    """Import one run and write it; flagged if samples were lost or clipped."""
+    result = import_recording(sources, channel_map, rig=rig)
+    write_recording(result.recording, output, encoding=result.encoding)
+    report = result.report
+    flags = [f"{report.n_lost} samples lost"] if report.n_lost else []
+    flags += [f"{report.n_clipped} samples clipped"] if report.n_clipped else []
+    lines = [*report.lines(), f"recording: {output}"]
+    return {"lines": lines, "flags": flags, "output": str(output), "report": report.to_dict()}
+
+
+def describe_sources(sources: Sequence[Path]) -> dict[str, Any]:
+    """List columns, units, rates and traps of files, no map needed."""
+    described = [describe_source(source) for source in sources]
+    lines = [line for one in described for line in one.lines()]
+    return {"lines": lines, "flags": [], "sources": [one.to_dict() for one in described]}
