@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sloshlab.conditioning.quality import ChannelQuality, RunQuality, quality_of
+from sloshlab.conditioning.redundancy import PairAgreement
 from sloshlab.errors import RecordingError
 from sloshlab.recording import read_recording
 
@@ -54,13 +55,16 @@ def _table(path: Path, quality: RunQuality) -> list[str]:
         f"gaps: {len(quality.gaps)} ({quality.n_lost} samples); CRC repaired: {quality.n_crc_repaired}; "
         f"out of order: {quality.n_out_of_order}",
     ]
-    for pair in quality.accelerometers.pairs if quality.accelerometers else ():
-        lines.append(
-            f"{pair.name} against {pair.reference}: gain {pair.gain_ratio:.4f}, "
-            f"delay {1e6 * pair.delay_s:+.1f} µs ({1e3 * pair.phase_error_at_20_hz_rad:+.2f} mrad at 20 Hz), sign {pair.sign:+d}, "
-            f"RMS difference {100 * pair.rms_disagreement:.2f} %"
-        )
+    lines += [_agreement(pair) for pair in (quality.accelerometers.pairs if quality.accelerometers else ())]
     return lines
+
+
+def _agreement(pair: PairAgreement) -> str:
+    phase_mrad = 1e3 * pair.phase_error_at_20_hz_rad
+    return (
+        f"{pair.name} against {pair.reference}: gain {pair.gain_ratio:.4f}, delay {1e6 * pair.delay_s:+.1f} µs "
+        f"({phase_mrad:+.2f} mrad at 20 Hz), sign {pair.sign:+d}, RMS difference {100 * pair.rms_disagreement:.2f} %"
+    )
 
 
 def _row(channel: ChannelQuality) -> str:
