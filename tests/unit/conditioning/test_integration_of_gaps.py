@@ -50,6 +50,8 @@ def test_islands_too_short_for_the_rule_stay_nan():
     result = integrated(values, 1 / RATE_HZ)
     assert np.isnan(result[3000:3007]).all()
     assert np.isfinite(result[4001:4007]).all()
+    values[-6] = np.nan
+    assert np.isnan(integrated(values, 1 / RATE_HZ)[-6:]).all()
 
 
 def test_everything_lost_gives_everything_lost():
