@@ -70,9 +70,7 @@ def read(path: Path, settings: SourceSection) -> Table:
         _check_blf(path)
     database = _database(Path(settings.database)) if settings.database else None
     log = _Log()
-    with ReaderGuard(
-        path, f"CAN {kind}", loggers=("can", "can.io", "can.io.asc", "can.io.blf", "can.io.trc")
-    ) as guard:
+    with ReaderGuard(path, f"CAN {kind}", loggers=("can",)) as guard:
         for message in _messages(path, kind):
             _take(message, log, database, settings.can_channel)
     if not log.times:
@@ -96,8 +94,8 @@ def _messages(path: Path, kind: str) -> Iterator[Any]:
     import can
 
     if kind == "blf":
-        with can.BLFReader(str(path)) as reader:
-            yield from reader
+        with path.open("rb") as stream:
+            yield from can.BLFReader(stream)
         return
     with path.open(encoding="utf-8", errors="replace") as stream:
         yield from can.ASCReader(stream) if kind == "asc" else can.TRCReader(stream)

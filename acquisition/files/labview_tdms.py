@@ -34,8 +34,9 @@ def read(path: Path, settings: SourceSection) -> Table:
     columns: list[Column] = []
     unusable: dict[str, str] = {}
     starts: list[Any] = []
-    guard = ReaderGuard(path, "TDMS", loggers=("nptdms", "nptdms.tdms", "nptdms.reader"))
-    with guard, nptdms.TdmsFile.open(str(path)) as source:
+    guard = ReaderGuard(path, "TDMS", loggers=("nptdms",))
+    # given a stream, npTDMS looks for no index file
+    with guard, path.open("rb") as stream, nptdms.TdmsFile.open(stream) as source:
         channels = [channel for group in source.groups() for channel in group.channels()]
         total = 0
         for channel in channels:

@@ -7,6 +7,7 @@ import importlib
 import io
 import logging
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Final
@@ -94,7 +95,7 @@ class ReaderGuard:
     format_name : str
         Used in the message.
     loggers : tuple of str
-        Loggers of the library whose records become traps.
+        Loggers of the library whose records, and those of its modules, become traps.
 
     Examples
     --------
@@ -150,11 +151,16 @@ class _ListHandler(logging.Handler):
 
 
 @contextlib.contextmanager
-def _captured(name: str, records: list[str]):  # type: ignore[no-untyped-def]
-    logger = logging.getLogger(name)
-    handlers, propagate = logger.handlers, logger.propagate
-    logger.handlers, logger.propagate = [_ListHandler(records)], False
+def _captured(prefix: str, records: list[str]) -> Iterator[None]:
+    """Send what a library logs to `records`, from all its modules, instead of to the terminal."""
+    names = [prefix, *(name for name in logging.root.manager.loggerDict if name.startswith(f"{prefix}."))]
+    loggers = [logging.getLogger(name) for name in names]
+    before = [(logger, logger.handlers, logger.propagate) for logger in loggers]
+    handler = _ListHandler(records)
+    for logger in loggers:
+        logger.handlers, logger.propagate = [handler], False
     try:
         yield
     finally:
-        logger.handlers, logger.propagate = handlers, propagate
+        for logger, handlers, propagate in before:
+            logger.handlers, logger.propagate = handlers, propagate

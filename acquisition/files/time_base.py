@@ -18,6 +18,9 @@ LARGEST_LOST_FRACTION: Final = 0.5
 _FINEST_DECIMALS = 12
 _LARGEST_INDEX = 2**40
 _MOST_GAPS = 200_000
+_FEWEST_ODD_STEPS = 3
+_HALF = 0.5 * 1.01
+"""Rounding moves a stamp by half a unit."""
 
 
 @dataclass(frozen=True)
@@ -116,15 +119,16 @@ def uniform_grid(
     _check_stamps(time_s, name)
     resolution = resolution_s or stored_resolution(time_s)
     offset = time_s - time_s[0]
-    uniform = _all_samples_present(offset, rate_hz, resolution, jitter_allowed_steps)
-    rate, index = uniform or _with_gaps(offset, rate_hz, resolution, name)
-    deviation = np.abs(offset - index / rate)
-    worst = float(deviation.max())
-    if worst > resolution * 1.01 + jitter_allowed_steps / rate:
-        at = int(deviation.argmax())
+    found = _whole_steps(offset, rate_hz, resolution) or _all_samples_present(
+        offset, rate_hz, resolution, jitter_allowed_steps
+    )
+    rate, index = found or _with_gaps(offset, rate_hz, resolution, name)
+    worst = _half_range(offset, index, rate)
+    if worst > _HALF * resolution + jitter_allowed_steps / rate:
+        at = int(np.abs(offset - index / rate).argmax())
         raise RecordingError(
             f"{name}: time is not uniform",
-            got=f"jitter of {worst * rate:.3g} steps ({worst:.3g} s) at sample {at + 1} for {rate:.9g} Hz",
+            got=f"jitter of {worst * rate:.3g} steps ({worst:.3g} s) near sample {at + 1} for {rate:.9g} Hz",
             allowed=f"≤ {jitter_allowed_steps:g} steps beyond the {resolution:.1g} s to which time is written",
             remedy="state sampling_rate_hz if it is known, or jitter_allowed_steps, or resample",
         )
@@ -163,12 +167,44 @@ def _check_stamps(time_s: FloatArray, name: str) -> None:
         raise RecordingError(f"{name}: time", got="one time for all samples", allowed="increasing time")
 
 
+def _half_range(offset: FloatArray, index: NDArray[np.int64], rate: float) -> float:
+    """Largest distance of the stamps from the best-placed uniform grid of that rate [s]."""
+    residual = offset - index / rate
+    return 0.5 * float(residual.max() - residual.min())
+
+
+def _whole_steps(
+    offset: FloatArray, rate_hz: float | None, resolution: float
+) -> tuple[float, NDArray[np.int64]] | None:
+    """The grid of the smallest step, if every step is a whole multiple of it.
+
+    A longer step is a gap. Only a regular pattern of at least `_FEWEST_ODD_STEPS` longer steps that
+    rounding alone explains is left to the other readings: 900 Hz written to a millisecond looks so.
+    """
+    steps = np.diff(offset)
+    unit = float(steps.min())
+    if unit <= 0 or offset[-1] / unit > _LARGEST_INDEX:
+        return None
+    counts = np.rint(steps / unit)
+    spacing = float(np.spacing(np.abs(offset).max()))
+    noise = resolution if resolution < 0.01 * unit else 0.0
+    if np.abs(steps - counts * unit).max() > 1e-6 * unit + 8 * spacing + 2 * noise:
+        return None
+    index = np.concatenate([[0], np.cumsum(counts.astype(np.int64))])
+    rate = _simplest_rate(offset, index, noise or 4 * spacing)
+    if rate_hz is not None:
+        return (rate_hz, index) if abs(rate / rate_hz - 1) <= 1e-6 else None
+    if (counts > 1).sum() >= _FEWEST_ODD_STEPS and _all_samples_present(offset, None, resolution, 0.0):
+        return None
+    return rate, index
+
+
 def _all_samples_present(
     offset: FloatArray, rate_hz: float | None, resolution: float, jitter: float
 ) -> tuple[float, NDArray[np.int64]] | None:
     index = np.arange(offset.size, dtype=np.int64)
     rate = rate_hz or _simplest_rate(offset, index, resolution)
-    fits = np.abs(offset - index / rate).max() <= resolution * 1.01 + jitter / rate
+    fits = _half_range(offset, index, rate) <= _HALF * resolution + jitter / rate
     return (rate, index) if fits else None
 
 
@@ -217,6 +253,5 @@ def _simplest_rate(offset: FloatArray, index: NDArray[np.int64], resolution: flo
     if not 0 < resolution < duration:
         return mean
     simplest = simplest_decimal_between(n_steps / (duration + resolution), n_steps / (duration - resolution))
-    before = np.abs(offset - index / mean).max()
-    after = np.abs(offset - index / simplest).max()
-    return simplest if after <= max(before, resolution * 1.01) else mean
+    before, after = _half_range(offset, index, mean), _half_range(offset, index, simplest)
+    return simplest if after <= max(before, _HALF * resolution) else mean
