@@ -63,7 +63,8 @@ def _agreement(pair: PairAgreement) -> str:
     phase_mrad = 1e3 * pair.phase_error_at_20_hz_rad
     return (
         f"{pair.name} against {pair.reference}: gain {pair.gain_ratio:.4f}, delay {1e6 * pair.delay_s:+.1f} µs "
-        f"({phase_mrad:+.2f} mrad at 20 Hz), sign {pair.sign:+d}, RMS difference {100 * pair.rms_disagreement:.2f} %"
+        f"({phase_mrad:+.2f} mrad at 20 Hz), sign {pair.sign:+d}, "
+        f"RMS difference {100 * pair.rms_disagreement:.2f} %"
     )
 
 

@@ -15,6 +15,7 @@ from pipelines.results import SweepExperiment
 from sloshlab import atomic_file
 
 _HASH_BLOCK = 1 << 20
+_SMALLEST_COMPRESSED_SIZE = 1000
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
@@ -26,7 +27,7 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
         if variable.dtype.kind in "OU":
             stored[name] = variable.astype(str)
             encoding[str(name)] = {"dtype": "S1", "char_dim_name": f"{name}_length"}
-        elif variable.ndim and variable.dtype.kind == "f":
+        elif variable.size >= _SMALLEST_COMPRESSED_SIZE and variable.dtype.kind == "f":
             encoding[str(name)] = {"zlib": True, "complevel": 4, "shuffle": True, "_FillValue": np.nan}
     with atomic_file.replaced(path) as temporary:
         stored.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)

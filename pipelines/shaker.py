@@ -165,7 +165,7 @@ def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
 
 def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings) -> RunResult:
     recording = read_recording(run.path)
-    require_usable(recording, run.path)
+    quality = require_usable(recording, run.path)
     check_signs(recording, rig)
     forces, accelerations = force_channels(recording), acceleration_channels(recording)
     gain = 1.0 if dry is None else dry.gain_ratio
@@ -179,7 +179,7 @@ def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings
         inertia_kg=mass,
         noise_power=_noise_power(recording, forces, accelerations, mass),
     )
-    return analyse_sweep(recording, run.path, signals, settings, rig, run.rig_name)
+    return analyse_sweep(recording, run.path, signals, settings, quality=quality, rig=rig, rig_name=run.rig_name)
 
 
 def _noise_power(

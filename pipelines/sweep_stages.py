@@ -13,7 +13,7 @@ from pipelines.outputs import sha256_of
 from pipelines.results import Excerpt, RunResult
 from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import integrated
-from sloshlab.conditioning.quality import quality_of
+from sloshlab.conditioning.quality import RunQuality, quality_of
 from sloshlab.errors import AnalysisError
 from sloshlab.recording import RunAttributes, run_attributes
 from sloshlab.rig import Rig
@@ -72,8 +72,8 @@ class SweepOptions:
     allow_incomplete: bool = False
 
 
-def require_usable(recording: xr.Dataset, path: Path) -> None:
-    """Refuse a recording that no analysis may rest on.
+def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
+    """Quality of a recording; refuse one that no analysis may rest on.
 
     Raises
     ------
@@ -83,6 +83,7 @@ def require_usable(recording: xr.Dataset, path: Path) -> None:
     quality = quality_of(recording)
     if not quality.usable:
         raise AnalysisError(f"recording {path}", got="; ".join(quality.reasons), allowed="working sensors")
+    return quality
 
 
 def clipped_in(recording: xr.Dataset, names: list[str]) -> BoolArray | None:
@@ -100,8 +101,10 @@ def analyse_sweep(
     path: Path,
     signals: SweepSignals,
     options: SweepOptions,
-    rig: Rig | None,
-    rig_name: str,
+    *,
+    quality: RunQuality,
+    rig: Rig | None = None,
+    rig_name: str = "",
 ) -> RunResult:
     """Take one recording from its signals to its windows.
 
@@ -150,7 +153,7 @@ def analyse_sweep(
         law=law,
         stated=stated,
         boundary_error_s=_boundary_error(measured + start_time_s, stated),
-        quality=quality_of(recording),
+        quality=quality,
         n_cycles=cycles.usable.size,
         n_cycles_lost=n_lost,
         excerpts=_excerpts(cycles, windows, signals, rig, rate_hz, start_time_s),

@@ -96,7 +96,7 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
 
 def _analysed(path: Path, settings: WorkSettings) -> RunResult:
     recording = read_recording(path)
-    require_usable(recording, path)
+    quality = require_usable(recording, path)
     force = _channel(recording, path, settings.force, "force")
     motion = _channel(recording, path, settings.motion, settings.motion_quantity)
     reference = None
@@ -111,7 +111,7 @@ def _analysed(path: Path, settings: WorkSettings) -> RunResult:
         phase_motion=reference,
         clipped=clipped_in(recording, [settings.force, settings.motion]),
     )
-    return analyse_sweep(recording, path, signals, settings, None, "")
+    return analyse_sweep(recording, path, signals, settings, quality=quality)
 
 
 def _channel(recording: xr.Dataset, path: Path, name: str, quantity: str | None) -> FloatArray:

@@ -9,7 +9,7 @@ cross-validation decides.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,23 +85,28 @@ def energy_maps(
         return ScatteredField(plane.at(frequency, amplitude), used[name].values, used[f"{name}_std"].values, group)
 
     covered = used if extent is None else extent
-    builder = _Builder(
-        plane, used, group, n_grid, covered["frequency_hz"].values, covered["amplitude_m"].values
-    )  # fmt: skip
+    grids = _grids(covered["frequency_hz"].values, covered["amplitude_m"].values, rig, n_grid)
+    mask = [_measured(plane, used, group, grid) for grid in grids]
     work = field("dissipated_mass_kg")
     chosen = {"work_j": cross_validation(work)}
-    variables = _work_map(builder, work, chosen["work_j"])
+    variables = _axes(grids, rig)
+    variables |= _work_map(grids[0], _on_grids(plane, grids[:1], mask[:1], work, chosen["work_j"])[0], mask[0])
     if rig is not None:
         beta = field("beta")
         chosen |= {"w_bar": _divided(chosen["work_j"], rig.liquid_mass_kg), "beta": cross_validation(beta)}
-        variables |= _liquid_maps(builder, rig, work, beta, chosen)
+        w_bar = dataclasses.replace(
+            work, values=work.values / rig.liquid_mass_kg, std=work.std / rig.liquid_mass_kg
+        )
+        for name, one in (("w_bar", w_bar), ("beta", beta)):
+            variables |= _liquid_maps(name, _on_grids(plane, grids[1:], mask[1:], one, chosen[name]))
+        variables["measured"] = (("omega_bar", "u_bar"), mask[1].astype(np.int8))
+        variables["measured_over_v_bar"] = (("omega_bar", "v_bar"), mask[2].astype(np.int8))
+    for name in ("w_bar", "beta") if rig is not None else ("work_j",):
+        kinds = ("windows", "runs")
+        variables |= {
+            f"{name}_left_out_{kind}_rms": ((), getattr(chosen[name], f"left_out_{kind}_rms")) for kind in kinds
+        }
     dataset = described(xr.Dataset(variables))
-    dataset.attrs = {
-        f"{name}_left_out_{kind}_rms": getattr(result, f"left_out_{kind}_rms")
-        for name, result in chosen.items()
-        for kind in ("windows", "runs")
-        if name != "work_j" or rig is None
-    }
     return EnergyMaps(dataset, chosen)
 
 
@@ -138,56 +143,93 @@ class _Plane:
 
 
 @dataclass(frozen=True)
-class _Builder:
-    """The measured region, and the grids over the range of frequencies and amplitudes."""
+class _Grid:
+    """A grid over frequency and some amplitude; `amplitude_m` is the displacement at its nodes."""
 
-    plane: _Plane
-    windows: xr.Dataset
-    group: npt.NDArray[np.intp]
-    n_grid: int
-    frequency_hz: FloatArray
+    frequencies_hz: FloatArray
+    axis: FloatArray
     amplitude_m: FloatArray
 
-    def measured(self, at: dict[str, FloatArray]) -> npt.NDArray[np.bool_]:
-        """Where the windows lie around, judged in the logarithms."""
-        own = self.plane.at(self.windows["frequency_hz"].values, self.windows["amplitude_m"].values)
-        return inside_measured_region(next(iter(own.values())), self.group, next(iter(at.values())))
-
-    def frequencies(self) -> FloatArray:
-        return np.linspace(self.frequency_hz.min(), self.frequency_hz.max(), self.n_grid)
-
-    def amplitudes(self, largest: float) -> FloatArray:
-        return np.linspace(0.0, largest, self.n_grid + 1)[1:]
-
-    def on_grid(
-        self,
-        amplitudes: FloatArray,
-        displacement: Callable[[FloatArray, FloatArray], FloatArray],
-        fields: list[tuple[ScatteredField, CrossValidation]],
-    ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_], list[tuple[FloatArray, FloatArray]]]:
-        """Frequencies, displacements and mask on the grid, and values with errors of each field."""
-        frequency, amplitude = np.meshgrid(self.frequencies(), amplitudes, indexing="ij")
-        u0 = displacement(frequency, amplitude)
-        at = self.plane.at(frequency.ravel(), u0.ravel())
-        mask = self.measured(at)
-        inside = {name: points[mask] for name, points in at.items()}
-        results = []
-        for field, chosen in fields:
-            value, std = np.full(mask.size, np.nan), np.full(mask.size, np.nan)
-            if mask.any():
-                value[mask], std[mask] = interpolated(field, inside, chosen)
-            results.append((value.reshape(frequency.shape), std.reshape(frequency.shape)))
-        return frequency, u0, mask.reshape(frequency.shape), results
+    @property
+    def frequency_hz(self) -> FloatArray:
+        """Frequency at the nodes, shape (n_frequencies, n_amplitudes)."""
+        return np.broadcast_to(self.frequencies_hz[:, None], self.amplitude_m.shape)
 
 
-def _work_map(builder: _Builder, work: ScatteredField, chosen: CrossValidation) -> dict[str, tuple[object, ...]]:
-    amplitudes = builder.amplitudes(float(builder.amplitude_m.max()))
-    frequency, u0, mask, [(value, std)] = builder.on_grid(amplitudes, lambda f, a: a, [(work, chosen)])
-    speed2 = (2 * np.pi * frequency * u0) ** 2
+def _grids(frequency_hz: FloatArray, amplitude_m: FloatArray, rig: Rig | None, n_grid: int) -> list[_Grid]:
+    """Grids over u₀ and, with a tank, over ū and v̄, that cover the given windows."""
+    frequencies = np.linspace(frequency_hz.min(), frequency_hz.max(), n_grid)
+    per_speed = 1 / (2 * np.pi * frequencies)
+
+    def grid(largest: float, metres_per_unit: FloatArray) -> _Grid:
+        axis = np.linspace(0.0, largest, n_grid + 1)[1:]
+        return _Grid(frequencies, axis, np.outer(metres_per_unit, axis))
+
+    one = np.ones(n_grid)
+    grids = [grid(float(amplitude_m.max()), one)]
+    if rig is not None:
+        height, speed = rig.tank.height_m, rig.velocity_scale_m_per_s
+        grids.append(grid(float(amplitude_m.max()) / height, height * one))
+        grids.append(grid(float((2 * np.pi * frequency_hz * amplitude_m).max()) / speed, speed * per_speed))
+    return grids
+
+
+def _measured(
+    plane: _Plane, windows: xr.Dataset, group: npt.NDArray[np.intp], grid: _Grid
+) -> npt.NDArray[np.bool_]:
+    """Nodes that the windows lie around, judged in the logarithms."""
+    own = plane.at(windows["frequency_hz"].values, windows["amplitude_m"].values)
+    nodes = plane.at(grid.frequency_hz.ravel(), grid.amplitude_m.ravel())
+    inside = inside_measured_region(next(iter(own.values())), group, next(iter(nodes.values())))
+    return inside.reshape(grid.amplitude_m.shape)
+
+
+def _on_grids(
+    plane: _Plane,
+    grids: Sequence[_Grid],
+    masks: Sequence[npt.NDArray[np.bool_]],
+    field: ScatteredField,
+    chosen: CrossValidation,
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Values and standard errors on each grid, NaN outside the mask; the weights are found once for all grids."""
+    frequency = np.concatenate([grid.frequency_hz[mask] for grid, mask in zip(grids, masks, strict=True)])
+    amplitude = np.concatenate([grid.amplitude_m[mask] for grid, mask in zip(grids, masks, strict=True)])
+    edges = np.cumsum([mask.sum() for mask in masks])[:-1]
+    both = (
+        interpolated(field, plane.at(frequency, amplitude), chosen) if frequency.size else (frequency, amplitude)
+    )
+    results = []
+    for mask, *parts in zip(masks, *(np.split(one, edges) for one in both), strict=True):
+        filled = [np.full(mask.shape, np.nan) for _ in parts]
+        for whole, part in zip(filled, parts, strict=True):
+            whole[mask] = part
+        results.append((filled[0], filled[1]))
+    return results
+
+
+def _axes(grids: Sequence[_Grid], rig: Rig | None) -> dict[str, tuple[object, ...]]:
+    axes: dict[str, tuple[object, ...]] = {
+        "frequency_hz": ("frequency_hz", grids[0].frequencies_hz),
+        "amplitude_m": ("amplitude_m", grids[0].axis),
+    }
+    if rig is not None:
+        omega_bar = 2 * np.pi * grids[1].frequencies_hz / rig.frequency_scale_rad_per_s
+        axes |= {
+            "omega_bar": ("omega_bar", omega_bar),
+            "u_bar": ("u_bar", grids[1].axis),
+            "v_bar": ("v_bar", grids[2].axis),
+        }
+    return axes
+
+
+def _work_map(
+    grid: _Grid, dissipated_mass: tuple[FloatArray, FloatArray], mask: npt.NDArray[np.bool_]
+) -> dict[str, tuple[object, ...]]:
+    """W = (u₀Ω)² × W/(u₀Ω)²."""
+    speed2 = (2 * np.pi * grid.frequency_hz * grid.amplitude_m) ** 2
+    value, std = dissipated_mass
     dimensions = ("frequency_hz", "amplitude_m")
     return {
-        "frequency_hz": ("frequency_hz", builder.frequencies()),
-        "amplitude_m": ("amplitude_m", amplitudes),
         "work_j": (dimensions, value * speed2),
         "work_j_std": (dimensions, std * speed2),
         "measured_work_j": (dimensions, mask.astype(np.int8)),
@@ -195,28 +237,12 @@ def _work_map(builder: _Builder, work: ScatteredField, chosen: CrossValidation) 
 
 
 def _liquid_maps(
-    builder: _Builder,
-    rig: Rig,
-    work: ScatteredField,
-    beta: ScatteredField,
-    chosen: dict[str, CrossValidation],
+    name: str, over_u_and_v: Sequence[tuple[FloatArray, FloatArray]]
 ) -> dict[str, tuple[object, ...]]:
-    height, omega_scale = rig.tank.height_m, rig.frequency_scale_rad_per_s
-    fields = [(work, chosen["work_j"]), (beta, chosen["beta"])]
-    u_bar = builder.amplitudes(float(builder.amplitude_m.max()) / height)
-    speed = 2 * np.pi * builder.frequency_hz * builder.amplitude_m / rig.velocity_scale_m_per_s
-    v_bar = builder.amplitudes(float(speed.max()))
-    variables: dict[str, tuple[object, ...]] = {
-        "omega_bar": ("omega_bar", 2 * np.pi * builder.frequencies() / omega_scale),
-        "u_bar": ("u_bar", u_bar),
-        "v_bar": ("v_bar", v_bar),
+    (value_u, std_u), (value_v, std_v) = over_u_and_v
+    return {
+        name: (("omega_bar", "u_bar"), value_u),
+        f"{name}_std": (("omega_bar", "u_bar"), std_u),
+        f"{name}_over_v_bar": (("omega_bar", "v_bar"), value_v),
+        f"{name}_over_v_bar_std": (("omega_bar", "v_bar"), std_v),
     }
-    over_u = builder.on_grid(u_bar, lambda f, a: a * height, fields)
-    over_v = builder.on_grid(v_bar, lambda f, a: a * rig.velocity_scale_m_per_s / (2 * np.pi * f), fields)
-    for (_, _, mask, results), suffix, axis in ((over_u, "", "u_bar"), (over_v, "_over_v_bar", "v_bar")):
-        dimensions = ("omega_bar", axis)
-        for name, (value, std), scale in zip(("w_bar", "beta"), results, (rig.liquid_mass_kg, 1.0), strict=True):
-            variables[name + suffix] = (dimensions, value / scale)
-            variables[name + suffix + "_std"] = (dimensions, std / scale)
-        variables["measured" + suffix] = (dimensions, mask.astype(np.int8))
-    return variables

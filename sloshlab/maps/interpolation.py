@@ -21,6 +21,8 @@ FloatArray = npt.NDArray[np.float64]
 KERNEL = "thin_plate_spline"
 SMOOTHINGS = (0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
 """Candidates for the smoothing of a point with the median standard error."""
+DEFAULT_SMOOTHING = 1e-2
+"""Smoothing where cross-validation over runs is not possible."""
 _SMALLEST_RELATIVE_STD = 0.25
 """Standard errors below this part of the median are raised to it: a few cycles may agree by chance."""
 _LARGEST_NUMBER_OF_POINTS = 20_000
@@ -115,15 +117,17 @@ def interpolated(
 def cross_validation(field: ScatteredField, *, n_folds: int = 10) -> CrossValidation:
     """Choose coordinates and smoothing, and estimate the error of the map at points not measured.
 
-    Whole runs are left out where there are at least three, otherwise every tenth window. The error
-    reported belongs to the choice made by it and is therefore slightly optimistic; twelve
-    candidates leave little to choose from.
+    Whole runs are left out to choose. With fewer than three runs there is nothing between runs to choose
+    by, and the first coordinates with `DEFAULT_SMOOTHING` are taken. The error reported belongs to the
+    choice made by it and is therefore slightly optimistic; twelve candidates leave little to choose from.
     """
     thinned = _thinned(field)
-    folds = _inner_runs(thinned) or _every(thinned, n_folds)
-    candidates = [(name, smoothing) for name in field.coordinates for smoothing in SMOOTHINGS]
-    errors = [_left_out_rms(thinned, folds, *candidate) for candidate in candidates]
-    coordinates, smoothing = candidates[int(np.nanargmin([*errors, np.inf])) % len(candidates)]
+    folds = _inner_runs(thinned)
+    coordinates, smoothing = next(iter(field.coordinates)), DEFAULT_SMOOTHING
+    if folds:
+        candidates = [(name, smoothing) for name in field.coordinates for smoothing in SMOOTHINGS]
+        errors = [_left_out_rms(thinned, folds, *candidate) for candidate in candidates]
+        coordinates, smoothing = candidates[int(np.argmin(errors))]
     runs = _inner_runs(field)
     return CrossValidation(
         left_out_windows_rms=_left_out_rms(field, _every(field, n_folds), coordinates, smoothing),

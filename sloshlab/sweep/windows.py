@@ -183,8 +183,8 @@ def _row(
         "dissipated_mass_kg": float(work.mean() / speed2.mean()),
         "dissipated_mass_kg_std": _standard_error(work, at) / float(speed2.mean()),
         "harmonic_amplitude_n": np.abs(cycles.dynamic_phasor[at].mean(axis=0)),
-        "change_of_squared_amplitude_m2": float(np.polyfit(at, speed2 / omega**2, 1)[0]),
-        "change_of_log_omega": float(np.polyfit(at, np.log(omega), 1)[0]),
+        "change_of_squared_amplitude_m2": _slope(at, speed2 / omega**2),
+        "change_of_log_omega": _slope(at, np.log(omega)),
         "stored_work_j": 0.0,
     }
     row.update(_regime(cycles, at, row, rig, noise_power))
@@ -192,6 +192,12 @@ def _row(
         scatter = (force * acceleration.conj()).real - mass * accel2
         row["beta_std"] = _standard_error(scatter, at) / float(accel2.mean()) / rig.liquid_mass_kg
     return row
+
+
+def _slope(at: npt.NDArray[np.intp], values: FloatArray) -> float:
+    """Slope of the straight line through values at cycles, per cycle."""
+    from_middle = at - at.mean()
+    return float(from_middle @ values / (from_middle @ from_middle))
 
 
 def _pair_starts(at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
