@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -100,15 +99,3 @@ def _collected_cells(h5py: Any, source: Any, name: str, dataset: Any, found: Fou
             continue
         check_declared(Path(str(source.filename)), f"cell {label}", _decoded_bytes(target))
         collect(label, np.asarray(target[()]).T, found)
-
-
-def user_block() -> bytes:
-    """The 512 bytes that stand before the HDF5 content of such a file.
-
-    Examples
-    --------
-    >>> len(user_block())
-    512
-    """
-    text = b"MATLAB 7.3 MAT-file".ljust(116)
-    return (text + bytes(8) + struct.pack("<H", 0x0200) + b"IM").ljust(512, b"\0")
