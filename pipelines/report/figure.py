@@ -1,0 +1,39 @@
+"""A figure of the report, or the reason why there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ReportFigure:
+    """One figure, drawn.
+
+    Attributes
+    ----------
+    name : str
+        Stem of its file name.
+    caption : str
+        Full sentences: what is seen, how it was made.
+    counterpart : str
+        Figure of the source that it corresponds to, empty if none.
+    png : bytes
+        The image.
+    """
+
+    name: str
+    caption: str
+    counterpart: str
+    png: bytes
+
+
+@dataclass(frozen=True)
+class SkippedFigure:
+    """A figure that would have been empty, and why."""
+
+    name: str
+    reason: str
+
+
+class NothingToDrawError(Exception):
+    """Raised by a figure that has no data; its text is the reason shown in the report."""

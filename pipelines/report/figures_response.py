@@ -1,0 +1,173 @@
+"""Response of a structure without a tank: amplitude and phase of ü/F, resonance per level."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.report.axes import plain_log_ticks
+from pipelines.report.figure import NothingToDrawError, ReportFigure
+from pipelines.report.style import new_figure, ordered_colours, plain, png_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from pipelines.results import RunResult
+
+FloatArray = npt.NDArray[np.float64]
+
+_ZOOM = 0.09
+
+
+@dataclass(frozen=True)
+class Response:
+    """Frequency response of one run from its windows.
+
+    Attributes
+    ----------
+    label : str
+        The run.
+    frequency_hz, acceleration_g : ndarray, shape (n,)
+        Of the windows, in order of time.
+    accelerance_per_kg : ndarray of complex, shape (n,)
+        ü/F at the excitation frequency [m s-2 N-1 = kg-1].
+    peak_hz, peak_per_kg : float
+        Where |ü/F| is largest, and that value.
+    loudest_hz, loudest_g : float
+        Where the acceleration itself is largest, and that value.
+    """
+
+    label: str
+    frequency_hz: FloatArray
+    acceleration_g: FloatArray
+    accelerance_per_kg: npt.NDArray[np.complex128]
+    peak_hz: float
+    peak_per_kg: float
+    loudest_hz: float
+    loudest_g: float
+
+
+def responses(runs: Sequence[RunResult]) -> tuple[Response, ...]:
+    """Compute ü/F = 1/(m − jγ/Ω) of every run: F = m ü + γ u̇ and u̇ = ü/(jΩ)."""
+    found = []
+    for run in runs:
+        windows = run.windows.sortby("time_s")
+        frequency = windows["frequency_hz"].values
+        apparent = windows["apparent_mass_kg"].values - 1j * windows["gamma_kg_per_s"].values / (
+            2 * np.pi * frequency
+        )
+        usable = np.isfinite(apparent) & (np.abs(apparent) > 0)
+        if not usable.any():
+            continue
+        frequency, accelerance = frequency[usable], 1 / apparent[usable]
+        acceleration = windows["acceleration_g"].values[usable]
+        peak, value = vertex(frequency, np.abs(accelerance))
+        loudest, level = vertex(frequency, acceleration)
+        found.append(
+            Response(
+                plain(run.attributes.run_id, 28), frequency, acceleration, accelerance, peak, value, loudest, level
+            )
+        )
+    if not found:
+        raise NothingToDrawError("no run has a window")
+    return tuple(found)
+
+
+def vertex(abscissa: FloatArray, values: FloatArray) -> tuple[float, float]:
+    """Place and height of the largest value, by the parabola through it and its two neighbours.
+
+    Examples
+    --------
+    >>> x = np.array([0.0, 1.0, 2.0, 3.0])
+    >>> [round(float(part), 6) for part in vertex(x, 5 - (x - 1.3) ** 2)]
+    [1.3, 5.0]
+    """
+    at = int(np.nanargmax(values))
+    if not 0 < at < values.size - 1:
+        return float(abscissa[at]), float(values[at])
+    x, y = abscissa[at - 1 : at + 2], values[at - 1 : at + 2]
+    if not (np.isfinite(y).all() and (x[1] - x[0]) * (x[2] - x[1]) > 0):
+        return float(abscissa[at]), float(values[at])
+    left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
+    curvature = (right - left) / (x[2] - x[0])
+    if curvature >= 0:
+        return float(x[1]), float(y[1])
+    place = float(np.clip(0.5 * (x[0] + x[1]) - left / (2 * curvature), x.min(), x.max()))
+    height = y[0] + left * (place - x[0]) + curvature * (place - x[0]) * (place - x[1])
+    return place, float(height)
+
+
+def frequency_response(name: str, runs: Sequence[RunResult]) -> ReportFigure:
+    """Amplitude and phase of ü/F, whole range and around the resonance, peaks marked."""
+    found = responses(runs)
+    figure = new_figure(5.0)
+    grid = figure.subplots(2, 2, sharex="col", width_ratios=[1.15, 1.0])
+    for colour, response in zip(ordered_colours(len(found)), found, strict=True):
+        for column in (0, 1):
+            draw_response(grid[:, column], response, colour, marked=column == 1)
+    for axes in grid[0]:
+        axes.set_yscale("log")
+        plain_log_ticks(axes.yaxis)
+    low, high = (function(response.peak_hz for response in found) for function in (min, max))
+    grid[1, 1].set_xlim(low * (1 - _ZOOM), high * (1 + _ZOOM))
+    near = [np.abs(r.accelerance_per_kg)[_near(r, low, high)] for r in found]
+    grid[0, 1].set_ylim(
+        0.7 * min(float(part.min()) for part in near), 1.5 * max(float(part.max()) for part in near)
+    )
+    grid[0, 0].set_ylabel("|ü/F| [m s⁻²/N]")
+    grid[1, 0].set_ylabel("phase of ü/F [°]")
+    grid[0, 0].set_title("whole sweep")
+    grid[0, 1].set_title("around the largest response")
+    for axes in grid[1]:
+        axes.set(xlabel="frequency Ω/2π [Hz]", ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180])
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
+    caption = (
+        "Acceleration over force at the excitation frequency, from in-phase and quadrature force of every window: "
+        "amplitude above, phase below, the neighbourhood of the largest response on the right. Vertical "
+        "lines mark "
+        "where |ü/F| of each run is largest; where they move with the level, the structure is not linear."
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def _near(response: Response, low: float, high: float) -> npt.NDArray[np.bool_]:
+    frequency = response.frequency_hz
+    near = (frequency > low * (1 - _ZOOM)) & (frequency < high * (1 + _ZOOM))
+    return near if near.any() else np.ones(frequency.size, dtype=bool)
+
+
+def draw_response(panels: Sequence[Axes], response: Response, colour: object, *, marked: bool) -> None:
+    """Draw amplitude and phase of one run in two panels."""
+    upper, lower = panels
+    style = {"color": colour, "lw": 1.0, "marker": ".", "ms": 2.5}
+    upper.plot(response.frequency_hz, np.abs(response.accelerance_per_kg), label=response.label, **style)
+    lower.plot(response.frequency_hz, np.degrees(np.angle(response.accelerance_per_kg)), **style)
+    if marked:
+        for axes in (upper, lower):
+            axes.axvline(response.peak_hz, color=colour, lw=0.9, ls="--")
+
+
+def loudest_response(name: str, runs: Sequence[RunResult]) -> ReportFigure:
+    """Acceleration amplitude over frequency with the largest value of each run marked."""
+    found = responses(runs)
+    figure = new_figure(3.3)
+    axes = figure.subplots()
+    for colour, response in zip(ordered_colours(len(found)), found, strict=True):
+        label = f"{response.label}: {response.loudest_hz:.2f} Hz"
+        axes.plot(
+            response.frequency_hz, response.acceleration_g, color=colour, marker=".", ms=2.5, lw=1.0, label=label
+        )
+        axes.plot(response.loudest_hz, response.loudest_g, "v", color=colour, ms=7, mec="white", mew=0.6)
+    axes.set(xlabel="frequency Ω/2π [Hz]", ylabel="acceleration amplitude a₀ [g]")
+    axes.set_ylim(0, 1.12 * max(response.loudest_g for response in found))
+    figure.legend(loc="outside right upper", title="run: largest at", title_fontsize=8.5)
+    caption = (
+        "Acceleration amplitude over frequency; the triangle marks the largest response of each run and its "
+        "frequency. If it falls as the level rises, the mode softens."
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))

@@ -1,0 +1,134 @@
+"""Drawing all figures and writing the report: everything complete or nothing."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipelines.report.citations import citation
+from pipelines.report.figure import NothingToDrawError, ReportFigure, SkippedFigure
+from pipelines.report.sections import SectionPlan, planned_sections
+from pipelines.report.style import drawing_style, file_stem
+from pipelines.report.summary import gravity_remark, sentences
+from sloshlab import __version__, atomic_file
+
+if TYPE_CHECKING:
+    from pipelines.report.tables import Table
+    from pipelines.results import SweepExperiment
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section with its figures drawn."""
+
+    title: str
+    figures: tuple[ReportFigure, ...]
+    skipped: tuple[SkippedFigure, ...]
+    tables: tuple[Table, ...]
+
+
+def write_report(experiment: SweepExperiment, folder: Path, *, progress: Progress | None = None) -> Path:
+    """Write `figures/*.png` and the self-contained `report.html` of an experiment.
+
+    Parameters
+    ----------
+    experiment : SweepExperiment
+        What was analysed.
+    folder : Path
+        Made if it is not there. Nothing is written before every figure is drawn.
+    progress : callable, optional
+        Called with (figures done, figures in all, name) after each figure.
+
+    Returns
+    -------
+    Path
+        The report. The same experiment gives the same bytes.
+    """
+    sections = drawn_sections(planned_sections(experiment), progress)
+    page = report_html(experiment, sections).encode("utf-8", errors="replace")
+    for figure in _figures(sections):
+        atomic_file.write_bytes(folder / "figures" / f"{figure.name}.png", figure.png)
+    report = folder / "report.html"
+    atomic_file.write_bytes(report, page)
+    return report
+
+
+def drawn_sections(plans: Sequence[SectionPlan], progress: Progress | None = None) -> tuple[Section, ...]:
+    """Draw the figures of all sections; those without data become a reason."""
+    total, done, sections = sum(len(plan.figures) for plan in plans), 0, []
+    with drawing_style():
+        for plan in plans:
+            figures, skipped = [], []
+            for one in plan.figures:
+                try:
+                    figures.append(one.draw(one.name))
+                except NothingToDrawError as reason:
+                    skipped.append(SkippedFigure(one.name, str(reason)))
+                done += 1
+                if progress is not None:
+                    progress(done, total, one.name)
+            sections.append(Section(plan.title, tuple(figures), tuple(skipped), plan.tables))
+    return tuple(sections)
+
+
+def report_html(experiment: SweepExperiment, sections: Sequence[Section]) -> str:
+    """The page as text: styles and images inside, nothing fetched from elsewhere."""
+    from jinja2 import Environment, StrictUndefined
+
+    files = resources.files("pipelines.report")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(files.joinpath("page.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        title=experiment.title,
+        subtitle=_subtitle(experiment),
+        css=_safe_css(files.joinpath("page.css").read_text(encoding="utf-8")),
+        flags=experiment.flags,
+        summary=sentences(experiment),
+        remark=gravity_remark(),
+        sections=_numbered(sections),
+        papers=citation(experiment.kind),
+    )
+
+
+def _safe_css(text: str) -> Any:
+    from markupsafe import Markup
+
+    return Markup(text)  # our own file, no input goes into it
+
+
+def _subtitle(experiment: SweepExperiment) -> str:
+    rigs = f", {len(experiment.rigs)} fill levels" if len(experiment.rigs) > 1 else ""
+    return f"{len(experiment.runs)} runs{rigs} · sloshlab {__version__}"
+
+
+def _numbered(sections: Sequence[Section]) -> list[dict[str, Any]]:
+    """Sections as the template takes them, figures numbered through the report."""
+    shown, number = [], 0
+    for index, section in enumerate(sections, start=1):
+        figures = []
+        for figure in section.figures:
+            number += 1
+            figures.append(
+                {
+                    "number": number,
+                    "name": figure.name,
+                    "caption": figure.caption,
+                    "counterpart": figure.counterpart,
+                    "data": base64.b64encode(figure.png).decode("ascii"),
+                }
+            )
+        anchor = f"section-{index}-{file_stem(section.title).lower()}"
+        shown.append({"title": section.title, "anchor": anchor, "figures": figures, "skipped": section.skipped,
+                      "tables": section.tables})  # fmt: skip
+    return shown
+
+
+def _figures(sections: Sequence[Section]) -> Iterator[ReportFigure]:
+    for section in sections:
+        yield from section.figures
