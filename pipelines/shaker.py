@@ -11,7 +11,7 @@ import xarray as xr
 
 from pipelines.progress import progress
 from pipelines.results import RigResult, RunResult, SweepExperiment
-from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in, require_usable
+from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in, naming, require_usable
 from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
@@ -89,7 +89,8 @@ def analyse_shaker(paths: Sequence[Path], rig_paths: Sequence[Path], settings: S
             dry[name] = _dry_mass(own, rig)
             for run in own:
                 if run.attributes.configuration == "sloshing":
-                    results[name].append(_analysed(run, rig, dry[name], settings))
+                    with naming(run.path):
+                        results[name].append(_analysed(run, rig, dry[name], settings))
                 advance(run.path.name)
         return _experiment(results, rigs, dry, settings)
 
@@ -146,14 +147,12 @@ def _assigned(paths: Sequence[Path], rigs: Mapping[str, Rig]) -> list[_Run]:
 
 def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
     dry = {
-        configuration: [read_recording(run.path) for run in runs if run.attributes.configuration == configuration]
+        configuration: [_dry_recording(run, rig) for run in runs if run.attributes.configuration == configuration]
         for configuration in ("empty", "frozen")
     }
     recordings = dry["empty"] + dry["frozen"]
     if not recordings:
         return None
-    for recording in recordings:
-        check_signs(recording, rig)
     return identify_dry_mass(
         dry["empty"],
         dry["frozen"],
@@ -161,6 +160,14 @@ def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
         force_names=force_channels(recordings[0]),
         acceleration_names=acceleration_channels(recordings[0]),
     )
+
+
+def _dry_recording(run: _Run, rig: Rig) -> xr.Dataset:
+    with naming(run.path):
+        recording = read_recording(run.path)
+        require_usable(recording, run.path)
+        check_signs(recording, rig)
+    return recording
 
 
 def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings) -> RunResult:

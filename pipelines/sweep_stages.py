@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +16,7 @@ from pipelines.results import Excerpt, RunResult
 from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import integrated
 from sloshlab.conditioning.quality import RunQuality, quality_of
-from sloshlab.errors import AnalysisError
+from sloshlab.errors import AnalysisError, InputError
 from sloshlab.recording import RunAttributes, run_attributes
 from sloshlab.rig import Rig
 from sloshlab.sweep.cycles import Cycles, evaluate_cycles
@@ -70,6 +72,19 @@ class SweepOptions:
     windows: WindowSettings
     boundaries: str = "measured"
     allow_incomplete: bool = False
+
+
+@contextlib.contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name the recording in every error that an analysis of it raises."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in error.what:
+            raise
+        raise AnalysisError(
+            f"{path}: {error.what}", got=error.got, allowed=error.allowed, remedy=error.remedy
+        ) from error
 
 
 def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
@@ -164,12 +179,8 @@ def analyse_sweep(
 def _phase(path: Path, signals: SweepSignals, rate_hz: float) -> MotionPhase:
     reference = signals.motion if signals.phase_motion is None else signals.phase_motion
     lead = np.pi / 2 if signals.motion_is_velocity and signals.phase_motion is None else 0.0
-    try:
+    with naming(path):
         return measured_phase(reference, None, rate_hz, lead_rad=lead)
-    except AnalysisError as error:
-        raise AnalysisError(
-            f"{path}: {error.what}", got=error.got, allowed=error.allowed, remedy=error.remedy
-        ) from error
 
 
 def _stated(attributes: RunAttributes) -> SweepLaw | None:

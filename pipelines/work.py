@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipelines.progress import progress
 from pipelines.results import RunResult, SweepExperiment
-from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in, require_usable
+from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in, naming, require_usable
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.recording import channels, read_recording
@@ -76,7 +76,8 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
     results: list[RunResult] = []
     with progress("work", len(paths)) as advance:
         for path in paths:
-            results.append(_analysed(path, settings))
+            with naming(path):
+                results.append(_analysed(path, settings))
             advance(path.name)
     windows = xr.concat([result.windows for result in results], dim="window", combine_attrs="drop")
     _check_energy_sign(windows, settings)
