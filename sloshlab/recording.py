@@ -238,7 +238,7 @@ def validate_recording(recording: xr.Dataset, *, name: str = "recording") -> Run
     if "time" not in recording.coords or recording["time"].dims != ("time",):
         raise RecordingError(f"{name}: time", got="no coordinate time(time)", allowed="seconds, uniform")
     time = np.asarray(recording["time"].values)
-    _check_time(_chunks(time), time.size, attributes.sampling_rate_hz, name)
+    _check_time(time, attributes.sampling_rate_hz, name)
     found = False
     for channel, variable in recording.data_vars.items():
         if not _is_channel(str(channel), variable.dims, variable.attrs):
@@ -271,7 +271,7 @@ def _decoded(source: Any, name: str, maximum_decoded_bytes: int) -> xr.Dataset:
     if units not in ("s", "second", "seconds"):
         raise RecordingError(f"{name}: units of time", got=repr(units), allowed="'s', seconds from the trigger")
     time = np.asarray(time_variable[:], dtype=np.float64)
-    _check_time(_chunks(time), n_samples, attributes.sampling_rate_hz, name)
+    _check_time(time, attributes.sampling_rate_hz, name)
     variables: dict[str, xr.Variable] = {}
     for channel, variable in source.variables.items():
         if channel == "time":
@@ -316,16 +316,14 @@ def _chunks(values: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:
         yield start, values[start : start + _TIME_CHUNK]
 
 
-def _check_time(chunks: Iterable[tuple[int, np.ndarray]], n_samples: int, rate_hz: float, name: str) -> None:
-    if n_samples < 2:
+def _check_time(time: np.ndarray, rate_hz: float, name: str) -> None:
+    if time.size < 2:
         raise RecordingError(
-            f"{name}: time", got=f"{n_samples} samples", allowed="≥ 2 samples", remedy="record again"
+            f"{name}: time", got=f"{time.size} samples", allowed="≥ 2 samples", remedy="record again"
         )
     step = 1.0 / rate_hz
-    origin = np.nan
-    worst, worst_at = 0.0, 0
-    last = np.nan
-    for start, chunk in chunks:
+    worst = 0.0
+    for start, chunk in _chunks(time):
         if not np.isfinite(chunk).all():
             raise RecordingError(
                 f"{name}: time",
@@ -333,28 +331,31 @@ def _check_time(chunks: Iterable[tuple[int, np.ndarray]], n_samples: int, rate_h
                 allowed="uniform seconds",
                 remedy="time is never lost: keep it and flag the samples",
             )
-        if start == 0:
-            origin = float(chunk[0])
-        deviation = np.abs(chunk - (origin + step * np.arange(start, start + chunk.size)))
-        at = int(deviation.argmax())
-        if deviation[at] > worst:
-            worst, worst_at = float(deviation[at]), start + at
-        last = float(chunk[-1])
-    mean_step = (last - origin) / (n_samples - 1)
-    resolution = 4 * np.spacing(max(abs(origin), abs(last)))
-    rate_error = abs(mean_step - step) * (n_samples - 1)
-    if worst <= JITTER_ALLOWED_STEPS * step + resolution:
-        return
-    if mean_step <= 0 or (rate_error > 0.5 * worst and abs(mean_step / step - 1) > JITTER_ALLOWED_STEPS):
-        raise RecordingError(
+        deviation = np.abs(chunk - (time[0] + step * np.arange(start, start + chunk.size)))
+        worst = max(worst, float(deviation.max()))
+    resolution = 4 * np.spacing(max(abs(float(time[0])), abs(float(time[-1]))))
+    if worst > JITTER_ALLOWED_STEPS * step + resolution:
+        raise _time_error(time, step, worst, name)
+
+
+def _time_error(time: np.ndarray, step: float, worst: float, name: str) -> RecordingError:
+    """A wrong rate if the mean and the usual step both differ from the stated one, else jitter or a jump."""
+    mean_step = float(time[-1] - time[0]) / (time.size - 1)
+    usual_step = float(np.median(np.diff(time)))
+    rate_error = abs(mean_step - step) * (time.size - 1)
+    off = min(abs(mean_step / step - 1), abs(usual_step / step - 1))
+    if mean_step <= 0 or (rate_error > 0.5 * worst and off > JITTER_ALLOWED_STEPS):
+        return RecordingError(
             f"{name}: sampling_rate_hz",
-            got=f"{rate_hz:.9g} Hz, but the mean time step is {mean_step:.9g} s",
+            got=f"{1 / step:.9g} Hz, but the mean time step is {mean_step:.9g} s",
             allowed="the rate of the time coordinate",
             remedy="correct the attribute or the time coordinate",
         )
-    raise RecordingError(
+    deviation = np.abs(time - (time[0] + step * np.arange(time.size)))
+    first = int(np.argmax(deviation >= 0.999 * worst))
+    return RecordingError(
         f"{name}: time is not uniform",
-        got=f"jitter of {worst / step:.3g} steps ({worst:.3g} s) at sample {worst_at}",
+        got=f"jitter of {worst / step:.3g} steps ({worst:.3g} s) at sample {first}",
         allowed=f"≤ {JITTER_ALLOWED_STEPS:g} steps",
         remedy="resample on the device's sample counter, or mark the gap in `quality`",
     )
@@ -391,6 +392,8 @@ def _decoded_channel(channel: str, variable: Any, attributes: dict[str, Any], na
             values[lost] = np.nan
     kept = {key: value for key, value in attributes.items() if key not in _STORAGE_ATTRIBUTES}
     kept["units"] = SI_UNITS[described.quantity]
+    if kind in "iu":
+        kept["adc_step"] = abs(scale)
     for key in _SCALED_ATTRIBUTES:
         if key in kept:
             kept[key] = float(kept[key]) * factor
