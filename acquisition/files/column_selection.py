@@ -117,7 +117,7 @@ def with_time_column(named: NamedTable, settings: SourceSection) -> NamedTable:
             continue
         same = column.values.size == time_s.size
         others.append(replace(column, time_s=time_s, time_resolution_s=0.0) if same else column)
-    if not any(column.time_s is time_s for column in others):
+    if others and not any(column.time_s is time_s for column in others):
         raise ChannelMapError(
             "source.time",
             got=f"{clock.name!r} with {time_s.size} samples",
