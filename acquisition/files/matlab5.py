@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Iterator
@@ -16,6 +17,12 @@ from acquisition.files.reading_limits import LARGEST_DECODED_BYTES, ReaderGuard,
 from acquisition.files.table import Column, Table, as_float64, rows_of
 from sloshlab.errors import FileFormatError
 
+_INT8, _INT32, _UINT32, _UTF8 = 1, 5, 6, 16
+_ITEM_BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
+"""Type of a data element → bytes per number."""
+
+_COMPLEX_FLAG = 0x0800
+_OPAQUE = 17
 _MATRIX, _COMPRESSED = 14, 15
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE = 1, 2, 3, 4, 5
 _NUMERIC = frozenset(range(6, 16))
@@ -186,36 +193,65 @@ def _checked_matrix(body: bytes, order: str, path: Path, depth: int, budget: _Bu
     if not body:
         return "", "empty"
     parts = list(_elements(body, order, path))
-    if len(parts) < 2 or len(parts[0][1]) < 4 or len(parts[1][1]) % 4:
-        raise _damaged(path, "a variable without flags or shape")
-    kind = struct.unpack_from(order + "I", parts[0][1])[0] & 0xFF
-    name = parts[2][1].decode("latin-1")[:200] if len(parts) > 2 and kind != 17 else ""
+    types = [element for element, _ in parts]
+    if types[:2] != [_UINT32, _INT32] or len(parts[0][1]) != 8 or len(parts[1][1]) % 4 or len(parts) < 3:
+        raise _damaged(path, "a variable without flags, shape or name")
+    flags = struct.unpack_from(order + "I", parts[0][1])[0]
+    kind = flags & 0xFF
+    name = parts[2][1].decode("latin-1")[:200] if kind != _OPAQUE else ""
     if kind in _CLASS_NAMES:
         return name or "(unnamed)", f"{_CLASS_NAMES[kind]}, not an array"
     shape = struct.unpack(f"{order}{len(parts[1][1]) // 4}i", parts[1][1])
-    if len(shape) < 2 or len(shape) > 32 or min(shape) < 0:
+    if types[2] not in (_INT8, _UTF8) or not 2 <= len(shape) <= 32 or min(shape) < 0:
         raise _damaged(path, f"variable {name[:40]!r} of shape {shape[:4]}")
-    size = 1
-    for extent in shape:
-        size *= extent
-    if kind in _NUMERIC or kind == _CHAR:
-        available = sum(len(data) for _, data in parts[3:])
-        if size > available:
-            raise _damaged(path, f"variable {name[:40]!r} of {size} numbers in {available} bytes")
-    elif kind in (_CELL, _STRUCT):
-        inner = [data for element, data in parts[3:] if element == _MATRIX]
-        if kind == _CELL and size != len(inner):
-            raise _damaged(path, f"a cell array of {size} cells of which {len(inner)} are there")
-        if kind == _STRUCT and size > max(1, len(inner)):
-            raise _damaged(path, f"a structure array of {size} elements with {len(inner)} members")
-        budget.n_elements -= len(inner)
-        if budget.n_elements < 0:
-            raise _damaged(path, "more than a million cells and members")
-        for data in inner:
-            _checked_matrix(data, order, path, depth + 1, budget)
+    size = math.prod(shape)
+    if kind in _NUMERIC:
+        _check_numbers(path, name, size, parts[3:], 2 if flags & _COMPLEX_FLAG else 1)
+    elif kind == _CHAR:
+        _check_numbers(path, name, size, parts[3:], 1, exact=False)
+    elif kind == _CELL:
+        _check_members(path, name, size, parts[3:], order, depth, budget)
+    elif kind == _STRUCT:
+        n_fields = _n_fields(path, name, parts[3:5], order)
+        _check_members(path, name, size * n_fields, parts[5:], order, depth, budget)
     else:
         return name, f"of unknown class {kind}"
     return name, ""
+
+
+def _check_numbers(
+    path: Path, name: str, size: int, parts: list[tuple[int, bytes]], n_parts: int, *, exact: bool = True
+) -> None:
+    if len(parts) != n_parts or any(element not in _ITEM_BYTES for element, _ in parts):
+        raise _damaged(path, f"variable {name[:40]!r} without its numbers")
+    for element, data in parts:
+        n_items, rest = divmod(len(data), _ITEM_BYTES[element])
+        if rest or (n_items != size if exact else n_items > 4 * size):
+            raise _damaged(path, f"variable {name[:40]!r} of {size} numbers in {len(data)} bytes")
+
+
+def _n_fields(path: Path, name: str, parts: list[tuple[int, bytes]], order: str) -> int:
+    if [element for element, _ in parts] != [_INT32, _INT8] or len(parts[0][1]) != 4:
+        raise _damaged(path, f"structure {name[:40]!r} without field names")
+    length = struct.unpack(order + "i", parts[0][1])[0]
+    if not 0 < length <= 256 or len(parts[1][1]) % length:
+        raise _damaged(path, f"structure {name[:40]!r} with field names of {length} bytes")
+    names = [parts[1][1][start : start + length] for start in range(0, len(parts[1][1]), length)]
+    if len(set(names)) != len(names) or any(not field.strip(b"\0") or field[-1] for field in names):
+        raise _damaged(path, f"structure {name[:40]!r} with broken field names")
+    return len(names)
+
+
+def _check_members(
+    path: Path, name: str, n_members: int, parts: list[tuple[int, bytes]], order: str, depth: int, budget: _Budget
+) -> None:
+    if n_members != len(parts) or any(element != _MATRIX for element, _ in parts):
+        raise _damaged(path, f"variable {name[:40]!r} of {n_members} members of which {len(parts)} are there")
+    budget.n_elements -= len(parts)
+    if budget.n_elements < 0:
+        raise _damaged(path, "more than a million cells and members")
+    for _, data in parts:
+        _checked_matrix(data, order, path, depth + 1, budget)
 
 
 def _damaged(path: Path, what: str) -> FileFormatError:
