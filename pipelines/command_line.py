@@ -191,8 +191,10 @@ def _command() -> str:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
-        code = app(args=list(arguments) if arguments is not None else None, standalone_mode=False)
-        return int(code or 0)
+        code = int(app(args=list(arguments) if arguments is not None else None, standalone_mode=False) or 0)
+        if code == INTERRUPTED:  # some versions of typer turn Ctrl-C into this code without a word
+            raise KeyboardInterrupt
+        return code
     except SloshlabError as error:
         print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
         return INPUT_IS_BAD

@@ -61,7 +61,7 @@ def write_experiment(
     experiment : SweepExperiment
         What was analysed.
     folder : Path
-        Made if it is not there. Each file appears complete or not at all.
+        Made if it is not there. All files appear together, complete, or none does.
     command : str
         What the user typed, for the report.
     report : bool
@@ -72,29 +72,35 @@ def write_experiment(
     dict
         ``lines`` for people, ``flags``, and numbers for machines.
     """
-    inputs = {run.path.name: run.sha256 for run in experiment.runs}
-    used = versions()
+    provenance = {
+        "command": command,
+        "inputs": {run.path.name: run.sha256 for run in experiment.runs},
+        "versions": versions(),
+    }
+    with atomic_file.filled_folder(folder) as complete:
+        _write_results(experiment, complete, provenance)
+        if report:
+            from pipelines.report import write_report
+
+            write_report(dataclasses.replace(experiment, provenance=provenance), complete)
+    n_windows = int(experiment.windows.sizes["window"])
+    lines = [f"windows: {folder / 'windows.nc'} ({n_windows} windows)", f"maps: {folder / 'maps.nc'}"]
+    return {
+        "lines": lines + ([f"report: {folder / 'report.html'}"] if report else []),
+        "flags": list(experiment.flags),
+        "runs": len(experiment.runs),
+        "windows": n_windows,
+        "output": str(folder),
+    }
+
+
+def _write_results(experiment: SweepExperiment, folder: Path, provenance: dict[str, Any]) -> None:
     for name, dataset in (("windows.nc", experiment.windows), ("maps.nc", experiment.maps)):
         stamped = dataset.assign_attrs(
             title=experiment.title,
-            inputs=json.dumps(inputs, sort_keys=True),
-            versions=json.dumps(used, sort_keys=True),
+            inputs=json.dumps(provenance["inputs"], sort_keys=True),
+            versions=json.dumps(provenance["versions"], sort_keys=True),
             half_width_cycles=experiment.settings.half_width_cycles,
             spacing_cycles=experiment.settings.spacing_cycles,
         )
         write_dataset(stamped, folder / name)
-    lines = [f"windows: {folder / 'windows.nc'} ({experiment.windows.sizes['window']} windows)",
-             f"maps: {folder / 'maps.nc'}"]  # fmt: skip
-    if report:
-        from pipelines.report import write_report
-
-        provenance = {"command": command, "inputs": inputs, "versions": used}
-        complete = dataclasses.replace(experiment, provenance=provenance)
-        lines.append(f"report: {write_report(complete, folder)}")
-    return {
-        "lines": lines,
-        "flags": list(experiment.flags),
-        "runs": len(experiment.runs),
-        "windows": int(experiment.windows.sizes["window"]),
-        "output": str(folder),
-    }

@@ -1,9 +1,10 @@
-"""Files that appear complete or not at all."""
+"""Files, and folders of files, that appear complete or not at all."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -38,6 +39,37 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def filled_folder(folder: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary folder; on success its files take their places in `folder`, all together.
+
+    On any exception, an interrupt included, `folder` is as it was, or still absent.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made if missing. Files that are there and are not written again stay.
+
+    Yields
+    ------
+    Path
+        An empty folder on the same file system.
+    """
+    target = Path(folder).absolute()
+    beside = target if target.is_dir() else target.parent
+    beside.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=beside))
+    try:
+        yield temporary
+        target.mkdir(exist_ok=True)
+        for source in sorted(path for path in temporary.rglob("*") if path.is_file()):
+            place = target / source.relative_to(temporary)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source, place)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
