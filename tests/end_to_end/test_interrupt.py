@@ -1,0 +1,102 @@
+"""Ctrl-C: exit 130, all outputs or none, no temporary files."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from short_runs import DONE_BUT_FLAGGED, INTERRUPTED, contents, leftovers, shaker_arguments
+
+import pipelines.outputs
+import pipelines.report
+import pipelines.sweep_stages
+from pipelines.command_line import run
+from sloshlab import atomic_file
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent to a process of its own")
+PLACES = {
+    "after the first run": (pipelines.sweep_stages, "evaluate_windows"),
+    "before windows.nc": (pipelines.outputs, "write_dataset"),
+    "while a file is closed": (atomic_file.os, "chmod"),
+    "before the report": (pipelines.report, "write_report"),
+}
+
+
+def arguments_for(laboratory: Path, output: Path) -> list[str]:
+    runs = [laboratory / name for name in ("sweep_1.5g.nc", "sweep_3g.nc", "empty.nc")]
+    return [word for word in shaker_arguments(runs, [laboratory / "rig.toml"], output) if word != "--no-report"]
+
+
+@pytest.mark.parametrize("place", list(PLACES))
+@pytest.mark.parametrize("nth_call", [1, 2])
+def test_interrupted_at_a_known_place(
+    place, nth_call, laboratory: Path, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    module, name = PLACES[place]
+    if name == "write_report" and nth_call == 2:
+        pytest.skip("the report is written once")
+    original, calls = getattr(module, name), []
+
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        calls.append(name)
+        if len(calls) == nth_call:
+            raise KeyboardInterrupt
+        return original(*arguments, **options)
+
+    monkeypatch.setattr(module, name, interrupted)
+    assert run(arguments_for(laboratory, tmp_path / "out")) == INTERRUPTED
+    captured = capsys.readouterr()
+    assert captured.err.strip() == "sloshlab: interrupted; nothing half-written"
+    assert captured.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupt_leaves_earlier_results_alone(laboratory: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "windows.nc").write_bytes(b"results of yesterday")
+
+    def interrupted(*arguments: Any, **options: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipelines.report, "write_report", interrupted)
+    assert run(arguments_for(laboratory, out)) == INTERRUPTED
+    assert contents(out) == {"windows.nc": b"results of yesterday"}
+    assert leftovers(tmp_path) == []
+
+
+def test_signals_at_many_moments(laboratory: Path, tmp_path: Path) -> None:
+    """Wherever the signal falls, the folder is complete or absent; no moment is assumed to be in any stage."""
+    command = [str(Path(sys.executable).with_name("sloshlab"))]
+    complete = {"windows.nc", "maps.nc", "report.html"}
+    codes = []
+    for number, delay_s in enumerate((0.9, 1.4, 2.2, 3.0, 4.5)):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        process = subprocess.Popen(
+            command + arguments_for(laboratory, folder / "out"),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=60)
+        codes.append(process.returncode)
+        written = contents(folder / "out")
+        assert leftovers(folder) == []
+        if process.returncode in (0, DONE_BUT_FLAGGED):
+            assert complete <= set(written or {})
+        elif process.returncode == INTERRUPTED:
+            assert written is None
+            assert stderr.strip() == "sloshlab: interrupted; nothing half-written"
+        else:  # the interpreter was still loading the command
+            assert process.returncode == -signal.SIGINT
+            assert written is None
+    assert INTERRUPTED in codes
