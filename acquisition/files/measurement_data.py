@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import struct
+import traceback
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -17,6 +18,8 @@ _NUMERIC_CONVERSIONS = frozenset({0, 1, 2, 4, 5})
 """None, linear, rational, and tables from number to number."""
 
 _MASTER_TYPES = (2, 3)
+_VIRTUAL_MASTER = 3
+_LAST_NUMERIC_DATA_TYPE = 5
 _CHAINED = (b"##DG", b"##CG", b"##CN", b"##DL", b"##FH", b"##CH", b"##AT", b"##EV")
 """Blocks whose first link is the next of their kind."""
 
@@ -43,16 +46,17 @@ def read(path: Path, settings: SourceSection) -> Table:
     found: list[Column] = []
     unusable: dict[str, str] = {}
     start: str | None = None
-    _check_links(path)
+    n_data_bytes = _check_links(path)
     guard = ReaderGuard(path, "MF4", loggers=("asammdf",))
     # given a stream, asammdf neither copies nor finishes the file
-    with guard, path.open("rb") as stream, asammdf.MDF(stream) as source:
+    with guard, path.open("rb") as stream, _opened(asammdf, stream) as source:
         total = 0
         for group in source.groups:
             described = group.channel_group
             total += described.cycles_nr * (described.samples_byte_nr + described.invalidation_bytes_nr + 8)
             check_declared(path, "channel groups", total, max(1100 * size, 1 << 20))
             check_declared(path, "channel groups", total)
+        _check_records(path, source.groups, n_data_bytes)
         for number in range(len(source.groups)):
             found += _group(source, number, settings, unusable)
         if source.header.start_time.tzinfo is not None and source.header.start_time.year > 1970:
@@ -67,6 +71,19 @@ def read(path: Path, settings: SourceSection) -> Table:
     columns = tuple(Column(**{**column.__dict__, "name": name}) for column, name in zip(found, names, strict=True))
     traps = tuple(f"asammdf: {trap}" for trap in guard.traps)
     return Table("mf4", columns, traps=traps, unusable=unusable, start_time_utc=start)
+
+
+def _opened(asammdf: Any, stream: BinaryIO) -> Any:
+    """Open a stream; an object that fails halfway is closed here, because its own destructor cannot."""
+    try:
+        return asammdf.MDF(stream)
+    except Exception as error:
+        for frame, _ in traceback.walk_tb(error.__traceback__):
+            unfinished = frame.f_locals.get("self")
+            if type(unfinished).__module__.startswith("asammdf") and hasattr(unfinished, "_tempfile"):
+                unfinished._tempfile.close()
+                unfinished._closed = True
+        raise
 
 
 def _group(source: Any, number: int, settings: SourceSection, unusable: dict[str, str]) -> list[Column]:
@@ -114,8 +131,12 @@ def _column(name: str, group_name: str, signal: Any, values: np.ndarray) -> Colu
     )
 
 
-def _check_links(path: Path) -> None:
-    """Follow every link once: they must lie in the file, and no chain of blocks may bite its tail."""
+def _check_links(path: Path) -> int:
+    """Follow every link once: they must lie in the file, and no chain of blocks may bite its tail.
+
+    Returns the number of bytes in all data blocks, once decompressed.
+    """
+    n_data_bytes = 0
     content = path.read_bytes()
     if len(content) < _FIRST_BLOCK + _BLOCK.size or any(content[60:64]):
         raise _damaged(path, "an MDF file that its recorder did not finish")
@@ -134,9 +155,32 @@ def _check_links(path: Path) -> None:
             raise _damaged(path, f"a broken block at byte {address}")
         links = struct.unpack_from(f"<{n_links}Q", content, address + _BLOCK.size)
         waiting.extend(link for link in links if link)
+        if kind in (b"##DT", b"##DV"):
+            n_data_bytes += length - _BLOCK.size
+        elif kind == b"##DZ" and length >= _BLOCK.size + 24:
+            n_data_bytes += struct.unpack_from("<Q", content, address + _BLOCK.size + 8)[0]
         if kind in _CHAINED and links and links[0]:
             following[address] = links[0]
     _check_chains(path, following)
+    return n_data_bytes
+
+
+def _check_records(path: Path, groups: Any, n_data_bytes: int) -> None:
+    """Records must fit the data blocks, and channels their records: the reader's C code trusts both."""
+    n_needed = 0
+    for group in groups:
+        described = group.channel_group
+        record_bytes = described.samples_byte_nr
+        n_needed += described.cycles_nr * (record_bytes + described.invalidation_bytes_nr)
+        for channel in group.channels:
+            if channel.channel_type == _VIRTUAL_MASTER:
+                continue
+            last = channel.byte_offset + (channel.bit_offset + channel.bit_count + 7) // 8
+            is_number = channel.data_type <= _LAST_NUMERIC_DATA_TYPE
+            if last > record_bytes or (is_number and not 0 < channel.bit_count <= 64):
+                raise _damaged(path, f"channel {str(channel.name)[:40]!r} outside its record")
+    if n_needed > n_data_bytes:
+        raise _damaged(path, f"records of {n_needed} bytes in data of {n_data_bytes}")
 
 
 def _check_chains(path: Path, following: dict[int, int]) -> None:
