@@ -32,6 +32,7 @@ LOST, CLIPPED, CRC_REPAIRED, OUT_OF_ORDER = 1, 2, 4, 8
 """Bits of `quality(time)`."""
 
 _TIME_CHUNK = 1 << 18
+_DECODING_BLOCK = 1 << 20
 
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]
@@ -131,8 +132,8 @@ def read_recording(
     Returns
     -------
     xarray.Dataset
-        Dimension ``time``; channels float64 (float32 where stored so) in SI units, NaN where lost;
-        ``quality`` uint8 where present. Upward positive.
+        Dimension ``time``; channels float64 (float32 where stored so, or as counts of up to 16 bits) in
+        SI units, NaN where lost; ``quality`` uint8 where present. Upward positive.
 
     Raises
     ------
@@ -373,23 +374,10 @@ def _decoded_channel(channel: str, variable: Any, attributes: dict[str, Any], na
     kind = np.dtype(variable.dtype).kind
     if kind not in "fiu":
         raise RecordingError(f"{name}: {channel}", got=f"values of type {variable.dtype}", allowed="numbers")
-    raw = variable[:]
-    if not isinstance(raw, np.ndarray) or raw.shape != (len(variable),):
-        raise RecordingError(f"{name}: {channel}", got="values that cannot be read", allowed="one per time")
     scale = _number(attributes, "scale_factor", 1.0, channel, name) * factor
     offset = _number(attributes, "add_offset", 0.0, channel, name) * factor
     fill = attributes.get("_FillValue", attributes.get("missing_value"))
-    if kind == "f" and scale == 1.0 and offset == 0.0:
-        values = raw
-    else:
-        values = raw * (raw.dtype.type(scale) if kind == "f" else np.float64(scale))
-        if offset:
-            values += offset
-    if fill is not None and np.ndim(fill) == 0 and not (kind == "f" and np.isnan(fill)):
-        lost = raw == fill
-        if lost.any():
-            values = values.copy() if values is raw else values
-            values[lost] = np.nan
+    values = _decoded_values(variable, scale, offset, None if fill is None or np.ndim(fill) else fill)
     kept = {key: value for key, value in attributes.items() if key not in _STORAGE_ATTRIBUTES}
     kept["units"] = SI_UNITS[described.quantity]
     if kind in "iu":
@@ -398,6 +386,28 @@ def _decoded_channel(channel: str, variable: Any, attributes: dict[str, Any], na
         if key in kept:
             kept[key] = float(kept[key]) * factor
     return xr.Variable(("time",), values, kept)
+
+
+def _decoded_values(variable: Any, scale: float, offset: float, fill: float | None) -> np.ndarray:
+    """Counts × scale + offset, NaN where they are the fill value.
+
+    Block by block, so that only the result is large. Up to 16 bits float32 has no rounding that matters.
+    """
+    stored = np.dtype(variable.dtype)
+    few_bits = stored.kind in "iu" and stored.itemsize <= 2 and abs(offset) <= 2**15 * abs(scale)
+    values = np.empty(len(variable), dtype=np.float32 if few_bits or stored == np.float32 else np.float64)
+    storage = variable.chunking()
+    block = storage[0] if isinstance(storage, list) else _DECODING_BLOCK
+    block = max(block, _DECODING_BLOCK // block * block)
+    for start in range(0, values.size, block):
+        raw = variable[start : start + block]
+        part = values[start : start + block]
+        np.multiply(raw, values.dtype.type(scale), out=part, dtype=values.dtype)
+        if offset:
+            np.add(part, values.dtype.type(offset), out=part)
+        if fill is not None:
+            part[raw == fill] = np.nan
+    return values
 
 
 def _number(attributes: Mapping[str, Any], key: str, default: float, channel: str, name: str) -> float:

@@ -73,7 +73,7 @@ class CrossValidation:
     Attributes
     ----------
     left_out_windows_rms : float
-        RMS error when every tenth window is left out, in the units of the map.
+        RMS error when every fifth window is left out, in the units of the map.
     left_out_runs_rms : float
         RMS error when whole runs are left out and their surroundings must predict them; NaN for one run.
     coordinates : str
@@ -114,7 +114,7 @@ def interpolated(
     return operator @ field.values, np.sqrt(operator**2 @ field.std**2)
 
 
-def cross_validation(field: ScatteredField, *, n_folds: int = 10) -> CrossValidation:
+def cross_validation(field: ScatteredField, *, n_folds: int = 5) -> CrossValidation:
     """Choose coordinates and smoothing, and estimate the error of the map at points not measured.
 
     Whole runs are left out to choose. With fewer than three runs there is nothing between runs to choose

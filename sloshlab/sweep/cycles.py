@@ -8,6 +8,7 @@ inertia m_i of everything on the cells is removed (the dynamic sloshing force Δ
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -65,18 +66,18 @@ class Cycles:
     dynamic_peak: FloatArray
     inertia_kg: float
 
-    @property
+    @cached_property
     def omega_rad_per_s(self) -> FloatArray:
         """Ω of each cycle [rad/s], shape (n,)."""
         return 2 * np.pi / (self.stop_s - self.start_s)
 
-    @property
+    @cached_property
     def harmonic_work_j(self) -> FloatArray:
         """πγΩu₀² = ½ T Re(F₁ u̇₁*), the work of the fundamental alone [J], shape (n,)."""
         duration = self.stop_s - self.start_s
         return np.asarray(0.5 * duration * (self.force_phasor[:, 0] * self.velocity_phasor.conj()).real)
 
-    @property
+    @cached_property
     def dynamic_phasor(self) -> ComplexArray:
         """Amplitudes of d at Ω … 5Ω [N], shape (n, 5)."""
         return np.asarray(self.inertia_kg * self.acceleration_phasor - self.force_phasor)

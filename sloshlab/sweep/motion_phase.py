@@ -25,6 +25,7 @@ _DEMODULATION_RATE_HZ = 1000.0
 """The motion is averaged down to about this rate before its phase is taken."""
 _KNOTS_PER_CYCLE = 1.0
 _CYCLES_PER_BLOCK = 8.0
+_BLOCKS_AT_ONCE = 16
 _WINDOW_CYCLES = 2.0
 _SMALLEST_RELATIVE_AMPLITUDE = 2e-3
 _LARGEST_PHASE_JUMP_RAD = 0.7
@@ -170,7 +171,25 @@ def _dominant_frequency(motion: FloatArray, weight: FloatArray, rate_hz: float) 
 def _block_peaks(
     motion: FloatArray, weight: FloatArray, rate_hz: float, n_block: int
 ) -> tuple[FloatArray, FloatArray]:
+    """Centres and frequencies of the largest line of every half-overlapping block that is complete and moves."""
     starts = np.arange(0, max(1, motion.size - n_block + 1), max(1, n_block // 2))
+    peaks = [
+        _peaks(motion, weight, rate_hz, n_block, starts[first : first + _BLOCKS_AT_ONCE])
+        for first in range(0, starts.size, _BLOCKS_AT_ONCE)
+    ]
+    frequency, height = (np.concatenate(part) for part in zip(*peaks, strict=True))
+    good = height > _SMALLEST_RELATIVE_AMPLITUDE * height.max()
+    if not good.any() or height.max() <= 0:
+        raise AnalysisError(
+            "motion", got="no oscillation", allowed="a shaken tank", remedy="check the motion channel"
+        )
+    return ((starts + 0.5 * (n_block - 1)) / rate_hz)[good], frequency[good]
+
+
+def _peaks(
+    motion: FloatArray, weight: FloatArray, rate_hz: float, n_block: int, starts: npt.NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray]:
+    """Frequency and height of the largest line of blocks; height 0 where samples are lost."""
     blocks = np.lib.stride_tricks.sliding_window_view(motion, n_block)[starts]
     complete = np.lib.stride_tricks.sliding_window_view(weight, n_block)[starts].mean(axis=1) > 0.9
     blocks = (blocks - blocks.mean(axis=1, keepdims=True)) * np.hanning(n_block)
@@ -181,14 +200,7 @@ def _block_peaks(
     # velocity, not acceleration: it weighs a harmonic less than the fundamental
     velocity = np.where(candidate, spectrum / np.maximum(frequency, lowest), 0.0)
     peak = velocity.argmax(axis=1)
-    height = velocity[np.arange(starts.size), peak]
-    good = complete & (height > _SMALLEST_RELATIVE_AMPLITUDE * height.max())
-    if not good.any() or height.max() <= 0:
-        raise AnalysisError(
-            "motion", got="no oscillation", allowed="a shaken tank", remedy="check the motion channel"
-        )
-    centres = (starts + 0.5 * (n_block - 1)) / rate_hz
-    return centres[good], frequency[peak[good]]
+    return frequency[peak], np.where(complete, velocity[np.arange(starts.size), peak], 0.0)
 
 
 def _phase_knots(centres: FloatArray, frequency: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,70 @@
+"""Speed and memory of the shaker analysis as ratios measured in one run.
+
+Each measurement runs in a process of its own on one core. Times are processor times, the best of several
+repeats after a warm-up that compiles the kernels; the parent prints the table and says where a figure
+misses its aim.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+AIMS = {
+    "netCDF to windows.nc and maps.nc [s]": 1.5,
+    "… over reading and decoding the file": 5.0,
+    "peak memory over decoded recording": 4.0,
+    "10 × longer recording costs": 11.0,
+}
+ONE_CORE = {
+    name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+}
+
+
+def measured(what: str, *arguments: object) -> dict[str, float]:
+    """Run one measurement of `tests.benchmarks.measurements` in a process of its own."""
+    command = [sys.executable, "-m", "tests.benchmarks.measurements", what, *map(str, arguments)]
+    done = subprocess.run(command, env=os.environ | ONE_CORE, capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(done.stderr)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def main() -> None:
+    """Measure, print, and end with 1 if an aim is missed."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        print("making recordings …", flush=True)
+        measured("make", folder)
+        print("measuring …", flush=True)
+        standard = measured("analyse", folder / "standard.nc", folder)
+        memory = measured("memory", folder / "standard.nc", folder)
+        short = measured("analyse", folder / "chirp.nc", folder)
+        long = measured("analyse", folder / "chirp_10.nc", folder)
+        peer = measured("peer", folder / "standard.nc")
+        blas = measured("blas")
+    figures = {
+        "netCDF to windows.nc and maps.nc [s]": standard["analysis_s"],
+        "… over reading and decoding the file": standard["analysis_s"] / standard["read_s"],
+        "peak memory over decoded recording": memory["peak_bytes"] / memory["decoded_bytes"],
+        "10 × longer recording costs": long["analysis_s"] / short["analysis_s"],
+        "reading and decoding [s]": standard["read_s"],
+        "decoded recording [MB]": memory["decoded_bytes"] / 1e6,
+        "plain SciPy work per cycle, over ours": peer["analysis_s"] / (standard["analysis_s"] - standard["read_s"]),
+        "analysis over a 1000³ matrix product": standard["analysis_s"] / blas["product_s"],
+    }  # fmt: skip
+    missed = 0
+    for label, value in figures.items():
+        aim = AIMS.get(label)
+        verdict = "" if aim is None else f"   aim ≤ {aim:g}   {'met' if value <= aim else 'MISSED'}"
+        missed += aim is not None and value > aim
+        print(f"{label:<52}{value:>10.3g}{verdict}")
+    sys.exit(1 if missed else 0)
+
+
+if __name__ == "__main__":
+    main()

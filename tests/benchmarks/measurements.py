@@ -1,0 +1,152 @@
+"""One measurement per process: `python -m tests.benchmarks.measurements WHAT ARGUMENTS…` prints JSON."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import resource
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+RATE_HZ, DURATION_S = 10_000.0, 240.0
+RIG = """
+[tank]
+height_m = 0.0272
+length_m = 0.1172
+width_m = 0.0780
+dry_mass_kg = 0.61
+[liquid]
+density_kg_per_m3 = 1000.0
+fill_level = 0.5
+"""
+
+
+def best_of(action: Callable[[], object], n: int) -> float:
+    """Shortest processor time of `n` calls [s]; what else the machine does has no part in it."""
+    times = []
+    for _ in range(n):
+        start = time.process_time()
+        action()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def make(folder: str) -> dict[str, float]:
+    """A run of the virtual rig, and a plain chirp in two lengths."""
+    from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run, write_virtual_run
+    from sloshlab.rig import Rig
+
+    rig_file = Path(folder, "rig.toml")
+    rig_file.write_text(RIG)
+    run = virtual_shaker_run(
+        Rig.from_toml(rig_file), acceleration_g=3.0, sampling_rate_hz=RATE_HZ, duration_s=DURATION_S
+    )
+    write_virtual_run(run, Path(folder, "standard.nc"))
+    write_chirp(Path(folder, "chirp.nc"), DURATION_S)
+    write_chirp(Path(folder, "chirp_10.nc"), 10 * DURATION_S)
+    return {}
+
+
+def write_chirp(path: Path, duration_s: float) -> None:
+    """Octave sweep from 5 to 20 Hz of a damped mass, five channels of 16-bit counts."""
+    from sloshlab.recording import write_recording
+
+    t = np.arange(round(duration_s * RATE_HZ)) / RATE_HZ
+    octaves_per_s = 2.0 / duration_s
+    omega = 2 * np.pi * 5.0 * np.exp2(octaves_per_s * t)
+    phase = omega / (octaves_per_s * np.log(2))
+    acceleration = 30.0 * np.cos(phase)
+    force = 0.35 * acceleration + 1.5 * np.sin(phase)
+    rng = np.random.default_rng(0)
+    variables, encoding = {}, {}
+    for name, values, units in (
+        ("force_cell_1", force, "N"), ("force_cell_2", force, "N"), ("acceleration_roof_1", acceleration, "m s-2"),
+        ("acceleration_roof_2", acceleration, "m s-2"), ("acceleration_control", acceleration, "m s-2"),
+    ):  # fmt: skip
+        noisy = values + 0.002 * rng.standard_normal(t.size)
+        variables[name] = ("time", noisy, {"units": units, "quantity": name.partition("_")[0]})
+        encoding[name] = {"dtype": "int16", "scale_factor": 0.002, "_FillValue": np.int16(-32768), "complevel": 1}
+    attributes = {
+        "sloshlab_format": "1", "run_id": path.stem, "experiment": "shaker_sweep", "configuration": "sloshing",
+        "rig": "rig.toml", "sampling_rate_hz": RATE_HZ, "start_time_utc": "2026-01-01T00:00:00Z",
+    }  # fmt: skip
+    recording = xr.Dataset(variables, {"time": ("time", t, {"units": "s"})}, attributes)
+    write_recording(recording, path, encoding=encoding | {"time": {"complevel": 1}})
+
+
+def _analysis(recording: str, folder: str) -> Callable[[], object]:
+    from pipelines.outputs import write_experiment
+    from pipelines.shaker import ShakerSettings, analyse_shaker
+
+    settings = ShakerSettings.checked(p=6, m=24, boundaries="measured", allow_incomplete=False)
+
+    def analyse() -> None:
+        experiment = analyse_shaker([Path(recording)], [Path(folder, "rig.toml")], settings)
+        write_experiment(experiment, Path(folder, "out"), command="benchmark", report=False)
+
+    return analyse
+
+
+def analyse(recording: str, folder: str) -> dict[str, float]:
+    """Time of the whole analysis and of reading alone."""
+    from sloshlab.recording import read_recording
+
+    action = _analysis(recording, folder)
+    action()
+    n = 5 if Path(recording).stat().st_size < 30e6 else 3
+    return {"analysis_s": best_of(action, n), "read_s": best_of(lambda: read_recording(recording), n)}
+
+
+def memory(recording: str, folder: str) -> dict[str, float]:
+    """Peak memory of one analysis above that of the idle interpreter, and the size of the decoded recording.
+
+    The chirp of another process has compiled the kernels, so that no compiler is counted.
+    """
+    from sloshlab.recording import read_recording
+
+    action = _analysis(recording, folder)
+    short = Path(folder, "short.nc")
+    write_chirp(short, 20.0)
+    _analysis(str(short), folder)()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    action()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {"peak_bytes": 1024.0 * (peak - before), "decoded_bytes": float(read_recording(recording).nbytes)}
+
+
+def peer(recording: str) -> dict[str, float]:
+    """The same windows the usual way: Hilbert phase, cumulative trapezoid, high-pass, a loop over cycles."""
+    from scipy import integrate, signal
+
+    from sloshlab.recording import read_recording
+
+    run = read_recording(recording)
+
+    def analyse() -> None:
+        force = (run["force_cell_1"] + run["force_cell_2"]).values
+        acceleration = (0.5 * (run["acceleration_roof_1"] + run["acceleration_roof_2"])).values
+        phase = np.unwrap(np.angle(signal.hilbert(acceleration)))
+        velocity = integrate.cumulative_trapezoid(acceleration, dx=1 / RATE_HZ, initial=0.0)
+        sos = signal.butter(2, 0.5, "highpass", fs=RATE_HZ, output="sos")
+        velocity = signal.sosfiltfilt(sos, velocity)
+        edges = np.searchsorted(phase, 2 * np.pi * np.arange(np.ceil(phase[0] / 6.2832), phase[-1] / 6.2832))
+        [integrate.trapezoid(force[i:j] * velocity[i:j], dx=1 / RATE_HZ) for i, j in itertools.pairwise(edges)]
+
+    analyse()
+    return {"analysis_s": best_of(analyse, 3)}
+
+
+def blas() -> dict[str, float]:
+    """Time of a 1000³ matrix product."""
+    matrix = np.random.default_rng(0).standard_normal((1000, 1000))
+    return {"product_s": best_of(lambda: matrix @ matrix, 5)}
+
+
+if __name__ == "__main__":
+    chosen = {"make": make, "analyse": analyse, "memory": memory, "peer": peer, "blas": blas}[sys.argv[1]]
+    print(json.dumps(chosen(*sys.argv[2:])))
