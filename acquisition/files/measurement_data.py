@@ -79,7 +79,7 @@ def _opened(asammdf: Any, stream: BinaryIO) -> Any:
         return asammdf.MDF(stream)
     except Exception as error:
         for frame, _ in traceback.walk_tb(error.__traceback__):
-            unfinished = frame.f_locals.get("self")
+            unfinished: Any = frame.f_locals.get("self")
             if type(unfinished).__module__.startswith("asammdf") and hasattr(unfinished, "_tempfile"):
                 unfinished._tempfile.close()
                 unfinished._closed = True
