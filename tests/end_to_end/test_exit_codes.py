@@ -117,8 +117,10 @@ def test_lost_samples_cost_only_the_cycles_that_they_touch(unbroken_and_broken: 
     assert 1 <= int(near.sum()) <= 3
     far_away = np.flatnonzero(~near.values)
     partner = np.array([int(np.abs(broken.time_s.values - t).argmin()) for t in whole.time_s.values])
+    # the knots of the phase lie elsewhere after a gap, which moves boundaries by up to 0.15 ms; that cycles with
+    # the same boundaries do not change at all is shown in tests/property/test_sweep_properties.py
     for name in ("time_s", "work_j", "beta", "gamma_kg_per_s", "frequency_hz"):
-        np.testing.assert_allclose(broken[name].values[partner[far_away]], whole[name].values[far_away], rtol=1e-6)
+        np.testing.assert_allclose(broken[name].values[partner[far_away]], whole[name].values[far_away], rtol=1e-4)
     touched = broken.n_cycles.values[partner[near.values]]
     # 88 ms at 9 Hz lie in two cycles; the six samples that an integral needs beside may touch a third
     assert 1 <= int((12 - touched).sum()) <= 3
