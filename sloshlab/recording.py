@@ -285,11 +285,18 @@ def _decoded(source: Any, name: str, maximum_decoded_bytes: int) -> xr.Dataset:
             variables[channel] = xr.Variable(variable.dimensions, variable[...], stored)
     if not any("quantity" in variable.attrs for variable in variables.values()):
         raise _no_channel(name)
-    recording = xr.Dataset(
-        variables, coords={"time": ("time", time, {"units": "s"})}, attrs=_attributes_of(source)
-    )
+    recording = xr.Dataset(variables, coords=_time_coordinate(time), attrs=_attributes_of(source))
+    recording["time"].attrs["units"] = "s"
     _check_lost_are_flagged(recording, name)
     return recording
+
+
+def _time_coordinate(time: np.ndarray) -> xr.Coordinates:
+    """Coordinate whose index is the array itself; built from values it would be a copy."""
+    import pandas as pd
+    from xarray.indexes import PandasIndex
+
+    return xr.Coordinates.from_xindex(PandasIndex(pd.Index(time, copy=False), "time"))
 
 
 def _check_size(source: Any, n_samples: int, name: str, maximum_decoded_bytes: int) -> None:
