@@ -144,7 +144,7 @@ def error_text(maps: EnergyMaps, name: str, symbol: str, unit: str = "") -> str:
     result = maps.validation.get(name)
     if result is None:
         return ""
-    factor, unit = prefixed_unit([result.left_out_windows_rms], unit) if unit else (1.0, "")
+    factor, unit = (1e3, "g") if unit == "kg" and result.left_out_windows_rms < 0.5 else (1.0, unit)
     lines = [f"window left out: {text(factor * result.left_out_windows_rms, 2)} {unit}".rstrip()]
     if np.isfinite(result.left_out_runs_rms):
         lines.append(f"run left out: {text(factor * result.left_out_runs_rms, 2)} {unit}".rstrip())
@@ -337,13 +337,14 @@ def isolines(name: str, rigs: Sequence[RigResult], share: float = 0.85) -> Repor
         )
         row, column = np.unravel_index(int(np.nanargmax(field.values)), field.values.shape)
         axes.plot(field.abscissa[column], field.ordinate[row], "+", color=colour, ms=9, mew=1.6)
-        axes.plot([], [], color=colour, lw=1.8, label=f"{rig_text(rig)}: {share:.0%} of {text(largest)}")
+        axes.plot([], [], color=colour, lw=1.8, label=f"{rig_text(rig)}: {100 * share:.0f} % of {text(largest)}")
     figure.legend(loc="outside upper center", ncols=min(len(rigs), 3))
     same_tank = len({rig.rig.tank.height_m for rig in rigs}) == 1
     if same_tank:
         add_dimensional_twins(axes, plane)
     caption = (
-        f"Lines on which W̄ is {share:.0%} of its maximum (crosses) for each fill level: where on the plane the "
+        f"Lines on which W̄ is {100 * share:.0f} % of its maximum (crosses) for each fill level: where on "
+        "the plane the "
         "liquid dissipates best, and how far this region reaches. A line that ends is cut by the border of the "
         "measured region."
     )

@@ -11,8 +11,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.report.figure import NothingToDrawError, ReportFigure
+from pipelines.report.figures_runs import run_label
 from pipelines.report.numbers import prefixed_unit
-from pipelines.report.selection import by_level, level_text
+from pipelines.report.selection import by_level
 from pipelines.report.style import (
     DISTINCT_COLOURS,
     DISTINCT_MARKERS,
@@ -104,7 +105,7 @@ def phase_lines(runs: Sequence[RunResult], *, by_name: bool) -> tuple[PhaseLine,
         windows = run.windows.sortby("time_s")
         error = windows["phase_error_rad"].values
         if np.isfinite(error).any():
-            label = plain(run.attributes.run_id, 26) if by_name else level_text(run)
+            label = plain(run.attributes.run_id, 26) if by_name else run_label(run)
             lines.append(PhaseLine(label, windows["time_s"].values, error - float(np.nanmedian(error))))
     return tuple(lines)
 

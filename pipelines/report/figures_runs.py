@@ -53,7 +53,7 @@ def run_paths(runs: Sequence[RunResult], *, by_level: bool = True) -> tuple[RunP
         windows = run.windows.sortby("time_s")
         paths.append(
             RunPath(
-                _label(run) if by_level else plain(run.attributes.run_id, 24),
+                run_label(run) if by_level else plain(run.attributes.run_id, 24),
                 windows["frequency_hz"].values,
                 windows["amplitude_m"].values,
                 windows["acceleration_g"].values,
@@ -63,7 +63,8 @@ def run_paths(runs: Sequence[RunResult], *, by_level: bool = True) -> tuple[RunP
     return tuple(paths)
 
 
-def _label(run: RunResult) -> str:
+def run_label(run: RunResult) -> str:
+    """Level and what distinguishes the run from others of that level."""
     notes = [] if goes_up(run) else ["down"]
     notes += [] if is_sweep(run) else ["VFA"]
     notes += [f"repeat {run.attributes.repeat}"] if (run.attributes.repeat or 1) > 1 else []
@@ -172,7 +173,7 @@ def _add_time_axis(axes: Axes, law: SweepLaw) -> None:
 def law_text(law: SweepLaw) -> str:
     """The law of a sweep in words."""
     if law.kind is LawKind.OCTAVE:
-        return f"{law.start_hz:.4g} Hz at the trigger, {60 * law.rate:.4g} octaves per minute"
+        return f"{law.start_hz:.4g} Hz at the trigger, {60 * law.rate:.4g} octaves per minute".replace("-", "−")
     if law.kind is LawKind.LINEAR:
-        return f"{law.start_hz:.4g} Hz at the trigger, {law.rate:.4g} Hz/s"
+        return f"{law.start_hz:.4g} Hz at the trigger, {law.rate:.4g} Hz/s".replace("-", "−")
     return "stepped" if law.kind is LawKind.STEPPED else "free"

@@ -29,6 +29,17 @@ def text(value: float | None, digits: int = 3) -> str:
     return shown.replace("-", "−")
 
 
+def signed(value: float, decimals: int = 1) -> str:
+    """A number with its sign, for changes.
+
+    Examples
+    --------
+    >>> signed(-3.94), signed(0.5)
+    ('−3.9', '+0.5')
+    """
+    return f"{value:+.{decimals}f}".replace("-", "−")
+
+
 def interval(values: Iterable[float], digits: int = 3) -> str:
     """Smallest and largest finite value as ``"a … b"``.
 

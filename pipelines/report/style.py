@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 DOTS_PER_INCH: Final = 160
+_N_COLOURS: Final = 256
 WIDTH_INCH: Final = 6.7
 """Width of a figure: the text width of an A4 page, so that fonts print at the size given here."""
 
@@ -83,10 +84,30 @@ def new_figure(height_inch: float, width_inch: float = WIDTH_INCH) -> Figure:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """The figure as PNG without date or software version: same figure, same bytes."""
+    """The figure as PNG with a palette, a third of the size, and without date: same figure, same bytes."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    height, width, _ = pixels.shape
+    image = Image.fromarray(np.vstack([pixels, _swatches(width)]))
+    reduced = image.quantize(_N_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    reduced.crop((0, 0, width, height)).save(buffer, format="PNG", dpi=(DOTS_PER_INCH, DOTS_PER_INCH))
     return buffer.getvalue()
+
+
+def _swatches(width: int) -> npt.NDArray[np.uint8]:
+    """Rows of the colours of small marks: the palette is cut by area and would drop them; shape (24, width, 3)."""
+    from matplotlib.colors import to_rgb
+
+    regimes = [colour for colour, _ in REGIME_MARKS.values()]
+    marks = [REFERENCE_COLOUR, MODE_COLOUR, ACCELERATION_COLOUR, NEUTRAL_COLOUR, *DISTINCT_COLOURS, *regimes]
+    colours = np.round(255 * np.array([to_rgb(colour) for colour in marks])).astype(np.uint8)
+    row = colours[np.arange(width) * len(marks) // width]
+    return np.broadcast_to(row, (24, width, 3))
 
 
 def negative_colours() -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipelines.report.figure import NothingToDrawError
 from pipelines.report.figures_response import responses
-from pipelines.report.numbers import interval, text
+from pipelines.report.numbers import interval, signed, text
 from pipelines.report.selection import by_level, is_sweep, level_g, rig_text, runs_of
 from sloshlab.constants import GRAVITY_M_PER_S2
 
@@ -64,7 +64,7 @@ def _onset(rig: RigResult, runs: Sequence[RunResult]) -> str:
     onset = onset_g(runs, ONSET_SHARE * largest) if largest > 0 else math.nan
     if not math.isfinite(onset):
         return ""
-    return f"It exceeds {ONSET_SHARE:.0%} of this, on the mean over a level, from {onset:.2g} g."
+    return f"It exceeds {100 * ONSET_SHARE:.0f} % of this, on the mean over a level, from {onset:.2g} g."
 
 
 def onset_g(runs: Sequence[RunResult], threshold: float) -> float:
@@ -120,7 +120,7 @@ def _work_sentences(experiment: SweepExperiment) -> tuple[str, ...]:
         lines.append(
             f"The largest acceleration moves from {weak.loudest_hz:.2f} Hz ({weak.label}, "
             f"{weak.loudest_g:.2g} g) to "
-            f"{strong.loudest_hz:.2f} Hz ({strong.label}, {strong.loudest_g:.2g} g), {change:+.1f} %: the "
+            f"{strong.loudest_hz:.2f} Hz ({strong.label}, {strong.loudest_g:.2g} g), {signed(change)} %: the "
             f"mode {word}."
         )
     at = int(np.nanargmax(windows["work_j"].values))

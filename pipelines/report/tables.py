@@ -13,7 +13,7 @@ import xarray as xr
 from pipelines.report.figures_quality import identity_difference
 from pipelines.report.figures_response import responses
 from pipelines.report.figures_runs import law_text
-from pipelines.report.numbers import MISSING, interval, prefixed_unit, text
+from pipelines.report.numbers import MISSING, interval, prefixed_unit, signed, text
 from pipelines.report.selection import REFERENCE_FREQUENCIES_HZ, by_level, is_sweep, level_g, rig_text, runs_of
 from sloshlab import viscous_equivalent
 from sloshlab.errors import SloshlabError
@@ -134,7 +134,7 @@ def dry_mass_table(rigs: Sequence[RigResult]) -> Table:
                 rig.name,
                 text(believed, 4),
                 f"{dry.mass_kg:.4f} ± {text(dry.mass_std_kg, 2)}",
-                f"{100 * (dry.mass_kg / believed - 1):+.2f}".replace("-", "−"),
+                signed(100 * (dry.mass_kg / believed - 1), 2),
                 gain,
                 text(1e6 * dry.delay_s, 2),
                 ", ".join(dry.source_runs),
@@ -323,7 +323,7 @@ def validation_table(experiment: SweepExperiment) -> Table:
             "map of",
             "quantity",
             "unit",
-            "every tenth window left out (RMS)",
+            "windows left out (RMS)",
             "whole runs left out (RMS)",
             "smoothing",
         ),
