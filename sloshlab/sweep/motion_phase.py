@@ -26,8 +26,14 @@ _DEMODULATION_RATE_HZ = 1000.0
 _KNOTS_PER_CYCLE = 1.0
 _CYCLES_PER_BLOCK = 8.0
 _BLOCKS_AT_ONCE = 16
+_STRONG_LINE = 0.4
+"""The fundamental has at least this part of the largest line of a block."""
+_LOBE_LINES = 13
+"""Lines from the foot of a line to beyond its top, under a Hann window padded to four times its length."""
 _WINDOW_CYCLES = 2.0
 _SMALLEST_RELATIVE_AMPLITUDE = 2e-3
+_SMALLEST_SHARE_OF_POWER = 0.1
+"""Where the fundamental has less of the power than this, there is noise and no motion."""
 _LARGEST_PHASE_JUMP_RAD = 0.7
 
 
@@ -119,9 +125,10 @@ def measured_phase(
     for iteration in range(3):
         spline = CubicSpline(times, phase)
         window_s = _WINDOW_CYCLES * 2 * np.pi / np.maximum(spline(times, 1), 1e-6)
-        z, lost = _demodulated(decimated, weight, rate_hz, times, window_s, spline.c, spline.x)
+        z, power, lost = _demodulated(decimated, weight, rate_hz, times, window_s, spline.c, spline.x)
         amplitude = np.abs(z)
         moving = (amplitude > _SMALLEST_RELATIVE_AMPLITUDE * amplitude.max()) & ~lost
+        moving &= 0.5 * amplitude**2 > _SMALLEST_SHARE_OF_POWER * power
         correction = _unwrapped(np.angle(z), moving)
         phase = spline(times) + correction
         if iteration == 0:
@@ -196,11 +203,13 @@ def _peaks(
     spectrum = np.abs(np.fft.rfft(blocks, 4 * n_block, axis=1))
     frequency = np.fft.rfftfreq(4 * n_block, 1 / rate_hz)
     lowest = 2.0 * rate_hz / n_block
-    candidate = (frequency > lowest) & (frequency < 0.4 * rate_hz)
-    # velocity, not acceleration: it weighs a harmonic less than the fundamental
-    velocity = np.where(candidate, spectrum / np.maximum(frequency, lowest), 0.0)
-    peak = velocity.argmax(axis=1)
-    return frequency[peak], np.where(complete, velocity[np.arange(starts.size), peak], 0.0)
+    spectrum[:, (frequency < lowest) | (frequency > 0.4 * rate_hz)] = 0.0
+    # the fundamental is the first strong line, a harmonic may be the strongest
+    first = (spectrum >= _STRONG_LINE * spectrum.max(axis=1, keepdims=True)).argmax(axis=1)
+    lobe = np.minimum(first[:, None] + np.arange(_LOBE_LINES), frequency.size - 1)
+    rows = np.arange(starts.size)
+    peak = lobe[rows, spectrum[rows[:, None], lobe].argmax(axis=1)]
+    return frequency[peak], np.where(complete, spectrum[rows, peak], 0.0)
 
 
 def _phase_knots(centres: FloatArray, frequency: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
@@ -262,12 +271,15 @@ def _demodulated(
     window_s: FloatArray,
     coefficients: FloatArray,
     breaks: FloatArray,
-) -> tuple[npt.NDArray[np.complex128], BoolArray]:
-    """Mean of motion·e^{-jφ} under a Hann window at each knot; True where samples were lost.
+) -> tuple[npt.NDArray[np.complex128], FloatArray, BoolArray]:
+    """Amplitude, twice the mean of motion·e^{-jφ}, and mean square under a Hann window at each knot.
+
+    The third result is True where samples were lost.
 
     ``coefficients`` and ``breaks`` are those of the cubic spline φ(t).
     """
     result = np.zeros(times.size, dtype=np.complex128)
+    power = np.zeros(times.size)
     lost = np.zeros(times.size, dtype=np.bool_)
     last_piece = breaks.size - 2
     for k in range(times.size):
@@ -275,7 +287,7 @@ def _demodulated(
         first = max(0, int(np.ceil((times[k] - half) * rate_hz)))
         last = min(motion.size - 1, int(np.floor((times[k] + half) * rate_hz)))
         piece = max(0, min(last_piece, k))
-        total, norm, present = 0.0 + 0.0j, 0.0, 0.0
+        total, square, norm, present = 0.0 + 0.0j, 0.0, 0.0, 0.0
         while piece > 0 and breaks[piece] > first / rate_hz:
             piece -= 1
         for i in range(first, last + 1):
@@ -288,10 +300,12 @@ def _demodulated(
             ) * x + coefficients[3, piece]
             w = 0.5 + 0.5 * np.cos(np.pi * (t - times[k]) / half)
             total += w * weight[i] * motion[i] * (np.cos(phi) - 1j * np.sin(phi))
+            square += w * weight[i] * motion[i] ** 2
             norm += w
             present += w * weight[i]
         expected = 0.5 * window_s[k] * rate_hz
         lost[k] = norm == 0.0 or present < 0.999 * norm or norm < 0.98 * expected
         if norm > 0.0:
             result[k] = 2.0 * total / norm
-    return result, lost
+            power[k] = square / norm
+    return result, power, lost
