@@ -1,0 +1,163 @@
+"""The documentation says what the program does: commands, options, variables, pages and examples."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+import typer.main
+import yaml
+
+from pipelines.command_line import app
+from sloshlab import __version__
+from sloshlab.quantities import QUANTITIES
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+DOCS = REPOSITORY / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+COMMANDS = typer.main.get_command(app).commands
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+NAMED_FILE = re.compile(r"^`([\w.]+\.\w+)`:[^`]*?\n\n```\w+\n(.*?)^```", re.MULTILINE | re.DOTALL)
+LOCAL_LINK = re.compile(r"\]\((?!https?://|#)([^)#\s]+)")
+
+
+def section_of(command: str) -> str:
+    """The part of docs/commands.md about one command."""
+    text = (DOCS / "commands.md").read_text(encoding="utf-8")
+    parts = re.split(r"^## ", text, flags=re.MULTILINE)
+    return next((part for part in parts if part.startswith(f"sloshlab {command}\n")), "")
+
+
+def tracked_text_files() -> list[Path]:
+    """Files that git tracks and that are text."""
+    try:
+        listed = subprocess.run(["git", "ls-files", "-z"], cwd=REPOSITORY, capture_output=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("not a git checkout: tracked files are not known")
+    paths = [REPOSITORY / name for name in listed.decode().split("\0") if name]
+    return [path for path in paths if path.is_file() and b"\0" not in path.read_bytes()[:4096]]
+
+
+def test_the_documented_commands_are_those_of_the_program() -> None:
+    text = (DOCS / "commands.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## sloshlab (\w+)$", text, flags=re.MULTILINE) == list(COMMANDS)
+    readme = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `sloshlab (\w+)", readme, flags=re.MULTILINE)) == set(COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_option_is_documented_and_no_other(command: str) -> None:
+    options = {
+        name for parameter in COMMANDS[command].params for name in parameter.opts if name.startswith("-")
+    } - {"-h", "--help"}
+    section = section_of(command)
+    rows = "\n".join(line.split("|")[1] for line in section.splitlines() if line.startswith("| `-"))
+    assert set(re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", rows)) == options
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_documented_defaults_are_those_of_the_program(command: str) -> None:
+    rows = [line.split("|") for line in section_of(command).splitlines() if line.startswith("| `-")]
+    for parameter in COMMANDS[command].params:
+        if not isinstance(parameter.default, int | float) or isinstance(parameter.default, bool):
+            continue
+        [row] = [row for row in rows if re.search(rf"`{parameter.opts[0]}[ `]", row[1])]
+        assert row[-3].strip() == str(parameter.default)
+
+
+def test_every_variable_of_the_results_is_documented() -> None:
+    text = (DOCS / "results.md").read_text(encoding="utf-8")
+    missing = [name for name in QUANTITIES if f"`{name}`" not in text]
+    # standard errors of maps are described together
+    assert [name for name in missing if not name.endswith("_std")] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of one page share their names; files that the page shows under their names are there."""
+    text = page.read_text(encoding="utf-8")
+    blocks = [code for language, code in FENCE.findall(text) if language == "python"]
+    if not blocks:
+        pytest.skip("no Python on this page")
+    for name, content in NAMED_FILE.findall(text):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "documentation"}
+    for code in blocks:
+        exec(compile(code, str(page), "exec"), names)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_toml_examples_are_toml(page: Path) -> None:
+    for language, code in FENCE.findall(page.read_text(encoding="utf-8")):
+        if language == "toml":
+            tomllib.loads(code)
+
+
+def test_the_map_shown_for_the_f16_sweeps_is_in_the_example() -> None:
+    shown = next(
+        code for language, code in FENCE.findall((DOCS / "f16.md").read_text("utf-8")) if language == "toml"
+    )
+    example = tomllib.loads((DOCS / "examples" / "f16_sweep.toml").read_text(encoding="utf-8"))
+    part = tomllib.loads(shown)
+    assert part["source"] == example["source"]
+    assert part["channels"] == {name: example["channels"][name] for name in part["channels"]}
+    assert part["channels"]
+
+
+def test_the_navigation_lists_every_page() -> None:
+    def pages(entry: object) -> list[str]:
+        if isinstance(entry, str):
+            return [entry]
+        nested = entry.values() if isinstance(entry, dict) else entry
+        return [page for one in nested for page in pages(one)]
+
+    settings = yaml.safe_load((REPOSITORY / "mkdocs.yml").read_text(encoding="utf-8"))
+    assert sorted(pages(settings["nav"])) == [str(page.relative_to(DOCS)) for page in PAGES]
+    assert settings["theme"]["font"] is False
+    assert not {"extra_javascript", "extra_css"} & settings.keys()
+
+
+def test_the_citation_file_is_complete_and_of_this_version() -> None:
+    citation = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["cff-version"] == "1.2.0"
+    assert str(citation["version"]) == __version__
+    assert {"message", "title", "authors"} <= citation.keys()
+    assert all({"type", "title", "authors"} <= reference.keys() for reference in citation["references"])
+
+
+def test_the_first_screen_of_the_readme_has_two_commands_and_a_picture() -> None:
+    first_screen = (REPOSITORY / "README.md").read_text(encoding="utf-8").partition("\n## ")[0]
+    [(language, code)] = FENCE.findall(first_screen)
+    assert language == "sh"
+    assert [line.split("#")[0].strip() for line in code.splitlines()] == ["make shaker", "make test"]
+    assert len(re.findall(r"!\[", first_screen)) == 1
+    assert len(first_screen.splitlines()) <= 25
+
+
+@pytest.mark.parametrize("page", [REPOSITORY / "README.md", *PAGES], ids=lambda page: page.stem)
+def test_local_links_lead_somewhere(page: Path) -> None:
+    targets = LOCAL_LINK.findall(page.read_text(encoding="utf-8"))
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def test_make_targets_that_are_named_exist() -> None:
+    makefile = (REPOSITORY / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z-]+):", makefile, flags=re.MULTILINE))
+    named: set[str] = set()
+    for page in [REPOSITORY / "README.md", *PAGES]:
+        named |= set(re.findall(r"(?:`|^)make ([a-z-]+)", page.read_text(encoding="utf-8"), flags=re.MULTILINE))
+    assert {"shaker", "test", "bench", "docs"} <= named <= targets
+
+
+def test_no_path_of_one_machine_is_tracked() -> None:
+    roots = "|".join(("work", "root", "tmp", "home/[a-z]", "Users/[A-Za-z]", "var/folders"))
+    pattern = re.compile(rf"(?<![\w.)}}\"'*-])/(?:{roots})(?![\w-])|(?<=[\"'])/(?:{roots})/")
+    found = []
+    for path in tracked_text_files():
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        found += [f"{path.name}:{number}" for number, line in enumerate(lines, 1) if pattern.search(line)]
+    assert found == []
