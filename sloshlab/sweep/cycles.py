@@ -52,6 +52,8 @@ class Cycles:
         Largest |d| of the cycle [N].
     inertia_kg : float
         m_i.
+    velocity_is_measured : bool
+        False if the velocity was integrated from the acceleration.
     """
 
     start_s: FloatArray
@@ -65,6 +67,7 @@ class Cycles:
     dynamic_power: FloatArray
     dynamic_peak: FloatArray
     inertia_kg: float
+    velocity_is_measured: bool = False
 
     @cached_property
     def omega_rad_per_s(self) -> FloatArray:
@@ -147,6 +150,7 @@ def evaluate_cycles(
         dynamic_power=scalars[:, _POWER],
         dynamic_peak=scalars[:, _PEAK],
         inertia_kg=inertia_kg,
+        velocity_is_measured=motion_is_velocity,
     )
 
 

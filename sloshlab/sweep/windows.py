@@ -13,15 +13,16 @@ import xarray as xr
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.quantities import described
 from sloshlab.rig import Rig
-from sloshlab.sweep.cycles import Cycles
+from sloshlab.sweep.cycles import N_HARMONICS, Cycles
 from sloshlab.sweep.law import SweepLaw
 from sloshlab.sweep.regime import classify
-from sloshlab.sweep.stored_energy import stored_work
+from sloshlab.sweep.stored_energy import Changes, stored_work
 
 FloatArray = npt.NDArray[np.float64]
 
 _LARGEST_CHANGE_PER_CYCLE = 0.02
 """A frequency that changes by more than this from one cycle to the next starts a new step."""
+_CHANGES = ("elastic_change_m2", "kinetic_change_m2_per_s2", "chirp_m2_per_s2")
 _SETTLING_CYCLES = 4
 """Cycles left out on each side of a step: the phase is smoothed over two cycles and a spline."""
 _OUTLIER_SIGMA, _SMALLEST_OUTLIER = 5.0, 5e-4
@@ -110,24 +111,26 @@ def evaluate_windows(
         at = _steady(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
         if at.size >= chosen.smallest_n_cycles:
             rows.append(_row(cycles, at, law, start_time_s, rig, noise_power))
-    _take_out_stored_energy(rows)
+    _take_out_stored_energy(rows, velocity_is_measured=cycles.velocity_is_measured)
     if rig is not None:
         for row in rows:
             row.update(_scaled(row, cycles.inertia_kg, rig))
     return described(_table(rows, run_id, rig))
 
 
-def _take_out_stored_energy(rows: list[dict[str, object]]) -> None:
+def _take_out_stored_energy(rows: list[dict[str, object]], *, velocity_is_measured: bool) -> None:
     """Turn the work of the force into the dissipated work, in place."""
-    names = (
-        "frequency_hz",
-        "apparent_mass_kg",
-        "amplitude_m",
-        "change_of_squared_amplitude_m2",
-        "change_of_log_omega",
+
+    def column(name: str) -> FloatArray:
+        return np.array([_number(row, name) for row in rows])
+
+    changes = Changes(*(column(name) for name in _CHANGES))
+    stored = stored_work(
+        2 * np.pi * column("frequency_hz"),
+        column("apparent_mass_kg"),
+        changes,
+        velocity_is_measured=velocity_is_measured,
     )
-    frequency, *others = (np.array([_number(row, name) for row in rows]) for name in names)
-    stored = stored_work(2 * np.pi * frequency, *others)
     for row, in_loop, in_phasors in zip(rows, stored.in_loop, stored.in_phasors, strict=True):
         omega = 2 * np.pi * _number(row, "frequency_hz")
         speed2 = (omega * _number(row, "amplitude_m")) ** 2
@@ -166,6 +169,7 @@ def _row(
     work, force, velocity = cycles.work_j[at], cycles.force_phasor[at, 0], cycles.velocity_phasor[at]
     acceleration = cycles.acceleration_phasor[at, 0]
     speed2, accel2 = np.abs(velocity) ** 2, np.abs(acceleration) ** 2
+    cos2 = acceleration.real**2 / accel2
     gamma = float((force * velocity.conj()).real.mean() / speed2.mean())
     mass = float((force * acceleration.conj()).real.mean() / accel2.mean())
     row: dict[str, object] = {
@@ -183,8 +187,9 @@ def _row(
         "dissipated_mass_kg": float(work.mean() / speed2.mean()),
         "dissipated_mass_kg_std": _standard_error(work, at) / float(speed2.mean()),
         "harmonic_amplitude_n": np.abs(cycles.dynamic_phasor[at].mean(axis=0)),
-        "change_of_squared_amplitude_m2": _slope(at, speed2 / omega**2),
-        "change_of_log_omega": _slope(at, np.log(omega)),
+        "elastic_change_m2": _slope(at, speed2 / omega**2 * cos2),
+        "kinetic_change_m2_per_s2": _slope(at, speed2 * (1 - cos2)),
+        "chirp_m2_per_s2": float((speed2 * (2 * cos2 - 1)).mean()) * _slope(at, np.log(omega)),
         "stored_work_j": 0.0,
     }
     row.update(_regime(cycles, at, row, rig, noise_power))
@@ -253,8 +258,9 @@ def _regime(
     pairs = at[_pair_starts(at)]
     subharmonic = 0.5 * (cycles.subharmonic_phasor[pairs] + cycles.subharmonic_phasor[pairs + 1])
     mass = rig.liquid_mass_kg if rig is not None else abs(_number(row, "apparent_mass_kg"))
+    lead = np.angle(cycles.acceleration_phasor[at, 0])
     regime = classify(
-        cycles.dynamic_phasor[at],
+        cycles.dynamic_phasor[at] * np.exp(-1j * np.outer(lead, np.arange(1, N_HARMONICS + 1))),
         subharmonic,
         cycles.dynamic_power[at],
         cycles.dynamic_peak[at],
@@ -310,7 +316,7 @@ def _empty_names(rig: Rig | None) -> list[str]:
         "work_harmonic_j", "phase_error_rad", "gamma_kg_per_s", "apparent_mass_kg", "dissipated_mass_kg",
         "dissipated_mass_kg_std", "harmonic_amplitude_n", "subharmonic_amplitude_n", "regime", "force_ratio",
         "subharmonic_share", "harmonic_share", "unrepeated_share", "crest_factor",
-        "change_of_squared_amplitude_m2", "change_of_log_omega", "stored_work_j",
+        *_CHANGES, "stored_work_j",
     ]  # fmt: skip
     scaled = ["w_bar", "w_bar_std", "beta", "beta_std", "loss_factor", "omega_bar", "u_bar", "v_bar", "fill_level"]
     return names + (scaled if rig is not None else [])

@@ -33,7 +33,7 @@ def motion(knots_s, frequency_hz, acceleration_m_per_s2, *, sampling_rate_hz=200
     amplitude = spline(
         knots, np.asarray(acceleration_m_per_s2, float) / (2 * np.pi * np.asarray(frequency_hz)) ** 2
     )
-    t = np.arange(int(round(knots[-1] * sampling_rate_hz)) + 1) / sampling_rate_hz
+    t = np.arange(round(knots[-1] * sampling_rate_hz) + 1) / sampling_rate_hz
     phi, w, w1 = omega.antiderivative()(t), omega(t), omega.derivative()(t)
     a, a1, a2 = amplitude(t), amplitude.derivative()(t), amplitude.derivative(2)(t)
     cos, sin = np.cos(phi), np.sin(phi)

@@ -118,6 +118,25 @@ def test_a_spring_alone_seems_to_feed_energy_until_its_stored_energy_is_taken_ou
     assert np.abs(windows.work_j / fall).max() < 0.02
 
 
+@pytest.mark.parametrize("phase_from", ["acceleration", "velocity", "between"])
+@pytest.mark.parametrize("kind", ["viscous", "cubic", "coulomb"])
+@pytest.mark.parametrize("channel", ["acceleration", "velocity"])
+def test_work_does_not_depend_on_where_a_cycle_begins(phase_from, kind, channel):
+    """Cycles may be counted by another signal, as the shaker's voltage; then other energies are stored."""
+    motion = sweep("octave_up")
+    sin, cos = np.sin(motion.phase_rad), np.cos(motion.phase_rad)
+    counted = {"acceleration": cos, "velocity": sin, "between": np.cos(motion.phase_rad + 0.6)}[phase_from]
+    phase = measured_phase(counted, None, 2000.0)
+    cycles = evaluate_cycles(
+        forces(motion)[kind], getattr(motion, channel), phase.cycle_boundaries_s(), sampling_rate_hz=2000.0,
+        motion_is_velocity=channel == "velocity",
+    )  # fmt: skip
+    windows = evaluate_windows(cycles, run_id="run", law=None, settings=SETTINGS)
+    work, gamma = expected(kind, *truth(motion, windows))
+    np.testing.assert_allclose(windows.work_j, work, rtol=5e-3)
+    np.testing.assert_allclose(windows.gamma_kg_per_s, gamma, rtol=5e-3)
+
+
 def test_mass_with_noise_does_no_work_within_its_scatter():
     motion = sweep("octave_up")
     windows = windows_of(motion, MASS * motion.acceleration, noise=0.01, seed=5)
