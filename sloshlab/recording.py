@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from sloshlab import atomic_file
 from sloshlab.errors import RecordingError, UnitsError
+from sloshlab.file_structure import require_sound_structure
 from sloshlab.units import SI_UNITS, factor_to_si
 
 FORMAT: Final = "1"
@@ -153,6 +154,7 @@ def _opened(file: Path) -> Iterator[Any]:
     if not file.is_file():
         raise RecordingError(f"recording {file}", got="no such file", allowed="a netCDF-4 file")
     try:
+        require_sound_structure(file)
         with netCDF4.Dataset(file, mode="r") as source:
             source.set_auto_maskandscale(False)
             yield source
