@@ -8,6 +8,7 @@ leaving whole runs out.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,7 @@ DEFAULT_SMOOTHING = 1e-2
 _SMALLEST_RELATIVE_STD = 0.25
 """Standard errors below this part of the median are raised to it: a few cycles may agree by chance."""
 _LARGEST_NUMBER_OF_POINTS = 20_000
-_LARGEST_NUMBER_TO_CHOOSE_BY = 400
+_LARGEST_NUMBER_TO_CHOOSE_BY = 600
 
 
 @dataclass(frozen=True)
@@ -117,23 +118,27 @@ def interpolated(
 def cross_validation(field: ScatteredField, *, n_folds: int = 5) -> CrossValidation:
     """Choose coordinates and smoothing, and estimate the error of the map at points not measured.
 
-    Whole runs are left out to choose. With fewer than three runs there is nothing between runs to choose
-    by, and the first coordinates with `DEFAULT_SMOOTHING` are taken. The error reported belongs to the
-    choice made by it and is therefore slightly optimistic; twelve candidates leave little to choose from.
+    The smoothing answers to the scatter of the windows: for each kind of coordinates every fifth window is left
+    out. The coordinates answer to the gaps between runs: whole runs are left out. With fewer than three
+    runs there is nothing to choose by, and the first coordinates with `DEFAULT_SMOOTHING` are taken. The
+    errors reported belong to the choice made by them and are therefore slightly optimistic; twelve candidates
+    leave little to choose from.
     """
-    thinned = _thinned(field)
-    folds = _inner_runs(thinned)
-    coordinates, smoothing = next(iter(field.coordinates)), DEFAULT_SMOOTHING
-    if folds:
-        candidates = [(name, smoothing) for name in field.coordinates for smoothing in SMOOTHINGS]
-        errors = [_left_out_rms(thinned, folds, *candidate) for candidate in candidates]
-        coordinates, smoothing = candidates[int(np.argmin(errors))]
     runs = _inner_runs(field)
+    chosen = (next(iter(field.coordinates)), DEFAULT_SMOOTHING)
+    if runs:
+        thinned = _thinned(field)
+        folds = _every(thinned, n_folds)
+        smoothest = {
+            name: min(SMOOTHINGS, key=functools.partial(_left_out_rms, thinned, folds, name))
+            for name in field.coordinates
+        }
+        chosen = min(smoothest.items(), key=lambda candidate: _left_out_rms(field, runs, *candidate))
     return CrossValidation(
-        left_out_windows_rms=_left_out_rms(field, _every(field, n_folds), coordinates, smoothing),
-        left_out_runs_rms=_left_out_rms(field, runs, coordinates, smoothing),
-        coordinates=coordinates,
-        smoothing=smoothing,
+        left_out_windows_rms=_left_out_rms(field, _every(field, n_folds), *chosen),
+        left_out_runs_rms=_left_out_rms(field, runs, *chosen),
+        coordinates=chosen[0],
+        smoothing=chosen[1],
     )
 
 
