@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 
-ISO_LEVELS_G = (0.001, 0.003, 0.01, 0.03, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0, 20.0, 50.0)
+BULLET: Final[dict[str, Any]] = {
+    "marker": "o", "ms": 5.5, "mfc": REFERENCE_COLOUR, "mec": "white", "mew": 0.8, "ls": "none", "zorder": 7,
+}  # fmt: skip
+"""How a reference point looks."""
+ISO_LEVELS_G: Final = (0.001, 0.003, 0.01, 0.03, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0, 20.0, 50.0)
 
 
 @dataclass(frozen=True)
@@ -169,8 +173,8 @@ def draw_points(axes: Axes, plane: Plane, points: Iterable[Point]) -> None:
         axes.plot(
             plane.abscissa(point.frequency_hz, point.acceleration_g),
             plane.ordinate(point.frequency_hz),
-            marker="o", ms=5.5, mfc=REFERENCE_COLOUR, mec="white", mew=0.8, ls="none", zorder=7,
-        )  # fmt: skip
+            **BULLET,
+        )
 
 
 def mode_frequency_hz(rig: Rig) -> float | None:

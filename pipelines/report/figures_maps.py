@@ -253,14 +253,11 @@ def mark_maximum(axes: Axes, field: MapField) -> None:
 
 def surface(name: str, maps: EnergyMaps, windows: xr.Dataset) -> ReportFigure:
     """Data points and the interpolated surface (Fig. 1.10)."""
-    from mpl_toolkits.mplot3d.axes3d import Axes3D
-
     field = work_field(maps.dataset)
     factor, _ = prefixed_unit(maps.dataset["work_j"].values, "J")
     length_factor, _ = prefixed_unit(maps.dataset["amplitude_m"].values, "m")
     figure = new_figure(4.4)
-    axes = figure.add_subplot(projection="3d", computed_zorder=False)
-    assert isinstance(axes, Axes3D)
+    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
     abscissa, ordinate = np.meshgrid(field.abscissa, field.ordinate)
     axes.plot_surface(
         abscissa, ordinate, field.values, cmap=WORK_COLOURS, rstride=1, cstride=1, lw=0, alpha=0.9,

@@ -115,15 +115,16 @@ def phase_error(name: str, runs: Sequence[RunResult], *, by_name: bool = False) 
     groups = _with_law(runs)
     figure = new_figure(0.7 + (2.6 if len(groups) == 1 else 1.7 * len(groups)))
     panels = figure.subplots(len(groups), 1, squeeze=False, sharex=True)[:, 0]
-    longest = max(groups.values(), key=len)
-    for axes, (rig_name, own) in zip(panels, groups.items(), strict=True):
-        lines = phase_lines(own, by_name=by_name)
-        step = max(1, -(-len(lines) // _MOST_LINES))
-        for number, (colour, line) in enumerate(zip(ordered_colours(len(lines)), lines, strict=True)):
-            label = line.label if own is longest and number % step == 0 else None
-            axes.plot(line.time_s, line.error_rad, color=colour, lw=0.8, label=label)
+    shown = {rig_name: phase_lines(own, by_name=by_name) for rig_name, own in groups.items()}
+    labels = list(dict.fromkeys(line.label for line in phase_lines(runs, by_name=by_name)))
+    colours = dict(zip(labels, ordered_colours(len(labels)), strict=True))
+    for axes, (rig_name, lines) in zip(panels, shown.items(), strict=True):
+        for line in lines:
+            axes.plot(line.time_s, line.error_rad, color=colours[line.label], lw=0.8)
         axes.set_ylabel("φ − φ_law [rad]")
         axes.set_title(plain(rig_name))
+    for label in labels[:: max(1, -(-len(labels) // _MOST_LINES))]:
+        panels[0].plot([], [], color=colours[label], label=label)
     panels[-1].set_xlabel("time from the trigger [s]")
     figure.legend(loc="outside right upper", title="run", title_fontsize=8.5)
     stated = all(run.stated is not None for own in groups.values() for run in own)
@@ -149,6 +150,8 @@ def _with_law(runs: Sequence[RunResult]) -> dict[str, list[RunResult]]:
 
 def sensor_agreement(name: str, runs: Sequence[RunResult]) -> ReportFigure:
     """Gain and delay of redundant accelerometers against their reference, run by run."""
+    from matplotlib.ticker import MaxNLocator
+
     rows = [(i, pair) for i, run in enumerate(runs) if run.quality.accelerometers
             for pair in run.quality.accelerometers.pairs]  # fmt: skip
     if not rows:
@@ -171,7 +174,7 @@ def sensor_agreement(name: str, runs: Sequence[RunResult]) -> ReportFigure:
     for axes in (left, right):
         axes.axhline(0, color="#333333", lw=0.8)
         axes.set_xlabel("number of the run in the table of runs")
-        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     left.set_ylabel("gain − 1 [%]")
     right.set_ylabel("delay [µs]")
     handles, labels = left.get_legend_handles_labels()
@@ -195,6 +198,8 @@ def lost_data(name: str, runs: Sequence[RunResult]) -> ReportFigure:
     cycles = [(i, 1e2 * run.n_cycles_lost / max(run.n_cycles, 1)) for i, run in enumerate(runs)]
     if not any(share > 0 for rows in (lost, clipped, cycles) for _, share in rows):
         raise NothingToDrawError("no sample is lost or clipped and no cycle is left out, in any run")
+    from matplotlib.ticker import MaxNLocator
+
     figure = new_figure(2.5)
     axes = figure.subplots()
     sets = (("samples lost", lost), ("samples clipped", clipped), ("cycles left out", cycles))
@@ -203,7 +208,7 @@ def lost_data(name: str, runs: Sequence[RunResult]) -> ReportFigure:
         colour = (NEUTRAL_COLOUR, "#e69f00", "#a3123a")[number]
         axes.bar(place, [share for _, share in rows], width=0.27, color=colour, label=label)
     axes.set(xlabel="number of the run in the table of runs", ylabel="share [%]", xlim=(0.4, len(runs) + 0.6))
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.legend(loc="upper left", ncols=3, bbox_to_anchor=(0, 1.16), borderaxespad=0)
     caption = (
         "Share of the samples lost in any channel or clipped in the worst channel, and share of the cycles left "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -144,7 +144,7 @@ def _near(response: Response, low: float, high: float) -> npt.NDArray[np.bool_]:
 def draw_response(panels: Sequence[Axes], response: Response, colour: object, *, marked: bool) -> None:
     """Draw amplitude and phase of one run in two panels."""
     upper, lower = panels
-    style = {"color": colour, "lw": 1.0, "marker": ".", "ms": 2.5}
+    style: dict[str, Any] = {"color": colour, "lw": 1.0, "marker": ".", "ms": 2.5}
     upper.plot(response.frequency_hz, np.abs(response.accelerance_per_kg), label=response.label, **style)
     lower.plot(response.frequency_hz, np.degrees(np.angle(response.accelerance_per_kg)), **style)
     if marked:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import ArrayLike
 
-from pipelines.report.axes import dimensional_plane, draw_points
+from pipelines.report.axes import BULLET, dimensional_plane, draw_points
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.numbers import prefixed_unit
 from pipelines.report.selection import (
-    Point,
     common_time_law,
     goes_up,
     is_sweep,
@@ -114,7 +114,7 @@ def acceleration_paths(name: str, runs: Sequence[RunResult], *, by_level: bool =
     axes.set(xlabel="acceleration amplitude a₀ [g = 9.81 m/s²]", ylabel="frequency Ω/2π [Hz]")
     draw_paths(axes, paths, "acceleration_g", 1.0)
     for point in reference_points(runs) if by_level else ():
-        axes.plot(point.acceleration_g, point.frequency_hz, **_bullet(point))
+        axes.plot(point.acceleration_g, point.frequency_hz, **BULLET)
     axes.set_xlim(left=0)
     _legend(axes)
     caption = (
@@ -123,10 +123,6 @@ def acceleration_paths(name: str, runs: Sequence[RunResult], *, by_level: bool =
     )
     caption += " Red bullets are the reference points." if by_level else ""
     return ReportFigure(name, caption, "Fig. 1.5", png_bytes(figure))
-
-
-def _bullet(point: Point) -> dict[str, object]:
-    return {"marker": "o", "ms": 5.5, "mfc": "#d62728", "mec": "white", "mew": 0.8, "ls": "none", "zorder": 7}
 
 
 def draw_paths(axes: Axes, paths: Sequence[RunPath], abscissa: str, factor: float) -> None:
@@ -160,20 +156,23 @@ def _legend(axes: Axes) -> None:
 
 
 def _add_time_axis(axes: Axes, law: SweepLaw) -> None:
-    def time_s(frequency_hz: FloatArray) -> FloatArray:
+    def time_s(frequency_hz: ArrayLike) -> FloatArray:
         ratio = np.maximum(np.asarray(frequency_hz, dtype=float), 1e-6) / law.start_hz
         if law.kind is LawKind.OCTAVE:
             return np.asarray(np.log2(ratio) / law.rate)
         return np.asarray((ratio - 1) * law.start_hz / law.rate)
 
-    right = axes.secondary_yaxis("right", functions=(time_s, lambda t: law.frequency_hz(np.asarray(t, float))))
+    def frequency_hz(time_s: ArrayLike) -> FloatArray:
+        return law.frequency_hz(np.asarray(time_s, dtype=float))
+
+    right = axes.secondary_yaxis("right", functions=(time_s, frequency_hz))
     right.set_ylabel("time of the sweep [s]")
 
 
 def law_text(law: SweepLaw) -> str:
     """The law of a sweep in words."""
     if law.kind is LawKind.OCTAVE:
-        return f"{law.start_hz:.4g} Hz at the trigger, {60 * law.rate:.4g} octaves per minute".replace("-", "−")
+        return f"from {law.start_hz:.4g} Hz, {60 * law.rate:.4g} octave/min".replace("-", "−")
     if law.kind is LawKind.LINEAR:
-        return f"{law.start_hz:.4g} Hz at the trigger, {law.rate:.4g} Hz/s".replace("-", "−")
+        return f"from {law.start_hz:.4g} Hz, {law.rate:.4g} Hz/s".replace("-", "−")
     return "stepped" if law.kind is LawKind.STEPPED else "free"

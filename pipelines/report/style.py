@@ -118,7 +118,7 @@ def negative_colours() -> Any:
     return ListedColormap(matplotlib.colormaps["magma"](np.linspace(0.16, 0.97, 256)))
 
 
-def ordered_colours(n: int) -> list[tuple[float, float, float, float]]:
+def ordered_colours(n: int) -> list[tuple[float, ...]]:
     """Colours for n lines that have an order, from dark to light, none too faint on white."""
     import matplotlib
 

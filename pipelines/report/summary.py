@@ -64,7 +64,7 @@ def _onset(rig: RigResult, runs: Sequence[RunResult]) -> str:
     onset = onset_g(runs, ONSET_SHARE * largest) if largest > 0 else math.nan
     if not math.isfinite(onset):
         return ""
-    return f"It exceeds {100 * ONSET_SHARE:.0f} % of this, on the mean over a level, from {onset:.2g} g."
+    return f"It exceeds {100 * ONSET_SHARE:.0f}\u00a0% of this, on the mean over a level, from {onset:.2g} g."
 
 
 def onset_g(runs: Sequence[RunResult], threshold: float) -> float:

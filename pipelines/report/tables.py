@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from pipelines.report.figures_quality import identity_difference
@@ -16,6 +17,7 @@ from pipelines.report.figures_runs import law_text
 from pipelines.report.numbers import MISSING, interval, prefixed_unit, signed, text
 from pipelines.report.selection import REFERENCE_FREQUENCIES_HZ, by_level, is_sweep, level_g, rig_text, runs_of
 from sloshlab import viscous_equivalent
+from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import SloshlabError
 from sloshlab.free_surface_modes import mode_table
 from sloshlab.sweep.regime import QUIET_FORCE_RATIO, REGIMES
@@ -357,10 +359,11 @@ def resonance_table(runs: Sequence[RunResult]) -> Table:
     )  # fmt: skip
 
 
-def _force_n(run: RunResult) -> np.ndarray:
+def _force_n(run: RunResult) -> npt.NDArray[np.float64]:
     windows = run.windows
     quadrature = windows["gamma_kg_per_s"].values / (2 * np.pi * windows["frequency_hz"].values)
-    return np.hypot(windows["apparent_mass_kg"].values, quadrature) * 9.81 * windows["acceleration_g"].values
+    acceleration = GRAVITY_M_PER_S2 * windows["acceleration_g"].values
+    return np.asarray(np.hypot(windows["apparent_mass_kg"].values, quadrature) * acceleration)
 
 
 def work_level_table(runs: Sequence[RunResult]) -> Table:

@@ -22,7 +22,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Drawn]:
             extra=True, flags=("<b>look</b> at run 2",), run_prefix="<script>alert(1)</script> $x_{$"
         ),
         "one run": lambda: shaker_experiment((0.5,), (2.0,), surface_tension=None),
-        "work": work_experiment,
+        "work": lambda: work_experiment(run_prefix="$x_{$ <i>level"),
     }
     done: dict[str, Drawn] = {}
 

@@ -61,7 +61,8 @@ def shaker_run(
     w_bar = w_bar_law(omega / the_rig.frequency_scale_rad_per_s, level)
     time = 120 * np.log2(frequency / 5.0)
     windows = _windows(
-        run_id, frequency, amplitude, time=240 - time if down else time, work=w_bar * mass * (amplitude * omega) ** 2,
+        run_id, frequency, amplitude, time=240 - time if down else time,
+        work=w_bar * mass * (amplitude * omega) ** 2,
         apparent_mass=0.61 + mass * (1 + beta_law(level)), n_cycles=12,
     )  # fmt: skip
     scaled = {
@@ -123,8 +124,9 @@ def _run(
     level_g: float | None, flags: tuple[str, ...],
 ) -> RunResult:  # fmt: skip
     attributes = RunAttributes(
-        sloshlab_format="1", run_id=run_id, experiment=experiment, configuration="sloshing", rig=rig_name or "none",
-        sampling_rate_hz=500.0, start_time_utc="2026-01-31T12:00:00Z", acceleration_g=level_g,
+        sloshlab_format="1", run_id=run_id, experiment=experiment, configuration="sloshing",
+        rig=rig_name or "none", sampling_rate_hz=500.0, start_time_utc="2026-01-31T12:00:00Z",
+        acceleration_g=level_g,
     )  # fmt: skip
     return RunResult(
         Path(f"{run_id[:20].replace('/', '_')}.nc"), "0" * 64, attributes, rig_name, windows, law,

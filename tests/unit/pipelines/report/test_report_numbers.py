@@ -108,7 +108,8 @@ def test_every_table_row_is_as_long_as_its_header() -> None:
         tables.run_table(experiment.runs), tables.dry_mass_table(experiment.rigs), tables.beta_table(experiment),
         tables.regime_table(experiment.windows), tables.parameter_table(experiment),
         tables.channel_table(experiment.runs), tables.agreement_table(experiment.runs),
-        tables.identity_table(experiment), tables.validation_table(experiment), tables.provenance_table(experiment),
+        tables.identity_table(experiment), tables.validation_table(experiment),
+        tables.provenance_table(experiment),
         tables.resonance_table(work_experiment().runs), tables.work_level_table(work_experiment().runs),
     ]  # fmt: skip
     for table in shown:

@@ -24,8 +24,8 @@ from pipelines.results import SweepExperiment
 Drawn = Callable[[str], tuple[SweepExperiment, Path]]
 
 OF_A_RIG = {
-    "w_bar_map", "beta_map", "displacement_paths", "acceleration_paths", "time_histories", "hysteresis", "work_bars",
-    "surface", "work_map", "over_velocity", "uncertainty", "regimes", "harmonics",
+    "w_bar_map", "beta_map", "displacement_paths", "acceleration_paths", "time_histories", "hysteresis",
+    "work_bars", "surface", "work_map", "over_velocity", "uncertainty", "regimes", "harmonics",
 }  # fmt: skip
 OF_QUALITY = {"energy_identity", "phase_error", "sensor_agreement", "lost_data"}
 OF_WORK = {
@@ -139,6 +139,7 @@ def test_hostile_names_are_text_and_not_markup(drawn: Drawn) -> None:
     page = page_of(folder)
     assert "<script>alert(1)</script> $x_{$ 0.5 1.5 g" in page.text
     assert "<b>look</b> at run 2" in page.text
+    assert "$x_{$ <i>level 3" in page_of(drawn("work")[1]).text  # and half a formula is drawn as it stands
 
 
 def test_flags_stand_before_the_summary(drawn: Drawn) -> None:
@@ -204,7 +205,7 @@ def test_the_callers_drawing_settings_neither_matter_nor_change(drawn: Drawn) ->
     plan = planned_sections(experiment)[0]
     plan = dataclasses.replace(plan, figures=plan.figures[:1])
     [usual] = drawn_sections([plan])
-    with matplotlib.rc_context({"font.size": 30.0, "axes.facecolor": "red"}):
+    with matplotlib.rc_context({"font.size": 30.0, "xtick.color": "red"}):
         [strange] = drawn_sections([plan])
         assert matplotlib.rcParams["font.size"] == 30.0
     assert usual.figures[0].png == strange.figures[0].png
