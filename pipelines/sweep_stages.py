@@ -31,7 +31,7 @@ EXCERPT_FREQUENCIES_HZ = (9.0, 13.0, 17.0)
 """Reference points of Table 1.2, where time histories and loops are shown."""
 _EARLY_STOP_SHARE = 0.03
 """A sweep must move during all but this share of the time it is stated or recorded to last."""
-_LARGEST_BOUNDARY_ERROR_CYCLES = 0.5
+_SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE = 8
 
 
 @dataclass(frozen=True)
@@ -145,6 +145,12 @@ def analyse_sweep(
         motion_is_velocity=signals.motion_is_velocity,
         unusable=signals.clipped,
     )
+    n_samples_per_cycle = rate_hz * float(np.diff(measured).min())
+    if n_samples_per_cycle < _SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE:
+        flags.append(
+            f"{attributes.run_id}: only {n_samples_per_cycle:.1f} samples in the shortest cycle; below "
+            f"{_SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE} the quadrature errs by more than 0.1 %"
+        )
     middle = 0.5 * (measured[1:] + measured[:-1])
     law = identify_law(middle + start_time_s, 1.0 / np.diff(measured))
     windows = evaluate_windows(
