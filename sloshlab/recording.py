@@ -280,6 +280,10 @@ def _decoded(source: Any, name: str, maximum_decoded_bytes: int) -> xr.Dataset:
         if channel == "time":
             continue
         its_attributes = _attributes_of(variable)
+        if len(set(variable.dimensions)) < len(variable.dimensions):
+            raise RecordingError(
+                f"{name}: {channel}", got=f"dimensions {variable.dimensions}", allowed="each dimension once"
+            )
         if _is_channel(channel, variable.dimensions, its_attributes):
             variables[channel] = _decoded_channel(channel, variable, its_attributes, name)
         elif np.dtype(variable.dtype).kind in "fiub" or variable.dtype is str:

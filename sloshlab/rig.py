@@ -177,9 +177,11 @@ class Rig(_Described):
             If the text is not TOML or describes an impossible rig.
         """
         try:
-            return cls.model_validate(tomllib.loads(text))
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
+            document = tomllib.loads(text)
+        except (ValueError, RecursionError) as error:  # ValueError: also integers of thousands of digits
             raise RigError(f"rig {name}", got=f"text that is not TOML ({error})", allowed="TOML") from error
+        try:
+            return cls.model_validate(document)
         except ValidationError as error:
             first = error.errors()[0]
             place = ".".join(str(part) for part in first["loc"]) or "rig"
