@@ -49,7 +49,7 @@ bench: setup  ## speed and memory as ratios in one run
 	$(BIN)/python -m tests.benchmarks
 
 docs: setup  ## the documentation as a web site in site/
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 clean:  ## remove everything that make made, the environment included
 	rm -rf $(VENV) $(RESULTS) site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
