@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
 from pipelines.report.axes import plain_log_ticks
 from pipelines.report.figure import NothingToDrawError, ReportFigure
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 _ZOOM = 0.09
+_NEIGHBOURHOOD = 0.1
+"""Part of the frequency around the largest acceleration that is taken for the same mode."""
 
 
 @dataclass(frozen=True)
@@ -35,20 +38,27 @@ class Response:
         Of the windows, in order of time.
     accelerance_per_kg : ndarray of complex, shape (n,)
         ü/F at the excitation frequency [m s-2 N-1 = kg-1].
-    peak_hz, peak_per_kg : float
-        Where |ü/F| is largest, and that value.
+    work_j : ndarray, shape (n,)
+        Dissipated work per cycle.
     loudest_hz, loudest_g : float
-        Where the acceleration itself is largest, and that value.
+        Where the acceleration is largest, and that value.
+    peak_hz, peak_per_kg : float
+        Where |ü/F| is largest in the neighbourhood of the largest acceleration, and that value.
+    work_peak_hz, work_peak_j : float
+        Where the work is largest in the same neighbourhood, and that value.
     """
 
     label: str
     frequency_hz: FloatArray
     acceleration_g: FloatArray
     accelerance_per_kg: npt.NDArray[np.complex128]
-    peak_hz: float
-    peak_per_kg: float
+    work_j: FloatArray
     loudest_hz: float
     loudest_g: float
+    peak_hz: float
+    peak_per_kg: float
+    work_peak_hz: float
+    work_peak_j: float
 
 
 def responses(runs: Sequence[RunResult]) -> tuple[Response, ...]:
@@ -63,18 +73,19 @@ def responses(runs: Sequence[RunResult]) -> tuple[Response, ...]:
         usable = np.isfinite(apparent) & (np.abs(apparent) > 0)
         if not usable.any():
             continue
-        frequency, accelerance = frequency[usable], 1 / apparent[usable]
-        acceleration = windows["acceleration_g"].values[usable]
-        peak, value = vertex(frequency, np.abs(accelerance))
-        loudest, level = vertex(frequency, acceleration)
-        found.append(
-            Response(
-                plain(run.attributes.run_id, 28), frequency, acceleration, accelerance, peak, value, loudest, level
-            )
-        )
+        label = plain(run.attributes.run_id, 28)
+        found.append(_response(label, windows.isel(window=usable), 1 / apparent[usable]))
     if not found:
         raise NothingToDrawError("no run has a window")
     return tuple(found)
+
+
+def _response(label: str, windows: xr.Dataset, accelerance_per_kg: npt.NDArray[np.complex128]) -> Response:
+    frequency, acceleration, work = (windows[name].values for name in ("frequency_hz", "acceleration_g", "work_j"))
+    loudest, level = vertex(frequency, acceleration)
+    near = np.abs(np.log(frequency / loudest)) < _NEIGHBOURHOOD
+    peaks = [vertex(frequency, np.where(near, values, -np.inf)) for values in (np.abs(accelerance_per_kg), work)]
+    return Response(label, frequency, acceleration, accelerance_per_kg, work, loudest, level, *peaks[0], *peaks[1])
 
 
 def vertex(abscissa: FloatArray, values: FloatArray) -> tuple[float, float]:
@@ -153,21 +164,27 @@ def draw_response(panels: Sequence[Axes], response: Response, colour: object, *,
 
 
 def loudest_response(name: str, runs: Sequence[RunResult]) -> ReportFigure:
-    """Acceleration amplitude over frequency with the largest value of each run marked."""
+    """Acceleration and work over frequency around the largest acceleration, largest values marked."""
     found = responses(runs)
-    figure = new_figure(3.3)
-    axes = figure.subplots()
+    figure = new_figure(5.0)
+    upper, lower = figure.subplots(2, 1, sharex=True)
     for colour, response in zip(ordered_colours(len(found)), found, strict=True):
-        label = f"{response.label}: {response.loudest_hz:.2f} Hz"
-        axes.plot(
-            response.frequency_hz, response.acceleration_g, color=colour, marker=".", ms=2.5, lw=1.0, label=label
-        )
-        axes.plot(response.loudest_hz, response.loudest_g, "v", color=colour, ms=7, mec="white", mew=0.6)
-    axes.set(xlabel="frequency Ω/2π [Hz]", ylabel="acceleration amplitude a₀ [g]")
-    axes.set_ylim(0, 1.12 * max(response.loudest_g for response in found))
-    figure.legend(loc="outside right upper", title="run: largest at", title_fontsize=8.5)
+        label = f"{response.label}: {response.loudest_hz:.2f} Hz, {response.work_peak_hz:.2f} Hz"
+        style: dict[str, Any] = {"color": colour, "marker": ".", "ms": 2.5, "lw": 1.0}
+        mark: dict[str, Any] = {"color": colour, "marker": "v", "ms": 7, "mec": "white", "mew": 0.6, "ls": "none"}
+        upper.plot(response.frequency_hz, response.acceleration_g / response.loudest_g, label=label, **style)
+        lower.plot(response.frequency_hz, response.work_j / abs(response.work_peak_j), **style)
+        upper.plot(response.loudest_hz, 1.0, **mark)
+        lower.plot(response.work_peak_hz, np.sign(response.work_peak_j), **mark)
+    centres = [centre for response in found for centre in (response.loudest_hz, response.work_peak_hz)]
+    lower.set_xlim(min(centres) * (1 - 2 * _ZOOM), max(centres) * (1 + 2 * _ZOOM))
+    upper.set(ylabel="acceleration over its largest", ylim=(0, 1.12))
+    lower.set(ylabel="work per cycle over its largest", ylim=(-0.25, 1.12), xlabel="frequency Ω/2π [Hz]")
+    figure.legend(loc="outside upper center", ncols=2, title="run: largest acceleration, largest work at",
+                  title_fontsize=8.5)  # fmt: skip
     caption = (
-        "Acceleration amplitude over frequency; the triangle marks the largest response of each run and its "
-        "frequency. If it falls as the level rises, the mode softens."
+        "Acceleration amplitude and dissipated work per cycle around the largest acceleration, each over its "
+        "largest value, which a triangle marks. If its frequency falls as the level rises, the mode softens. "
+        "While a sweep passes a resonance, energy that was stored comes back: the work may be negative."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))

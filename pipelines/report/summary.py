@@ -121,7 +121,8 @@ def _work_sentences(experiment: SweepExperiment) -> tuple[str, ...]:
             f"The largest acceleration moves from {weak.loudest_hz:.2f} Hz ({weak.label}, "
             f"{weak.loudest_g:.2g} g) to "
             f"{strong.loudest_hz:.2f} Hz ({strong.label}, {strong.loudest_g:.2g} g), {signed(change)} %: the "
-            f"mode {word}."
+            f"mode {word}. The largest work per cycle near it moves from {weak.work_peak_hz:.2f} Hz to "
+            f"{strong.work_peak_hz:.2f} Hz."
         )
     at = int(np.nanargmax(windows["work_j"].values))
     lines.append(

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pipelines.report.figure import NothingToDrawError
 from pipelines.report.figures_quality import identity_difference
 from pipelines.report.figures_response import responses
 from pipelines.report.figures_runs import law_text
@@ -336,26 +337,32 @@ def validation_table(experiment: SweepExperiment) -> Table:
 
 
 def resonance_table(runs: Sequence[RunResult]) -> Table:
-    """Resonance of every run: where ü/F and where the acceleration is largest."""
-    rows = [
-        (
-            run.attributes.run_id,
-            text(response.loudest_hz, 4),
-            text(response.loudest_g, 3),
-            text(response.peak_hz, 4),
-            text(response.peak_per_kg, 3),
-            interval(_force_n(run), 3),
+    """Resonance of every run: where acceleration, work and ü/F are largest."""
+    rows = []
+    for run in runs:
+        try:
+            [response] = responses([run])
+        except NothingToDrawError:
+            continue
+        rows.append(
+            (
+                run.attributes.run_id,
+                text(response.loudest_hz, 4),
+                text(response.loudest_g, 3),
+                text(response.work_peak_hz, 4),
+                text(response.peak_hz, 4),
+                text(response.peak_per_kg, 3),
+                interval(_force_n(run), 3),
+            )
         )
-        for run, response in zip(runs, responses(runs), strict=True)
-    ]
     return Table(
         "Resonance of every run",
-        ("run", "largest acceleration at [Hz]", "acceleration there [g]", "largest |ü/F| at [Hz]",
-         "|ü/F| there [1/kg]", "force amplitude along the run [N]"),
+        ("run", "largest acceleration at [Hz]", "acceleration there [g]", "largest work at [Hz]",
+         "largest |ü/F| at [Hz]", "|ü/F| there [1/kg]", "force amplitude along the run [N]"),
         tuple(rows),
-        "From the parabola through the largest window and its neighbours. A frequency that falls as the "
-        "level rises "
-        "is softening.",
+        "From the parabola through the largest window and its neighbours; work and |ü/F| within 10 % of "
+        "the frequency "
+        "of the largest acceleration. A frequency that falls as the level rises is softening.",
     )  # fmt: skip
 
 

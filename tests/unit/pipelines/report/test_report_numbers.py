@@ -41,6 +41,22 @@ def test_accelerance_peak_of_a_softening_oscillator_per_level() -> None:
         [resonance_hz(k) for k in stiffness], abs=0.004
     )
     assert found[0].peak_hz > found[1].peak_hz > found[2].peak_hz
+    # the work of a viscous damper under a constant force, πcΩu₀² with u₀ = F/|Z|, is largest near ω₀
+    natural = [math.sqrt(k / MASS_KG) / (2 * math.pi) for k in stiffness]
+    assert [one.work_peak_hz for one in found] == pytest.approx(natural, rel=0.002)
+
+
+def test_peaks_of_other_modes_do_not_count() -> None:
+    [run] = work_experiment().runs[:1]
+    spike = run.windows.copy(deep=True)
+    spike["apparent_mass_kg"][10], spike["gamma_kg_per_s"][10] = (
+        1e-6,
+        1e-6,
+    )  # a force that almost vanishes, far off
+    spike["work_j"][10] = 1e3
+    [one] = responses([dataclasses.replace(run, windows=spike)])
+    assert one.peak_hz == pytest.approx(resonance_hz(82_000.0), abs=0.004)
+    assert one.work_peak_hz == pytest.approx(one.peak_hz, rel=0.01)
 
 
 def test_accelerance_tends_to_one_over_the_mass_far_above_resonance() -> None:
