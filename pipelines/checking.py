@@ -7,9 +7,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pipelines.sweep_stages import naming
+from sloshlab.conditioning.calibration import check_signs
 from sloshlab.conditioning.quality import ChannelQuality, RunQuality, quality_of
 from sloshlab.conditioning.redundancy import PairAgreement
-from sloshlab.errors import RecordingError
+from sloshlab.errors import InputError, RecordingError
 from sloshlab.recording import read_recording
 
 
@@ -29,19 +31,40 @@ def check_runs(paths: Sequence[Path]) -> dict[str, Any]:
     lines: list[str] = []
     flags: list[str] = []
     summaries = []
+    refused: list[InputError] = []
     for path in paths:
-        quality = quality_of(read_recording(path))
-        if not quality.usable:
-            raise RecordingError(
-                f"recording {path}",
-                got="; ".join(quality.reasons),
-                allowed="a run that an analysis may rest on",
-                remedy="record again, or mend it with `sloshlab import`",
-            )
+        try:
+            quality = _usable_quality(path)
+        except InputError as error:
+            refused.append(error)
+            continue
         lines += _table(path, quality)
         flags += [f"{quality.run_id}: {remark}" for remark in quality.remarks]
         summaries.append({"path": str(path), **asdict(quality), "n_lost": quality.n_lost})
+    if refused:
+        more = (
+            f" (and {len(refused) - 1} more of {len(paths)} recordings cannot be used)" if len(refused) > 1 else ""
+        )
+        first = refused[0]
+        raise RecordingError(first.what, got=first.got + more, allowed=first.allowed, remedy=first.remedy)
     return {"lines": lines, "flags": flags, "runs": summaries}
+
+
+def _usable_quality(path: Path) -> RunQuality:
+    """Quality of a recording that keeps the format, has working sensors and right signs."""
+    recording = read_recording(path)
+    quality = quality_of(recording)
+    if not quality.usable:
+        raise RecordingError(
+            f"recording {path}",
+            got="; ".join(quality.reasons),
+            allowed="a run that an analysis may rest on",
+            remedy="record again, or mend it with `sloshlab import`",
+        )
+    if recording.attrs["experiment"] in ("shaker_sweep", "shaker_vfa"):
+        with naming(path):
+            check_signs(recording)
+    return quality
 
 
 def _table(path: Path, quality: RunQuality) -> list[str]:

@@ -79,6 +79,8 @@ def shaker(
     from pipelines.outputs import write_experiment
     from pipelines.shaker import ShakerSettings, analyse_shaker
 
+    if boundaries not in ("measured", "law"):
+        raise typer.BadParameter(f"{boundaries!r} is neither 'measured' nor 'law'", param_hint="--boundaries")
     settings = ShakerSettings.checked(p=p, m=m, boundaries=boundaries, allow_incomplete=allow_incomplete)
     experiment = analyse_shaker(runs, rig, settings)
     _finish(write_experiment(experiment, output, command=_command(), report=not no_report), as_json)
@@ -105,6 +107,8 @@ def work(
     from pipelines.work import WorkSettings, analyse_work
 
     motions = {"acceleration": acceleration, "velocity": velocity, "displacement": displacement}
+    if sum(map(bool, motions.values())) != 1:
+        raise typer.BadParameter("name exactly one of --acceleration, --velocity, --displacement")
     settings = WorkSettings.checked(p=p, m=m, force=force, motions=motions, phase_reference=phase_reference)
     experiment = analyse_work(runs, settings)
     _finish(write_experiment(experiment, output, command=_command(), report=not no_report), as_json)
@@ -205,7 +209,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         print("sloshlab: interrupted; nothing half-written", file=sys.stderr)  # noqa: T201
         return INTERRUPTED
     except OSError as error:
-        print(f"sloshlab: {error.strerror or error}: {error.filename or ''}", file=sys.stderr)  # noqa: T201
+        what = f"{error.filename}: " if error.filename else ""
+        remedy = "check that the path can be written, and that a folder or file of this name is not in the way"
+        print(f"sloshlab: {what}got {error.strerror or error}; remedy: {remedy}", file=sys.stderr)  # noqa: T201
         return INPUT_IS_BAD
 
 

@@ -74,7 +74,7 @@ def write_experiment(
     """
     provenance = {
         "command": command,
-        "inputs": {run.path.name: run.sha256 for run in experiment.runs},
+        "inputs": {path.name: sha256_of(path) for path in experiment.inputs},
         "versions": versions(),
     }
     with atomic_file.filled_folder(folder) as complete:

@@ -114,10 +114,12 @@ class SweepExperiment:
         All windows of all runs.
     maps : xarray.Dataset
         The contents of `maps.nc`.
-    work_maps : EnergyMaps, optional
-        For ``"work"``: the map without a tank.
     settings : WindowSettings
         P and M.
+    inputs : tuple of Path
+        Every file that the results depend on: recordings, dry runs among them, and rigs.
+    work_maps : EnergyMaps, optional
+        For ``"work"``: the map without a tank.
     provenance : dict
         Input hashes, versions and the command.
     flags : tuple of str
@@ -131,6 +133,7 @@ class SweepExperiment:
     windows: xr.Dataset
     maps: xr.Dataset
     settings: WindowSettings
+    inputs: tuple[Path, ...] = ()
     work_maps: EnergyMaps | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     flags: tuple[str, ...] = ()

@@ -92,7 +92,8 @@ def analyse_shaker(paths: Sequence[Path], rig_paths: Sequence[Path], settings: S
                     with naming(run.path):
                         results[name].append(_analysed(run, rig, dry[name], settings))
                 advance(run.path.name)
-        return _experiment(results, rigs, dry, settings)
+        inputs = [*(run.path for run in runs), *rig_paths]
+        return _experiment(results, rigs, dry, settings, inputs)
 
 
 def _rigs(paths: Sequence[Path]) -> dict[str, Rig]:
@@ -132,9 +133,9 @@ def _assigned(paths: Sequence[Path], rigs: Mapping[str, Rig]) -> list[_Run]:
                                 allowed="one run_id per run", remedy="give every run once")  # fmt: skip
         seen[attributes.run_id] = path
     named = sorted({attributes.rig for _, attributes in described})
-    if len(rigs) == 1 and len(named) == 1:
-        return [_Run(path, attributes, next(iter(rigs))) for path, attributes in described]
     unknown = [name for name in named if name not in rigs]
+    if len(rigs) == 1 and len(named) == 1 and not _another_rig_lies_beside(described, next(iter(rigs.values()))):
+        return [_Run(path, attributes, next(iter(rigs))) for path, attributes in described]
     if unknown:
         raise AnalysisError(
             "runs of different rigs",
@@ -143,6 +144,19 @@ def _assigned(paths: Sequence[Path], rigs: Mapping[str, Rig]) -> list[_Run]:
             remedy="analyse them apart, or give every rig with --rig",
         )
     return [_Run(path, attributes, attributes.rig) for path, attributes in described]
+
+
+def _another_rig_lies_beside(described: Sequence[tuple[Path, RunAttributes]], rig: Rig) -> bool:
+    """True if the rig that a run names lies beside it and describes another tank or filling.
+
+    A rig file that was only renamed is no reason to refuse its runs.
+    """
+    own = {
+        path.parent / attributes.rig
+        for path, attributes in described
+        if attributes.rig == Path(attributes.rig).name
+    }
+    return any(file.is_file() and Rig.from_toml(file) != rig for file in own)
 
 
 def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
@@ -214,6 +228,7 @@ def _experiment(
     rigs: Mapping[str, Rig],
     dry: Mapping[str, DryMass | None],
     settings: ShakerSettings,
+    inputs: Sequence[Path],
 ) -> SweepExperiment:
     windows = {name: _windows_of(name, results[name]) for name in rigs}
     everything = xr.concat(list(windows.values()), dim="window", combine_attrs="drop")
@@ -224,6 +239,7 @@ def _experiment(
     runs = [result for name in rigs for result in results[name]]
     return SweepExperiment(
         title="Tank on the shaker",
+        inputs=tuple(inputs),
         kind="shaker",
         runs=tuple(runs),
         rigs=tuple(rig_results),
@@ -262,5 +278,6 @@ def _joined(rigs: Sequence[RigResult]) -> xr.Dataset:
     """The maps of one rig as they are; of several along a dimension ``fill_level``."""
     if len(rigs) == 1:
         return rigs[0].maps.dataset
+    rigs = sorted(rigs, key=lambda rig: rig.rig.liquid.fill_level)
     joined = xr.concat([rig.maps.dataset for rig in rigs], dim="fill_level", combine_attrs="drop", join="exact")
     return described(joined.assign_coords(fill_level=[rig.rig.liquid.fill_level for rig in rigs]))

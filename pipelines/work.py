@@ -84,6 +84,7 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
     maps = energy_maps(windows)
     return SweepExperiment(
         title="Work per cycle",
+        inputs=tuple(paths),
         kind="work",
         runs=tuple(results),
         rigs=(),

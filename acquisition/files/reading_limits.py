@@ -35,6 +35,8 @@ def checked_size(path: Path, largest_bytes: int = LARGEST_BINARY_BYTES) -> int:
         size = path.stat().st_size
         with path.open("rb"):
             pass
+    except FileFormatError:
+        raise
     except (OSError, ValueError) as error:
         raise FileFormatError(f"source {path}", got=f"{error}", allowed="a readable file") from error
     if size == 0:

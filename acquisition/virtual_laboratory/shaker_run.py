@@ -160,8 +160,10 @@ def virtual_shaker_run(
         raise InputError("experiment", got=repr(experiment), allowed="shaker_sweep, shaker_vfa")
     if direction not in ("up", "down"):
         raise InputError("direction", got=repr(direction), allowed="up, down")
-    if seed < 0 or not 0 <= n_clipped <= 1000:
-        raise InputError("seed and n_clipped", got=f"{seed}, {n_clipped}", allowed="≥ 0, at most 1000 clipped")
+    if seed < 0:
+        raise InputError("seed", got=str(seed), allowed="≥ 0")
+    if not 0 <= n_clipped <= 1000:
+        raise InputError("n_clipped", got=str(n_clipped), allowed="0 … 1000")
     first, last = (start_hz, stop_hz) if direction == "up" else (stop_hz, start_hz)
     plan = SweepPlan(
         acceleration_g=acceleration_g,
@@ -197,6 +199,8 @@ def virtual_shaker_run(
     }
     if plan.law == "octave":
         attributes["sweep_rate_octave_per_s"] = plan.rate_octave_per_s
+    if plan.law == "linear":
+        attributes["sweep_rate_hz_per_s"] = (float(last) - float(first)) / float(duration_s)
     return _dataset(time_s, readings, lost_samples, attributes)
 
 

@@ -75,7 +75,10 @@ def energy_maps(
     used = windows.isel(window=np.flatnonzero(windows["acceleration_g"].values > 0))
     if used.sizes["window"] < 3:
         raise AnalysisError(
-            "map", got=f"{used.sizes['window']} windows", allowed="at least 3", remedy="give longer or more runs"
+            "map",
+            got=f"{used.sizes['window']} windows",
+            allowed="at least 3",
+            remedy="give longer or more runs, or put windows closer together (--m) or make them shorter (--p)",
         )
     frequency, amplitude = used["frequency_hz"].values, used["amplitude_m"].values
     plane = _Plane.spanned_by(frequency, amplitude)

@@ -20,8 +20,8 @@ from sloshlab.errors import AnalysisError
 FloatArray = npt.NDArray[np.float64]
 
 KERNEL = "thin_plate_spline"
-SMOOTHINGS = (0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
-"""Candidates for the smoothing of a point with the median standard error."""
+SMOOTHINGS = (1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+"""Candidates for the smoothing of a point with the median standard error; never zero, as points may coincide."""
 DEFAULT_SMOOTHING = 1e-2
 """Smoothing where cross-validation over runs is not possible."""
 _SMALLEST_RELATIVE_STD = 0.25

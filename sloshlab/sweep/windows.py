@@ -115,7 +115,8 @@ def evaluate_windows(
     if rig is not None:
         for row in rows:
             row.update(_scaled(row, cycles.inertia_kg, rig))
-    return described(_table(rows, run_id, rig))
+    table = _table(rows, run_id, rig)
+    return described(table if rig is not None else table.drop_vars("regime"))
 
 
 def _take_out_stored_energy(rows: list[dict[str, object]], *, velocity_is_measured: bool) -> None:
