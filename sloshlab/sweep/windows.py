@@ -24,9 +24,9 @@ _LARGEST_CHANGE_PER_CYCLE = 0.02
 """A frequency that changes by more than this from one cycle to the next starts a new step."""
 _CHANGES = ("elastic_change_m2", "kinetic_change_m2_per_s2", "chirp_m2_per_s2")
 _SETTLING_CYCLES = 4
-"""Cycles left out on each side of a step: the phase is smoothed over two cycles and a spline."""
-_OUTLIER_SIGMA, _SMALLEST_OUTLIER = 5.0, 5e-4
-"""Cycles whose frequency leaves the trend of their window by more than five times its scatter, and by more
+"""Cycles left out at both ends of a sweep and of each step: the phase is smoothed over two cycles and a spline."""
+_OUTLIER_SIGMA, _SMALLEST_OUTLIER = 10.0, 2e-3
+"""Cycles whose frequency leaves the trend of their window by more than ten times its scatter, and by more
 than this part, are a transition between steps."""
 _SMALLEST_AMPLITUDE_RATIO = 0.5
 """Cycles below this part of the median amplitude of their window are a start, a stop or a pause."""
@@ -56,15 +56,14 @@ def window_slices(cycles: Cycles, settings: WindowSettings) -> Iterator[slice]:
 
     Examples
     --------
-    With P = 6 and M = 24, a sweep of 60 cycles has windows 0–12, 24–36 and 48–60.
+    With P = 6 and M = 24, a sweep of 68 cycles has windows 4–16, 28–40 and 52–64.
     """
     frequency = cycles.omega_rad_per_s
     jumps = np.flatnonzero(np.abs(np.diff(frequency)) > _LARGEST_CHANGE_PER_CYCLE * frequency[:-1]) + 1
     edges = np.concatenate([[0], jumps, [frequency.size]])
     width = 2 * settings.half_width_cycles
     for left, right in itertools.pairwise(edges):
-        start = left + _SETTLING_CYCLES if left > 0 else left
-        stop = right - _SETTLING_CYCLES if right < frequency.size else right
+        start, stop = left + _SETTLING_CYCLES, right - _SETTLING_CYCLES
         if settings.smallest_n_cycles <= stop - start < width:
             yield slice(int(start), int(stop))
         for first in range(int(start), int(stop) - width + 1, settings.spacing_cycles):
