@@ -114,7 +114,7 @@ class Rig(_Described):
     ... fill_level = 0.5
     ... ''')
     >>> round(rig.liquid_mass_kg, 5)
-    0.12432
+    0.12433
     """
 
     tank: Tank
