@@ -28,10 +28,10 @@ campaign: setup  ## make the recordings of raw_data again
 	$(BIN)/sloshlab virtual campaign -o raw_data/shaker
 
 test: setup  ## the tests, at most 10 minutes on 2 cores
-	$(BIN)/python -m pytest -n 2 -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 test-all: setup  ## all tests
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: setup  ## style and the direction of imports
 	$(BIN)/ruff check .

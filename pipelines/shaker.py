@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from pipelines.progress import progress
@@ -22,7 +23,7 @@ from sloshlab.conditioning.combined_channels import (
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.quantities import described
-from sloshlab.recording import RunAttributes, read_attributes, read_recording
+from sloshlab.recording import RunAttributes, channels, read_attributes, read_recording
 from sloshlab.rig import Rig
 from sloshlab.sweep.windows import WindowSettings
 
@@ -187,7 +188,7 @@ def _dry_recording(run: _Run, rig: Rig) -> xr.Dataset:
 def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings) -> RunResult:
     recording = read_recording(run.path)
     quality = require_usable(recording, run.path)
-    check_signs(recording, rig)
+    check_signs(_enough_for_signs(recording), rig)
     forces, accelerations = force_channels(recording), acceleration_channels(recording)
     gain = 1.0 if dry is None else dry.gain_ratio
     mass = (dry.mass_kg if dry is not None else rig.tank.dry_mass_kg) + rig.liquid_mass_kg
@@ -196,11 +197,19 @@ def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings
     signals = SweepSignals(
         force_n=force,
         motion=mean_acceleration(recording).values,
-        clipped=clipped_in(recording, forces + accelerations),
+        clipped=clipped_in(recording, forces + accelerations, quality),
         inertia_kg=mass,
         noise_power=_noise_power(recording, forces, accelerations, mass),
     )
     return analyse_sweep(recording, run.path, signals, settings, quality=quality, rig=rig, rig_name=run.rig_name)
+
+
+def _enough_for_signs(recording: xr.Dataset) -> xr.Dataset:
+    """The middle minute, if it is complete: a sign does not need the whole run."""
+    middle, half = recording.sizes["time"] // 2, round(30 * float(recording.attrs["sampling_rate_hz"]))
+    part = recording.isel(time=slice(max(0, middle - half), middle + half))
+    complete = all(np.isfinite(part[name].values.sum()) for name in channels(part))
+    return part if complete else recording
 
 
 def _noise_power(

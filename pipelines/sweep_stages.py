@@ -101,12 +101,13 @@ def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
     return quality
 
 
-def clipped_in(recording: xr.Dataset, names: list[str]) -> BoolArray | None:
+def clipped_in(recording: xr.Dataset, names: list[str], quality: RunQuality) -> BoolArray | None:
     """True where one of the channels is clipped; None if nothing is."""
+    suffers = {channel.name for channel in quality.channels if channel.clipping.n_clipped}
     mask: BoolArray | None = None
     for name in names:
-        clipped = clipped_samples(recording[name])
-        if clipped.any():
+        if name in suffers:
+            clipped = clipped_samples(recording[name])
             mask = clipped if mask is None else mask | clipped
     return mask
 
@@ -275,7 +276,7 @@ def _excerpt(
     padding = int(2.0 * rate_hz)
     used = slice(max(0, shown.start - padding), min(signals.motion.size, shown.stop + padding))
     corner = max(0.2 * frequency, 0.5)
-    speed = integrated(signals.motion[used], 1 / rate_hz, corner_hz=corner)
+    speed = integrated(np.asarray(signals.motion[used], dtype=np.float64), 1 / rate_hz, corner_hz=corner)
     shift = integrated(speed, 1 / rate_hz, corner_hz=corner)[shown.start - used.start :][
         : shown.stop - shown.start
     ]

@@ -111,7 +111,7 @@ def _analysed(path: Path, settings: WorkSettings) -> RunResult:
         motion=motion,
         motion_is_velocity=settings.motion_quantity != "acceleration",
         phase_motion=reference,
-        clipped=clipped_in(recording, [settings.force, settings.motion]),
+        clipped=clipped_in(recording, [settings.force, settings.motion], quality),
     )
     return analyse_sweep(recording, path, signals, settings, quality=quality)
 

@@ -53,6 +53,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "elastic_change_m2": Quantity("m2", "change of u₀² cos²θ from one cycle to the next"),
     "kinetic_change_m2_per_s2": Quantity("m2 s-2", "change of Ω²u₀² sin²θ from one cycle to the next"),
     "chirp_m2_per_s2": Quantity("m2 s-2", "(Ωu₀)² cos 2θ times the change of ln Ω from one cycle to the next"),
+    "growth_per_cycle": Quantity("1", "change of ln a₀ from one cycle to the next", "Δ(ln a₀)"),
     "stored_work_j": Quantity("J", "change of elastic energy per cycle, taken out of the work of the force"),
     "harmonic_amplitude_n": Quantity("N", "amplitude of the repeated dynamic force at Ω … 5Ω"),
     "subharmonic_amplitude_n": Quantity("N", "amplitude of the repeated dynamic force at Ω/2 and 3Ω/2"),

@@ -90,9 +90,9 @@ def total_force(recording: xr.Dataset, names: Sequence[str] | None = None) -> xr
     Returns
     -------
     xarray.DataArray
-        ``force_total(time)`` [N], float64, upward positive, NaN where any of them is lost. The static
-        mean is not removed. A channel stated as the force *of* the tank (`block_from` = "tank")
-        enters with a minus, because F_ext acts on the tank (1.6).
+        ``force_total(time)`` [N], in the widest type of its channels, upward positive, NaN where any of
+        them is lost. The static mean is not removed. A channel stated as the force *of* the tank
+        (`block_from` = "tank") enters with a minus, because F_ext acts on the tank (1.6).
 
     Raises
     ------
@@ -118,7 +118,8 @@ def mean_acceleration(recording: xr.Dataset, names: Sequence[str] | None = None)
     Returns
     -------
     xarray.DataArray
-        ``acceleration_mean(time)`` [m/s²], float64, upward positive, NaN where any of them is lost.
+        ``acceleration_mean(time)`` [m/s²], in the widest type of its channels, upward positive, NaN where
+        any of them is lost.
 
     Raises
     ------
@@ -143,13 +144,14 @@ def _require_quantity(recording: xr.Dataset, names: Sequence[str], quantity: str
 def _combined(
     recording: xr.Dataset, names: Sequence[str], factors: Sequence[float], name: str, quantity: str
 ) -> xr.DataArray:
-    """Σ factor × channel in float64, in place after the first product."""
+    """Σ factor × channel in the widest type of the channels, in place after the first product."""
     equal = len(set(factors)) == 1
-    total = np.multiply(recording[names[0]].values, 1.0 if equal else factors[0], dtype=np.float64)
+    widest = np.result_type(*(recording[channel].dtype for channel in names), np.float32)
+    total = np.multiply(recording[names[0]].values, 1.0 if equal else factors[0], dtype=widest)
     for channel, factor in zip(names[1:], factors[1:], strict=True):
         values = recording[channel].values
-        np.add(total, values if equal else factor * values, out=total)
+        np.add(total, values if equal else factor * values, out=total, casting="same_kind")
     if equal and factors[0] != 1.0:
-        total *= factors[0]
+        total *= widest.type(factors[0])
     attributes = {"units": SI_UNITS[quantity], "quantity": quantity, "combined_from": ", ".join(names)}
     return derived_channel(recording[names[0]], total, name, attributes)

@@ -23,8 +23,8 @@ BoolArray = npt.NDArray[np.bool_]
 N_HARMONICS = 5
 """Harmonics 1 … 5 of the excitation frequency are kept."""
 
-_WORK, _MEAN_FORCE, _POWER, _PEAK = 0, 1, 2, 3
-_N_SCALARS = 4
+_WORK, _MEAN, _SQUARE, _HIGHEST, _LOWEST = 0, 1, 2, 3, 4
+_N_SCALARS = 5
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,8 @@ class Cycles:
     subharmonic_phasor : ndarray, shape (n, 2)
         Contribution of this cycle to the amplitudes of d at Ω/2 and 3Ω/2 [N]; meaningful as the
         mean over an even number of consecutive cycles.
-    dynamic_power : ndarray, shape (n,)
-        Mean of d² over the cycle, its mean removed [N²].
-    dynamic_peak : ndarray, shape (n,)
-        Largest |d| of the cycle [N].
+    dynamic_mean, dynamic_square, dynamic_highest, dynamic_lowest : ndarray, shape (n,)
+        Mean [N], mean square [N²], largest and smallest value [N] of d over the cycle.
     inertia_kg : float
         m_i.
     velocity_is_measured : bool
@@ -64,8 +62,10 @@ class Cycles:
     acceleration_phasor: ComplexArray
     velocity_phasor: ComplexArray
     subharmonic_phasor: ComplexArray
-    dynamic_power: FloatArray
-    dynamic_peak: FloatArray
+    dynamic_mean: FloatArray
+    dynamic_square: FloatArray
+    dynamic_highest: FloatArray
+    dynamic_lowest: FloatArray
     inertia_kg: float
     velocity_is_measured: bool = False
 
@@ -79,6 +79,16 @@ class Cycles:
         """πγΩu₀² = ½ T Re(F₁ u̇₁*), the work of the fundamental alone [J], shape (n,)."""
         duration = self.stop_s - self.start_s
         return np.asarray(0.5 * duration * (self.force_phasor[:, 0] * self.velocity_phasor.conj()).real)
+
+    def dynamic_power_and_peak(self, at: npt.NDArray[np.intp] | slice) -> tuple[FloatArray, FloatArray]:
+        """Mean square [N²] and largest |d| [N] of chosen cycles, their common mean removed; shapes (n_chosen,).
+
+        The mean of a single cycle is not removed: it is part of what repeats every second cycle.
+        """
+        mean = float(self.dynamic_mean[at].mean())
+        power = self.dynamic_square[at] - 2 * mean * self.dynamic_mean[at] + mean**2
+        peak = np.maximum(self.dynamic_highest[at] - mean, mean - self.dynamic_lowest[at])
+        return np.maximum(power, 0.0), peak
 
     @cached_property
     def dynamic_phasor(self) -> ComplexArray:
@@ -147,8 +157,10 @@ def evaluate_cycles(
         acceleration_phasor=phasors[:, N_HARMONICS : 2 * N_HARMONICS],
         velocity_phasor=phasors[:, 2 * N_HARMONICS],
         subharmonic_phasor=phasors[:, 2 * N_HARMONICS + 1 :],
-        dynamic_power=scalars[:, _POWER],
-        dynamic_peak=scalars[:, _PEAK],
+        dynamic_mean=scalars[:, _MEAN],
+        dynamic_square=scalars[:, _SQUARE],
+        dynamic_highest=scalars[:, _HIGHEST],
+        dynamic_lowest=scalars[:, _LOWEST],
         inertia_kg=inertia_kg,
         velocity_is_measured=motion_is_velocity,
     )
@@ -227,8 +239,9 @@ def _one_cycle(
     boundary_weights(stop - q, right)
     # φ/2π of the cycle as the cubic x + x (1-x) (c₀ (1-x) - c₁ x) with the measured slopes at both ends
     c_start, c_stop = slope_start - 1.0, slope_stop - 1.0
-    work = sum_force = sum_force_time = sum_velocity = sum_motion = peak = 0.0
+    work = sum_force = sum_force_time = sum_velocity = sum_motion = 0.0
     sum_d = sum_d2 = 0.0
+    highest, lowest = -np.inf, np.inf
     velocity_1 = time_1 = 0.0 + 0.0j
     half_1 = half_3 = 0.0 + 0.0j
     force_k = np.zeros(N_HARMONICS, dtype=np.complex128)
@@ -274,16 +287,15 @@ def _one_cycle(
         sum_d2 += w * d * d
         half_1 += w_phase * d * half
         half_3 += w_phase * d * half * unit
-        if p <= i <= q and abs(d) > peak:
-            peak = abs(d)
+        if p <= i <= q:
+            highest, lowest = max(highest, d), min(lowest, d)
     two_per_duration = 2.0 / duration
-    mean_force = sum_force / duration
     drift = 0.0 if motion_is_velocity else sum_motion / duration
     mean_velocity = sum_velocity / duration
     scalars[_WORK] = work - mean_velocity * sum_force - drift * sum_force_time
-    scalars[_MEAN_FORCE] = mean_force
-    scalars[_POWER] = max(0.0, sum_d2 / duration - (sum_d / duration) ** 2)
-    scalars[_PEAK] = peak
+    scalars[_MEAN] = sum_d / duration
+    scalars[_SQUARE] = sum_d2 / duration
+    scalars[_HIGHEST], scalars[_LOWEST] = highest, lowest
     velocity_1 = two_per_duration * (velocity_1 - drift * time_1)
     omega = 2.0 * np.pi / duration
     for k in range(N_HARMONICS):

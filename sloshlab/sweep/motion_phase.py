@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from numba import njit
+from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 
 from sloshlab.errors import AnalysisError
@@ -169,7 +170,8 @@ def _dominant_frequency(motion: FloatArray, weight: FloatArray, rate_hz: float) 
     """Centres [s] and dominant frequencies [Hz] of blocks of about eight cycles."""
     overall = _block_peaks(motion, weight, rate_hz, min(motion.size, 1 << 14))
     typical_hz = float(np.median(overall[1]))
-    n_block = int(min(motion.size, max(32, _CYCLES_PER_BLOCK / typical_hz * rate_hz)))
+    wanted = next_fast_len(int(max(32, _CYCLES_PER_BLOCK / typical_hz * rate_hz)), real=True)
+    n_block = min(motion.size, wanted)
     centres, frequency = _block_peaks(motion, weight, rate_hz, n_block)
     padded = np.pad(frequency, 1, mode="edge")
     return centres, np.median(np.stack([padded[:-2], frequency, padded[2:]]), axis=0)

@@ -62,8 +62,9 @@ def classify(
 
     Parameters
     ----------
-    dynamic_phasor : ndarray, shape (n_cycles, 5)
-        Amplitudes of d at Ω … 5Ω relative to the phase of the acceleration [N].
+    dynamic_phasor : ndarray, shape (n_pairs, 5)
+        Amplitudes of d at Ω … 5Ω relative to the phase of the acceleration, each the mean over two
+        consecutive cycles [N].
     subharmonic_phasor : ndarray, shape (n_pairs, 2)
         Amplitudes of d at Ω/2 and 3Ω/2, each the mean over two consecutive cycles [N].
     dynamic_power : ndarray, shape (n_cycles,)
@@ -83,9 +84,8 @@ def classify(
     total = max(float(dynamic_power.mean()) - noise_power, 0.0)
     others = max(total - 0.5 * abs(repeated[0]) ** 2, 0.0)
     # the mean over n phasors keeps 1/n of the power of what does not repeat; take it out again
-    n_cycles, n_pairs = dynamic_phasor.shape[0], subharmonic_phasor.shape[0]
-    harmonic = _unbiased_power(dynamic_phasor[:, 1:], n_cycles)
-    subharmonic = _unbiased_power(subharmonic_phasor, n_pairs)
+    harmonic = _unbiased_power(dynamic_phasor[:, 1:])
+    subharmonic = _unbiased_power(subharmonic_phasor)
     explained = harmonic + subharmonic
     scale = max(others, explained, np.finfo(float).tiny)
     shares = (subharmonic / scale, harmonic / scale, max(scale - explained, 0.0) / scale)
@@ -98,8 +98,9 @@ def classify(
     return Regime(label, force_ratio, *shares, crest_factor=float((dynamic_peak / rms).mean()))
 
 
-def _unbiased_power(phasor: ComplexArray, n: int) -> float:
+def _unbiased_power(phasor: ComplexArray) -> float:
     """Power of the part of phasors that repeats, its own scatter removed; shape (n, k) → scalar."""
+    n = phasor.shape[0]
     if n < 2:
         return 0.0
     mean = np.abs(phasor.mean(axis=0)) ** 2

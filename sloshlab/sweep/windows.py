@@ -28,6 +28,8 @@ _SETTLING_CYCLES = 4
 _OUTLIER_SIGMA, _SMALLEST_OUTLIER = 10.0, 2e-3
 """Cycles whose frequency leaves the trend of their window by more than ten times its scatter, and by more
 than this part, are a transition between steps."""
+_LARGEST_GROWTH_PER_CYCLE = 0.03
+"""Windows whose acceleration grows or falls by more than this part per cycle are a start or a stop."""
 _SMALLEST_AMPLITUDE_RATIO = 0.5
 """Cycles below this part of the median amplitude of their window are a start, a stop or a pause."""
 
@@ -109,7 +111,9 @@ def evaluate_windows(
     for window in window_slices(cycles, chosen):
         at = _steady(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
         if at.size >= chosen.smallest_n_cycles:
-            rows.append(_row(cycles, at, law, start_time_s, rig, noise_power))
+            row = _row(cycles, at, law, start_time_s, rig, noise_power)
+            if abs(_number(row, "growth_per_cycle")) < _LARGEST_GROWTH_PER_CYCLE:
+                rows.append(row)
     _take_out_stored_energy(rows, velocity_is_measured=cycles.velocity_is_measured)
     if rig is not None:
         for row in rows:
@@ -190,6 +194,7 @@ def _row(
         "elastic_change_m2": _slope(at, speed2 / omega**2 * cos2),
         "kinetic_change_m2_per_s2": _slope(at, speed2 * (1 - cos2)),
         "chirp_m2_per_s2": float((speed2 * (2 * cos2 - 1)).mean()) * _slope(at, np.log(omega)),
+        "growth_per_cycle": _slope(at, 0.5 * np.log(accel2)),
         "stored_work_j": 0.0,
     }
     row.update(_regime(cycles, at, row, rig, noise_power))
@@ -214,6 +219,11 @@ def _pair_starts(at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
             starts.append(position)
         position += 2 if consecutive else 1
     return np.array(starts, dtype=np.intp)
+
+
+def _pair_means(values: npt.NDArray[np.complex128], first: npt.NDArray[np.intp]) -> npt.NDArray[np.complex128]:
+    """Means over pairs of consecutive cycles, in which harmonics and subharmonics do not mix."""
+    return np.asarray(0.5 * (values[first] + values[first + 1]))
 
 
 def _standard_error(values: FloatArray, at: npt.NDArray[np.intp]) -> float:
@@ -255,20 +265,20 @@ def _number(row: dict[str, object], name: str) -> float:
 def _regime(
     cycles: Cycles, at: npt.NDArray[np.intp], row: dict[str, object], rig: Rig | None, noise_power: float
 ) -> dict[str, object]:
-    pairs = at[_pair_starts(at)]
-    subharmonic = 0.5 * (cycles.subharmonic_phasor[pairs] + cycles.subharmonic_phasor[pairs + 1])
+    first = _pair_starts(at)
     mass = rig.liquid_mass_kg if rig is not None else abs(_number(row, "apparent_mass_kg"))
     lead = np.angle(cycles.acceleration_phasor[at, 0])
+    dynamic = cycles.dynamic_phasor[at] * np.exp(-1j * np.outer(lead, np.arange(1, N_HARMONICS + 1)))
+    subharmonic = _pair_means(cycles.subharmonic_phasor[at], first)
     regime = classify(
-        cycles.dynamic_phasor[at] * np.exp(-1j * np.outer(lead, np.arange(1, N_HARMONICS + 1))),
+        _pair_means(dynamic, first) if first.size else dynamic,
         subharmonic,
-        cycles.dynamic_power[at],
-        cycles.dynamic_peak[at],
+        *cycles.dynamic_power_and_peak(at),
         reference_force_n=mass * _number(row, "acceleration_g") * GRAVITY_M_PER_S2,
         noise_power=noise_power,
     )
     return {
-        "subharmonic_amplitude_n": np.abs(subharmonic.mean(axis=0)) if pairs.size else np.full(2, np.nan),
+        "subharmonic_amplitude_n": np.abs(subharmonic.mean(axis=0)) if first.size else np.full(2, np.nan),
         "regime": regime.label,
         "force_ratio": regime.force_ratio,
         "subharmonic_share": regime.subharmonic_share,
@@ -316,7 +326,7 @@ def _empty_names(rig: Rig | None) -> list[str]:
         "work_harmonic_j", "phase_error_rad", "gamma_kg_per_s", "apparent_mass_kg", "dissipated_mass_kg",
         "dissipated_mass_kg_std", "harmonic_amplitude_n", "subharmonic_amplitude_n", "regime", "force_ratio",
         "subharmonic_share", "harmonic_share", "unrepeated_share", "crest_factor",
-        *_CHANGES, "stored_work_j",
+        *_CHANGES, "stored_work_j", "growth_per_cycle",
     ]  # fmt: skip
     scaled = ["w_bar", "w_bar_std", "beta", "beta_std", "loss_factor", "omega_bar", "u_bar", "v_bar", "fill_level"]
     return names + (scaled if rig is not None else [])

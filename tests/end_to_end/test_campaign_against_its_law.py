@@ -82,9 +82,6 @@ def test_windows_of_sweeps_are_within_three_percent_of_the_law(fill_level: float
         assert error < 0.03, f"{name} at α = {fill_level}: {error:.4f}"
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the first window of fill_0.50_sweep_down_3.00g contains the start of the shaker"
-)
 def test_no_window_gives_energy(campaign: Campaign) -> None:
     """A liquid takes energy: no work is negative beyond five of its standard errors and 2 % of the largest."""
     windows = campaign.windows

@@ -20,7 +20,8 @@ def regime_of(dynamic, noise_power=0.0):
     boundaries = 2 / F_HZ + np.arange(13) / F_HZ
     cycles = evaluate_cycles(-dynamic, A0 * np.cos(PHI), boundaries, sampling_rate_hz=RATE_HZ)
     pairs = 0.5 * (cycles.subharmonic_phasor[0::2] + cycles.subharmonic_phasor[1::2])
-    return classify(cycles.dynamic_phasor, pairs, cycles.dynamic_power, cycles.dynamic_peak,
+    dynamic_pairs = 0.5 * (cycles.dynamic_phasor[0::2] + cycles.dynamic_phasor[1::2])
+    return classify(dynamic_pairs, pairs, *cycles.dynamic_power_and_peak(slice(None)),
                     reference_force_n=REFERENCE_N, noise_power=noise_power)  # fmt: skip
 
 
@@ -52,11 +53,7 @@ def test_constructed_regimes(dynamic, label):
 
 
 def test_shares_are_those_of_the_powers():
-    """Powers: subharmonics (0.2² + 0.1²)/2, harmonics 4·0.1²/2: shares 5/9 and 4/9.
-
-    Over a single cycle subharmonics leak into the harmonics with alternating sign; the leak is taken for scatter
-    and costs the harmonics 1/12 of its power.
-    """
+    """Powers: subharmonics (0.2² + 0.1²)/2, harmonics 4·0.1²/2: shares 5/9 and 4/9."""
     regime = regime_of(INERTIAL + FARADAY_WAVES + COMB)
     assert regime.subharmonic_share == pytest.approx(5 / 9, abs=0.02)
     assert regime.harmonic_share == pytest.approx(4 / 9, abs=0.02)
@@ -68,10 +65,7 @@ def test_shares_are_those_of_the_powers():
     "phase",
     [
         0.0,
-        pytest.param(
-            np.pi / 2,
-            marks=pytest.mark.xfail(strict=True, reason="the mean of each cycle is removed, which is part of Ω/2"),
-        ),
+        np.pi / 2,
     ],
 )
 def test_force_ratio_counts_the_whole_subharmonic(phase):

@@ -29,8 +29,10 @@ def cycles_of(frequency_hz, *, usable=None, work_j=None, speed=1.0) -> Cycles:
         acceleration_phasor=acceleration,
         velocity_phasor=velocity,
         subharmonic_phasor=np.zeros((n, 2), complex),
-        dynamic_power=np.full(n, 2.0),
-        dynamic_peak=np.full(n, 2.0),
+        dynamic_mean=np.zeros(n),
+        dynamic_square=np.full(n, 2.0),
+        dynamic_highest=np.full(n, 2.0),
+        dynamic_lowest=np.full(n, -2.0),
         inertia_kg=0.0,
     )
 

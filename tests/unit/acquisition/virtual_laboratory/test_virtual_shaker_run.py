@@ -37,7 +37,8 @@ def test_a_run_is_a_complete_recording(rig, tmp_path):
     back = read_recording(tmp_path / "run.nc")
     assert channels(back) == CHANNELS
     for name in CHANNELS:
-        np.testing.assert_array_equal(back[name].values, run[name].values)
+        # 16-bit counts are read as float32: one rounding of the scale and one of the product
+        np.testing.assert_allclose(back[name].values, run[name].values, rtol=2.0**-22)
         assert back[name].attrs["range_max"] == -back[name].attrs["range_min"] > 0
         assert back[name].attrs["noise_std"] > 0
     assert back["force_cell_1"].attrs["block_from"] == "shaker"
