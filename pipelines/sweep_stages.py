@@ -146,10 +146,10 @@ def analyse_sweep(
         motion_is_velocity=signals.motion_is_velocity,
         unusable=signals.clipped,
     )
-    n_samples_per_cycle = rate_hz * float(np.diff(measured).min())
+    n_samples_per_cycle = rate_hz * float(np.quantile(np.diff(measured), 0.01))
     if n_samples_per_cycle < _SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE:
         flags.append(
-            f"{attributes.run_id}: only {n_samples_per_cycle:.1f} samples in the shortest cycle; below "
+            f"{attributes.run_id}: only {n_samples_per_cycle:.1f} samples in the shortest cycles; below "
             f"{_SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE} the quadrature errs by more than 0.1 %"
         )
     middle = 0.5 * (measured[1:] + measured[:-1])
