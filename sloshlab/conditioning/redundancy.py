@@ -21,6 +21,10 @@ PHASE_ERROR_AT_HZ = 20.0
 """Delays are also stated as phase at this frequency, the upper end of the source's sweeps."""
 
 
+_SMALLEST_COMMON_SHARE = 0.3
+"""Sensors that have less than this in common move apart, not against each other: one may be silent."""
+
+
 @dataclass(frozen=True)
 class PairAgreement:
     """One sensor compared with the reference sensor.
@@ -173,7 +177,7 @@ def _compared(recording: xr.Dataset, name: str, reference: str) -> PairAgreement
         gain_ratio=abs(ratio),
         delay_s=delay,
         phase_error_at_20_hz_rad=-2 * math.pi * PHASE_ERROR_AT_HZ * delay,
-        sign=-1 if ratio < 0 else 1,
+        sign=-1 if ratio < -_SMALLEST_COMMON_SHARE else 1,
         rms_disagreement=_rms_disagreement(x, y),
     )
 

@@ -134,8 +134,9 @@ def cross_validation(field: ScatteredField, *, n_folds: int = 5) -> CrossValidat
             for name in field.coordinates
         }
         chosen = min(smoothest.items(), key=lambda candidate: _left_out_rms(field, runs, *candidate))
+    few = field.values.size <= _LARGEST_NUMBER_TO_CHOOSE_BY
     return CrossValidation(
-        left_out_windows_rms=_left_out_rms(field, _every(field, n_folds), *chosen),
+        left_out_windows_rms=_left_out_rms(field, _every(field, n_folds)[: n_folds if few else 2], *chosen),
         left_out_runs_rms=_left_out_rms(field, runs, *chosen),
         coordinates=chosen[0],
         smoothing=chosen[1],

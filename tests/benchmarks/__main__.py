@@ -47,7 +47,6 @@ def main() -> None:
         long = measured("analyse", folder / "chirp_10.nc", folder)
         peer = measured("peer", folder / "standard.nc")
         blas = measured("blas")
-    ours_s = standard["analysis_s"] - standard["read_s"]
     figures = {
         "netCDF to windows.nc and maps.nc [s]": standard["analysis_s"],
         "… over reading and decoding the file": standard["analysis_s"] / standard["read_s"],
@@ -55,7 +54,7 @@ def main() -> None:
         "10 × longer recording costs": long["analysis_s"] / short["analysis_s"],
         "reading and decoding [s]": standard["read_s"],
         "decoded recording [MB]": memory["decoded_bytes"] / 1e6,
-        "plain SciPy work per cycle, over ours": peer["analysis_s"] / ours_s,
+        "plain SciPy: work per cycle, over ours with phasors": peer["plain_s"] / peer["ours_s"],
         "analysis over a 1000³ matrix product": standard["analysis_s"] / blas["product_s"],
     }  # fmt: skip
     missed = 0

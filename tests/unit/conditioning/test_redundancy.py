@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from swept_tank import RATE_HZ, swept_tank
 
 from sloshlab.conditioning.redundancy import agreement, redundant_accelerometers, require_equal_signs
@@ -104,3 +105,16 @@ def test_a_dead_sensor_gives_nan_not_a_number():
     (pair,) = agreement(run, [ROOF_1, ROOF_2]).pairs
     assert math.isnan(pair.gain_ratio)
     assert math.isnan(pair.delay_s)
+
+
+def test_noise_is_no_wrong_sign():
+    """Sensors without a common motion have nothing to be opposite in."""
+    rng = np.random.default_rng(12)
+    names = ["acceleration_roof_1", "acceleration_roof_2", "acceleration_control"]
+    for _ in range(20):
+        variables = {
+            name: ("time", rng.standard_normal(5000), {"units": "m s-2", "quantity": "acceleration"})
+            for name in names
+        }
+        run = xr.Dataset(variables, {"time": np.arange(5000) / 500.0}, {"sampling_rate_hz": 500.0})
+        assert agreement(run, names).wrong_sign == ()
