@@ -4,7 +4,8 @@ The dynamic force d of a window is split by power into what repeats every cycle 
 at the harmonics 2Ω … 5Ω, what repeats every second cycle (Ω/2 and 3Ω/2), and the rest, which does
 not repeat. The label is the largest of the last three shares; no threshold is needed between them.
 A window is quiet if everything in d but its inertial part, which is in phase with the acceleration,
-is small against the inertia of the liquid.
+is small against the inertia of the liquid. A window that dissipates smoothly, with nothing but the
+fundamental, is counted with the waves: nothing hits and nothing breaks.
 """
 
 from __future__ import annotations
@@ -94,7 +95,13 @@ def classify(
         float(np.sqrt(not_inertial) / (reference_force_n / np.sqrt(2))) if reference_force_n > 0 else np.nan
     )
     rms = np.sqrt(np.maximum(dynamic_power, np.finfo(float).tiny))
-    label = QUIET if force_ratio < QUIET_FORCE_RATIO else (FARADAY, IMPACTS, CHAOTIC)[int(np.argmax(shares))]
+    beside_fundamental = np.sqrt(2 * others) / reference_force_n if reference_force_n > 0 else np.nan
+    if force_ratio < QUIET_FORCE_RATIO:
+        label = QUIET
+    elif beside_fundamental < QUIET_FORCE_RATIO:
+        label = FARADAY
+    else:
+        label = (FARADAY, IMPACTS, CHAOTIC)[int(np.argmax(shares))]
     return Regime(label, force_ratio, *shares, crest_factor=float((dynamic_peak / rms).mean()))
 
 

@@ -39,6 +39,8 @@ BROAD = (
     ("dynamic", "label"),
     [
         (INERTIAL, QUIET),
+        (INERTIAL + 0.2 * REFERENCE_N * np.sin(PHI), FARADAY),
+        (INERTIAL + 0.2 * REFERENCE_N * np.sin(PHI) + 0.01 * COMB, FARADAY),
         (0 * INERTIAL, QUIET),
         (INERTIAL + 0.04 * REFERENCE_N * np.sin(PHI), QUIET),
         (INERTIAL + FARADAY_WAVES, FARADAY),
