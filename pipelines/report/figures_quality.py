@@ -19,6 +19,7 @@ from pipelines.report.style import (
     DISTINCT_MARKERS,
     NEUTRAL_COLOUR,
     REGIME_MARKS,
+    legend_columns,
     new_figure,
     ordered_colours,
     plain,
@@ -52,7 +53,7 @@ def identity(name: str, windows: xr.Dataset) -> ReportFigure:
     left.set(xlabel=f"πγΩu₀² of the fundamental [{unit}]", ylabel=f"W of the loop [{unit}]")
     right.set(xlabel="frequency Ω/2π [Hz]", ylabel=f"difference over {symbol}")
     handles, labels = left.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), markerscale=1.8)
+    figure.legend(handles, labels, loc="outside upper center", ncols=legend_columns(labels), markerscale=1.8)
     caption = (
         "Energy identity: the work integrated around the loop against the work of the fundamental alone. For a "
         "sinusoidal motion both are equal; the difference, on the right, is the work of the harmonics that motion "
@@ -178,7 +179,7 @@ def sensor_agreement(name: str, runs: Sequence[RunResult]) -> ReportFigure:
     left.set_ylabel("gain − 1 [%]")
     right.set_ylabel("delay [µs]")
     handles, labels = left.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 3))
+    figure.legend(handles, labels, loc="outside upper center", ncols=legend_columns(labels, 3))
     reference = plain(rows[0][1].reference)
     caption = (
         f"Redundant accelerometers against {reference}: relative gain and delay around the dominant "

@@ -24,6 +24,7 @@ from pipelines.report.style import (
     DISTINCT_COLOURS,
     DISTINCT_MARKERS,
     REGIME_MARKS,
+    legend_columns,
     new_figure,
     plain,
     png_bytes,
@@ -110,7 +111,7 @@ def harmonics(name: str, runs: Sequence[RunResult], *, with_liquid: bool) -> Rep
         axes.set_ylabel(f"amplitude [{unit}]")
     figure.axes[-1].set_xlabel("frequency Ω/2π [Hz]")
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), columnspacing=1.2)
+    figure.legend(handles, labels, loc="outside upper center", ncols=legend_columns(labels), columnspacing=1.2)
     subject = "the dynamic force of the liquid Δf" if with_liquid else "the force"
     caption = (
         f"Amplitudes of what repeats in {subject}: the fundamental and its multiples up to the fifth (solid), and "

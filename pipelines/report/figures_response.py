@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipelines.report.axes import plain_log_ticks
 from pipelines.report.figure import NothingToDrawError, ReportFigure
-from pipelines.report.style import new_figure, ordered_colours, plain, png_bytes
+from pipelines.report.style import legend_columns, new_figure, ordered_colours, plain, png_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,7 +136,7 @@ def frequency_response(name: str, runs: Sequence[RunResult]) -> ReportFigure:
     for axes in grid[1]:
         axes.set(xlabel="frequency Ω/2π [Hz]", ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180])
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
+    figure.legend(handles, labels, loc="outside upper center", ncols=legend_columns(labels, 4))
     caption = (
         "Acceleration over force at the excitation frequency, from in-phase and quadrature force of every window: "
         "amplitude above, phase below, the neighbourhood of the largest response on the right. Vertical "

@@ -27,6 +27,7 @@ from pipelines.report.style import (
     DISTINCT_MARKERS,
     NEUTRAL_COLOUR,
     REFERENCE_COLOUR,
+    legend_columns,
     new_figure,
     ordered_colours,
     plain,
@@ -140,7 +141,7 @@ def work_over_fill_level(name: str, experiment: SweepExperiment) -> ReportFigure
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.set_xticks(sorted({rig.rig.liquid.fill_level for rig in experiment.rigs})[:8])
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    figure.legend(handles, labels, loc="outside upper center", ncols=legend_columns(labels))
     caption = (
         "Dissipated work per cycle over the fill level, from the windows nearest to the reference points, with "
         "standard errors from the cycle scatter."

@@ -6,7 +6,7 @@ import contextlib
 import functools
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -21,6 +21,10 @@ DOTS_PER_INCH: Final = 160
 _N_COLOURS: Final = 256
 WIDTH_INCH: Final = 6.7
 """Width of a figure: the text width of an A4 page, so that fonts print at the size given here."""
+
+_LEGEND_CHARACTERS: Final = 100
+_HANDLE_CHARACTERS: Final = 8
+"""Characters that fit beside each other above a figure, and what a legend handle takes of them."""
 
 _RC: Final[dict[str, Any]] = {
     "font.family": "DejaVu Sans",
@@ -157,3 +161,9 @@ def file_stem(text: str, longest: int = 60) -> str:
     'Rig_1_.toml'
     """
     return re.sub(r"[^A-Za-z0-9.-]+", "_", text).lstrip("._-")[:longest] or "unnamed"
+
+
+def legend_columns(labels: Sequence[str], largest: int = 6) -> int:
+    """Columns of a legend above a figure that its longest label leaves room for."""
+    longest = max((len(label) for label in labels), default=1)
+    return max(1, min(len(labels), largest, _LEGEND_CHARACTERS // (longest + _HANDLE_CHARACTERS)))
