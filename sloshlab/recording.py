@@ -152,7 +152,8 @@ def _opened(file: Path) -> Iterator[Any]:
     import netCDF4
 
     if not file.is_file():
-        raise RecordingError(f"recording {file}", got="no such file", allowed="a netCDF-4 file")
+        got = "a folder" if file.is_dir() else "no such file"
+        raise RecordingError(f"recording {file}", got=got, allowed="a netCDF-4 file", remedy="check the path")
     try:
         require_sound_structure(file)
         with netCDF4.Dataset(file, mode="r") as source:

@@ -196,4 +196,4 @@ class Rig(_Described):
 def _allowed(place: str, message: str) -> str:
     if place == "liquid.fill_level":
         return "0 < fill_level < 1 (an empty or full tank does not slosh; record it as configuration 'empty')"
-    return message.removeprefix("Value error, ")
+    return message.removeprefix("Value error, ").removeprefix("Input should be ")

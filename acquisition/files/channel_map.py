@@ -190,7 +190,10 @@ def read_channel_map(path: Path) -> ChannelMap:
         raise ChannelMapError(f"map {path}", got="bytes that are not UTF-8 text", allowed="a TOML file") from error
     except (OSError, ValueError) as error:
         raise ChannelMapError(
-            f"map {path}", got=str(error), allowed="a readable TOML file", remedy="check the path given to --map"
+            f"map {path}",
+            got=getattr(error, "strerror", None) or str(error),
+            allowed="a readable TOML file",
+            remedy="check the path given to --map",
         ) from error
     return channel_map_from_text(text, name=str(path))
 
