@@ -42,13 +42,31 @@ def require_sound_structure(path: str | os.PathLike[str]) -> None:
                 allowed="a netCDF-4 file",
                 remedy="use `sloshlab import` for other formats",
             )
-        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-            damaged = _first_endless_heap(content)
+    require_sound_heaps(path, what=f"recording {path}")
+
+
+def require_sound_heaps(path: str | os.PathLike[str], *, what: str) -> None:
+    """Refuse a file in which the HDF5 library would never come to an end; other formats pass.
+
+    Parameters
+    ----------
+    path : path-like
+        An existing, non-empty file. It is searched once, without a copy in memory.
+    what : str
+        What the message calls the file.
+
+    Raises
+    ------
+    RecordingError
+        If a global heap is damaged.
+    """
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        damaged = _first_endless_heap(content)
     if damaged >= 0:
         raise RecordingError(
-            f"recording {path}",
+            what,
             got=f"a damaged heap at byte {damaged}",
-            allowed="a complete netCDF-4 file",
+            allowed="a complete HDF5 file",
             remedy="the file is damaged; copy it again",
         )
 

@@ -11,6 +11,7 @@ from acquisition.files.channel_map import SourceSection
 from acquisition.files.matlab5 import Found, collect, table_of
 from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
 from acquisition.files.table import Table
+from sloshlab.file_structure import require_sound_heaps
 
 _DEEPEST = 12
 _MOST_VARIABLES = 100_000
@@ -31,6 +32,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     """
     h5py = library("h5py", "reading MAT v7.3 files")
     checked_size(path)
+    require_sound_heaps(path, what=f"source {path}")
     found = Found()
     with ReaderGuard(path, "MAT v7.3") as guard, h5py.File(path, "r") as source:
         datasets: list[tuple[str, Any]] = []

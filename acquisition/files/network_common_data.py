@@ -12,6 +12,7 @@ from acquisition.files.channel_map import SourceSection
 from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
 from acquisition.files.table import Column, Table, as_float64, rows_of
 from sloshlab.errors import FileFormatError
+from sloshlab.file_structure import require_sound_heaps
 
 _TIME_UNITS = re.compile(r"^(?P<unit>[a-zA-Zµ]+)(\s+since\s+(?P<epoch>.+))?$")
 _SECONDS = {
@@ -34,6 +35,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     """
     netcdf4 = library("netCDF4", "reading netCDF files")
     checked_size(path)
+    require_sound_heaps(path, what=f"source {path}")
     columns: list[Column] = []
     unusable: dict[str, str] = {}
     scalars: dict[str, float] = {}

@@ -15,6 +15,7 @@ import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from acquisition.files.description import describe_source
 from sloshlab.errors import RecordingError, SloshlabError
 from sloshlab.recording import LOST, channels, read_recording, write_recording
 from sloshlab.units import SI_UNITS
@@ -132,6 +133,15 @@ def test_a_heap_that_leads_nowhere_is_refused(n_bytes: int, good: bytes, tmp_pat
     (tmp_path / "bad.nc").write_bytes(spoiled)
     with pytest.raises(RecordingError, match=f"damaged heap at byte {heap}"):
         read_recording(tmp_path / "bad.nc")
+
+
+def test_the_import_refuses_such_a_heap_too(good: bytes, tmp_path: Path) -> None:
+    heap = good.index(b"GCOL\x01\x00\x00\x00")
+    spoiled = bytearray(good)
+    spoiled[heap + 16 : heap + 32] = bytes(16)
+    (tmp_path / "bad.nc").write_bytes(spoiled)
+    with pytest.raises(RecordingError, match=f"source .*damaged heap at byte {heap}"):
+        describe_source(tmp_path / "bad.nc")
 
 
 NUMBERS = st.integers(-(2**31), 2**31 - 1) | st.floats() | st.sampled_from([0, 1, -1.0, 1e308, 5e-324])
