@@ -72,9 +72,10 @@ def write_experiment(
     dict
         ``lines`` for people, ``flags``, and numbers for machines.
     """
+    known = {run.path: run.sha256 for run in experiment.runs}
     provenance = {
         "command": command,
-        "inputs": {path.name: sha256_of(path) for path in experiment.inputs},
+        "inputs": {path.name: known.get(path) or sha256_of(path) for path in experiment.inputs},
         "versions": versions(),
     }
     with atomic_file.filled_folder(folder) as complete:
