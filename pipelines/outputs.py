@@ -77,6 +77,7 @@ def write_experiment(
         "command": command,
         "inputs": {path.name: known.get(path) or sha256_of(path) for path in experiment.inputs},
         "versions": versions(),
+        "n_unsteady_windows": sum(int(run.windows.attrs["n_unsteady_windows"]) for run in experiment.runs),
     }
     with atomic_file.filled_folder(folder) as complete:
         _write_results(experiment, complete, provenance)
@@ -85,12 +86,15 @@ def write_experiment(
 
             write_report(dataclasses.replace(experiment, provenance=provenance), complete)
     n_windows = int(experiment.windows.sizes["window"])
-    lines = [f"windows: {folder / 'windows.nc'} ({n_windows} windows)", f"maps: {folder / 'maps.nc'}"]
+    n_unsteady = provenance["n_unsteady_windows"]
+    left_out = f"; {n_unsteady} left out, their amplitude changes too quickly" if n_unsteady else ""
+    lines = [f"windows: {folder / 'windows.nc'} ({n_windows} windows{left_out})", f"maps: {folder / 'maps.nc'}"]
     return {
         "lines": lines + ([f"report: {folder / 'report.html'}"] if report else []),
         "flags": list(experiment.flags),
         "runs": len(experiment.runs),
         "windows": n_windows,
+        "unsteady_windows": n_unsteady,
         "output": str(folder),
     }
 
@@ -103,5 +107,6 @@ def _write_results(experiment: SweepExperiment, folder: Path, provenance: dict[s
             versions=json.dumps(provenance["versions"], sort_keys=True),
             half_width_cycles=experiment.settings.half_width_cycles,
             spacing_cycles=experiment.settings.spacing_cycles,
+            n_unsteady_windows=provenance["n_unsteady_windows"],
         )
         write_dataset(stamped, folder / name)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipelines.progress import progress
 from pipelines.results import RigResult, RunResult, SweepExperiment
-from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in, naming, require_usable
+from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
 from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
@@ -197,7 +197,7 @@ def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings
     signals = SweepSignals(
         force_n=force,
         motion=mean_acceleration(recording).values,
-        clipped=clipped_in(recording, forces + accelerations, quality),
+        not_measured=not_measured(recording, forces + accelerations, quality),
         inertia_kg=mass,
         noise_power=_noise_power(recording, forces, accelerations, mass),
     )
@@ -278,9 +278,9 @@ def _calibration_flags(dry: Mapping[str, DryMass | None], rigs: Mapping[str, Rig
 
 
 def w_bar_bias_of_delay(dry: DryMass, rig: Rig, *, frequency_hz: float = 20.0) -> float:
-    """W̄ that a delay of force behind acceleration feigns: −π Ωτ (M_dry + m_l)/m_l, to first order in Ωτ."""
+    """W̄ that a delay τ of force behind acceleration feigns: π Ωτ (M_dry + m_l)/m_l, to first order in Ωτ."""
     total = dry.mass_kg + rig.liquid_mass_kg
-    return -math.pi * 2 * math.pi * frequency_hz * dry.delay_s * total / rig.liquid_mass_kg
+    return math.pi * 2 * math.pi * frequency_hz * dry.delay_s * total / rig.liquid_mass_kg
 
 
 def _joined(rigs: Sequence[RigResult]) -> xr.Dataset:

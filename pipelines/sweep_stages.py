@@ -17,7 +17,7 @@ from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import integrated
 from sloshlab.conditioning.quality import RunQuality, quality_of
 from sloshlab.errors import AnalysisError, InputError
-from sloshlab.recording import RunAttributes, run_attributes
+from sloshlab.recording import CLIPPED, CRC_REPAIRED, LOST, RunAttributes, run_attributes
 from sloshlab.rig import Rig
 from sloshlab.sweep.cycles import Cycles, evaluate_cycles
 from sloshlab.sweep.law import SweepLaw, identify_law, stated_law
@@ -48,8 +48,8 @@ class SweepSignals:
         Which of the two.
     phase_motion : ndarray, optional
         What the phase is taken from, as an acceleration; None means `motion`.
-    clipped : ndarray of bool, optional
-        True where a sample that enters `force_n` or `motion` is clipped.
+    not_measured : ndarray of bool, optional
+        True where a sample that enters `force_n` or `motion` is clipped, lost or repaired.
     inertia_kg : float
         Mass removed to get the dynamic force.
     noise_power : float
@@ -60,7 +60,7 @@ class SweepSignals:
     motion: FloatArray
     motion_is_velocity: bool = False
     phase_motion: FloatArray | None = None
-    clipped: BoolArray | None = None
+    not_measured: BoolArray | None = None
     inertia_kg: float = 0.0
     noise_power: float = 0.0
 
@@ -101,10 +101,12 @@ def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
     return quality
 
 
-def clipped_in(recording: xr.Dataset, names: list[str], quality: RunQuality) -> BoolArray | None:
-    """True where one of the channels is clipped; None if nothing is."""
+def not_measured(recording: xr.Dataset, names: list[str], quality: RunQuality) -> BoolArray | None:
+    """True where a channel is clipped, or the recorder flags a sample as lost, clipped or repaired."""
     suffers = {channel.name for channel in quality.channels if channel.clipping.n_clipped}
     mask: BoolArray | None = None
+    if "quality" in recording:
+        mask = (recording["quality"].values & (LOST | CLIPPED | CRC_REPAIRED)) != 0
     for name in names:
         if name in suffers:
             clipped = clipped_samples(recording[name])
@@ -144,7 +146,7 @@ def analyse_sweep(
         sampling_rate_hz=rate_hz,
         inertia_kg=signals.inertia_kg,
         motion_is_velocity=signals.motion_is_velocity,
-        unusable=signals.clipped,
+        unusable=signals.not_measured,
     )
     n_samples_per_cycle = rate_hz * float(np.quantile(np.diff(measured), 0.01))
     if n_samples_per_cycle < _SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipelines.progress import progress
 from pipelines.results import RunResult, SweepExperiment
-from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, clipped_in, naming, require_usable
+from pipelines.sweep_stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.recording import channels, read_recording
@@ -111,7 +111,7 @@ def _analysed(path: Path, settings: WorkSettings) -> RunResult:
         motion=motion,
         motion_is_velocity=settings.motion_quantity != "acceleration",
         phase_motion=reference,
-        clipped=clipped_in(recording, [settings.force, settings.motion], quality),
+        not_measured=not_measured(recording, [settings.force, settings.motion], quality),
     )
     return analyse_sweep(recording, path, signals, settings, quality=quality)
 

@@ -26,7 +26,7 @@ from pipelines.report.axes import (
 )  # fmt: skip
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.numbers import prefixed_unit, text
-from pipelines.report.selection import Point, finite_or_raise, reference_points, rig_text
+from pipelines.report.selection import finite_or_raise, reference_points, rig_text
 from pipelines.report.style import (
     DISTINCT_COLOURS,
     ERROR_COLOURS,
@@ -346,8 +346,3 @@ def isolines(name: str, rigs: Sequence[RigResult], share: float = 0.85) -> Repor
         "measured region."
     )
     return ReportFigure(name, caption, "Fig. 1.20", png_bytes(figure))
-
-
-def reference_bullets(points: Sequence[Point]) -> str:
-    """The reference points in words."""
-    return "; ".join(f"{point.acceleration_g:.3g} g at {point.frequency_hz:.3g} Hz" for point in points)

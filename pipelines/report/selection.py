@@ -102,11 +102,6 @@ def reference_points(runs: Sequence[RunResult]) -> tuple[Point, ...]:
     )
 
 
-def reference_rig(experiment: SweepExperiment) -> RigResult:
-    """The rig nearest to a fill level of one half."""
-    return min(experiment.rigs, key=lambda rig: abs(rig.rig.liquid.fill_level - 0.5))
-
-
 def rig_text(rig: RigResult) -> str:
     """The fill level as text."""
     return f"α = {rig.rig.liquid.fill_level:.2f}"

@@ -91,44 +91,6 @@ def gaps(recording: xr.Dataset, names: Sequence[str] | None = None) -> tuple[Gap
     )
 
 
-def lost_fraction(recording: xr.Dataset, names: Sequence[str] | None = None) -> float:
-    """Share of the samples that are lost in at least one of the named channels, 0 … 1."""
-    usable = sample_is_usable(recording, names)
-    return 1.0 - np.count_nonzero(usable) / usable.size if usable.size else 0.0
-
-
-def bridged_for_coarse_phase(values: npt.ArrayLike, *, longest_samples: int) -> npt.NDArray[np.float64]:
-    """A copy with short gaps bridged by straight lines; only for finding which cycle is which.
-
-    Bridged values are not measurements: no work, force or amplitude may be computed from them.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        NaN where lost.
-    longest_samples : int
-        Longer gaps, and gaps at either end, stay NaN.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-
-    Examples
-    --------
-    >>> bridged_for_coarse_phase([0.0, np.nan, 2.0, np.nan, np.nan, 5.0], longest_samples=1)
-    array([ 0.,  1.,  2., nan, nan,  5.])
-    """
-    bridged = np.array(values, dtype=np.float64)
-    usable = np.ones(bridged.size, dtype=np.bool_)
-    mark_nan(bridged, usable)
-    for start, stop in runs(usable, False):
-        if start == 0 or stop == bridged.size or stop - start > longest_samples:
-            continue
-        line = np.linspace(bridged[start - 1], bridged[stop], stop - start + 2)
-        bridged[start:stop] = line[1:-1]
-    return bridged
-
-
 def runs(mask: BoolArray, value: bool) -> list[tuple[int, int]]:
     """(start, stop) of the stretches where `mask` equals `value`, stop exclusive.
 

@@ -104,21 +104,24 @@ def evaluate_windows(
     Returns
     -------
     xarray.Dataset
-        Dimension ``window``; variables as in `sloshlab.quantities`. Work is positive when dissipated.
+        Dimension ``window``; variables as in `sloshlab.quantities`. Work is positive when dissipated. The
+        attribute `n_unsteady_windows` counts those left out because the amplitude changes too quickly.
     """
     chosen = settings or WindowSettings()
-    rows = []
+    rows, n_unsteady = [], 0
     for window in window_slices(cycles, chosen):
         at = _steady(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
         if at.size >= chosen.smallest_n_cycles:
             row = _row(cycles, at, law, start_time_s, rig, noise_power)
             if abs(_number(row, "growth_per_cycle")) < _LARGEST_GROWTH_PER_CYCLE:
                 rows.append(row)
+            else:
+                n_unsteady += 1
     _take_out_stored_energy(rows, velocity_is_measured=cycles.velocity_is_measured)
     if rig is not None:
         for row in rows:
             row.update(_scaled(row, cycles.inertia_kg, rig))
-    table = _table(rows, run_id, rig)
+    table = _table(rows, run_id, rig).assign_attrs(n_unsteady_windows=n_unsteady)
     return described(table if rig is not None else table.drop_vars("regime"))
 
 

@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 
 from sloshlab.conditioning.gaps import (
     Gap,
-    bridged_for_coarse_phase,
     gaps,
-    lost_fraction,
     runs,
     sample_is_usable,
     sampling_step_s,
@@ -35,8 +33,6 @@ def test_gaps_are_listed_with_times_and_counts():
     assert [gap.start_s for gap in found] == pytest.approx([0.5, 0.8])
     assert [gap.stop_s for gap in found] == pytest.approx([0.5, 1.0])
     assert gaps(run, ["force_cell_2"]) == (Gap(run["time"].values[4], run["time"].values[5], 2),)
-    assert lost_fraction(run) == pytest.approx(4 / 6)
-    assert lost_fraction(run, ["force_cell_2"]) == pytest.approx(2 / 6)
 
 
 def test_no_gaps():
@@ -62,19 +58,6 @@ def test_a_missing_channel_is_named_with_those_there_are():
 def test_one_sample_has_no_step():
     with pytest.raises(AnalysisError, match="number of samples: got 1"):
         sampling_step_s(recording(force_cell_1=[0.0]))
-
-
-def test_bridging_is_linear_for_short_inner_gaps_only_and_copies():
-    values = np.array([NAN, 1.0, NAN, NAN, 4.0, NAN, NAN, NAN, 8.0, NAN])
-    before = values.copy()
-    bridged = bridged_for_coarse_phase(values, longest_samples=2)
-    assert bridged == pytest.approx([NAN, 1, 2, 3, 4, NAN, NAN, NAN, 8, NAN], nan_ok=True)
-    assert np.array_equal(values, before, equal_nan=True)
-
-
-def test_a_gap_at_the_start_is_not_bridged_from_the_end():
-    bridged = bridged_for_coarse_phase([NAN, 1.0, 2.0], longest_samples=5)
-    assert bridged == pytest.approx([NAN, 1, 2], nan_ok=True)
 
 
 @given(st.lists(st.booleans(), max_size=60), st.booleans())

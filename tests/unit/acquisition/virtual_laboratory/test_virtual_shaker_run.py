@@ -37,8 +37,10 @@ def test_a_run_is_a_complete_recording(rig, tmp_path):
     back = read_recording(tmp_path / "run.nc")
     assert channels(back) == CHANNELS
     for name in CHANNELS:
-        # 16-bit counts are read as float32: one rounding of the scale and one of the product
+        # 16-bit counts are read as float32: one rounding of the scale and one of the product; no count is lost
         np.testing.assert_allclose(back[name].values, run[name].values, rtol=2.0**-22)
+        step = back[name].attrs["adc_step"]
+        np.testing.assert_array_equal(np.round(back[name].values / step), np.round(run[name].values / step))
         assert back[name].attrs["range_max"] == -back[name].attrs["range_min"] > 0
         assert back[name].attrs["noise_std"] > 0
     assert back["force_cell_1"].attrs["block_from"] == "shaker"
