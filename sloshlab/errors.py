@@ -11,6 +11,16 @@ class SloshlabError(Exception):
     """Root of the tree: catch it to catch every error that sloshlab raises on purpose."""
 
 
+def _one_line(what: str, got: str, allowed: str, remedy: str) -> str:
+    parts = [
+        f"got {got}" if got else "",
+        f"allowed: {allowed}" if allowed else "",
+        f"remedy: {remedy}" if remedy else "",
+    ]
+    details = "; ".join(part for part in parts if part)
+    return " ".join((f"{what}: {details}" if details else what).split())
+
+
 class InputError(SloshlabError, ValueError):
     """An input cannot be used as it is.
 
@@ -33,14 +43,7 @@ class InputError(SloshlabError, ValueError):
 
     def __init__(self, what: str, *, got: str = "", allowed: str = "", remedy: str = "") -> None:
         self.what, self.got, self.allowed, self.remedy = what, got, allowed, remedy
-        parts = [
-            f"got {got}" if got else "",
-            f"allowed: {allowed}" if allowed else "",
-            f"remedy: {remedy}" if remedy else "",
-        ]
-        details = "; ".join(part for part in parts if part)
-        text = f"{what}: {details}" if details else what
-        super().__init__(" ".join(text.split()))
+        super().__init__(_one_line(what, got, allowed, remedy))
 
 
 class RecordingError(InputError):
@@ -81,3 +84,27 @@ class MissingExtraError(SloshlabError, ImportError):
         super().__init__(
             f"{purpose} needs {package}, which is not installed; remedy: pip install 'sloshlab[{extra}]'"
         )
+
+
+class SourceError(SloshlabError, OSError):
+    """A device cannot be opened, stopped answering, or sends what no device may send.
+
+    Parameters are those of `InputError`.
+
+    Examples
+    --------
+    >>> print(SourceError("serial:/dev/ttyUSB0", got="no such port", remedy="plug the device in"))
+    serial:/dev/ttyUSB0: got no such port; remedy: plug the device in
+    """
+
+    def __init__(self, what: str, *, got: str = "", allowed: str = "", remedy: str = "") -> None:
+        self.what, self.got, self.allowed, self.remedy = what, got, allowed, remedy
+        super().__init__(_one_line(what, got, allowed, remedy))
+
+
+class JournalError(InputError):
+    """A journal cannot be read, or holds nothing that can be recovered."""
+
+
+class FaultsError(InputError):
+    """A description of faults to simulate is malformed."""
