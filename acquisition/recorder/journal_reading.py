@@ -1,0 +1,495 @@
+"""Reading a journal, whole or cut short or damaged: an index of what is certain, counts on demand.
+
+A block counts only if its checksums are right. What a journal declares is checked before memory is
+allocated for it; the index needs about 60 bytes per entry, and counts stay on the disk until asked for.
+"""
+
+from __future__ import annotations
+
+import os
+import weakref
+import zlib
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recorder.journal_format import (
+    BLOCK_HEADER,
+    BLOCK_MAGIC,
+    ENTRY,
+    FILE_HEADER,
+    FILE_MAGIC,
+    MOST_SOURCES,
+    NO_CLOCK,
+    SAMPLES_HEAD,
+    VERSION,
+    BlockHeader,
+    BlockType,
+    MalformedBlockError,
+    end_from,
+    source_from,
+    trouble_from,
+    unpacked_block_header,
+    unpacked_text,
+)
+from acquisition.sources.interface import MOST_CHANNELS, CountArray, End, SourceInfo, Trouble
+from sloshlab.errors import JournalError
+
+MOST_ENTRIES: Final = 20_000_000
+MOST_TROUBLES_KEPT: Final = 10_000
+"""Further troubles are counted, not kept one by one."""
+
+_SCAN_BYTES: Final = 1 << 20
+
+
+class Damage(NamedTuple):
+    """A stretch of the file that was left out."""
+
+    offset: int
+    n_bytes: int
+    reason: str
+
+
+class Entry(NamedTuple):
+    """Consecutive samples of one group with the times that belong to them.
+
+    `counter` and `clock_ticks` (None if unknown) hold for the first sample, `host_monotonic_ns` and
+    `host_utc_ns` for the moment when the last one had been read. `offset` is the place of the counts.
+    """
+
+    source: int
+    group: int
+    stream: int
+    counter: int
+    n_samples: int
+    clock_ticks: int | None
+    host_monotonic_ns: int
+    host_utc_ns: int
+    offset: int
+    bytes_per_count: int
+
+
+@dataclass(frozen=True)
+class Entries:
+    """All entries of one group, in the order of arrival; one element per entry in every array.
+
+    Attributes
+    ----------
+    source, group : int
+    n_channels : int
+    stream, counter, n_samples, host_monotonic_ns, host_utc_ns : ndarray of int64
+    clock_ticks : ndarray of int64
+        −1 where the device gave no clock.
+    offset : ndarray of int64
+        Place of the counts in the file [bytes].
+    bytes_per_count : ndarray of uint8
+        2 or 4.
+    """
+
+    source: int
+    group: int
+    n_channels: int
+    stream: NDArray[np.int64]
+    counter: NDArray[np.int64]
+    n_samples: NDArray[np.int64]
+    clock_ticks: NDArray[np.int64]
+    host_monotonic_ns: NDArray[np.int64]
+    host_utc_ns: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    bytes_per_count: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return int(self.counter.size)
+
+    def __getitem__(self, number: int) -> Entry:
+        ticks = int(self.clock_ticks[number])
+        return Entry(
+            self.source,
+            self.group,
+            int(self.stream[number]),
+            int(self.counter[number]),
+            int(self.n_samples[number]),
+            None if ticks == NO_CLOCK else ticks,
+            int(self.host_monotonic_ns[number]),
+            int(self.host_utc_ns[number]),
+            int(self.offset[number]),
+            int(self.bytes_per_count[number]),
+        )
+
+
+@dataclass(frozen=True)
+class Journal:
+    """What a journal certainly holds.
+
+    Use it as a context manager, or `close` it.
+
+    Attributes
+    ----------
+    path : Path
+    metadata : dict
+        As the recorder wrote it.
+    sources : dict
+        `SourceInfo` by number of the source; a source whose description was lost is absent.
+    entries : dict
+        `Entries` by (source, group); every group of every source is there, maybe with none.
+    troubles : tuple of (int, Trouble)
+        Source and trouble, in the order of writing; the first `MOST_TROUBLES_KEPT`.
+    trouble_counts : dict
+        Total of `Trouble.count` by (source, kind).
+    ends : tuple of (int, End)
+        Source and end.
+    failures : tuple of (int, str)
+        Source and why it delivered nothing more.
+    closing : dict or None
+        What the recorder wrote when it closed the journal; None if it did not.
+    n_bytes, n_bytes_left_out : int
+        Size of the file, and how much of it could not be used.
+    damage : tuple of Damage
+        Where that is; the last may be a block that was not finished.
+    """
+
+    path: Path
+    metadata: dict[str, Any]
+    sources: dict[int, SourceInfo]
+    entries: dict[tuple[int, int], Entries]
+    troubles: tuple[tuple[int, Trouble], ...]
+    trouble_counts: dict[tuple[int, str], int]
+    ends: tuple[tuple[int, End], ...]
+    failures: tuple[tuple[int, str], ...]
+    closing: dict[str, Any] | None
+    n_bytes: int
+    n_bytes_left_out: int
+    damage: tuple[Damage, ...]
+    _file: _OpenFile = field(repr=False, compare=False)
+
+    @property
+    def closed_cleanly(self) -> bool:
+        """Whether the recorder ended the journal itself."""
+        return self.closing is not None
+
+    def counts(self, entry: Entry) -> CountArray:
+        """Counts of one entry, int32, shape (n_samples, n_channels of the group).
+
+        Raises
+        ------
+        JournalError
+            If the file has become shorter since it was indexed.
+        """
+        n_channels = self.entries[entry.source, entry.group].n_channels
+        n_bytes = entry.n_samples * n_channels * entry.bytes_per_count
+        data = self._file.read(entry.offset, n_bytes)
+        if len(data) < n_bytes:
+            raise JournalError(f"journal {self.path}", got="a file that became shorter", remedy="read it again")
+        counts = np.frombuffer(data, f"<i{entry.bytes_per_count}").astype(np.int32)
+        return counts.reshape(entry.n_samples, n_channels)
+
+    def close(self) -> None:
+        """Let the file go; may be called twice."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def read_journal(path: str | os.PathLike[str]) -> Journal:
+    """Index a journal.
+
+    Parameters
+    ----------
+    path : path-like
+        A journal, complete or not; it is not changed.
+
+    Returns
+    -------
+    Journal
+        Everything whose checksums are right; the rest is in `Journal.damage`.
+
+    Raises
+    ------
+    JournalError
+        If there is no such file, it is no journal, or of a newer version.
+    """
+    file = _OpenFile(Path(path))
+    try:
+        return _indexed(file)
+    except BaseException:
+        file.close()
+        raise
+
+
+class _OpenFile:
+    """A file read at given places; closed at the latest when nobody needs it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            got = "a folder" if path.is_dir() else "no such file"
+            raise JournalError(f"journal {path}", got=got, allowed="a journal of sloshlab record")
+        try:
+            descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+        except OSError as error:
+            raise JournalError(f"journal {path}", got=str(error.strerror), allowed="a readable file") from error
+        self._descriptor = descriptor
+        self.close = weakref.finalize(self, os.close, descriptor)
+        self.n_bytes = os.fstat(descriptor).st_size
+
+    def read(self, offset: int, n_bytes: int) -> bytes:
+        """Up to `n_bytes` from `offset`; fewer only at the end of the file."""
+        if not self.close.alive:
+            raise JournalError(f"journal {self.path}", got="a read after closing", remedy="read it again")
+        try:
+            data = os.pread(self._descriptor, n_bytes, offset)
+            while 0 < len(data) < n_bytes and (more := self._more(offset, n_bytes, data)):
+                data += more
+        except OSError as error:
+            raise JournalError(
+                f"journal {self.path}",
+                got=f"{error.strerror} at byte {offset}",
+                remedy="copy the file to a sound disk and recover from the copy",
+            ) from error
+        return data
+
+    def _more(self, offset: int, n_bytes: int, data: bytes) -> bytes:
+        return os.pread(self._descriptor, n_bytes - len(data), offset + len(data))
+
+
+class _Scan:
+    """Blocks of a journal in the order of the file; what is none is collected as damage."""
+
+    def __init__(self, file: _OpenFile) -> None:
+        self.file, self.damage = file, list[Damage]()
+        self.identity, self.begin = self._file_header()
+
+    def blocks(self) -> Iterator[tuple[int, BlockHeader, bytes]]:
+        """Offset of the payload, header, payload."""
+        position = self.begin
+        while position < self.file.n_bytes:
+            header = self._header_at(position)
+            if header is None:
+                found = self._next_header(position + 1)
+                self._leave_out(position, found - position, "no block")
+                position = found
+                continue
+            start = position + BLOCK_HEADER.size
+            payload = self.file.read(start, header.n_bytes)
+            if len(payload) < header.n_bytes:
+                self._leave_out(position, self.file.n_bytes - position, "a block that was not finished")
+                return
+            if zlib.crc32(payload) == header.payload_crc:
+                yield start, header, payload
+            else:
+                self._leave_out(position, BLOCK_HEADER.size + header.n_bytes, "a damaged block")
+            position = start + header.n_bytes
+
+    def refuse(self, start: int, header: BlockHeader, reason: str) -> None:
+        """Leave out a block that is whole but says what cannot be."""
+        self._leave_out(start - BLOCK_HEADER.size, BLOCK_HEADER.size + header.n_bytes, reason)
+
+    def _leave_out(self, offset: int, n_bytes: int, reason: str) -> None:
+        self.damage.append(Damage(offset, n_bytes, reason))
+
+    def _file_header(self) -> tuple[int | None, int]:
+        data = self.file.read(0, FILE_HEADER.size)
+        if len(data) == FILE_HEADER.size:
+            magic, version, _, identity, crc = FILE_HEADER.unpack(data)
+            if magic == FILE_MAGIC and crc == zlib.crc32(data[:-4]):
+                if version != VERSION:
+                    allowed = f"version {VERSION}"
+                    raise JournalError(
+                        f"journal {self.file.path}", got=f"version {version}", allowed=allowed, remedy="upgrade"
+                    )
+                return identity, FILE_HEADER.size
+        return None, 0
+
+    def _header_at(self, position: int) -> BlockHeader | None:
+        header = unpacked_block_header(self.file.read(position, BLOCK_HEADER.size), position)
+        if header is None:
+            return None
+        if self.identity is None:
+            self.identity = header.identity
+        return header if header.identity == self.identity else None
+
+    def _next_header(self, position: int) -> int:
+        """Place of the next sound header, or the end of the file."""
+        overlap = len(BLOCK_MAGIC) - 1
+        while position < self.file.n_bytes:
+            data = self.file.read(position, _SCAN_BYTES + overlap)
+            at = data.find(BLOCK_MAGIC)
+            while at >= 0:
+                if self._header_at(position + at) is not None:
+                    return position + at
+                at = data.find(BLOCK_MAGIC, at + 1)
+            position += _SCAN_BYTES
+        return self.file.n_bytes
+
+
+@dataclass
+class _Collected:
+    metadata: dict[str, Any] = field(default_factory=dict)
+    sources: dict[int, SourceInfo] = field(default_factory=dict)
+    samples: dict[tuple[int, int], list[_SamplesBlock]] = field(default_factory=lambda: defaultdict(list))
+    troubles: list[tuple[int, Trouble]] = field(default_factory=list)
+    trouble_counts: dict[tuple[int, str], int] = field(default_factory=lambda: defaultdict(int))
+    ends: list[tuple[int, End]] = field(default_factory=list)
+    failures: list[tuple[int, str]] = field(default_factory=list)
+    closing: dict[str, Any] | None = None
+    n_blocks: int = 0
+    n_entries: int = 0
+
+
+class _SamplesBlock(NamedTuple):
+    start: int
+    header: BlockHeader
+    n_channels: int
+    bytes_per_count: int
+    stream: int
+    counter: int
+    rows: NDArray[np.void]
+
+
+def _indexed(file: _OpenFile) -> Journal:
+    scan, found = _Scan(file), _Collected()
+    for start, header, payload in scan.blocks():
+        found.n_blocks += 1
+        try:
+            _collect(found, start, header, payload)
+        except MalformedBlockError as error:
+            scan.refuse(start, header, str(error))
+    if scan.begin == 0 and not found.n_blocks:
+        raise JournalError(
+            f"journal {file.path}",
+            got="no journal, or nothing of one",
+            allowed="a journal of sloshlab record",
+            remedy="check the path; if it is right, nothing had been recorded",
+        )
+    entries = _entries_of_all_groups(found, scan)
+    return Journal(
+        path=file.path,
+        metadata=found.metadata,
+        sources=dict(sorted(found.sources.items())),
+        entries=entries,
+        troubles=tuple(found.troubles),
+        trouble_counts=dict(found.trouble_counts),
+        ends=tuple(found.ends),
+        failures=tuple(found.failures),
+        closing=found.closing,
+        n_bytes=file.n_bytes,
+        n_bytes_left_out=sum(damage.n_bytes for damage in scan.damage),
+        damage=tuple(sorted(scan.damage)),
+        _file=file,
+    )
+
+
+def _collect(found: _Collected, start: int, header: BlockHeader, payload: bytes) -> None:
+    if header.source >= MOST_SOURCES:
+        raise MalformedBlockError(f"source number {header.source}")
+    if header.block_type == BlockType.SAMPLES:
+        _collect_samples(found, start, header, payload)
+        return
+    content = unpacked_text(payload)
+    if header.block_type == BlockType.METADATA:
+        found.metadata.update(content)
+    elif header.block_type == BlockType.SOURCE:
+        # repeated on purpose; the first is what the samples were taken with
+        found.sources.setdefault(header.source, source_from(content))
+    elif header.block_type == BlockType.TROUBLE:
+        _collect_trouble(found, header.source, trouble_from(content))
+    elif header.block_type == BlockType.END:
+        found.ends.append((header.source, end_from(content)))
+    elif header.block_type == BlockType.FAILURE:
+        found.failures.append((header.source, str(content.get("message", ""))[:1000]))
+    elif header.block_type == BlockType.CLOSING:
+        found.closing = content
+    else:
+        raise MalformedBlockError(f"block type {header.block_type}")
+
+
+def _collect_trouble(found: _Collected, source: int, trouble: Trouble) -> None:
+    found.trouble_counts[source, trouble.kind.name] += trouble.count
+    if len(found.troubles) < MOST_TROUBLES_KEPT:
+        found.troubles.append((source, trouble))
+
+
+def _collect_samples(found: _Collected, start: int, header: BlockHeader, payload: bytes) -> None:
+    if len(payload) < SAMPLES_HEAD.size:
+        raise MalformedBlockError("samples without a head")
+    group, n_bytes, zero, n_channels, n_entries, stream, counter = SAMPLES_HEAD.unpack_from(payload)
+    rows_end = SAMPLES_HEAD.size + n_entries * ENTRY.itemsize
+    if n_bytes not in (2, 4) or zero or not 1 <= n_channels <= MOST_CHANNELS or len(payload) < rows_end:
+        raise MalformedBlockError("samples with an impossible head")
+    rows = np.frombuffer(payload, ENTRY, n_entries, SAMPLES_HEAD.size).copy()
+    if not n_entries or not rows["n_samples"].all():
+        raise MalformedBlockError("samples without samples")
+    n_samples = int(rows["n_samples"].sum(dtype=np.int64))
+    if len(payload) != rows_end + n_samples * n_channels * n_bytes or counter > 2**63 - 1 - n_samples:
+        raise MalformedBlockError("samples whose number is wrong")
+    found.n_entries += n_entries
+    if found.n_entries > MOST_ENTRIES:
+        raise JournalError("journal", got=f"more than {MOST_ENTRIES} entries", remedy="record shorter runs")
+    block = _SamplesBlock(start + rows_end, header, n_channels, n_bytes, stream, counter, rows)
+    found.samples[header.source, group].append(block)
+
+
+def _entries_of_all_groups(found: _Collected, scan: _Scan) -> dict[tuple[int, int], Entries]:
+    expected = {
+        (number, group): len(members)
+        for number, info in found.sources.items()
+        for group, members in enumerate(info.groups)
+    }
+    for place, blocks in found.samples.items():
+        unusable = [block for block in blocks if block.n_channels != expected.get(place)]
+        for block in unusable:
+            n_rows_bytes = SAMPLES_HEAD.size + block.rows.nbytes
+            scan.refuse(block.start - n_rows_bytes, block.header, "samples of an unknown group")
+    return {
+        (number, group): _entries(
+            number,
+            group,
+            n_channels,
+            [block for block in found.samples.get((number, group), []) if block.n_channels == n_channels],
+        )
+        for (number, group), n_channels in expected.items()
+    }
+
+
+def _entries(source: int, group: int, n_channels: int, blocks: list[_SamplesBlock]) -> Entries:
+    rows = np.concatenate([block.rows for block in blocks]) if blocks else np.empty(0, ENTRY)
+    n_each = np.array([len(block.rows) for block in blocks], np.int64)
+    n_samples = rows["n_samples"].astype(np.int64)
+    before = _samples_before(n_samples, n_each)
+    width = np.repeat(_column(blocks, "bytes_per_count"), n_each)
+    return Entries(
+        source,
+        group,
+        n_channels,
+        stream=np.repeat(_column(blocks, "stream"), n_each),
+        counter=np.repeat(_column(blocks, "counter"), n_each) + before,
+        n_samples=n_samples,
+        clock_ticks=rows["clock_ticks"].astype(np.int64),
+        host_monotonic_ns=rows["host_monotonic_ns"].astype(np.int64),
+        host_utc_ns=rows["host_utc_ns"].astype(np.int64),
+        offset=np.repeat(_column(blocks, "start"), n_each) + before * n_channels * width,
+        bytes_per_count=width.astype(np.uint8),
+    )
+
+
+def _column(blocks: list[_SamplesBlock], name: str) -> NDArray[np.int64]:
+    return np.array([getattr(block, name) for block in blocks], np.int64)
+
+
+def _samples_before(n_samples: NDArray[np.int64], n_each: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Samples between the begin of an entry's block and the entry."""
+    running = np.cumsum(n_samples) - n_samples
+    first = np.cumsum(n_each) - n_each
+    return running - np.repeat(running[first], n_each)

@@ -1,0 +1,335 @@
+"""Writing a journal: append-only, each block whole and flushed, so that a crash costs the last one at most."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, Protocol, Self
+
+import numpy as np
+
+from acquisition.recorder.journal_format import (
+    ENTRY,
+    LARGEST_PAYLOAD_BYTES,
+    NO_CLOCK,
+    SAMPLES_HEAD,
+    BlockType,
+    described_source,
+    described_trouble,
+    is_in_file_range,
+    packed_block,
+    packed_file_header,
+    packed_text,
+)
+from acquisition.sources.interface import Block, CountArray, Delivery, End, SourceInfo, Trouble
+from sloshlab.errors import JournalError
+
+SYNCHRONISATION_INTERVAL_NS: Final = 500_000_000
+"""The journal is forced to the disk at most this often."""
+
+DESCRIPTION_INTERVAL_NS: Final = 30_000_000_000
+"""Metadata and sources are repeated this often, so that no single damage makes the samples unreadable."""
+
+SHORTEST_ENTRY_NS: Final = 40_000_000
+"""Blocks that were read closer together than this share their times."""
+
+_LARGEST_COUNTS_BYTES: Final = 4 << 20
+_MOST_BLOCKS_JOINED: Final = 20_000
+
+
+class JournalFile(Protocol):
+    """What a journal needs of a file; tests give one that runs full."""
+
+    def write(self, data: bytes | memoryview, /) -> int | None: ...
+    def truncate(self, size: int, /) -> int: ...
+    def seek(self, offset: int, /) -> int: ...
+    def fileno(self) -> int: ...
+    def close(self) -> None: ...
+
+
+def _new_file(path: Path, overwrite: bool) -> JournalFile:
+    return path.open("wb" if overwrite else "xb", buffering=0)
+
+
+class JournalWriter:
+    """An open journal.
+
+    Parameters
+    ----------
+    path : Path
+        The journal; its folder must be there.
+    metadata : mapping
+        Whatever is needed to make a recording of it, as JSON.
+    sources : sequence of SourceInfo
+        Described once; blocks name them by their position.
+    overwrite : bool
+        Whether an existing journal may be replaced.
+    monotonic_ns, synchronise, open_file : callable
+        Clock, `os.fsync` and opening; given by tests.
+
+    Raises
+    ------
+    JournalError
+        By every method, if the disk is full or refuses; the journal then ends with its last complete
+        block, and nothing more can be appended.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        metadata: Mapping[str, Any],
+        sources: Sequence[SourceInfo],
+        *,
+        overwrite: bool = False,
+        monotonic_ns: Callable[[], int] = time.monotonic_ns,
+        synchronise: Callable[[int], None] = os.fsync,
+        open_file: Callable[[Path, bool], JournalFile] = _new_file,
+    ) -> None:
+        self.path = path
+        self.n_bytes = 0
+        self._metadata, self._sources = dict(metadata), tuple(sources)
+        self._monotonic_ns, self._synchronise = monotonic_ns, synchronise
+        self._sequence = 0
+        self._identity = secrets.randbits(32)
+        self._synchronised_ns = self._described_ns = monotonic_ns()
+        self._is_broken = False
+        self._file: JournalFile | None = self._opened(open_file, overwrite)
+        try:
+            self._write(packed_file_header(self._identity))
+            self._describe()
+            self._force_to_disk()
+            _synchronise_folder(path.parent)
+        except BaseException:
+            self._release()
+            raise
+
+    def _opened(self, open_file: Callable[[Path, bool], JournalFile], overwrite: bool) -> JournalFile:
+        try:
+            return open_file(self.path, overwrite)
+        except FileExistsError:
+            raise existing_journal(self.path) from None
+        except OSError as error:
+            raise self._refused(error) from error
+
+    def update_metadata(self, more: Mapping[str, Any]) -> None:
+        """Add to the metadata; later values take the place of earlier ones."""
+        self._metadata.update(more)
+        self._describe()
+
+    def append(self, source: int, delivery: Delivery) -> None:
+        """Append one delivery of source number `source`."""
+        if isinstance(delivery, Block):
+            self.append_blocks(source, [delivery])
+        elif isinstance(delivery, Trouble):
+            self._append(BlockType.TROUBLE, source, packed_text(described_trouble(delivery)))
+        else:
+            self._append(BlockType.END, source, packed_text(_described_end(delivery)))
+
+    def append_blocks(self, source: int, blocks: Sequence[Block]) -> None:
+        """Append consecutive samples of one group and stream; each block's counter follows the one before.
+
+        Raises
+        ------
+        ValueError
+            If they are not consecutive: a journal block has one counter.
+        """
+        first, expected = blocks[0], blocks[0].counter
+        for block in blocks:
+            if (block.group, block.stream, block.counter) != (first.group, first.stream, expected):
+                raise ValueError("blocks that do not follow each other")
+            expected += len(block.counts)
+        if not is_in_file_range(first.stream, first.counter, expected):
+            raise ValueError(f"a counter that cannot be stored: {first.counter}")
+        for part in _parts(blocks):
+            self._append(BlockType.SAMPLES, source, _samples_payload(part))
+
+    def append_failure(self, source: int, message: str) -> None:
+        """Note that nothing more comes from source number `source`, and why."""
+        self._append(BlockType.FAILURE, source, packed_text({"message": message[:1000]}))
+
+    def close(self, closing: Mapping[str, Any] | None = None) -> None:
+        """Close cleanly with a last block that says so; may be called twice."""
+        if self._file is None:
+            return
+        try:
+            if not self._is_broken:
+                self._append(BlockType.CLOSING, 0, packed_text(closing or {}))
+                self._force_to_disk()
+        finally:
+            self._release()
+
+    def abandon(self) -> None:
+        """Close without the last block, as after a crash; may be called twice."""
+        self._release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.abandon()
+
+    def _describe(self) -> None:
+        self._described_ns = self._monotonic_ns()
+        self._append(BlockType.METADATA, 0, packed_text(self._metadata))
+        for number, info in enumerate(self._sources):
+            self._append(BlockType.SOURCE, number, packed_text(described_source(info)))
+
+    def _append(self, block_type: BlockType, source: int, payload: bytes) -> None:
+        place = {"identity": self._identity, "sequence": self._sequence, "offset": self.n_bytes}
+        self._write(packed_block(block_type, source, payload, **place))
+        self._sequence += 1
+        if block_type is not BlockType.SAMPLES:
+            return
+        now = self._monotonic_ns()
+        if now - self._described_ns >= DESCRIPTION_INTERVAL_NS:
+            self._describe()
+        if now - self._synchronised_ns >= SYNCHRONISATION_INTERVAL_NS:
+            self._force_to_disk()
+
+    def _write(self, data: bytes) -> None:
+        if self._file is None or self._is_broken:
+            raise JournalError(f"journal {self.path}", got="a write after its end", remedy="start a new journal")
+        rest = memoryview(data)
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) or 0 :]
+        except OSError as error:
+            self._cut_back()
+            raise self._refused(error) from error
+        except BaseException:
+            self._cut_back()
+            raise
+        self.n_bytes += len(data)
+
+    def _cut_back(self) -> None:
+        """Remove the incomplete block; if even that fails, readers leave it out by its checksum."""
+        self._is_broken = True
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                self._file.truncate(self.n_bytes)
+                self._file.seek(self.n_bytes)
+
+    def _force_to_disk(self) -> None:
+        if self._file is None:
+            return
+        self._synchronised_ns = self._monotonic_ns()
+        try:
+            self._synchronise(self._file.fileno())
+        except OSError as error:
+            self._is_broken = True
+            raise self._refused(error) from error
+
+    def _refused(self, error: OSError) -> JournalError:
+        return JournalError(
+            f"journal {self.path}",
+            got=f"{error.strerror or error} after {self.n_bytes} complete bytes",
+            allowed="a disk with enough space that can be written",
+            remedy="free space or record to another disk; everything up to there is kept",
+        )
+
+    def _release(self) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            file.close()
+
+
+def _synchronise_folder(folder: Path) -> None:
+    """Make the name of a new file survive a power cut, where the system can."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def existing_journal(path: Path) -> JournalError:
+    """The error for a journal that is in the way."""
+    return JournalError(
+        f"journal {path}",
+        got="a journal that is already there, from a recording that was cut short",
+        remedy=f"sloshlab recover {path} -o RUN.nc, then remove it; or record with --overwrite",
+    )
+
+
+def _described_end(end: End) -> dict[str, Any]:
+    return {"stream": end.stream, "n_samples": end.n_samples}
+
+
+def _parts(blocks: Sequence[Block]) -> list[list[Block]]:
+    """`blocks` in runs small enough for one journal block each."""
+    parts: list[list[Block]] = []
+    n_bytes = 0
+    for whole in blocks:
+        for block in _split(whole):
+            is_full = n_bytes + block.counts.nbytes > _LARGEST_COUNTS_BYTES
+            if not parts or is_full or len(parts[-1]) == _MOST_BLOCKS_JOINED:
+                parts.append([])
+                n_bytes = 0
+            parts[-1].append(block)
+            n_bytes += block.counts.nbytes
+    return parts
+
+
+def _split(block: Block) -> list[Block]:
+    n_each = max(1, _LARGEST_COUNTS_BYTES // (4 * max(1, block.counts.shape[1])))
+    if len(block.counts) <= n_each:
+        return [block] if len(block.counts) else []
+    # later pieces have no clock of their own: the device gave one for the first sample only
+    return [
+        Block(
+            block.group,
+            block.stream,
+            block.counter + start,
+            block.counts[start : start + n_each],
+            block.clock_ticks if start == 0 else None,
+            block.host_monotonic_ns,
+            block.host_utc_ns,
+        )
+        for start in range(0, len(block.counts), n_each)
+    ]
+
+
+def _samples_payload(blocks: Sequence[Block]) -> bytes:
+    first = blocks[0]
+    counts = first.counts if len(blocks) == 1 else np.concatenate([block.counts for block in blocks])
+    stored = _narrowed(counts)
+    entries = _entries(blocks)
+    n_channels = counts.shape[1]
+    head = SAMPLES_HEAD.pack(
+        first.group, stored.itemsize, 0, n_channels, len(entries), first.stream, first.counter
+    )
+    payload = head + entries.tobytes() + stored.tobytes()
+    if len(payload) > LARGEST_PAYLOAD_BYTES:
+        raise ValueError(f"{len(payload)} bytes in one journal block")
+    return payload
+
+
+def _narrowed(counts: CountArray) -> np.ndarray[Any, Any]:
+    """16-bit counts where all of them fit, whatever the channels declare."""
+    narrow = counts.astype("<i2")
+    return narrow if np.array_equal(narrow, counts) else counts.astype("<i4", copy=False)
+
+
+def _entries(blocks: Sequence[Block]) -> np.ndarray[Any, Any]:
+    rows: list[list[int]] = []
+    began_ns = 0
+    for block in blocks:
+        ticks = NO_CLOCK if block.clock_ticks is None else block.clock_ticks
+        if not 0 <= ticks < 2**63:
+            ticks = NO_CLOCK
+        brings_clock = bool(rows) and rows[-1][2] == NO_CLOCK != ticks
+        if rows and not brings_clock and block.host_monotonic_ns - began_ns < SHORTEST_ENTRY_NS:
+            rows[-1][0] += len(block.counts)
+            rows[-1][3:] = block.host_monotonic_ns, block.host_utc_ns
+        else:
+            rows.append([len(block.counts), 0, ticks, block.host_monotonic_ns, block.host_utc_ns])
+            began_ns = block.host_monotonic_ns
+    return np.array([tuple(row) for row in rows], ENTRY)
