@@ -156,7 +156,7 @@ def _decode(data: ByteArray, start: int, stop: int, body: ByteArray, write: int)
     if read == stop:
         return -1
     while read < stop:
-        code = np.int64(data[read])
+        code = int(np.int64(data[read]))
         if code == 0 or read + code > stop:
             return -1
         for k in range(read + 1, read + code):

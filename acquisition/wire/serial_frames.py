@@ -168,7 +168,7 @@ def parse(data: bytes | bytearray | memoryview) -> Parsed:
     runs = cobs.decode_runs(data, shortest=_SHORTEST_BODY, longest=LONGEST_BODY)
     frames: list[Frame] = []
     errors: list[FrameError] = []
-    bodies = memoryview(runs.bodies)
+    bodies = runs.bodies.data
     for start, stop, n_bytes in zip(
         runs.starts.tolist(), runs.stops.tolist(), runs.encoded_sizes.tolist(), strict=True
     ):
