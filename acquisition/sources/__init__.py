@@ -3,3 +3,31 @@
 `open_source` turns a URL into a `Source`; backends are found by the entry-point group
 ``sloshlab.sources``, so that a plug-in can bring its own.
 """
+
+from acquisition.sources.interface import (
+    Block,
+    Channel,
+    Delivery,
+    End,
+    Source,
+    SourceInfo,
+    SourceURL,
+    Trouble,
+    TroubleKind,
+)
+from acquisition.sources.urls import URLOptions, open_source, parse_url
+
+__all__ = [
+    "Block",
+    "Channel",
+    "Delivery",
+    "End",
+    "Source",
+    "SourceInfo",
+    "SourceURL",
+    "Trouble",
+    "TroubleKind",
+    "URLOptions",
+    "open_source",
+    "parse_url",
+]

@@ -1,0 +1,213 @@
+"""Where samples come from, written as one line: ``scheme:target?option=value&…``.
+
+The scheme names a backend, found by the entry-point group ``sloshlab.sources``; nothing of a backend is
+imported before it is asked for. Options are read through `URLOptions`, so that a misspelt one is an
+error and not a silent default.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import re
+from collections.abc import Callable, Iterable
+from typing import Final
+from urllib.parse import unquote
+
+from acquisition.sources.interface import Source, SourceURL
+from sloshlab.errors import SourceError
+
+ENTRY_POINT_GROUP: Final = "sloshlab.sources"
+LONGEST_URL: Final = 4096
+"""Characters; longer ones are refused."""
+
+_SCHEME = re.compile(r"[a-z][a-z0-9_+.-]{0,31}")
+_DEVICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_YES_NO = {"yes": True, "no": False}
+
+
+def parse_url(text: str) -> SourceURL:
+    """Take a URL apart; the backend and its options are not looked at.
+
+    Parameters
+    ----------
+    text : str
+        ``scheme:target?option=value&…``. The first colon ends the scheme, the first question mark the
+        target. Target and options may be percent-encoded: ``%3F`` is a question mark, ``%26`` an
+        ampersand, ``%25`` a per cent sign.
+
+    Returns
+    -------
+    SourceURL
+
+    Raises
+    ------
+    SourceError
+        If it has no scheme, or an option has no value or stands twice.
+
+    Examples
+    --------
+    >>> url = parse_url("serial:socket://127.0.0.1:7000?device=daq")
+    >>> url.scheme, url.target, dict(url.options)
+    ('serial', 'socket://127.0.0.1:7000', {'device': 'daq'})
+    """
+    if len(text) > LONGEST_URL or not text.isprintable():
+        got = f"{len(text)} characters" if len(text) > LONGEST_URL else repr(text)
+        raise SourceError("source", got=got, allowed=f"≤ {LONGEST_URL} printable characters on one line")
+    scheme, colon, rest = text.partition(":")
+    if not colon or not _SCHEME.fullmatch(scheme):
+        raise SourceError(
+            f"source {text!r}",
+            got="no scheme",
+            allowed="scheme:target, for example serial:/dev/ttyUSB0",
+            remedy=f"write file:{text} to play a recording",
+        )
+    target, _, query = rest.partition("?")
+    return SourceURL(text, scheme, unquote(target), _parsed_options(text, query))
+
+
+def open_source(text: str) -> Source:
+    """The source that a URL names, not yet opened: use it as a context manager.
+
+    Parameters
+    ----------
+    text : str
+        As for `parse_url`.
+
+    Returns
+    -------
+    Source
+        Of the backend whose entry point has the scheme's name.
+
+    Raises
+    ------
+    SourceError
+        If the URL is malformed, no backend or more than one has the scheme, or the backend cannot be
+        imported or refuses target or options.
+    """
+    url = parse_url(text)
+    backend = _backend(url, importlib.metadata.entry_points(group=ENTRY_POINT_GROUP))
+    return backend(url)
+
+
+def _backend(
+    url: SourceURL, entry_points: Iterable[importlib.metadata.EntryPoint]
+) -> Callable[[SourceURL], Source]:
+    """What makes a source of a URL: the class or function that the entry point names."""
+    installed = tuple(entry_points)
+    # an editable and a plain installation side by side name the same backend twice
+    found = {entry.value: entry for entry in installed if entry.name == url.scheme}
+    if len(found) != 1:
+        raise SourceError(
+            f"source {url.text}",
+            got=f"scheme {url.scheme!r}, which is that of {len(found)} backends" if found else repr(url.scheme),
+            allowed=", ".join(sorted({entry.name for entry in installed})) or "none: nothing is installed",
+            remedy="check the word before the colon, or install the package that brings the backend",
+        )
+    (entry,) = found.values()
+    try:
+        backend: Callable[[SourceURL], Source] = entry.load()
+    except (ImportError, AttributeError) as error:
+        raise SourceError(
+            f"source {url.text}",
+            got=f"backend {entry.value} that cannot be imported ({error})",
+            remedy="install what it needs",
+        ) from error
+    return backend
+
+
+def _parsed_options(text: str, query: str) -> dict[str, str]:
+    options: dict[str, str] = {}
+    for part in filter(None, query.split("&")):
+        name, equals, value = part.partition("=")
+        if not name or not equals or name in options:
+            raise SourceError(
+                f"source {text}",
+                got=f"option {name!r} twice" if name in options else f"{part!r}",
+                allowed="option=value, each option once, joined by &",
+            )
+        options[name] = unquote(value)
+    return options
+
+
+class URLOptions:
+    """The options of a URL, read one by one; what nobody asked for is refused.
+
+    Parameters
+    ----------
+    url : SourceURL
+
+    Examples
+    --------
+    >>> options = URLOptions(parse_url("sim:shaker_sweep?duration_s=60&real_time=no"))
+    >>> options.number("duration_s", 240.0, lowest=5, highest=7200), options.yes("real_time", True)
+    (60.0, False)
+    >>> options.refuse_others()
+    """
+
+    def __init__(self, url: SourceURL) -> None:
+        self._url = url
+        self._known: list[str] = []
+
+    def text(self, name: str, default: str | None = None) -> str | None:
+        """The option as it stands, or the default."""
+        self._known.append(name)
+        return self._url.options.get(name, default)
+
+    def choice(self, name: str, default: str, allowed: Iterable[str]) -> str:
+        """One of the allowed words."""
+        value, words = self.text(name, default) or "", tuple(allowed)
+        if value not in words:
+            raise self.error(name, value, ", ".join(words))
+        return value
+
+    def yes(self, name: str, default: bool) -> bool:
+        """``yes`` or ``no``."""
+        return _YES_NO[self.choice(name, "yes" if default else "no", _YES_NO)]
+
+    def number(self, name: str, default: float, *, lowest: float, highest: float) -> float:
+        """A finite number within limits, both allowed."""
+        text = self.text(name)
+        if text is None:
+            return default
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not lowest <= value <= highest:
+            raise self.error(name, text, f"a number, {lowest:g} … {highest:g}")
+        return value
+
+    def integer(self, name: str, default: int, *, lowest: int, highest: int) -> int:
+        """A whole number within limits, both allowed."""
+        text = self.text(name)
+        if text is None:
+            return default
+        if not re.fullmatch(r"[+-]?[0-9]{1,18}", text) or not lowest <= int(text) <= highest:
+            raise self.error(name, text, f"a whole number, {lowest} … {highest}")
+        return int(text)
+
+    def device(self, default: str) -> str:
+        """Option ``device``: a short name; the default is made into one."""
+        made = re.sub(r"[^A-Za-z0-9_.-]+", "_", default).lstrip("_.-")[:64] or self._url.scheme
+        name = self.text("device", made) or ""
+        if not _DEVICE.fullmatch(name):
+            raise self.error(
+                "device", name, "up to 64 letters, digits, '_', '.', '-', beginning with one of the former two"
+            )
+        return name
+
+    def refuse_others(self) -> None:
+        """Refuse options that have not been read.
+
+        Raises
+        ------
+        SourceError
+        """
+        for name, value in self._url.options.items():
+            if name not in self._known:
+                raise self.error(name, value, f"options {', '.join(sorted(set(self._known)))}")
+
+    def error(self, name: str, got: str, allowed: str) -> SourceError:
+        """The error that says that an option cannot be used."""
+        return SourceError(f"source {self._url.text}: {name}", got=repr(got)[:80], allowed=allowed)
