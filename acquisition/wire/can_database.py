@@ -1,0 +1,432 @@
+"""DBC files: the text of a layout of ours, and the layout that any DBC file of our convention describes.
+
+Written by hand, so that every number keeps all its digits; read through cantools, because other
+laboratories' files have more in them than ours.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from acquisition.sources.interface import MOST_CHANNELS, Channel
+from acquisition.wire.can_bits import BitField
+from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage, Selected
+from acquisition.wire.serial_calibration import channels_from_calibration
+from sloshlab.errors import FileFormatError, SourceError
+from sloshlab.units import SI_UNITS
+
+LARGEST_DATABASE_BYTES: Final = 4 << 20
+FEWEST_COUNTER_BITS: Final = 16
+MOST_COUNTER_BITS: Final = 48
+
+_TEXT_ATTRIBUTES: Final = {"block_from": "BlockFrom", "block_to": "BlockTo", "sensor_serial": "SensorSerial"}
+_FLOAT_ATTRIBUTES: Final = {"noise_std": "NoiseStd", "x_m": "XM", "range_min": "RangeMin", "range_max": "RangeMax"}
+_FRAME_FORMATS: Final = ["StandardCAN", "ExtendedCAN", *["reserved"] * 12, "StandardCAN_FD", "ExtendedCAN_FD"]
+_EXTENDED: Final = 1 << 31
+_SAMPLE_NAME: Final = re.compile(rf"((?:{'|'.join(SI_UNITS)})_[A-Za-z0-9_]+?)(?:__([0-9]{{1,2}}))?")
+_PART_NAME: Final = re.compile(r"(sample_counter|device_clock)_([0-9]{1,2})")
+_REMEDY: Final = "see docs/can_protocol.md for what a DBC file must say"
+
+_DEFINITIONS: Final = f"""\
+BA_DEF_ "DeviceName" STRING ;
+BA_DEF_ BO_ "SamplingRateHz" FLOAT 0 10000000;
+BA_DEF_ BO_ "DeviceClockHz" FLOAT 0 1000000000000;
+BA_DEF_ BO_ "VFrameFormat" ENUM {",".join(f'"{name}"' for name in _FRAME_FORMATS)};
+BA_DEF_ SG_ "MissingCount" INT -2147483648 2147483647;
+{"".join(f'BA_DEF_ SG_ "{n}" FLOAT -1e308 1e308;{chr(10)}' for n in _FLOAT_ATTRIBUTES.values())}\
+{"".join(f'BA_DEF_ SG_ "{n}" STRING ;{chr(10)}' for n in _TEXT_ATTRIBUTES.values())}\
+BA_DEF_DEF_ "DeviceName" "";
+BA_DEF_DEF_ "SamplingRateHz" 0;
+BA_DEF_DEF_ "DeviceClockHz" 0;
+BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
+BA_DEF_DEF_ "MissingCount" 0;
+{"".join(f'BA_DEF_DEF_ "{n}" 0;{chr(10)}' for n in _FLOAT_ATTRIBUTES.values())}\
+{"".join(f'BA_DEF_DEF_ "{n}" "";{chr(10)}' for n in _TEXT_ATTRIBUTES.values())}"""
+
+
+def dbc_text(layout: CanLayout) -> str:
+    """The layout as a DBC file.
+
+    Raises
+    ------
+    SourceError
+        If the device describes itself impossibly, or with text that a DBC file cannot hold.
+    """
+    _require_possible(layout)
+    controls = [one for one in (layout.status, layout.command) if one is not None]
+    parts = ['VERSION ""', "NS_ :", "BS_:", "BU_: device host"]
+    parts += ["\n".join(_control_lines(one)) for one in controls]
+    parts += ["\n".join(_message_lines(message, layout)) for message in layout.messages]
+    parts += [_DEFINITIONS + "\n".join(_attribute_lines(layout, controls))]
+    return "\n\n".join(parts) + "\n"
+
+
+def _require_possible(layout: CanLayout) -> tuple[Channel, ...]:
+    """The channels, after the checks that every description of a device goes through."""
+    fields = [{k: v for k, v in vars(channel).items() if v is not None} for channel in layout.channels]
+    described = {
+        "device": layout.device,
+        "sampling_rate_hz": layout.sampling_rate_hz,
+        "channels": fields,
+        **({"clock_hz": layout.clock_hz} if layout.clock_hz is not None else {}),
+    }
+    for channel in layout.channels:
+        match = _SAMPLE_NAME.fullmatch(channel.name)
+        if match is None or match[2] is not None:
+            raise SourceError(
+                f"channel {channel.name[:60]}: name",
+                got=repr(channel.name[:60]),
+                allowed="<quantity>_<place> that does not end in __ and digits",
+            )
+        if channel.sensor_serial is not None and re.search(r'["\\]', channel.sensor_serial):
+            raise SourceError(
+                f"channel {channel.name}: sensor_serial",
+                got=repr(channel.sensor_serial),
+                allowed="no quotes and backslashes",
+            )
+    return channels_from_calibration(json.dumps(described).encode()).channels
+
+
+def _control_lines(message: ControlMessage) -> Iterator[str]:
+    yield f"BO_ {_dbc_id(message)} {message.name}: {message.length} {_sender(message.name)}"
+    for field in message.fields:
+        yield _signal_line(field)
+
+
+def _sender(name: str) -> str:
+    return "host" if name == "host_command" else "device"
+
+
+def _message_lines(message: SampleMessage, layout: CanLayout) -> Iterator[str]:
+    yield f"BO_ {_dbc_id(message)} {message.name}: {message.length} device"
+    for field in (message.crc, message.n_samples):
+        if field is not None:
+            yield _signal_line(field)
+    for part in (*message.counter, *message.clock, *([message.flags] if message.flags else [])):
+        mark = "M" if part.field == message.multiplexor else "".join(f"m{n}" for n in part.selectors)
+        yield _signal_line(part.field, mark)
+    for index, fields in zip(message.channels, message.samples, strict=True):
+        for field in fields:
+            yield _signal_line(field, "", layout.channels[index])
+
+
+def _signal_line(field: BitField, mark: str = "", channel: Channel | None = None) -> str:
+    scale, offset, limits, units = "1", "0", f"{field.lowest}|{field.highest}", ""
+    if channel is not None:
+        scale, offset, units = repr(channel.scale_factor), repr(channel.add_offset), channel.units
+        both = channel.range_min is not None and channel.range_max is not None
+        limits = f"{channel.range_min!r}|{channel.range_max!r}" if both else "0|0"
+    order = "0" if field.big_endian else "1"
+    sign = "-" if field.signed else "+"
+    place = f"{field.start_bit}|{field.length}@{order}{sign}"
+    name = " ".join([field.name, mark] if mark else [field.name])
+    return f' SG_ {name} : {place} ({scale},{offset}) [{limits}] "{units}" host'
+
+
+def _attribute_lines(layout: CanLayout, controls: Sequence[ControlMessage]) -> Iterator[str]:
+    yield f'BA_ "DeviceName" "{layout.device}";'
+    everything: list[SampleMessage | ControlMessage] = [*controls, *layout.messages]
+    for message in everything:
+        yield f'BA_ "VFrameFormat" BO_ {_dbc_id(message)} {14 * message.fd + message.extended};'
+    for group in layout.messages:
+        yield f'BA_ "SamplingRateHz" BO_ {_dbc_id(group)} {layout.sampling_rate_hz!r};'
+        if layout.clock_hz is not None:
+            yield f'BA_ "DeviceClockHz" BO_ {_dbc_id(group)} {layout.clock_hz!r};'
+        for index, fields in zip(group.channels, group.samples, strict=True):
+            place = f"SG_ {_dbc_id(group)} {fields[0].name}"
+            for name, text in _channel_attributes(layout.channels[index]):
+                yield f'BA_ "{name}" {place} {text};'
+
+
+def _channel_attributes(channel: Channel) -> Iterator[tuple[str, str]]:
+    if channel.missing_count is not None:
+        yield "MissingCount", str(channel.missing_count)
+    in_limits = channel.range_min is not None and channel.range_max is not None
+    for key, name in _FLOAT_ATTRIBUTES.items():
+        value = getattr(channel, key)
+        if value is not None and not (in_limits and key.startswith("range")):
+            yield name, repr(float(value))
+    for key, name in _TEXT_ATTRIBUTES.items():
+        if getattr(channel, key) is not None:
+            yield name, f'"{getattr(channel, key)}"'
+
+
+def _dbc_id(message: SampleMessage | ControlMessage) -> int:
+    return message.arbitration_id | (_EXTENDED if message.extended else 0)
+
+
+def read_layout(source: Path | str) -> CanLayout:
+    """The layout that a DBC file describes.
+
+    Parameters
+    ----------
+    source : Path or str
+        The file, or its text.
+
+    Raises
+    ------
+    SourceError
+        If it cannot be read, no message has both channels and ``sample_counter_0``, or it describes
+        what no device can be.
+
+    Examples
+    --------
+    >>> from acquisition.wire.can_layout import device_database
+    >>> layout = device_database("cells", 1000.0, None, [Channel("force_cell_1", "force", "N")])
+    >>> read_layout(layout.to_dbc()) == layout
+    True
+    """
+    from acquisition.files.reading_limits import ReaderGuard
+
+    name = str(source) if isinstance(source, Path) else "DBC"
+    text = _text_of(source)
+    try:
+        with ReaderGuard(Path(name), "DBC", loggers=("cantools",)):
+            import cantools
+
+            database = cantools.database.load_string(text, database_format="dbc", strict=True)
+    except FileFormatError as error:
+        raise SourceError(error.what, got=error.got, allowed=error.allowed, remedy=error.remedy) from error
+    return _DatabaseReader(name, database).layout()
+
+
+def _text_of(source: Path | str) -> str:
+    if isinstance(source, str):
+        size = len(source)
+        content = source.encode()
+    else:
+        try:
+            size = source.stat().st_size
+            with source.open("rb") as stream:
+                content = stream.read(LARGEST_DATABASE_BYTES + 1)
+        except OSError as error:
+            raise SourceError(f"{source}", got=error.strerror or "no file", allowed="a DBC file") from error
+    if max(size, len(content)) > LARGEST_DATABASE_BYTES:
+        raise SourceError(f"{source}"[:200], got=f"{size} bytes", allowed=f"≤ {LARGEST_DATABASE_BYTES} bytes")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
+
+class _DatabaseReader:
+    """Takes the layout out of what cantools has read."""
+
+    def __init__(self, name: str, database: Any) -> None:
+        self._name = name
+        self._messages = list(database.messages)
+        self._attributes = dict(database.dbc.attributes) if database.dbc else {}
+        self._channels: list[Channel] = []
+
+    def layout(self) -> CanLayout:
+        described = [message for message in self._messages if self._has_samples(message)]
+        if not described:
+            self._refuse("messages", "none with channels and sample_counter_0", "at least one")
+        messages = tuple(self._sample_message(message) for message in described)
+        device = str(self._attributes["DeviceName"].value) if "DeviceName" in self._attributes else ""
+        layout = CanLayout(
+            device or Path(self._name).stem,
+            self._one_number(described, "SamplingRateHz", needed=True) or 0.0,
+            self._one_number(described, "DeviceClockHz", needed=any(message.clock for message in messages)),
+            tuple(self._channels),
+            messages,
+            self._control("device_status", ("state", "stream", "n_samples")),
+            self._control("host_command", ("command",)),
+        )
+        return self._checked(layout)
+
+    def _checked(self, layout: CanLayout) -> CanLayout:
+        try:
+            _require_possible(layout)
+        except SourceError as error:
+            what = error.what.replace("calibration of the device", "device")
+            raise SourceError(
+                f"{self._name}: {what}", got=error.got, allowed=error.allowed, remedy=_REMEDY
+            ) from error
+        return layout
+
+    def _refuse(self, what: str, got: str, allowed: str) -> NoReturn:
+        raise SourceError(f"{self._name}: {what}", got=got, allowed=allowed, remedy=_REMEDY)
+
+    def _has_samples(self, message: Any) -> bool:
+        names = {signal.name for signal in message.signals}
+        return "sample_counter_0" in names and any(_SAMPLE_NAME.fullmatch(name) for name in names)
+
+    def _sample_message(self, message: Any) -> SampleMessage:
+        signals = {signal.name: signal for signal in message.signals}
+        if not 1 <= message.length <= 64:
+            self._refuse(message.name, f"{message.length} bytes", "1 … 64 bytes")
+        first = len(self._channels)
+        samples = tuple(self._sample_fields(message, signals))
+        counter = self._parts(message, signals, "sample_counter")
+        flags = signals.get("device_flags")
+        found = SampleMessage(
+            name=message.name,
+            arbitration_id=message.frame_id,
+            length=message.length,
+            channels=tuple(range(first, len(self._channels))),
+            samples=samples,
+            counter=counter,
+            clock=self._parts(message, signals, "device_clock"),
+            multiplexor=self._multiplexor(message, signals),
+            crc=self._crc(message, signals),
+            n_samples=self._always("n_samples_in_frame", message, signals),
+            flags=Selected(_field(flags), 0, _selectors(flags)) if flags is not None else None,
+            extended=bool(message.is_extended_frame),
+            fd=bool(message.is_fd),
+        )
+        self._check_counter(found)
+        return found
+
+    def _multiplexor(self, message: Any, signals: dict[str, Any]) -> BitField | None:
+        ours = re.compile(r"(sample_counter|device_clock)_[0-9]+|device_flags")
+        used = {s.multiplexer_signal for s in signals.values() if s.multiplexer_ids and ours.fullmatch(s.name)}
+        if not used:
+            return None
+        if len(used) > 1 or signals[min(used)].multiplexer_ids:
+            self._refuse(f"{message.name}: multiplexors", ", ".join(sorted(used)), "one, itself in every frame")
+        return _field(signals[min(used)])
+
+    def _always(self, name: str, message: Any, signals: dict[str, Any]) -> BitField | None:
+        signal = signals.get(name)
+        if signal is None:
+            return None
+        if signal.multiplexer_ids or signal.is_signed or signal.is_float:
+            self._refuse(f"{message.name}.{name}", "multiplexed, signed or float", "unsigned, in every frame")
+        return _field(signal)
+
+    def _crc(self, message: Any, signals: dict[str, Any]) -> BitField | None:
+        crc = self._always("crc_16", message, signals)
+        if crc is not None and (crc.length != 16 or len(crc.pieces()) != 2):
+            self._refuse(f"{message.name}.crc_16", f"bit {crc.start_bit}, {crc.length} bits", "two whole bytes")
+        return crc
+
+    def _parts(self, message: Any, signals: dict[str, Any], kind: str) -> tuple[Selected, ...]:
+        parts = []
+        for name, signal in signals.items():
+            match = _PART_NAME.fullmatch(name)
+            if match is None or match[1] != kind:
+                continue
+            if signal.is_signed or signal.is_float:
+                self._refuse(f"{message.name}.{name}", "signed or float", "unsigned")
+            parts.append(Selected(_field(signal), int(match[2]), _selectors(signal)))
+        parts.sort(key=lambda part: part.bit)
+        reached = 0
+        for part in parts:
+            if part.bit != reached:
+                self._refuse(
+                    f"{message.name}.{part.field.name}", f"bit {part.bit}", f"bit {reached}, which is missing"
+                )
+            reached += part.field.length
+        if reached > (MOST_COUNTER_BITS if kind == "sample_counter" else 62):
+            self._refuse(f"{message.name}.{kind}", f"{reached} bits", f"≤ {MOST_COUNTER_BITS}")
+        return tuple(parts)
+
+    def _check_counter(self, message: SampleMessage) -> None:
+        n_bits = sum(part.field.length for part in message.counter)
+        if n_bits < FEWEST_COUNTER_BITS:
+            self._refuse(
+                f"{message.name}: sample counter",
+                f"{n_bits} bits",
+                f"≥ {FEWEST_COUNTER_BITS}, of which 3 in every frame",
+            )
+        if message.counter[0].selectors:
+            self._refuse(f"{message.name}.sample_counter_0", "multiplexed", "in every frame")
+        latched = any(part.selectors for part in message.clock)
+        if latched and (message.multiplexor is None or message.multiplexor.name != "sample_counter_0"):
+            self._refuse(
+                f"{message.name}: device clock", "multiplexed by another signal", "sample_counter_0 as multiplexor"
+            )
+
+    def _sample_fields(self, message: Any, signals: dict[str, Any]) -> Iterator[tuple[BitField, ...]]:
+        by_channel: dict[str, dict[int, Any]] = {}
+        for name, signal in signals.items():
+            match = _SAMPLE_NAME.fullmatch(name)
+            if match is not None:
+                by_channel.setdefault(match[1], {})[int(match[2] or 0)] = signal
+        lengths = {len(found) for found in by_channel.values()}
+        for channel, found in by_channel.items():
+            if sorted(found) != list(range(len(found))) or len(lengths) > 1:
+                self._refuse(
+                    f"{message.name}.{channel}",
+                    f"samples {', '.join(map(str, sorted(found)))}",
+                    "samples 0, 1, 2 … , as many for every channel",
+                )
+            if len(self._channels) >= MOST_CHANNELS:
+                self._refuse("channels", f"more than {MOST_CHANNELS}", f"≤ {MOST_CHANNELS}")
+            self._channels.append(self._channel(f"{message.name}.{channel}", channel, found))
+            yield tuple(_field(found[k]) for k in range(len(found)))
+
+    def _channel(self, place: str, name: str, found: dict[int, Any]) -> Channel:
+        first = found[0]
+        needed_bits = first.length + (0 if first.is_signed else 1)
+        if any(one.is_float or one.multiplexer_ids for one in found.values()) or needed_bits > 32:
+            self._refuse(
+                place, f"{first.length} bits, float or multiplexed", "integer of ≤ 32 bits in every frame"
+            )
+        same = {(one.length, one.is_signed, one.scale, one.offset, one.unit) for one in found.values()}
+        if len(same) > 1:
+            self._refuse(place, "samples with different scaling", "one scaling")
+        attributes = {key: one.value for key, one in (first.dbc.attributes if first.dbc else {}).items()}
+        given = {key: attributes[text] for key, text in _TEXT_ATTRIBUTES.items() if attributes.get(text)}
+        given |= {key: float(attributes[a]) for key, a in _FLOAT_ATTRIBUTES.items() if a in attributes}
+        if first.minimum is not None and first.maximum is not None:
+            given |= {"range_min": float(first.minimum), "range_max": float(first.maximum)}
+        return Channel(
+            name=name,
+            quantity=name.partition("_")[0],
+            units=(first.unit or "").strip(),
+            bits=next(bits for bits in (16, 24, 32) if needed_bits <= bits),
+            scale_factor=float(first.scale),
+            add_offset=float(first.offset),
+            missing_count=int(attributes["MissingCount"]) if "MissingCount" in attributes else None,
+            **given,
+        )
+
+    def _one_number(self, messages: Sequence[Any], attribute: str, *, needed: bool) -> float | None:
+        found = [message.dbc.attributes.get(attribute) if message.dbc else None for message in messages]
+        values = {float(one.value) for one in found if one is not None}
+        if len(values) > 1 or (needed and (not values or None in found)):
+            self._refuse(
+                f"attribute {attribute}",
+                ", ".join(map(repr, sorted(values))) or "nothing",
+                "one value, the same in every message",
+            )
+        return values.pop() if values else None
+
+    def _control(self, name: str, needed: tuple[str, ...]) -> ControlMessage | None:
+        message = next((message for message in self._messages if message.name == name), None)
+        if message is None:
+            return None
+        signals = {signal.name: signal for signal in message.signals}
+        missing = [field for field in needed if field not in signals]
+        if missing:
+            self._refuse(name, f"no {', '.join(missing)}", f"signals {', '.join(needed)}")
+        self._crc(message, signals)
+        fields = [self._always(field, message, signals) for field in ("crc_16", *needed)]
+        return ControlMessage(
+            name,
+            message.frame_id,
+            bool(message.is_extended_frame),
+            message.length,
+            tuple(field for field in fields if field is not None),
+            bool(message.is_fd),
+        )
+
+
+def _field(signal: Any) -> BitField:
+    return BitField(
+        signal.name,
+        signal.start,
+        signal.length,
+        signal.byte_order == "big_endian",
+        bool(signal.is_signed),
+    )
+
+
+def _selectors(signal: Any) -> tuple[int, ...]:
+    return tuple(int(one) for one in signal.multiplexer_ids or ())
