@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from acquisition.recorder.journal_reading import Damage, Entries, Entry, Journal, read_journal
+from acquisition.recorder.journal_reading import Entries, Entry, Journal, read_journal
+from acquisition.recorder.journal_scanning import Damage
 from acquisition.recorder.journal_writing import JournalWriter, existing_journal
 
 __all__ = [

@@ -114,7 +114,7 @@ def _header_crc(start: bytes, offset: int) -> int:
 
 def packed_text(content: Mapping[str, Any]) -> bytes:
     """JSON of a description; ValueError if it is larger than any reader accepts."""
-    text = json.dumps(content, ensure_ascii=False, allow_nan=False, sort_keys=True).encode()
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False, sort_keys=True).encode("utf-8", "replace")
     if len(text) > LARGEST_TEXT_BYTES:
         raise ValueError(f"a description of {len(text)} bytes is larger than {LARGEST_TEXT_BYTES}")
     return text
@@ -173,7 +173,7 @@ def _checked(described: T) -> T:
 
 def described_trouble(trouble: Trouble) -> dict[str, Any]:
     """JSON object of a trouble; the inverse of `trouble_from`."""
-    return {**dataclasses.asdict(trouble), "kind": trouble.kind.name}
+    return {**dataclasses.asdict(trouble), "kind": trouble.kind.name, "detail": trouble.detail[:1000]}
 
 
 def trouble_from(content: Mapping[str, Any]) -> Trouble:
