@@ -50,13 +50,20 @@ class DescribedDevice(Protocol):
     """Whatever has a name, a rate, a clock and channels: `Calibration`, `SourceInfo`."""
 
     @property
-    def device(self) -> str: ...
+    def device(self) -> str:
+        """Its name."""
+
     @property
-    def sampling_rate_hz(self) -> float: ...
+    def sampling_rate_hz(self) -> float:
+        """Nominal rate of the sample counter."""
+
     @property
-    def clock_hz(self) -> float | None: ...
+    def clock_hz(self) -> float | None:
+        """Ticks per second of the device clock."""
+
     @property
-    def channels(self) -> tuple[Channel, ...]: ...
+    def channels(self) -> tuple[Channel, ...]:
+        """In the order of the device."""
 
 
 class _ChannelText(BaseModel):
