@@ -29,7 +29,7 @@ MAXIMUM_DECODED_BYTES: Final = 6 * 2**30
 JITTER_ALLOWED_STEPS: Final = 1e-6
 """Largest deviation of the time coordinate from a uniform one, in steps."""
 
-LOST, CLIPPED, CRC_REPAIRED, OUT_OF_ORDER = 1, 2, 4, 8
+LOST, CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, STUCK = 1, 2, 4, 8, 16
 """Bits of `quality(time)`."""
 
 _TIME_CHUNK = 1 << 18
