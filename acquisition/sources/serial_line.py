@@ -179,10 +179,10 @@ def _socket_line(target: str) -> Line:
         raise SourceError(f"serial:{target}", got="no host and port", allowed="socket://HOST:PORT")
     try:
         connection = socket.create_connection(address, _CONNECT_TIMEOUT_S)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:  # the latter for host names that cannot be one
         raise SourceError(
             f"serial:{target}",
-            got=error.strerror or str(error) or "no answer",
+            got=getattr(error, "strerror", None) or str(error) or "no answer",
             remedy="start the device that listens there, or correct host and port",
         ) from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -248,6 +248,10 @@ def test_nobody_listens(listener: socket.socket) -> None:
     refused(target, "refused; remedy: start the device")
 
 
+def test_a_host_name_that_cannot_be_one() -> None:
+    refused(f"socket://{'a' * 70}.example:7", "remedy: start the device")
+
+
 @pytest.mark.parametrize("target", ["socket://", "socket://127.0.0.1", "socket://127.0.0.1:99999", "socket://:7"])
 def test_a_socket_without_host_or_port(target: str) -> None:
     refused(target, "got no host and port; allowed: socket://HOST:PORT")
