@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from acquisition.sources.interface import Block, Delivery, End, SourceURL, Trouble, TroubleKind
-from acquisition.sources.serial_line import Line, LineLostError, open_line
+from acquisition.sources.serial_line import DescriptorLine, Line, LineLostError, open_line
 from acquisition.sources.serial_source import SerialSource
 from sloshlab.errors import SourceError
 
@@ -187,6 +187,26 @@ def test_a_terminal_that_hangs_up_is_lost(terminal: Terminal) -> None:
     with pytest.raises(LineLostError, match="the connection was lost"):
         line.write(b"hello?")
     line.close()
+
+
+def test_what_was_read_before_an_error_is_not_lost() -> None:
+    # some drivers report the error of an unplugged adapter after the last bytes
+    readable, writable = os.pipe()
+    os.write(writable, b"x")
+    script: list[bytes | OSError] = [b"last ", b"words", OSError(5, "Input/output error"), OSError(5, "I/O again")]
+
+    def receive(n_bytes: int) -> bytes:
+        piece = script.pop(0)
+        if isinstance(piece, OSError):
+            raise piece
+        return piece
+
+    line = DescriptorLine("serial:x", readable, receive, len, lambda: os.close(readable))
+    assert line.read(0.0) == b"last words"
+    with pytest.raises(LineLostError, match="I/O again"):
+        line.read(0.0)
+    line.close()
+    os.close(writable)
 
 
 def test_a_device_that_does_not_read_does_not_block_the_host(listener: socket.socket) -> None:

@@ -120,6 +120,12 @@ def test_a_lost_request_is_repeated_each_half_second() -> None:
         assert source.info.device == "daq"
 
 
+def test_a_babbling_line_is_not_asked_more_often() -> None:
+    script = Script([(0.1 * k, b"babble") for k in range(12)] + [(1.2, b"\0" + CALIBRATION)])
+    with source_of(script):
+        assert [at_s for at_s, _ in script.sent] == pytest.approx([0.0, 0.5, 1.0])
+
+
 @pytest.mark.parametrize(
     ("events", "got"),
     [
@@ -270,6 +276,15 @@ def test_a_line_that_breaks_again_and_again_is_one_trouble() -> None:
     assert kinds(found) == [Block, TroubleKind.DISCONNECTED, TroubleKind.RECONNECTED, Block]
 
 
+def test_noise_is_not_the_device_coming_back() -> None:
+    events = [(1.0, samples(0, 4)), (2.0, lost()), (3.0, b"noise\0"), (4.0, samples(4, 4))]
+    script = Script(events, answering_nothing_later())
+    with source_of(script) as source:
+        found = read_all(source, script, 5.0)
+    expected = [Block, TroubleKind.DISCONNECTED, TroubleKind.GARBAGE, TroubleKind.RECONNECTED, Block]
+    assert kinds(found) == expected
+
+
 def answering_nothing_later():  # type: ignore[no-untyped-def]
     """A device that describes itself once."""
     said: list[bytes] = []
@@ -311,6 +326,7 @@ def test_a_line_that_closes_after_the_end_is_no_trouble(options: str) -> None:
         found = read_all(source, script, 5.0)
     assert found[1:] == [End(1, 4)]
     assert kinds(found[:1]) == [Block]
+    assert (script.n_attempts == 1) == bool(options)
 
 
 def test_a_device_that_is_done_is_not_started_again() -> None:

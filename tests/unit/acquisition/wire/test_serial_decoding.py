@@ -255,6 +255,9 @@ def test_silence_in_which_the_counter_may_have_wrapped_is_a_failure() -> None:
     assert places(decoder.feed(by_hand.ramp(4, 4), at(wrap_half_s - 1))) == [(0, 4, 4)]
     assert decoder.feed(by_hand.ramp(8, 4), at(2 * wrap_half_s)) == []
     assert "may have wrapped" in str(decoder.failure)
+    steady = ready(longest_gap_s=1e6)
+    for k in range(4):
+        assert places(steady.feed(by_hand.ramp(4 * k, 4), at(0.9 * k * wrap_half_s))) == [(0, 4 * k, 4)]
     fresh = ready(longest_gap_s=1e6)
     fresh.feed(by_hand.ramp(0, 4, stream=1), at(0))
     assert places(fresh.feed(by_hand.ramp(0, 4, stream=2), at(3 * wrap_half_s))) == [(2, 0, 4)]
