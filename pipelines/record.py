@@ -1,0 +1,271 @@
+"""Recording live devices: check what can be checked, open, record through a journal, assemble, read back."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from acquisition.recorder.assembly import ALIGNMENTS, assemble
+from acquisition.recorder.assembly_summary import AssemblySummary
+from acquisition.recorder.journal import JournalWriter, existing_journal, read_journal
+from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
+from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus, StopReason
+from acquisition.sources.interface import Source
+from acquisition.sources.urls import open_source
+from pipelines.run_attributes import checked_run_attributes, require_rate
+from sloshlab.errors import InputError, JournalError, RecordingError, SourceError
+from sloshlab.recording import read_attributes
+from sloshlab.rig import Rig
+
+LONGEST_DURATION_S: Final = 30 * 86_400.0
+_MOST_SOURCES: Final = 64
+_SAMPLES_READ_BACK: Final = 1 << 20
+
+
+@dataclass(frozen=True)
+class RecordSettings:
+    """What to record, and how.
+
+    Attributes
+    ----------
+    sources : tuple of str
+        URLs; the first is the time base.
+    rig : Path
+        Description of the rig; its file name goes into the recording.
+    output : Path
+        The recording; the journal is beside it, with suffix ``.journal``.
+    duration_s : float or None
+        Of the first device's samples; None records until all devices end or a stop is requested.
+    run : Path or None
+        TOML table of attributes of the run.
+    attributes : tuple of str
+        ``KEY=VALUE``.
+    align : {"host", "device", "counter"}
+    redundant : tuple of str
+        ``A:B``, channels of two devices that show the same motion.
+    keep_journal, overwrite : bool
+    """
+
+    sources: tuple[str, ...]
+    rig: Path
+    output: Path
+    duration_s: float | None = None
+    run: Path | None = None
+    attributes: tuple[str, ...] = ()
+    align: str = "host"
+    redundant: tuple[str, ...] = ()
+    keep_journal: bool = False
+    overwrite: bool = False
+
+    @property
+    def journal(self) -> Path:
+        """Where the journal is."""
+        return self.output.with_suffix(".journal")
+
+    @property
+    def pairs(self) -> list[list[str]]:
+        """Names of redundant channels.
+
+        Raises
+        ------
+        InputError
+            If one is not ``A:B``.
+        """
+        pairs = [text.split(":") for text in self.redundant]
+        for text, pair in zip(self.redundant, pairs, strict=True):
+            if len(pair) != 2 or not all(pair) or pair[0] == pair[1]:
+                raise InputError("--redundant", got=repr(text)[:80], allowed="A:B, two different channels")
+        return pairs
+
+
+def record(
+    settings: RecordSettings,
+    observer: Observer | None = None,
+    *,
+    open_source: Callable[[str], Source] = open_source,
+) -> dict[str, Any]:
+    """Record one run.
+
+    Parameters
+    ----------
+    settings : RecordSettings
+    observer : Observer, optional
+        Shown what happens while it records.
+    open_source : callable
+        Makes the unopened source of a URL; given by tests.
+
+    Returns
+    -------
+    dict
+        `lines` for a person, `flags` for everything that is not as it should be, numbers for machines.
+
+    Raises
+    ------
+    SloshlabError
+        If nothing could be recorded, or not stored: the message says what is kept and how to get at it.
+    """
+    metadata = _checked_metadata(settings)
+    _require_free_place(settings)
+    with opened([open_source(url) for url in settings.sources]) as sources:
+        require_rate(metadata["attributes"], sources[0].info.sampling_rate_hz)
+        outcome = _recorded(sources, settings, metadata, observer)
+    if outcome.storage_error is not None:
+        kept = f"; then: sloshlab recover {settings.journal} -o {settings.output}"
+        raise JournalError(outcome.storage_error + kept)
+    if not any(source.n_samples for source in outcome.status.sources):
+        settings.journal.unlink(missing_ok=True)
+        raise SourceError(_why_nothing(outcome))
+    summary = _assembled(settings)
+    if not settings.keep_journal:
+        settings.journal.unlink()
+    return _summary(settings, outcome, summary)
+
+
+def _checked_metadata(settings: RecordSettings) -> dict[str, Any]:
+    if not 1 <= len(settings.sources) <= _MOST_SOURCES:
+        raise InputError("--source", got=f"{len(settings.sources)} sources", allowed=f"1 … {_MOST_SOURCES}")
+    if len(set(settings.sources)) < len(settings.sources):
+        raise InputError("--source", got="the same source twice", allowed="each source once")
+    if settings.align not in ALIGNMENTS:
+        raise InputError("--align", got=repr(settings.align), allowed=", ".join(ALIGNMENTS))
+    if settings.duration_s is not None and not 0 < settings.duration_s <= LONGEST_DURATION_S:
+        raise InputError("--duration", got=f"{settings.duration_s:g} s", allowed=f"0 … {LONGEST_DURATION_S:g} s")
+    Rig.from_toml(settings.rig)
+    attributes = checked_run_attributes(settings.output, settings.rig, settings.run, settings.attributes)
+    return {"attributes": attributes, "align": settings.align, "redundant": settings.pairs}
+
+
+def _require_free_place(settings: RecordSettings) -> None:
+    """Refuse places that are taken or cannot be written, before any device is touched."""
+    output, journal = settings.output, settings.journal
+    if output == journal:
+        raise InputError(f"recording {output}", got="the suffix of journals", allowed="RUN.nc")
+    if output.is_dir() or journal.is_dir():
+        raise InputError(f"recording {output}", got="a folder in the way", remedy="choose another name")
+    if output.exists() and not settings.overwrite:
+        raise InputError(f"recording {output}", got="a file that is there already", remedy="--overwrite")
+    if journal.exists() and not settings.overwrite:
+        raise existing_journal(journal)
+    folder = next(folder for folder in output.absolute().parents if folder.exists())
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(
+            f"recording {output}", got=f"{folder}, which cannot be written", allowed="a writable folder"
+        )
+
+
+def _recorded(
+    sources: Sequence[Source], settings: RecordSettings, metadata: dict[str, Any], observer: Observer | None
+) -> RecordingOutcome:
+    journal_path = settings.journal
+    journal_path.parent.mkdir(parents=True, exist_ok=True)
+    with contextlib.ExitStack() as until_started:
+        if not journal_path.exists() or settings.overwrite:
+            # an interrupt before the first sample leaves nothing behind
+            until_started.callback(journal_path.unlink, missing_ok=True)
+        infos = [source.info for source in sources]
+        journal = JournalWriter(journal_path, metadata, infos, overwrite=settings.overwrite)
+        until_started.callback(journal.abandon)
+        recorder = Recorder(sources, journal, RecorderSettings(duration_s=settings.duration_s))
+        with _signals_stop(recorder):
+            until_started.pop_all()
+            return recorder.run(observer)
+
+
+@contextlib.contextmanager
+def _signals_stop(recorder: Recorder) -> Iterator[None]:
+    """While it records, Ctrl-C, a termination and a closed terminal end the recording and keep it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    names = ("SIGINT", "SIGTERM", "SIGHUP")
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    before = {number: signal.getsignal(number) for number in numbers}
+    try:
+        for number in numbers:
+            signal.signal(number, lambda *_: recorder.request_stop())
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _why_nothing(outcome: RecordingOutcome) -> str:
+    if outcome.failures:
+        return "; ".join(outcome.failures.values())
+    urls = ", ".join(source.url for source in outcome.status.sources)
+    return f"source {urls}: got not one sample; remedy: check that the device was started"
+
+
+def _assembled(settings: RecordSettings) -> AssemblySummary:
+    with read_journal(settings.journal) as journal:
+        summary = assemble(journal, settings.output)
+    _require_readable(settings.output, summary.n_samples)
+    return summary
+
+
+def _require_readable(output: Path, n_samples: int) -> None:
+    """Read a recording back, every byte of it: its chunks carry checksums.
+
+    Raises
+    ------
+    RecordingError
+        If it is not what was written; the journal is still there then.
+    """
+    import netCDF4
+
+    read_attributes(output)
+    try:
+        with netCDF4.Dataset(output, mode="r") as file:
+            file.set_auto_maskandscale(False)
+            n_found = len(file.dimensions["time"])
+            for variable in file.variables.values():
+                for start in range(0, len(variable) if variable.ndim else 0, _SAMPLES_READ_BACK):
+                    variable[start : start + _SAMPLES_READ_BACK]
+    except (OSError, RuntimeError, KeyError) as error:
+        raise RecordingError(
+            f"recording {output}", got=f"a file that cannot be read back ({error})", remedy="recover the journal"
+        ) from error
+    if n_found != n_samples:
+        raise RecordingError(
+            f"recording {output}", got=f"{n_found} samples", allowed=f"{n_samples}", remedy="recover the journal"
+        )
+
+
+def _summary(settings: RecordSettings, outcome: RecordingOutcome, assembled: AssemblySummary) -> dict[str, Any]:
+    lines = [*assembled.lines, f"ended: {outcome.reason.value}"]
+    lines += [f"journal: {settings.journal}"] if settings.keep_journal else []
+    flags = list(assembled.flags)
+    if outcome.reason in (StopReason.SILENCE, StopReason.SOURCES_FAILED):
+        flags.append(f"recording ended: {outcome.reason.value}")
+    return {
+        "lines": lines,
+        "flags": flags,
+        "output": str(settings.output),
+        "journal": str(settings.journal) if settings.keep_journal else None,
+        "reason": outcome.reason.name.lower(),
+        "sources": [_source_numbers(source) for source in outcome.status.sources],
+        "report": assembled.to_dict(),
+    }
+
+
+def _source_numbers(source: SourceStatus) -> dict[str, Any]:
+    return {
+        "device": source.device,
+        "url": source.url,
+        "state": source.state.name.lower(),
+        "n_samples": source.n_samples,
+        "n_lost": source.n_lost,
+        "sampling_rate_hz": source.sampling_rate_hz,
+        "measured_rate_hz": source.measured_rate_hz,
+        "drift_ppm": None if source.drift is None else source.drift.ppm,
+        "drift_uncertainty_ppm": None if source.drift is None else source.drift.uncertainty_ppm,
+        "n_clipped": {level.name: level.n_clipped for level in source.levels},
+        "troubles": {kind.name: count for kind, count in source.troubles.items()},
+        "error": source.error,
+    }
