@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.devices.appearance import Appearance, appearance
+from acquisition.devices.faults import Faults
 from acquisition.devices.laboratory_time import LaboratoryTime
 from acquisition.devices.played_signal import played_signal
 from acquisition.devices.player import Player
@@ -42,7 +43,7 @@ class ReplaySettings:
     speed : str
         A factor of real time, or ``max``.
     faults : sequence of Path or None
-        Once per device; a single one is for a single device. None is a device without faults.
+        TOML files, once per device; None is a device without faults.
     samples_per_frame : int or None
         Of serial devices.
     expose : str or None
@@ -150,6 +151,7 @@ def _players(settings: ReplaySettings, places: Sequence[Appearance], laboratory:
                 played,
                 place,
                 laboratory,
+                faults=_faults(settings, number),
                 seed=settings.seed * 1000 + number,
                 samples_per_frame=settings.samples_per_frame if place.transport == "serial" else None,
                 n_hosts=settings.wait_clients if place.interface == "socketcand" else 1,
@@ -157,6 +159,11 @@ def _players(settings: ReplaySettings, places: Sequence[Appearance], laboratory:
             )
         )
     return players
+
+
+def _faults(settings: ReplaySettings, number: int) -> Faults | None:
+    path = settings.faults[number] if settings.faults else None
+    return None if path is None else Faults.from_toml(path)
 
 
 def _run(players: Sequence[Player]) -> None:
@@ -184,7 +191,7 @@ def _play(player: Player, errors: list[BaseException]) -> None:
 
 def _stop(players: Sequence[Player]) -> None:
     for player in players:
-        player.stop.set()
+        player.stop()
 
 
 @contextlib.contextmanager

@@ -8,7 +8,7 @@ import numpy as np
 
 from acquisition.devices.device_clock import DeviceClock
 from acquisition.devices.frames import FrameArray, FrameKind, can_frame
-from acquisition.sources.interface import CountArray
+from acquisition.sources.interface import Channel, CountArray
 from acquisition.wire.can_frames import ENDED, LOST_DATA, RUNNING, checksums, control_frame, encode_samples
 from acquisition.wire.can_layout import STATUS, STATUS_ID, CanLayout, SampleMessage
 from sloshlab.errors import InputError
@@ -35,8 +35,12 @@ class CanWire:
         self.layout, self._clock = layout, clock
         self.channels = layout.channels
         self.n_groups = len(layout.messages)
+        self.samples_per_frame = max(message.samples_per_frame for message in layout.messages)
         self._type = can_frame(64 if layout.fd else 8)
         self._messages: dict[int, SampleMessage] = {m.arbitration_id: m for m in layout.messages}
+
+    def described_as(self, channels: tuple[Channel, ...]) -> None:
+        """Nothing: a CAN device describes its channels in its DBC file only."""
 
     def samples(self, stream: int, first_counter: int, counts: CountArray) -> FrameArray:
         """Frames of consecutive samples, in the order in which their last samples are taken."""

@@ -34,6 +34,10 @@ class FrameKind(enum.IntEnum):
     GARBAGE = 2
     ERROR = 3
     """Error frame of a CAN bus."""
+    SPOILED = 4
+    """Samples, damaged on purpose."""
+    REPEATED = 5
+    """Samples that were sent already."""
 
 
 def can_frame(longest: int) -> np.dtype[np.void]:
@@ -50,8 +54,6 @@ def serial_frames(frames: list[bytes], kind: FrameKind = FrameKind.CONTROL, *, d
     return made
 
 
-def lengths(frames: FrameArray) -> NDArray[np.int64]:
-    """Bytes of each frame: on the wire for serial ones, of data for CAN."""
-    if "bytes" in (frames.dtype.names or ()):
-        return np.array([len(frame) for frame in frames["bytes"]], dtype=np.int64)
-    return frames["length"].astype(np.int64)
+def place(frame: np.void) -> dict[str, int]:
+    """Where a frame with samples belongs."""
+    return {key: int(frame[key]) for key in ("group", "counter", "n_samples")}

@@ -1,35 +1,33 @@
-"""A device at work: waits for its hosts, takes samples, sends frames when they are due, ends."""
+"""A device at work: waits for its hosts, takes samples, makes frames of them, ends."""
 
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
 from acquisition.devices.device_clock import DeviceClock
 from acquisition.devices.endpoint import Endpoint
-from acquisition.devices.frames import FrameArray, FrameKind
+from acquisition.devices.faults import DisconnectFault
+from acquisition.devices.faulty_frames import FrameFaults
+from acquisition.devices.frames import FrameArray
 from acquisition.devices.laboratory_time import LaboratoryTime
+from acquisition.devices.sender import STEP_S, HostGoneError, Sender, StoppedError
+from acquisition.devices.sensor_faults import SensorFaults
 from acquisition.devices.signal import Piece, Signal
 from acquisition.devices.truth import Truth
 from acquisition.sources.interface import Channel, CountArray
 
-HOST_GONE_S: Final = 20.0
-"""A device that has been started and that nobody hears for so long ends."""
-
 LINGER_S: Final = 10.0
 """So long the device waits at its end for the hosts to read everything and to go."""
 
-_COALESCED_S = 0.004
-_STEP_S = 0.05
 _LONGEST_BLOCK_SAMPLES = 8192
 _PACED_BLOCK_S, _UNPACED_BLOCK_S = 0.25, 1.0
 _DESCRIBED_EVERY_S = 1.0
-_STOPPED_PATIENCE_S = 2.0
+_UNPLUGGED_S = 0.5
 _READ_LINGER_S, _STOPPED_LINGER_S = 2.0, 0.1
 
 
@@ -38,6 +36,10 @@ class Wire(Protocol):
 
     channels: tuple[Channel, ...]
     n_groups: int
+    samples_per_frame: int
+
+    def described_as(self, channels: tuple[Channel, ...]) -> None:
+        """Describe the channels differently from now on."""
 
     def samples(self, stream: int, first_counter: int, counts: CountArray) -> FrameArray:
         """Frames of consecutive samples."""
@@ -47,14 +49,6 @@ class Wire(Protocol):
 
     def end(self, stream: int, counter: int) -> FrameArray:
         """What it says at its end."""
-
-
-class HostGoneError(Exception):
-    """Nobody listens any more."""
-
-
-class StoppedError(Exception):
-    """The device was told to end before its signal does."""
 
 
 @dataclass
@@ -81,6 +75,33 @@ class Progress:
         return self.base + self.next_sample
 
 
+class Stretch(NamedTuple):
+    """Samples first … last − 1, taken while the device is plugged in, or not because of `fault`."""
+
+    first: int
+    last: int
+    fault: DisconnectFault | None = None
+
+
+def stretches(faults: Sequence[DisconnectFault], clock: DeviceClock, n_samples: int) -> list[Stretch]:
+    """All samples of a device in stretches with and without a connection.
+
+    Examples
+    --------
+    >>> pulled = DisconnectFault(at_s=2.0, for_s=1.0)
+    >>> [(s.first, s.last, s.fault is None) for s in stretches([pulled], DeviceClock(10.0), 100)]
+    [(0, 20, True), (20, 30, False), (30, 100, True)]
+    """
+    found, position = [], 0
+    for fault in sorted(faults, key=lambda fault: fault.at_s):
+        first = min(clock.sample_at(fault.at_s), n_samples)
+        last = min(clock.sample_at(fault.at_s + fault.for_s), n_samples)
+        if first < n_samples:
+            found += [Stretch(position, first), Stretch(first, last, fault)]
+            position = last
+    return [*found, Stretch(position, n_samples)]
+
+
 @dataclass(eq=False)
 class Player:
     """One device and its life.
@@ -90,31 +111,51 @@ class Player:
     signal : Signal
         What its sensors see, as its clock samples it.
     wire : Wire
-    endpoint : Endpoint
+    sender : Sender
     clock : DeviceClock
-    laboratory : LaboratoryTime
     streams : iterator of int
         Numbers of streams.
-    truth : Truth
-    stop : threading.Event
-        Ends the device from outside.
+    sensor_faults : SensorFaults
+    frame_faults : FrameFaults
+    disconnects : sequence of DisconnectFault
+    announcements : mapping of int to tuple of Channel
+        Samples from which the device describes its channels differently.
     """
 
     signal: Signal
     wire: Wire
-    endpoint: Endpoint
+    sender: Sender
     clock: DeviceClock
-    laboratory: LaboratoryTime
     streams: Iterator[int]
-    truth: Truth = field(default_factory=Truth)
-    stop: threading.Event = field(default_factory=threading.Event)
+    sensor_faults: SensorFaults
+    frame_faults: FrameFaults
+    disconnects: Sequence[DisconnectFault] = ()
+    announcements: Mapping[int, tuple[Channel, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.progress = Progress(next(self.streams), self.clock.counter_start)
         self.has_lost_host = False
         self._described_second = -1
         self._has_arrived = False
-        self._stopped_at_s = math.inf
+
+    @property
+    def endpoint(self) -> Endpoint:
+        """Where the device appears."""
+        return self.sender.endpoint
+
+    @property
+    def laboratory(self) -> LaboratoryTime:
+        """Its clock on the wall."""
+        return self.sender.laboratory
+
+    @property
+    def truth(self) -> Truth:
+        """What it did."""
+        return self.sender.truth
+
+    def stop(self) -> None:
+        """End the device from outside."""
+        self.sender.stop.set()
 
     def describe(self) -> FrameArray:
         """What the device says about itself now."""
@@ -124,7 +165,11 @@ class Player:
         """Live: wait for the start, play everything, end, and wait until it has been read."""
         try:
             self._await_start()
-            self._play_samples(0, self.signal.n_samples)
+            for stretch in stretches(self.disconnects, self.clock, self.signal.n_samples):
+                if stretch.fault is None:
+                    self._play(stretch)
+                else:
+                    self._pass_unplugged(stretch, stretch.fault)
             self._end()
         except HostGoneError:
             self.has_lost_host = True
@@ -137,33 +182,40 @@ class Player:
 
     def _await_start(self) -> None:
         while not self.endpoint.is_started:
-            self._serve(_STEP_S)
+            self.sender.serve(STEP_S)
         self._has_arrived = True
         self.laboratory.arrive()
         while not self.laboratory.has_begun:
-            self._serve(_STEP_S)
+            self.sender.serve(STEP_S)
 
-    def _serve(self, timeout_s: float) -> None:
-        self.endpoint.serve(timeout_s)
-        if self.stop.is_set() or self.endpoint.is_stopped:
-            raise StoppedError
-
-    def _play_samples(self, first: int, last: int) -> None:
-        length = self._block_samples()
-        for start in range(first, last, length):
-            stop = min(start + length, last)
-            self._transmit(self._frames(start, self._taken(start, stop)))
+    def _play(self, stretch: Stretch) -> None:
+        for start, stop in self._blocks(stretch):
+            self._announce(start)
+            frames = self._frames(start, self._taken(start, stop))
+            self.sender.transmit(self.frame_faults.applied(frames, self.progress.stream), self.progress.stream)
             self.progress.next_sample = stop
+        held = self.frame_faults.flushed()
+        if held is not None:
+            self.sender.transmit(held, self.progress.stream)
+        self.sender.drain(self.progress.stream)
 
-    def _block_samples(self) -> int:
-        """Samples prepared at once: a fraction of a second in real time, whole frames."""
+    def _blocks(self, stretch: Stretch) -> Iterator[tuple[int, int]]:
+        """Samples prepared at once: a fraction of a second in real time, whole frames, one description."""
         block_s = min(_PACED_BLOCK_S * self.laboratory.speed, _UNPACED_BLOCK_S)
         samples = max(1, min(int(block_s * self.signal.sampling_rate_hz), _LONGEST_BLOCK_SAMPLES))
-        per_frame = getattr(self.wire, "samples_per_frame", 1)
-        return max(samples // per_frame, 1) * per_frame
+        length = max(samples // self.wire.samples_per_frame, 1) * self.wire.samples_per_frame
+        inner = [sample for sample in sorted(self.announcements) if stretch.first < sample < stretch.last]
+        for first, last in zip([stretch.first, *inner], [*inner, stretch.last], strict=True):
+            for start in range(first, last, length):
+                yield start, min(start + length, last)
+
+    def _announce(self, start: int) -> None:
+        if start in self.announcements:
+            self.wire.described_as(self.announcements[start])
+            self._described_second = -1
 
     def _taken(self, start: int, stop: int) -> Piece:
-        piece = self.signal.piece(start, stop)
+        piece = self.sensor_faults.applied(start, self.signal.piece(start, stop))
         self.truth.n_taken += int(piece.taken.sum())
         return piece
 
@@ -185,85 +237,49 @@ class Player:
         is_due, self._described_second = second != self._described_second, second
         return said if is_due else said[:0]
 
-    def _transmit(self, frames: FrameArray) -> None:
-        """Send frames when they are due; what is due while nobody listens is lost, unless nothing is paced."""
-        position = 0
-        while position < len(frames):
-            stop = position + self._n_due(frames["due_s"][position:])
-            if stop > position:
-                self._send(frames[position:stop])
-                position = stop
-                self._serve(0.0)
-            else:
-                self._serve(self._wait_s(float(frames["due_s"][position])))
+    def _pass_unplugged(self, stretch: Stretch, fault: DisconnectFault) -> None:
+        """Lose the connection; the counter runs on, or starts anew if the device lost power."""
+        self.sender.await_read()
+        self.endpoint.unplug()
+        for group in range(self.wire.n_groups):
+            self.truth.note(
+                "disconnect",
+                stream=self.progress.stream,
+                group=group,
+                counter=self.progress.base + stretch.first,
+                n_samples=stretch.last - stretch.first,
+            )
+        for start, stop in self._blocks(stretch):
+            self._announce(start)
+            if not fault.restart:
+                self._taken(start, stop)
+        self._wait_unplugged(fault)
+        self.endpoint.plug_in()
+        self.progress.next_sample = stretch.last
+        if fault.restart:
+            self.progress = Progress(next(self.streams), -stretch.last, stretch.last)
+        self._described_second = -1
 
-    def _n_due(self, due_s: np.ndarray) -> int:
-        if not self.laboratory.is_paced:
-            return len(due_s)
-        return int(np.searchsorted(due_s, self.laboratory.now_s(), side="right"))
-
-    def _wait_s(self, due_s: float) -> float:
-        """Until the next frame is due, and long enough that frames are sent in bunches."""
-        waiting_s = (due_s - self.laboratory.now_s()) / self.laboratory.speed
-        return min(max(waiting_s, _COALESCED_S), _STEP_S)
-
-    def _send(self, frames: FrameArray) -> None:
-        if not self.laboratory.is_paced:
-            self._await_listener()
-        if self.endpoint.is_heard and self.endpoint.send(frames, is_given_up=self._is_given_up):
-            self._note_sent(frames)
-            self._unheard_since_s: float | None = None
+    def _wait_unplugged(self, fault: DisconnectFault) -> None:
+        if self.laboratory.is_paced:
+            self.sender.await_until(fault.at_s + fault.for_s)
             return
-        if self._is_given_up():
-            raise StoppedError
-        self._note_unheard(frames)
-
-    def _note_sent(self, frames: FrameArray) -> None:
-        self.truth.n_sent += int(frames["n_samples"][frames["kind"] == FrameKind.SAMPLES].sum())
-
-    def _note_unheard(self, frames: FrameArray) -> None:
-        for frame in frames[frames["kind"] == FrameKind.SAMPLES]:
-            self.truth.note("unheard", stream=self.progress.stream, **place(frame))
-        now_s = self.laboratory.monotonic_s()
-        self._unheard_since_s = getattr(self, "_unheard_since_s", None) or now_s
-        if now_s - self._unheard_since_s > HOST_GONE_S:
-            raise HostGoneError
-
-    def _await_listener(self) -> None:
-        self._await(lambda: self.endpoint.is_heard, HOST_GONE_S)
-
-    def _await(self, condition: Callable[[], bool], patience_s: float) -> None:
-        until_s = self.laboratory.monotonic_s() + patience_s
-        while not condition():
-            if self.laboratory.monotonic_s() > until_s:
-                raise HostGoneError
-            self._serve(_STEP_S)
-
-    def _is_given_up(self) -> bool:
-        """Whether sending is to be broken off: at once from outside, soon after a host said stop."""
-        if self.endpoint.is_stopped:
-            now_s = self.laboratory.monotonic_s()
-            self._stopped_at_s = min(self._stopped_at_s, now_s)
-            return now_s - self._stopped_at_s > _STOPPED_PATIENCE_S
-        return self.stop.is_set()
+        until_s = self.laboratory.monotonic_s() + _UNPLUGGED_S
+        while self.laboratory.monotonic_s() < until_s:
+            self.sender.serve(STEP_S)
 
     def _end(self) -> None:
         """Say that the stream is complete, and wait until the hosts have read it or gone."""
         if not self.laboratory.has_begun:
             return
         frames = self.wire.end(self.progress.stream, self.progress.counter)
-        self.endpoint.send(frames, is_given_up=self._is_given_up)
+        self.endpoint.send(frames, is_given_up=self.sender.is_given_up)
         until_s = self.laboratory.monotonic_s() + LINGER_S
         read_until_s = math.inf
-        while self.endpoint.is_heard and not self.stop.is_set():
+        while self.endpoint.is_heard and not self.sender.stop.is_set():
             now_s = self.laboratory.monotonic_s()
             patience_s = _STOPPED_LINGER_S if self.endpoint.is_stopped else _READ_LINGER_S
             read_until_s = min(read_until_s, now_s + patience_s) if self.endpoint.is_read() else math.inf
             if now_s > min(until_s, read_until_s):
                 return
-            self.endpoint.serve(_STEP_S)
-
-
-def place(frame: np.void) -> dict[str, int]:
-    """Where a frame belongs."""
-    return {key: int(frame[key]) for key in ("group", "counter", "n_samples")}
+            self.endpoint.serve(STEP_S)
