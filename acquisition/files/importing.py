@@ -213,10 +213,11 @@ def _raw_encoding(column: Column, scaling: Scaling, values: FloatArray, compensa
     raw = column.raw
     if raw is None or compensated_s or raw.counts.dtype.name not in ("int16", "int32", "uint16", "int8", "uint8"):
         return {}
-    if np.isnan(values).any() or raw.scale_factor * scaling.factor == 0:
+    if raw.scale_factor * scaling.factor == 0 or np.isinf(column.values).any():
         return {}
     limits = np.iinfo(raw.counts.dtype)
-    unused = [code for code in (limits.min, limits.max) if not (raw.counts == code).any()]
+    used = raw.counts[~np.isnan(column.values)]
+    unused = [code for code in (limits.min, limits.max) if not (used == code).any()]
     if not unused:
         return {}
     return {
