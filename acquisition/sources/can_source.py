@@ -29,6 +29,9 @@ from sloshlab.errors import SourceError
 
 _STEP_S: Final = 0.1
 _RETRY_S: Final = 0.2
+_RETRY_TIMEOUT_S: Final = 0.5
+"""A server that does not answer must not keep `CanSource.read` for long."""
+
 _ASK_AGAIN_NS: Final = 500_000_000
 _SOCKETCAND_PORT: Final = 29536
 _MULTICAST_PORT: Final = 43113
@@ -93,14 +96,15 @@ class CanSource(Source):
             remedy = "add dbc=FILE.dbc, which describes the frames of the device"
             raise SourceError(f"source {self.url}: dbc", got="none", allowed="a DBC file", remedy=remedy)
         layout = read_layout(Path(self._dbc))
-        if layout.fd and self._interface == "socketcand":
+        controls = [message for message in (layout.status, layout.command) if message is not None]
+        if self._interface == "socketcand" and (layout.fd or any(message.fd for message in controls)):
             allowed = "classic frames, as socketcand carries no others"
             raise SourceError(f"source {self.url}: {self._dbc}", got="messages of CAN FD", allowed=allowed)
         self._receiver = CanReceiver(layout, self._longest_gap_s)
         self._identifiers = [message.arbitration_id for message in layout.messages]
         if layout.status is not None:
             self._identifiers.append(layout.status.arbitration_id)
-        self._link = self._connect()
+        self._link = self._connect(self._timeout_s)
         self._layout = layout
 
     @property
@@ -232,16 +236,17 @@ class CanSource(Source):
         if wait_s > 0 or not self._reconnect:
             self._sleep(min(wait_s, timeout_s) if self._reconnect else timeout_s)
             return
-        self._retried_ns = self._monotonic_ns()
         try:
-            self._link = self._connect()
+            self._link = self._connect(min(_RETRY_TIMEOUT_S, self._timeout_s))
         except SourceError:
             return  # not back yet
+        finally:
+            self._retried_ns = self._monotonic_ns()
         if self._started:
             self._begin()
 
-    def _connection(self, options: URLOptions, url: SourceURL) -> Callable[[], CanLink]:
-        """What opens the link that the options describe; all options are read now, nothing is opened."""
+    def _connection(self, options: URLOptions, url: SourceURL) -> Callable[[float], CanLink]:
+        """What opens the link within so many seconds; all options are read now, nothing is opened."""
         fd = options.yes("fd", False)
         if self._interface == "socketcand":
             return self._socketcand(options)
@@ -251,18 +256,18 @@ class CanSource(Source):
             group = options.text("channel") or DEFAULT_GROUP
             port = options.integer("port", _MULTICAST_PORT, lowest=1, highest=65535)
             exposed = options.yes("expose", False)
-            return lambda: self._python_can(open_multicast_bus(group, port, fd=True, exposed=exposed))
+            return lambda _: self._python_can(open_multicast_bus(group, port, fd=True, exposed=exposed))
         return self._hardware(options, url, fd)
 
-    def _socketcand(self, options: URLOptions) -> Callable[[], CanLink]:
+    def _socketcand(self, options: URLOptions) -> Callable[[float], CanLink]:
         host = options.text("host") or "127.0.0.1"
         port = options.integer("port", _SOCKETCAND_PORT, lowest=1, highest=65535)
         bus = options.text("channel") or "can0"
-        return lambda: open_socketcand(
-            host, port, bus, timeout_s=self._timeout_s, monotonic_ns=self._monotonic_ns, sleep=self._sleep
+        return lambda timeout_s: open_socketcand(
+            host, port, bus, timeout_s=timeout_s, monotonic_ns=self._monotonic_ns, sleep=self._sleep
         )
 
-    def _slcan(self, options: URLOptions) -> Callable[[], CanLink]:
+    def _slcan(self, options: URLOptions) -> Callable[[float], CanLink]:
         port = options.text("channel")
         if port is None:
             raise options.error("channel", "", "the port of the adapter")
@@ -270,9 +275,9 @@ class CanSource(Source):
         bitrate = options.integer("bitrate", 0, lowest=0, highest=1_000_000)
         if bitrate and bitrate not in SLCAN_BITRATES:
             raise options.error("bitrate", str(bitrate), ", ".join(map(str, SLCAN_BITRATES)))
-        return lambda: open_slcan(port, baudrate, bitrate, sleep=self._sleep)
+        return lambda _: open_slcan(port, baudrate, bitrate, sleep=self._sleep)
 
-    def _hardware(self, options: URLOptions, url: SourceURL, fd: bool) -> Callable[[], CanLink]:
+    def _hardware(self, options: URLOptions, url: SourceURL, fd: bool) -> Callable[[float], CanLink]:
         configuration: dict[str, Any] = {"interface": self._interface, **({"fd": True} if fd else {})}
         configuration["channel"] = options.text("channel")
         bitrate = options.integer("bitrate", 0, lowest=0, highest=10_000_000)
@@ -281,7 +286,7 @@ class CanSource(Source):
         for name in url.options:
             if name.startswith(_PASSED_ON):
                 configuration[name.removeprefix(_PASSED_ON)] = _typed(options.text(name) or "")
-        return lambda: self._python_can(open_bus(f"source {self.url}", configuration))
+        return lambda _: self._python_can(open_bus(f"source {self.url}", configuration))
 
     def _python_can(self, bus: Any) -> CanLink:
         return PythonCanLink(bus, f"source {self.url}", sleep=self._sleep)
