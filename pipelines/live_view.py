@@ -6,6 +6,7 @@ comes from devices is shown without its control characters.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import shutil
 import sys
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 SHORTEST_UPDATE_INTERVAL_NS: Final = 200_000_000
 _BAR_WIDTH: Final = 30
+_NUMBER_WIDTH: Final = 9
+_LONGEST_NAME: Final = 28
 _FEWEST_CHANNELS_SHOWN: Final = 3
 _LINES_PER_SOURCE: Final = 5
 _NEARLY_FULL: Final = 0.9
@@ -87,7 +90,8 @@ class LiveView:
         self._shown_ns: int | None = None
         self._n_failed = 0
         self._live: Live | None = None
-        if self._console.is_terminal:
+        # a terminal that cannot show the bars is served as a pipe is
+        if self._console.is_terminal and self._console.encoding.lower().startswith("utf"):
             self._live = Live(console=self._console, auto_refresh=False, transient=True)
 
     def __enter__(self) -> Self:
@@ -99,7 +103,8 @@ class LiveView:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._live is not None:
-            self._live.stop()
+            with contextlib.suppress(OSError):
+                self._live.stop()
 
     def event(self, event: Event) -> None:
         """Show what happened above the view; in a pipe only what fails while others go on."""
@@ -110,7 +115,8 @@ class LiveView:
         if self._live is None and (not event.is_failure or is_last):
             return
         style = "bold red" if event.is_failure else "yellow"
-        self._console.print(Text(plain(event.message), style=style), soft_wrap=True)
+        with self._terminal_may_go():
+            self._console.print(Text(plain(event.message), style=style), soft_wrap=True)
 
     def status(self, status: RecorderStatus) -> None:
         """Show the state, at most five times per second."""
@@ -121,7 +127,16 @@ class LiveView:
             return
         self._shown_ns = now_ns
         height = self._console.size.height
-        self._live.update(rendered(status, self._space_left(), height), refresh=True)
+        with self._terminal_may_go():
+            self._live.update(rendered(status, self._space_left(), height), refresh=True)
+
+    @contextlib.contextmanager
+    def _terminal_may_go(self) -> Iterator[None]:
+        """A terminal that was closed must not end the recording: from then on nothing is shown."""
+        try:
+            yield
+        except (OSError, UnicodeEncodeError):
+            self._live = None
 
     def _space_left(self) -> int | None:
         try:
@@ -137,9 +152,12 @@ def rendered(status: RecorderStatus, n_bytes_free: int | None, height: int = 50)
 
     n_sources = max(1, len(status.sources))
     n_channels = max(_FEWEST_CHANNELS_SHOWN, (height - 2) // n_sources - _LINES_PER_SOURCE)
+    # the same widths for all sources and moments, so that nothing jumps
+    names = [level.name for source in status.sources for level in source.levels]
+    n_letters = min(_LONGEST_NAME, max(map(len, names), default=0))
     parts: list[RenderableType] = [_heading(status, n_bytes_free)]
     for source in status.sources:
-        parts += [_source_line(source), *_remarks(source), _levels(source, n_channels)]
+        parts += [_source_line(source), *_remarks(source), _levels(source, n_channels, n_letters)]
     return Group(*parts)
 
 
@@ -165,10 +183,8 @@ def _source_line(source: SourceStatus) -> Text:
     line.append(plain(source.device), style="bold")
     line.append(f"  {source.state.value}", style=_STATE_STYLES[source.state])
     line.append(f"  {_grouped(source.n_samples)} samples")
-    measured = (
-        "" if source.measured_rate_hz is None else f"{source.measured_rate_hz:,.1f}".replace(",", " ") + " of "
-    )
-    line.append(f"  {measured}{source.sampling_rate_hz:g} Hz")
+    measured = "" if source.measured_rate_hz is None else f"{source.measured_rate_hz:.1f} of "
+    line.append(f"  {measured}{source.sampling_rate_hz:.10g} Hz")
     line.append(f"  lost {_grouped(source.n_lost)}", style="bold red" if source.n_lost else "green")
     if source.drift is not None:
         line.append(f"  drift {source.drift.ppm:+.1f} ± {source.drift.uncertainty_ppm:.1f} ppm")
@@ -180,23 +196,24 @@ def _source_line(source: SourceStatus) -> Text:
 def _remarks(source: SourceStatus) -> Iterator[Text]:
     from rich.text import Text
 
-    counts = [f"{_grouped(count)} {_TROUBLE_NAMES[kind]}" for kind, count in source.troubles.items() if count]
+    counts = [f"{_TROUBLE_NAMES[kind]} {_grouped(count)}" for kind, count in source.troubles.items() if count]
     if counts:
         yield Text("  " + ", ".join(counts), style="red")
     if source.error:
         yield Text("  " + plain(source.error), style="bold red")
 
 
-def _levels(source: SourceStatus, n_shown: int) -> Table:
+def _levels(source: SourceStatus, n_shown: int, n_letters: int) -> Table:
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None, padding=(0, 1), header_style="dim")
-    for title in ("channel", "RMS", "peak"):
-        table.add_column(title, justify="left" if title == "channel" else "right", no_wrap=True)
-    table.add_column("units", no_wrap=True)
+    table.add_column("channel", no_wrap=True, width=max(n_letters, len("channel")))
+    for title in ("RMS", "peak"):
+        table.add_column(title, justify="right", no_wrap=True, width=_NUMBER_WIDTH)
+    table.add_column("units", no_wrap=True, min_width=5)
     table.add_column("RMS, peak of range", width=_BAR_WIDTH)
-    table.add_column("clipped", justify="right")
+    table.add_column("clipped")
     for level in source.levels[:n_shown]:
         clipped = _grouped(level.n_clipped)
         missing = f" + {_grouped(level.n_missing)} missing" if level.n_missing else ""
