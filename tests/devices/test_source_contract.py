@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 import socket
 import threading
 from pathlib import Path
@@ -155,6 +156,33 @@ class TestMulticast(SourceContract):
 
     def device(self, folder: Path, number: int):
         return simulated(f"can:udp_multicast?port={free_port()}&dbc={folder}/bus_{number}.dbc", number)
+
+
+class TestRamp(SourceContract):
+    """The backend that docs/sources.md shows how to write."""
+
+    unknown_url = "ramp:two words"
+
+    @contextlib.contextmanager
+    def device(self, folder: Path, number: int):
+        counts = np.arange(1000 * number)[:, np.newaxis]
+        url = f"ramp:pressure_{number}?n_samples={len(counts)}"
+        yield WorkingDevice(url, counts, [f"voltage_pressure_{number}"], RATE_HZ)
+
+    def source(self, url: str):
+        return DOCUMENTED["RampSource"](parse_url(url))
+
+
+def documented_backend() -> dict:
+    """What the Python of docs/sources.md defines."""
+    page = Path(__file__).resolve().parents[2] / "docs" / "sources.md"
+    (code,) = re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    defined: dict = {"__name__": "documented"}
+    exec(compile(code, str(page), "exec"), defined)
+    return defined
+
+
+DOCUMENTED = documented_backend()
 
 
 def free_port() -> int:

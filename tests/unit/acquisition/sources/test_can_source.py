@@ -167,6 +167,7 @@ def test_a_broken_connection_comes_back_and_loses_only_what_was_sent_meanwhile(d
     assert delivered(deliveries) == expected
     kinds = [kind for kind, _ in troubles(deliveries)]
     assert kinds == [TroubleKind.DISCONNECTED, TroubleKind.RECONNECTED]
+    assert server.heard.count(b"< rawmode >") == 2
     assert len({d.stream for d in deliveries if isinstance(d, Block)}) == 1
 
 
