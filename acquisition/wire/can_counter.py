@@ -34,6 +34,8 @@ LONGEST_GAP_S: Final = 3600.0
 _MOST_WAITING: Final = 4096
 _PATIENCE_S: Final = 3.0
 _FEWEST_PATIENCE: Final = 1024
+_MOST_CONTRADICTIONS: Final = 2
+_PIECE: Final = 32
 _NONE: Final = -1
 _NOTHING: Final = np.zeros(0, np.int64)
 
@@ -114,7 +116,7 @@ class CounterTracker:
         self._begin: int | None = None
         self.end: int | None = None
         self._near: int | None = None
-        self._n_impossible = 0
+        self._n_impossible, self._n_contradictions = 0, 0
         return n_given_up
 
     @property
@@ -187,42 +189,45 @@ class CounterTracker:
         SourceError
             If for seconds no counter fits what came before: a jump beyond the longest gap, or back.
         """
-        parts = [
-            self._take(value[start : start + self._chunk], known[start : start + self._chunk])
-            for start in range(0, max(len(value), 1), self._chunk)
-        ]
-        if len(parts) == 1:
-            return parts[0]
-        return Decided(
-            np.concatenate([part.counters for part in parts]),
-            sum(part.n_uncertain for part in parts),
-            sum(part.n_repeated for part in parts),
-        )
+        return self._in_pieces(value, known, self._chunk)
 
     def _take(self, value: IntArray, known: IntArray) -> Decided:
+        waiting = self._value, self._known
         self._value = np.concatenate([self._value, value])
         self._known = np.concatenate([self._known, known])
         n_before = self._n_before_begin()
         self._drop(n_before)
         if not len(self._value) or (self._begin is None and self.highest is None):
             return Decided(np.full(n_before, _NONE), n_before, 0)
-        decided = self._decided()
+        counters, n_decided = self._bounded()
+        if n_decided is None and len(value) > _PIECE and not n_before and not self._is_distrusted:
+            self._value, self._known = waiting
+            return self._in_pieces(value, known, _PIECE)
+        decided = self._impossible(counters) if n_decided is None else self._proved(counters[:n_decided])
         if not n_before:
             return decided
         counters = np.concatenate([np.full(n_before, _NONE), decided.counters])
         return Decided(counters, decided.n_uncertain + n_before, decided.n_repeated)
 
-    def _decided(self) -> Decided:
+    def _in_pieces(self, value: IntArray, known: IntArray, n_frames: int) -> Decided:
+        parts = [
+            self._take(value[start : start + n_frames], known[start : start + n_frames])
+            for start in range(0, max(len(value), 1), n_frames)
+        ]
+        return Decided(
+            np.concatenate([part.counters for part in parts]),
+            sum(part.n_uncertain for part in parts),
+            sum(part.n_repeated for part in parts),
+        )
+
+    def _bounded(self) -> tuple[IntArray, int | None]:
+        """Counters of all that wait and how many of them are decided; None if they cannot be as they are."""
         lowest, highest = self._window()
-        counters, n_decided, possible = _decide(self._value, self._known, lowest, highest, self.reach)
-        if not possible:
-            return self._impossible(np.full(len(counters), _NONE), 0)
+        counters, n_decided, is_possible = _decide(self._value, self._known, lowest, highest, self.reach)
         n_decided = max(n_decided, len(counters) - _MOST_WAITING)
-        jump = self._first_jump(counters[:n_decided])
-        if jump is not None:
-            return self._impossible(counters, jump)
-        self._drop(n_decided)
-        return self._without_repeats(counters[:n_decided])
+        if not is_possible or self._is_distrusted or self._has_jump(counters[:n_decided]):
+            return counters, None
+        return counters, n_decided
 
     def _n_before_begin(self) -> int:
         """Frames before the first that has a smallest counter; that frame becomes the beginning."""
@@ -240,23 +245,27 @@ class CounterTracker:
         highest = lowest + self._horizon
         return lowest, min(highest, self.end - 1) if self.end is not None else highest
 
-    def _first_jump(self, counters: IntArray) -> int | None:
-        """Number of the first frame that lies further ahead than the longest gap."""
-        proved = np.flatnonzero(counters >= 0)
+    @property
+    def _is_distrusted(self) -> bool:
+        """Twice in succession is no late frame but a device that counts anew: it must not catch up unnoticed."""
+        return self._n_contradictions >= _MOST_CONTRADICTIONS
+
+    def _has_jump(self, counters: IntArray) -> bool:
+        """Whether any frame lies further ahead than the longest gap."""
+        proved = counters[counters >= 0]
         if not len(proved):
-            return None
-        before = np.maximum.accumulate(counters[proved])
+            return False
+        before = np.maximum.accumulate(proved)
         start = self.highest if self.highest is not None else int(before[0])
         before = np.concatenate([[start], before[:-1]])
-        jumps = np.flatnonzero(counters[proved] - before > self.longest_gap_samples)
-        return int(proved[jumps[0]]) if len(jumps) else None
+        return bool((proved - before > self.longest_gap_samples).any())
 
-    def _impossible(self, counters: IntArray, first: int) -> Decided:
-        """Accept what came before frame `first` and give up the rest; too much of that is an error."""
-        good = self._without_repeats(counters[:first])
-        n_left = len(self._value) - first
-        self._value, self._known = _NOTHING, _NOTHING
-        self._n_impossible += n_left
+    def _impossible(self, counters: IntArray) -> Decided:
+        """Give up all that waits; too much of that is an error."""
+        n_frames = len(counters)
+        self._drop(n_frames)
+        self._n_contradictions += 1
+        self._n_impossible += n_frames
         if self._n_impossible > self._patience:
             limit = self.longest_gap_samples
             raise SourceError(
@@ -265,13 +274,14 @@ class CounterTracker:
                 allowed=f"a gap of ≤ {limit} samples; a step back only with a new stream in device_status",
                 remedy="the device has started anew without saying so, or two devices send the same message",
             )
-        counters = np.concatenate([good.counters, np.full(n_left, _NONE)])
-        return Decided(counters, good.n_uncertain + n_left, good.n_repeated)
+        return Decided(np.full(n_frames, _NONE), n_frames, 0)
 
     def _drop(self, n_decided: int) -> None:
         self._value, self._known = self._value[n_decided:], self._known[n_decided:]
 
-    def _without_repeats(self, counters: IntArray) -> Decided:
+    def _proved(self, counters: IntArray) -> Decided:
+        """Accept the oldest frames, each counter once."""
+        self._drop(len(counters))
         n_uncertain = int((counters < 0).sum())
         proved = np.flatnonzero(counters >= 0)
         if not len(proved):
@@ -288,7 +298,7 @@ class CounterTracker:
     def _remember(self, new: IntArray) -> None:
         if not len(new):
             return
-        self._n_impossible = 0
+        self._n_impossible, self._n_contradictions = 0, 0
         self.highest = max(int(new.max()), self.highest if self.highest is not None else 0)
         recent = np.concatenate([self._recent, new])
         self._recent = recent[recent >= self.highest - 2 * self.reach]

@@ -332,7 +332,7 @@ class _DatabaseReader:
             self._refuse(
                 f"{message.name}: sample counter",
                 f"{n_bits} bits",
-                f"≥ {FEWEST_COUNTER_BITS}, of which 3 in every frame",
+                f"≥ {FEWEST_COUNTER_BITS} bits",
             )
         if message.counter[0].selectors:
             self._refuse(f"{message.name}.sample_counter_0", "multiplexed", "in every frame")

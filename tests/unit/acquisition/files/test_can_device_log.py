@@ -92,7 +92,7 @@ def status(database: Any, state: int, n_samples: int, stamp_s: float, stream: in
 
 def frames_of_run(lost: frozenset[tuple[int, int]] = frozenset(), *, end: bool = True) -> list[can.Message]:
     """A run whose time stamps jitter by several samples; `lost` has (counter, message)."""
-    database = cantools.database.load_string(DBC, "dbc")
+    database: Any = cantools.database.load_string(DBC, "dbc")
     rng = np.random.default_rng(3)
     stamps = 100.0 + np.sort(np.arange(N_SAMPLES) / 500.0 + rng.uniform(0, 0.02, N_SAMPLES))
     frames = [status(database, 1, 0, 99.9)]
@@ -177,9 +177,9 @@ def test_corrupt_frame_is_left_out(tmp_path: Path) -> None:
 
 def test_missing_count_is_missing(tmp_path: Path) -> None:
     frames = frames_of_run()
-    database = cantools.database.load_string(DBC, "dbc")
+    database: Any = cantools.database.load_string(DBC, "dbc")
     at = next(n for n, frame in enumerate(frames) if frame.arbitration_id == 0x101 and n > 700)
-    signals = database.decode_message(0x101, frames[at].data, scaling=False)
+    signals: Any = database.decode_message(0x101, frames[at].data, scaling=False)
     stamp = frames[at].timestamp
     frames[at] = message(database, "samples_0", **{**signals, "crc_16": 0, "force_cell_1": -30000})
     frames[at].timestamp, frames[at].channel = stamp, 0
@@ -216,7 +216,7 @@ def vars_of(frame: can.Message) -> dict[str, Any]:
 
 
 def test_longest_stream_is_taken_and_the_other_named(tmp_path: Path) -> None:
-    database = cantools.database.load_string(DBC, "dbc")
+    database: Any = cantools.database.load_string(DBC, "dbc")
     before = [status(database, 1, 0, 90.0, stream=8)]
     for counter in range(50):
         before += sample_frames(database, counter, np.array([1, 1, 1]), 90 + counter / 500)
