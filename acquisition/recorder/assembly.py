@@ -180,7 +180,7 @@ def _start_time_utc(base: SourcePlacement) -> str:
             last = group.index[0] + group.entries.n_samples[0] - 1
             arrivals.append(int(group.entries.host_utc_ns[0]) * 1e-9 - int(last) / base.info.sampling_rate_hz)
     try:
-        moment = datetime.fromtimestamp(0, UTC) + timedelta(seconds=min(arrivals))
+        moment = datetime.fromtimestamp(0, UTC) + timedelta(milliseconds=round(1e3 * min(arrivals)))
     except (OverflowError, ValueError):
         moment = datetime.fromtimestamp(0, UTC)
     return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
