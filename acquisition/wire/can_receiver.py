@@ -294,7 +294,7 @@ class _GroupReceiver:
         )
         self._waiting = new if self._waiting is None else self._waiting.followed_by(new)
         decided = self.tracker.take(frames.counter[good], frames.counter_known[good])
-        return deliveries + self._decided(decided, stream, now_ns, everything=False)
+        return deliveries + self._decided(decided, stream, now_ns, everything=self.tracker.end is not None)
 
     def ends_at(self, n_samples: int | None, stream: int, now_ns: int) -> list[Delivery]:
         """Learn where the stream ends; None takes it back."""
