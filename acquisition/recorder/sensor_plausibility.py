@@ -16,6 +16,8 @@ from sloshlab.conditioning.resampling import resampled
 from sloshlab.errors import AnalysisError
 from sloshlab.units import factor_to_si
 
+_MOTION_OVER_NOISE = 3.0
+
 LARGEST_DELAY_S: Final = 2e-3
 """Accelerometers of one tank further apart in time than this are remarked on: 0.25 rad at 20 Hz."""
 
@@ -26,7 +28,7 @@ def doubtful_sensors(parts: Sequence[Part], experiment: str) -> list[str]:
         return []
     recording = _thinned_recording(parts)
     names = redundant_accelerometers(recording)
-    if len(names) < 2:
+    if len(names) < 2 or not any(_moves(recording[name]) for name in names):
         return []
     try:
         agreed = agreement(recording, names)
@@ -47,8 +49,16 @@ def _thinned_recording(parts: Sequence[Part]) -> xr.Dataset:
             if channel.quantity == "acceleration" and channel.name in part.survey.thinned:
                 values = _on_base(part, part.survey.thinned[channel.name], n, step_s)
                 factor = factor_to_si(channel.units, "acceleration")
-                variables[name] = ("time", factor * values, {"quantity": "acceleration"})
+                noise = factor * max(channel.noise_std or 0.0, abs(channel.scale_factor))
+                attributes = {"quantity": "acceleration", "noise_std": noise}
+                variables[name] = ("time", factor * values, attributes)
     return xr.Dataset(variables, coords={"time": step_s * np.arange(n)})
+
+
+def _moves(channel: xr.DataArray) -> bool:
+    """Whether there is more than noise to compare."""
+    values = channel.values[np.isfinite(channel.values)]
+    return bool(values.size) and float(values.std()) > _MOTION_OVER_NOISE * channel.attrs["noise_std"]
 
 
 def _on_base(part: Part, values: NDArray[np.float64], n: int, step_s: float) -> NDArray[np.float64]:

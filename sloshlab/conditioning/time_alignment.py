@@ -243,7 +243,7 @@ def _require_common_time(reference: SampledSignal, other: SampledSignal) -> None
 
 def _highest_frequency_hz(signal: SampledSignal) -> float:
     """Below this lie 99 % of the power."""
-    values = np.nan_to_num(signal.values - np.nanmean(signal.values))
+    values = _centred(signal)
     power = np.cumsum(np.abs(np.fft.rfft(values)) ** 2)
     line = int(np.searchsorted(power, 0.99 * power[-1]))
     return min(_HIGHEST_FREQUENCY_HZ, max(_LOWEST_FREQUENCY_HZ, line / (values.size * signal.step_s)))
@@ -279,9 +279,16 @@ def _drifts(largest_ppm: float, duration_s: float, frequency_hz: float) -> Float
 
 def _interpolated(signal: SampledSignal, time: FloatArray) -> FloatArray:
     """Good enough for a coarse search: linear, lost samples and what is outside at the mean."""
-    values = np.nan_to_num(signal.values - np.nanmean(signal.values))
+    values = _centred(signal)
     places = signal.start_s + signal.step_s * np.arange(values.size)
     return np.asarray(np.interp(time, places, values, left=0.0, right=0.0))
+
+
+def _centred(signal: SampledSignal) -> FloatArray:
+    """Values about their mean; lost samples at the mean."""
+    there = np.isfinite(signal.values)
+    mean = float(signal.values[there].mean()) if there.any() else 0.0
+    return np.where(there, signal.values - mean, 0.0)
 
 
 def _maxima(values: FloatArray) -> list[tuple[float, float]]:

@@ -107,6 +107,14 @@ def test_different_motions_have_nothing_in_common() -> None:
     assert clock_delay(x, y).status is AlignmentStatus.NO_COMMON_MOTION
 
 
+@pytest.mark.parametrize("value", [np.nan, 3.0])
+def test_a_silent_sensor_has_nothing_in_common(value: float) -> None:
+    silent = SampledSignal(np.full(20000, value), 0.0, 1 / 512)
+    moving = SampledSignal(sweep(np.arange(20000) / 512), 0.0, 1 / 512)
+    assert clock_delay(silent, moving).status is AlignmentStatus.NO_COMMON_MOTION
+    assert clock_delay(moving, silent).status is AlignmentStatus.NO_COMMON_MOTION
+
+
 def test_lost_samples_cost_their_windows_only() -> None:
     reference, other, true_s = pair(sweep, 0.05, 100.0, noise=0.002, seed=0)
     other.values[10000:10003] = np.nan

@@ -346,6 +346,14 @@ def test_accelerometers_of_a_rigid_tank_that_disagree_are_doubted(
     assert ("sensor swapped or gain wrong?" in result.flags) is doubts
 
 
+def test_accelerometers_at_rest_are_not_compared(tmp_path: Path) -> None:
+    counts = np.random.default_rng(0).integers(-1, 2, (10240, 2))
+    channels = (ACCELERATION, replace(ACCELERATION, name="acceleration_roof_2"))
+    sent = [block(0, 10240, counts=counts.astype(np.int32)), End(STREAM, 10240)]
+    result = made(tmp_path, sent, device(*channels), attributes={"experiment": "shaker_sweep"})
+    assert result.flags == ""
+
+
 # refusals
 
 
