@@ -21,8 +21,9 @@ from acquisition.sources.multicast_loopback import DEFAULT_GROUP, open_multicast
 from acquisition.sources.serial_line import LineLostError
 from acquisition.sources.urls import URLOptions
 from acquisition.wire.can_batch import FrameBatch
+from acquisition.wire.can_counter import CounterTracker
 from acquisition.wire.can_database import read_layout
-from acquisition.wire.can_frames import START, STOP, control_frame
+from acquisition.wire.can_frames import START, STOP, control_frame, decode
 from acquisition.wire.can_layout import CanLayout
 from acquisition.wire.can_receiver import CanReceiver
 from sloshlab.errors import SourceError
@@ -101,6 +102,7 @@ class CanSource(Source):
             allowed = "classic frames, as socketcand carries no others"
             raise SourceError(f"source {self.url}: {self._dbc}", got="messages of CAN FD", allowed=allowed)
         self._receiver = CanReceiver(layout, self._longest_gap_s)
+        _load_decoder(layout)
         self._identifiers = [message.arbitration_id for message in layout.messages]
         if layout.status is not None:
             self._identifiers.append(layout.status.arbitration_id)
@@ -290,6 +292,17 @@ class CanSource(Source):
 
     def _python_can(self, bus: Any) -> CanLink:
         return PythonCanLink(bus, f"source {self.url}", sleep=self._sleep)
+
+
+def _load_decoder(layout: CanLayout) -> None:
+    """Take a made-up frame apart and throw it away.
+
+    What is compiled or loaded at first use takes seconds on a busy computer, and so long the buffers of
+    the interface do not hold what arrives.
+    """
+    message = layout.messages[0]
+    frames = decode(message, np.zeros((1, message.length), np.uint8))
+    CounterTracker(message, layout.sampling_rate_hz).take(frames.counter, frames.counter_known)
 
 
 def _command(link: CanLink, layout: CanLayout, command: int) -> None:

@@ -59,7 +59,7 @@ def simulated(url: str, number: int):
         channels = [f"voltage_pattern_{k + 1}" for k in range(n_channels)]
         yield WorkingDevice(its_url, counts, channels, RATE_HZ)
     finally:
-        player.stop.set()
+        player.stop()
         thread.join(60.0)
         assert not thread.is_alive()
 
