@@ -72,6 +72,11 @@ class BusEndpoint(Endpoint):
         """A bus does not know; yes while it is there."""
         return self._bus is not None
 
+    @property
+    def has_hosts(self) -> bool:
+        """A bus does not know."""
+        return False
+
     def serve(self, timeout_s: float) -> None:
         """Listen for the host's command."""
         if self._bus is None:

@@ -47,6 +47,11 @@ class Endpoint(ABC):
     def is_heard(self) -> bool:
         """Whether any host takes frames now."""
 
+    @property
+    @abstractmethod
+    def has_hosts(self) -> bool:
+        """Whether anybody is still connected, as far as can be known."""
+
     @abstractmethod
     def send(self, frames: FrameArray, *, is_given_up: Callable[[], bool]) -> bool:
         """Send frames and wait until the hosts took them; False if nobody listens or it was given up."""
@@ -138,14 +143,19 @@ class StreamEndpoint(Endpoint):
         """Whether anybody listens."""
         return any(self._listens(line) for line in self._lines)
 
+    @property
+    def has_hosts(self) -> bool:
+        """Whether there is a connection, listening or not."""
+        return bool(self._lines)
+
     def _listens(self, line: _Line) -> bool:
         return self._runs_freely or (line.host.listens and self._now_s() >= line.host.listens_from_s)
 
     def serve(self, timeout_s: float) -> None:
         """Wait for hosts or their words; then let in, listen, answer, let out."""
         self._wait(timeout_s, for_writing=())
+        self._listen()  # who has gone makes room for who comes
         self._admit()
-        self._listen()
 
     def _wait(self, timeout_s: float, *, for_writing: tuple[_Line, ...] | list[_Line]) -> None:
         waiting = select.poll()
@@ -214,8 +224,8 @@ class StreamEndpoint(Endpoint):
             if is_given_up():
                 return False
             self._wait(_STEP_S, for_writing=unsent)
-            self._admit()
             self._listen()
+            self._admit()
 
     def _push(self, line: _Line, *, n_lines: int) -> None:
         before = len(line.unsent)

@@ -28,7 +28,7 @@ _LONGEST_BLOCK_SAMPLES = 8192
 _PACED_BLOCK_S, _UNPACED_BLOCK_S = 0.25, 1.0
 _DESCRIBED_EVERY_S = 1.0
 _UNPLUGGED_S = 0.5
-_READ_LINGER_S, _STOPPED_LINGER_S = 2.0, 0.1
+_READ_LINGER_S, _STOPPED_LINGER_S = 2.0, 1.0
 
 
 class Wire(Protocol):
@@ -136,6 +136,7 @@ class Player:
         self.progress = Progress(next(self.streams), self.clock.counter_start)
         self.has_lost_host = False
         self._described_second = -1
+        self._block_end = 0
         self._has_arrived = False
 
     @property
@@ -173,7 +174,10 @@ class Player:
             self._end()
         except HostGoneError:
             self.has_lost_host = True
-        except StoppedError:
+        except StoppedError as stopped:
+            self.progress.next_sample = self._block_end
+            if stopped.next_counter is not None:
+                self.progress.next_sample = stopped.next_counter - self.progress.base
             self._end()
         finally:
             if not self._has_arrived:
@@ -191,6 +195,7 @@ class Player:
     def _play(self, stretch: Stretch) -> None:
         for start, stop in self._blocks(stretch):
             self._announce(start)
+            self._block_end = stop
             frames = self._frames(start, self._taken(start, stop))
             self.sender.transmit(self.frame_faults.applied(frames, self.progress.stream), self.progress.stream)
             self.progress.next_sample = stop
@@ -276,7 +281,7 @@ class Player:
         self.endpoint.send(frames, is_given_up=self.sender.is_given_up)
         until_s = self.laboratory.monotonic_s() + LINGER_S
         read_until_s = math.inf
-        while self.endpoint.is_heard and not self.sender.stop.is_set():
+        while self.endpoint.has_hosts and not self.sender.stop.is_set():
             now_s = self.laboratory.monotonic_s()
             patience_s = _STOPPED_LINGER_S if self.endpoint.is_stopped else _READ_LINGER_S
             read_until_s = min(read_until_s, now_s + patience_s) if self.endpoint.is_read() else math.inf

@@ -29,7 +29,9 @@ class HostGoneError(Exception):
 
 
 class StoppedError(Exception):
-    """The device was told to end before its signal does."""
+    """The device was told to end before its signal does; `next_counter` is that of the first sample not sent."""
+
+    next_counter: int | None = None
 
 
 class LossyLine(Protocol):
@@ -92,15 +94,21 @@ class Sender:
         StoppedError, HostGoneError
         """
         position = 0
-        while position < len(frames):
-            stop = position + self._n_due(frames[position:])
-            if stop > position:
-                self._put(frames[position:stop], stream)
-                position = stop
-                self.serve(0.0)
-            else:
-                self.serve(self._wait_s(float(frames["due_s"][position])))
-            self._send_carried(stream)
+        try:
+            while position < len(frames):
+                stop = position + self._n_due(frames[position:])
+                if stop > position:
+                    self._put(frames[position:stop], stream)
+                    position = stop
+                    self.serve(0.0)
+                else:
+                    self.serve(self._wait_s(float(frames["due_s"][position])))
+                self._send_carried(stream)
+        except StoppedError as stopped:
+            unsent = frames[position:]
+            counters = unsent["counter"][np.isin(unsent["kind"], (FrameKind.SAMPLES, FrameKind.SPOILED))]
+            stopped.next_counter = int(counters.min()) if len(counters) else None
+            raise
 
     def drain(self, stream: int) -> None:
         """Wait until the line has carried everything."""
