@@ -62,10 +62,11 @@ def parse_socketcand(text: bytes) -> SocketcandText:
     (b'< fra', 1, 1)
     """
     end = text.rfind(b">") + 1
-    whole, rest = text[:end], text[end:].lstrip()
+    whole, (between, beginning, rest) = text[:end], text[end:].partition(b"<")
+    rest = beginning + rest
     found = _FRAME.findall(whole)
     others, n_error_frames = _ERROR.subn(b"", _FRAME.sub(b"", whole))
-    n_garbage_bytes = len(_HARMLESS.sub(b"", others))
+    n_garbage_bytes = len(_HARMLESS.sub(b"", others)) + len(_HARMLESS.sub(b"", between))
     if len(rest) > LONGEST_MESSAGE_BYTES:
         n_garbage_bytes, rest = n_garbage_bytes + len(rest), b""
     return SocketcandText(_batch(found), rest, n_error_frames, n_garbage_bytes)

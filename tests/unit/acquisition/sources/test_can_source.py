@@ -25,6 +25,7 @@ from can_by_hand import (
 from acquisition.sources import Block, End, Trouble, TroubleKind, open_source, parse_url
 from acquisition.sources.can_links import CanLink, PythonCanLink
 from acquisition.sources.can_source import CanSource
+from acquisition.sources.can_text_links import open_socketcand
 from acquisition.sources.multicast_loopback import DEFAULT_GROUP, open_multicast_bus
 from acquisition.sources.serial_line import LineLostError
 from acquisition.wire.can_counter import CounterTracker
@@ -311,6 +312,26 @@ def test_what_is_no_socketcand_is_one_line(dbc, script, said):
             source.open()
         assert "\n" not in str(caught.value)
         source.close()
+
+
+class EndlessLine:
+    """A peer that talks and never comes to the point."""
+
+    n_reads = 0
+
+    def read(self, timeout_s):
+        self.n_reads += 1
+        assert self.n_reads < 3
+        return b"x" * 65536
+
+    def close(self):
+        """Nothing to do."""
+
+
+def test_a_handshake_without_end_is_broken_off(monkeypatch):
+    monkeypatch.setattr("acquisition.sources.can_text_links.open_line", lambda *_: EndlessLine())
+    with pytest.raises(SourceError, match="allowed: '< hi >'"):
+        open_socketcand("127.0.0.1", 1, "can0", timeout_s=60.0)
 
 
 def test_a_server_that_never_stops_talking_costs_no_memory(dbc):
