@@ -17,6 +17,7 @@ from acquisition.recorder import recorder as recorder_module
 from acquisition.recorder.block_joining import BlockJoiner
 from acquisition.recorder.delivery_queue import Delivered, DeliveryQueue, Finished
 from acquisition.recorder.journal import JournalWriter, read_journal
+from acquisition.recorder.reader_thread import ReaderThread
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
 from acquisition.recorder.status import Event, RecorderStatus, SourceState, StopReason
 from acquisition.sources.interface import Block, End, Trouble, TroubleKind
@@ -563,3 +564,19 @@ def test_a_closed_queue_lets_waiting_readers_go() -> None:
     queue.close()
     helper.join(PATIENCE_S)
     assert answers == [False]
+
+
+def test_what_had_arrived_when_the_stop_came_is_read() -> None:
+    queue = DeliveryQueue(1)
+
+    def stop_in_the_middle() -> list[Block]:
+        reader.stop()
+        return [block(0)]
+
+    source = FakeSource([stop_in_the_middle, [block(10)], [block(20)]])
+    reader = ReaderThread(0, source, queue, threading.Barrier(1), lambda number, error: None)
+    reader.start()
+    assert reader.join(PATIENCE_S)
+    first, last, finished = queue.take(0.0)
+    assert [item.deliveries[0].counter for item in (first, last)] == [0, 10]
+    assert finished == Finished(0, None)
