@@ -48,9 +48,9 @@ column = "force_cell_2"
 def counts() -> np.ndarray:
     """Every count is different from its neighbours, so that a sample in a wrong place shows."""
     n = np.arange(N_SAMPLES)
-    return np.stack(
-        [(n * 7919) % 60001 - 29999, (n * 104729) % 65521 - 32760, (n * 15485863) % 16777213 - 8388606], 1
-    )
+    columns = [(n * 7919) % 60001 - 29999, (n * 104729) % 65521 - 32760, (n * 15485863) % 16777213 - 8388606]
+    columns[1][7] = -(2**15)  # a reading like any other: it must not be taken for the mark of a lost sample
+    return np.stack(columns, 1)
 
 
 def with_checksum(arbitration_id: int, data: bytes) -> bytes:
@@ -124,6 +124,7 @@ def test_whole_run_has_every_sample_in_its_place(tmp_path: Path, suffix: str) ->
     expected = counts()
     np.testing.assert_array_equal(recording["time"].values, np.arange(N_SAMPLES) / 500.0)
     np.testing.assert_array_equal(recording["force_cell_1"].values, expected[:, 0] * SCALE_N + OFFSET_N)
+    np.testing.assert_allclose(recording["acceleration_roof_1"].values, expected[:, 1] * 0.001, rtol=1e-15)
     np.testing.assert_allclose(recording["force_cell_2"].values, expected[:, 2] * 1e-6, rtol=1e-15)
     assert "quality" not in recording or not recording["quality"].any()
     assert any("placed by its sample counter at 500 Hz" in trap for trap in result.report.traps)
