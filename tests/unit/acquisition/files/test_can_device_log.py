@@ -22,7 +22,7 @@ N_SAMPLES = 1001
 SCALE_N, OFFSET_N = 0.0078125, -3.5
 CHANNELS = [
     Channel("force_cell_1", "force", "N", 16, SCALE_N, OFFSET_N, missing_count=-30000),
-    Channel("acceleration_roof_1", "acceleration", "m s-2", 16, 0.001),
+    Channel("acceleration_roof_1", "acceleration", "m s-2", 16, 2.0**-10),
     Channel("force_cell_2", "force", "N", 24, 1e-6),
 ]
 DBC = device_database("daq", 500.0, 1e6, CHANNELS).to_dbc()
@@ -124,7 +124,7 @@ def test_whole_run_has_every_sample_in_its_place(tmp_path: Path, suffix: str) ->
     expected = counts()
     np.testing.assert_array_equal(recording["time"].values, np.arange(N_SAMPLES) / 500.0)
     np.testing.assert_array_equal(recording["force_cell_1"].values, expected[:, 0] * SCALE_N + OFFSET_N)
-    np.testing.assert_allclose(recording["acceleration_roof_1"].values, expected[:, 1] * 0.001, rtol=1e-15)
+    np.testing.assert_array_equal(recording["acceleration_roof_1"].values, expected[:, 1] * 2.0**-10)
     np.testing.assert_allclose(recording["force_cell_2"].values, expected[:, 2] * 1e-6, rtol=1e-15)
     assert "quality" not in recording or not recording["quality"].any()
     assert any("placed by its sample counter at 500 Hz" in trap for trap in result.report.traps)
