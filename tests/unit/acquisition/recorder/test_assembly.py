@@ -303,6 +303,25 @@ def test_device_clocks_that_are_absent_are_refused(tmp_path: Path) -> None:
         made(tmp_path, sent, *infos, options=AssemblyOptions(align="device"))
 
 
+def test_a_faster_device_is_aligned_by_its_signals(tmp_path: Path) -> None:
+    def sweep(t: np.ndarray) -> np.ndarray:
+        return np.round(8000 * np.sin(2 * np.pi * (5 * t + 0.375 * t**2)))
+
+    roof = replace(ACCELERATION, name="acceleration_roof_2")
+    infos = device(ACCELERATION), device(roof, name="can", rate_hz=5120.0)
+    counts = sweep(np.arange(10240) / RATE_HZ)[:, None].astype(np.int32)
+    own = [(0, block(k, k + 16, counts=counts[k : k + 16])) for k in range(0, 10240, 16)]
+    other = second(sweep(np.arange(102400) / 5120.0)[:, None], rate_hz=5120.0)
+    pairs = AssemblyOptions(redundant=(("acceleration_roof_2", "acceleration_roof_1"),))
+    result = made(tmp_path, [*own, *other], *infos, options=pairs)
+    stated = result.recording["counts_acceleration_roof_2"].attrs
+    # both sampled at t = 0, though one is read 1 ms after its last sample and the other 2 ms
+    assert result.summary.record["alignment"]["can"]["method"] == "signals"
+    assert abs(stated["first_sample_s"]) < 5e-6
+    values = result.recording["acceleration_roof_2"].values
+    np.testing.assert_allclose(values[100:-100], counts[100:-100, 0] * 0.25, atol=2.0)
+
+
 def test_lost_samples_of_a_resampled_device_are_lost_in_its_channels_only(tmp_path: Path) -> None:
     infos = device(FORCE), device(ACCELERATION, name="can")
     own = [(0, block(k, k + 16, n_channels=1)) for k in range(0, 5120, 16)]
