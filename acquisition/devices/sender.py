@@ -21,7 +21,7 @@ STEP_S: Final = 0.05
 
 _COALESCED_S = 0.004
 _STOPPED_PATIENCE_S = 2.0
-_READ_PATIENCE_S = 5.0
+_READ_PATIENCE_S, _EMPTY_FOR_S = 5.0, 0.25
 
 
 class HostGoneError(Exception):
@@ -122,11 +122,13 @@ class Sender:
 
     def await_read(self) -> None:
         """Wait until the hosts have taken everything, for a few seconds."""
-        until_s = self.laboratory.monotonic_s() + _READ_PATIENCE_S
-        n_empty = 0
-        while n_empty < 3 and self.endpoint.is_heard and self.laboratory.monotonic_s() < until_s:
+        now_s = self.laboratory.monotonic_s()
+        until_s, empty_since_s = now_s + _READ_PATIENCE_S, now_s
+        # a terminal hands its bytes on in portions: empty for a moment is not empty
+        while self.endpoint.is_heard and now_s < until_s and now_s - empty_since_s < _EMPTY_FOR_S:
             self.serve(_COALESCED_S)
-            n_empty = n_empty + 1 if self.endpoint.is_read() else 0
+            now_s = self.laboratory.monotonic_s()
+            empty_since_s = empty_since_s if self.endpoint.is_read() else now_s
 
     def await_until(self, physical_s: float) -> None:
         """Wait for a physical time."""
