@@ -16,8 +16,11 @@ _MOST_BLOCKS_WAITING: Final = 4096
 class Sink(Protocol):
     """Where joined blocks go: the journal."""
 
-    def append_blocks(self, source: int, blocks: list[Block], /) -> None: ...
-    def append(self, source: int, delivery: Delivery, /) -> None: ...
+    def append_blocks(self, source: int, blocks: list[Block], /) -> None:
+        """Take consecutive blocks of one group."""
+
+    def append(self, source: int, delivery: Delivery, /) -> None:
+        """Take anything else."""
 
 
 @dataclass
