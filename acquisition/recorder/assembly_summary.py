@@ -106,6 +106,7 @@ def summarised(
     lines += described({part.label: part.alignment for part in parts})
     lines += [f"{count} × {TroubleKind[kind].value}" for kind, count in record["troubles"]["counts"].items()]
     flags = [flag for part in parts for flag in _part_flags(part, losses)]
+    flags += [flag for part in parts for flag in _damage_flags(journal, part)]
     flags += [
         f"{count} × {TroubleKind[kind].value}"
         for kind, count in record["troubles"]["counts"].items()
@@ -233,6 +234,16 @@ def _part_flags(part: Part, losses: Sequence[Loss]) -> Iterator[str]:
     yield from _restart_flags(part)
     if part.alignment.method in (AlignmentMethod.NONE, AlignmentMethod.HOST):
         yield f"{label}: aligned by {part.alignment.method.value}"
+
+
+def _damage_flags(journal: Journal, part: Part) -> Iterator[str]:
+    """Order is all that tells of damage that a short checksum has let through."""
+    is_damaged = journal.trouble_counts.get((part.placement.source, TroubleKind.CORRUPT_FRAME.name), 0)
+    if is_damaged and part.survey.n_late:
+        yield (
+            f"{part.label}: {part.survey.n_late} samples came out of order on a line that damages frames; "
+            "some may be damaged themselves"
+        )
 
 
 def _restart_flags(part: Part) -> Iterator[str]:

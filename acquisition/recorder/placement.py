@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recorder.arrival_order import out_of_order
 from acquisition.recorder.journal import Entries, Journal
 from acquisition.sources.interface import SourceInfo
 from sloshlab.conditioning.device_clock import ClockStatus, DeviceClock, fitted_device_clock
@@ -76,7 +77,7 @@ class GroupPlacement:
     start, stop : ndarray of int64
         Places that the entry fills, stop exclusive; equal where it has none.
     is_late : ndarray of bool
-        Whether a higher counter of the stream had arrived before.
+        Whether it came out of order, see `out_of_order`.
     """
 
     entries: Entries
@@ -278,8 +279,12 @@ def _following(before: Stream, here: Stream, rate_hz: float) -> Stream:
     host_s = origins_s + here.clock.host_s(here.first_counter)
     period_s = before.clock.period_s if before.clock.status is ClockStatus.FITTED else 1.0 / rate_hz
     samples = (host_s - before.clock.host_s(before.first_counter)) / period_s
-    errors = [_place_error_s(one.clock) for one in (before, here)]
-    return _at(here, max(end + 1, before.first_index + round(samples)), sum(errors) + 0.5 / rate_hz)
+    error_s = sum(_place_error_s(one.clock) for one in (before, here)) + 0.5 / rate_hz
+    index = before.first_index + round(samples)
+    if index + error_s * rate_hz < end:
+        # more samples than there was time for: the device was not read, or did not sample, in real time
+        return _at(here, end + 1, None)
+    return _at(here, max(end + 1, index), error_s)
 
 
 def _place_error_s(clock: DeviceClock) -> float:
@@ -302,7 +307,7 @@ def _placed_group(entries: Entries, streams: Sequence[Stream]) -> GroupPlacement
         bounds = stream.first_index, stream.first_index + stream.n_samples
         start[own] = np.clip(index[own], *bounds)
         stop[own] = np.clip(index[own] + n, *bounds)
-        is_late[own[1:]] = counter[1:] < np.maximum.accumulate(counter + n)[:-1]
+        is_late[own] = out_of_order(counter, n)
     return GroupPlacement(entries, index, start, stop, is_late)
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from journals import RATE_HZ, STREAM, block, blocks, device, ended, made
+from journals import ORIGIN_NS, RATE_HZ, STREAM, UTC_NS, block, blocks, device, ended, made
 
 from acquisition.recorder.journal import read_journal
 from acquisition.recorder.placement import placed_source
-from acquisition.sources.interface import Block, Delivery
+from acquisition.sources.interface import Block, Delivery, Trouble, TroubleKind
 from sloshlab.errors import JournalError
 from sloshlab.recording import LOST, OUT_OF_ORDER
 
@@ -63,6 +63,33 @@ def test_of_equal_copies_the_first_is_kept_and_nothing_flagged(tmp_path: Path) -
     assert not result.quality.any()
     assert result.flags == ""
     assert result.summary.record["devices"][0]["n_repeated"] == 16
+
+
+def test_what_follows_a_copy_in_its_block_is_not_late(tmp_path: Path) -> None:
+    """A serial frame sent twice: the second copy and all that follows it is read as one block."""
+    result = made(tmp_path, ended([block(0, 32), block(16, 320)], 320))
+    np.testing.assert_array_equal(result.raw["force_cell_1"], np.arange(320))
+    assert not result.quality.any()
+    assert result.summary.record["devices"][0]["n_repeated"] == 16
+
+
+def damaged(kind: TroubleKind) -> Trouble:
+    return Trouble(kind, "frames with a wrong checksum", 3, ORIGIN_NS)
+
+
+def test_a_block_far_ahead_is_flagged_and_not_those_that_follow(tmp_path: Path) -> None:
+    """Damage that a checksum of 16 bits lets through puts a frame where another belongs."""
+    sent = blocks(320)
+    intruder = block(160, 161, counts=np.array([[5, 5]], np.int32))
+    lost = [block(144, 160), block(161, 176)]
+    result = made(tmp_path, ended([*sent[:4], intruder, *sent[4:9], *lost, *sent[11:]], 320))
+    np.testing.assert_array_equal(np.flatnonzero(result.quality == OUT_OF_ORDER), [160])
+    assert result.flags == ""
+    result = made(
+        tmp_path,
+        ended([damaged(TroubleKind.CORRUPT_FRAME), *sent[:4], intruder, *sent[4:9], *lost, *sent[11:]], 320),
+    )
+    assert "1 samples came out of order on a line that damages frames" in result.flags
 
 
 def test_a_copy_with_other_counts_is_reported(tmp_path: Path) -> None:
@@ -164,6 +191,17 @@ def test_a_restart_without_real_time_is_never_joined_silently(tmp_path: Path) ->
             sent.append(Block(0, stream, one.counter, one.counts, None, ns, ns))
     result = made(tmp_path, sent)
     np.testing.assert_array_equal(np.flatnonzero(result.quality == LOST), [5120])
+    assert "how long the gap was is unknown" in result.flags
+
+
+def test_more_samples_than_there_was_time_for_are_not_placed_by_host_time(tmp_path: Path) -> None:
+    """10 s of samples arrive at once, 1 s after the stream before ended: nobody knows when they were taken."""
+    sent = blocks(512)
+    late = block(0, 5120, stream=STREAM + 1)
+    ns = ORIGIN_NS + 2_000_000_000
+    sent.append(Block(0, STREAM + 1, 0, late.counts, None, ns, UTC_NS + 2_000_000_000))
+    result = made(tmp_path, sent)
+    np.testing.assert_array_equal(np.flatnonzero(result.quality == LOST), [512])
     assert "how long the gap was is unknown" in result.flags
 
 
