@@ -7,7 +7,7 @@ the counts hold, the second writes them. Memory is bounded by stretches, not by 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -42,6 +42,9 @@ from sloshlab.errors import InputError, JournalError
 from sloshlab.recording import FORMAT
 
 Align = Literal["host", "device", "counter"]
+Watch = Callable[[int, int], None]
+"""Called with samples done and samples to do, while a recording is assembled."""
+
 ALIGNMENTS: Final = ("host", "device", "counter")
 
 
@@ -66,7 +69,13 @@ class AssemblyOptions:
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
 
-def assemble(journal: Journal, output: Path, options: AssemblyOptions | None = None) -> AssemblySummary:
+def assemble(
+    journal: Journal,
+    output: Path,
+    options: AssemblyOptions | None = None,
+    *,
+    watch: Watch = lambda n_done, n_all: None,
+) -> AssemblySummary:
     """Write the recording that a journal holds.
 
     Parameters
@@ -77,6 +86,8 @@ def assemble(journal: Journal, output: Path, options: AssemblyOptions | None = N
         Replaced, atomically, if it is there.
     options : AssemblyOptions, optional
         ``journal.metadata`` if not given: its keys `align`, `redundant` and `attributes`.
+    watch : callable
+        Called with samples done and samples to do; each is read once and written once.
 
     Returns
     -------
@@ -104,7 +115,9 @@ def assemble(journal: Journal, output: Path, options: AssemblyOptions | None = N
         what=f"recording {output}",
         explanation=_longest(losses, placements),
     )
-    parts = _parts(journal, placements, chosen, str(attributes["experiment"]))
+    # every sample is read once to know it, and once to write it
+    advance = _advancing(watch, sum(one.n_samples for one in placements) + base.n_samples)
+    parts = _parts(journal, placements, chosen, str(attributes["experiment"]), advance)
     n_samples = _n_samples(parts, chosen)
     _require_size(parts, n_samples, output)
     attributes = checked_attributes(attributes, parts, str(output), rate_hz)
@@ -113,11 +126,23 @@ def assemble(journal: Journal, output: Path, options: AssemblyOptions | None = N
     variables = variables_of(parts)
     everything = {**attributes, "acquisition": json.dumps(record, allow_nan=False)}
     with written_recording(output, dimensions_of(parts, n_samples), variables, everything) as file:
-        n_lost = write_samples(file, parts, n_samples, rate_hz)
+        n_lost = write_samples(file, parts, n_samples, rate_hz, advance)
     return summarised(
         journal, parts, losses, output=output, n_samples=n_samples, n_lost=n_lost, record=record,
         doubts=[*without_samples, *doubts],
     )  # fmt: skip
+
+
+def _advancing(watch: Watch, n_all: int) -> Callable[[int], None]:
+    """A function that counts the samples that are done."""
+    n_done = 0
+
+    def advance(n_samples: int) -> None:
+        nonlocal n_done
+        n_done += n_samples
+        watch(min(n_done, n_all), n_all)
+
+    return advance
 
 
 def options_of(journal: Journal) -> AssemblyOptions:
@@ -187,7 +212,11 @@ def _start_time_utc(base: SourcePlacement) -> str:
 
 
 def _parts(
-    journal: Journal, placements: Sequence[SourcePlacement], options: AssemblyOptions, experiment: str
+    journal: Journal,
+    placements: Sequence[SourcePlacement],
+    options: AssemblyOptions,
+    experiment: str,
+    advance: Callable[[int], None],
 ) -> list[Part]:
     base = placements[0]
     pairs = [common_motion_pairs(base, other, options.redundant, experiment) for other in placements[1:]]
@@ -195,7 +224,7 @@ def _parts(
     labels = device_labels(placements)
     names = channel_names(placements, labels)
     samples = [PlacedSamples(journal, placement) for placement in placements]
-    surveys = [_survey(one, for_alignment, experiment) for one in samples]
+    surveys = [_survey(one, for_alignment, experiment, advance) for one in samples]
     alignments = [first_source(base)]
     for other, survey, own in zip(placements[1:], surveys[1:], pairs, strict=True):
         alignments.append(_aligned(base, other, (surveys[0], survey), own, options.align))
@@ -207,12 +236,14 @@ def _parts(
     return parts
 
 
-def _survey(samples: PlacedSamples, for_alignment: set[str], experiment: str) -> SourceSurvey:
+def _survey(
+    samples: PlacedSamples, for_alignment: set[str], experiment: str, advance: Callable[[int], None]
+) -> SourceSurvey:
     info = samples.placement.info
     factor = thinned_by(info.sampling_rate_hz)
     rigid = [c.name for c in info.channels if c.quantity == "acceleration" and experiment.startswith("shaker_")]
     n_each = max(1, samples_at_once(len(info.channels)) // factor) * factor
-    return surveyed(samples, n_each, for_alignment | set(rigid))
+    return surveyed(samples, n_each, for_alignment | set(rigid), advance)
 
 
 def _aligned(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -26,8 +26,14 @@ def samples_at_once(n_channels: int, rate_ratio: float = 1.0) -> int:
     return max(1024, n // SAMPLES_PER_CHUNK * SAMPLES_PER_CHUNK or n)
 
 
-def write_samples(file: RecordingFile, parts: Sequence[Part], n_samples: int, rate_hz: float) -> dict[str, int]:
-    """Write all samples.
+def write_samples(
+    file: RecordingFile,
+    parts: Sequence[Part],
+    n_samples: int,
+    rate_hz: float,
+    advance: Callable[[int], None] = lambda n_samples: None,
+) -> dict[str, int]:
+    """Write all samples; `advance` is called with their number after each stretch.
 
     Returns
     -------
@@ -44,6 +50,7 @@ def write_samples(file: RecordingFile, parts: Sequence[Part], n_samples: int, ra
             write = _put_counts if part.alignment.is_on_base else _put_values
             quality |= write(file, part, start, stop, rate_hz, lost)
         file.put("quality", start, quality)
+        advance(stop - start)
     for part in parts:
         if not part.alignment.is_on_base:
             _write_own_counts(file, part)

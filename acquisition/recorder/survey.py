@@ -7,7 +7,7 @@ them with the others of the device; a thinned copy of some channels serves to al
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -128,7 +128,12 @@ def thinned_by(sampling_rate_hz: float) -> int:
     return max(1, int(sampling_rate_hz / THINNED_RATE_HZ))
 
 
-def surveyed(samples: PlacedSamples, n_each: int, thinned_channels: Collection[str] = ()) -> SourceSurvey:
+def surveyed(
+    samples: PlacedSamples,
+    n_each: int,
+    thinned_channels: Collection[str] = (),
+    advance: Callable[[int], None] = lambda n_samples: None,
+) -> SourceSurvey:
     """Read a source once.
 
     Parameters
@@ -138,6 +143,8 @@ def surveyed(samples: PlacedSamples, n_each: int, thinned_channels: Collection[s
         Samples to read at a time; a multiple of `thinned_by` of the rate.
     thinned_channels : collection of str
         Channels to keep a thinned copy of.
+    advance : callable
+        Called with the number of samples after each stretch.
     """
     placement = samples.placement
     info, repeats = placement.info, Repeats()
@@ -155,6 +162,7 @@ def surveyed(samples: PlacedSamples, n_each: int, thinned_channels: Collection[s
             means = _means(stretch.counts[:, k], read[:, k], factor)
             part = thinned[info.channels[k].name][start // factor :][: means.size]
             part[:] = means[: part.size] * info.channels[k].scale_factor + info.channels[k].add_offset
+        advance(stop - start)
     return SourceSurvey(tracker.channels(), repeats, n_late, thinned, factor)
 
 

@@ -486,3 +486,15 @@ def test_the_journal_is_only_read(tmp_path: Path) -> None:
     (tmp_path / "run.journal").chmod(0o444)
     with read_journal(tmp_path / "run.journal") as journal:
         assert assemble(journal, tmp_path / "deep" / "run.nc").n_samples == 320
+
+
+def test_whoever_watches_sees_the_end_come(tmp_path: Path) -> None:
+    n = 5_000_000
+    write(tmp_path / "long.journal", [device()], [(0, block(0, n, counts=np.zeros((n, 2), np.int32)))])
+    seen: list[tuple[int, int]] = []
+    with read_journal(tmp_path / "long.journal") as journal:
+        assemble(journal, tmp_path / "watched.nc", watch=lambda n_done, n_all: seen.append((n_done, n_all)))
+    assert seen == sorted(seen)
+    assert {n_all for _, n_all in seen} == {2 * n}
+    assert seen[-1] == (2 * n, 2 * n)
+    assert len(seen) > 4
