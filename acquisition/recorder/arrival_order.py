@@ -1,4 +1,4 @@
-"""Which blocks of samples came out of order: as few samples as possible, the intruder and not those it makes late."""
+"""Which blocks of samples came out of order: as few samples as possible, an intruder and not its victims."""
 
 from __future__ import annotations
 
