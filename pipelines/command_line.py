@@ -17,7 +17,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from sloshlab import __version__
-from sloshlab.errors import SloshlabError
+from sloshlab.errors import RecordingInterruptedError, SloshlabError
 
 INPUT_IS_BAD, USAGE, DONE_BUT_FLAGGED, INTERRUPTED = 1, 2, 3, 130
 
@@ -326,6 +326,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if code == INTERRUPTED:  # some versions of typer turn Ctrl-C into this code without a word
             raise KeyboardInterrupt
         return code
+    except RecordingInterruptedError as error:
+        print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
+        return INTERRUPTED
     except SloshlabError as error:
         print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
         return INPUT_IS_BAD

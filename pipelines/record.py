@@ -19,7 +19,14 @@ from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus
 from acquisition.sources.interface import Source
 from acquisition.sources.urls import open_source
 from pipelines.run_attributes import checked_run_attributes, require_rate
-from sloshlab.errors import InputError, JournalError, RecordingError, SourceError
+from sloshlab.errors import (
+    InputError,
+    JournalError,
+    RecordingError,
+    RecordingInterruptedError,
+    SloshlabError,
+    SourceError,
+)
 from sloshlab.recording import read_attributes
 from sloshlab.rig import Rig
 
@@ -116,12 +123,11 @@ def record(
         require_rate(metadata["attributes"], sources[0].info.sampling_rate_hz)
         outcome = _recorded(sources, settings, metadata, observer)
     if outcome.storage_error is not None:
-        kept = f"; then: sloshlab recover {settings.journal} -o {settings.output}"
-        raise JournalError(outcome.storage_error + kept)
+        raise JournalError(f"{outcome.storage_error}; then: {_recovery(settings)}")
     if not any(source.n_samples for source in outcome.status.sources):
         settings.journal.unlink(missing_ok=True)
         raise SourceError(_why_nothing(outcome))
-    summary = _assembled(settings)
+    summary = _assembled_or_kept(settings)
     if not settings.keep_journal:
         settings.journal.unlink()
     return _summary(settings, outcome, summary)
@@ -200,6 +206,26 @@ def _why_nothing(outcome: RecordingOutcome) -> str:
         return "; ".join(outcome.failures.values())
     urls = ", ".join(source.url for source in outcome.status.sources)
     return f"source {urls}: got not one sample; remedy: check that the device was started"
+
+
+def _recovery(settings: RecordSettings) -> str:
+    """What to type to get the recording out of its journal."""
+    overwrite = " --overwrite" if settings.output.exists() else ""
+    return f"sloshlab recover {settings.journal} -o {settings.output}{overwrite}"
+
+
+def _assembled_or_kept(settings: RecordSettings) -> AssemblySummary:
+    """Assemble; whatever prevents it, the journal stays, and the error says where it is."""
+    try:
+        return _assembled(settings)
+    except KeyboardInterrupt as error:
+        raise RecordingInterruptedError(
+            f"interrupted before {settings.output} was complete; every sample is in {settings.journal}; "
+            f"remedy: {_recovery(settings)}"
+        ) from error
+    except SloshlabError as error:
+        kept = f"every sample is in {settings.journal}; then: {_recovery(settings)}"
+        raise JournalError(f"{error}; {kept}") from error
 
 
 def _assembled(settings: RecordSettings) -> AssemblySummary:

@@ -12,7 +12,7 @@ from typing import Any, Final
 from numpy.typing import DTypeLike, NDArray
 
 from sloshlab import atomic_file
-from sloshlab.errors import RecordingError
+from sloshlab.errors import RecordingError, SloshlabError
 from sloshlab.recording import MAXIMUM_DECODED_BYTES
 
 SAMPLES_PER_CHUNK: Final = 1 << 17
@@ -94,10 +94,15 @@ def written_recording(
     variables : sequence of Variable
     attributes : mapping
         Global attributes.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be written; what was there before is there still.
     """
     import netCDF4
 
-    with atomic_file.replaced(path) as temporary:
+    with _refusals_named(path), atomic_file.replaced(path) as temporary:
         with netCDF4.Dataset(temporary, mode="w", format="NETCDF4") as dataset:
             dataset.set_auto_maskandscale(False)
             for name, size in dimensions.items():
@@ -108,6 +113,23 @@ def written_recording(
             yield RecordingFile(dataset)
         _force_to_disk(temporary)
     _force_to_disk(path.absolute().parent)
+
+
+@contextlib.contextmanager
+def _refusals_named(path: Path) -> Iterator[None]:
+    """Say in one line that the system, or the netCDF library, refuses to write."""
+    try:
+        yield
+    except SloshlabError:
+        raise
+    except (OSError, RuntimeError) as error:
+        # the library tells of a full disk when it closes the file, as an error of its own without the reason
+        raise RecordingError(
+            f"recording {path}",
+            got=f"a file that cannot be written ({getattr(error, 'strerror', None) or error})",
+            allowed="a disk with enough space that can be written",
+            remedy="free space, or write to another disk",
+        ) from error
 
 
 def _create(dataset: Any, variable: Variable, size: int) -> None:

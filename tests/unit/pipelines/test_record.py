@@ -22,7 +22,14 @@ from acquisition.recorder.status import NobodyWatching, RecorderStatus
 from acquisition.sources.interface import Block, Channel, Delivery, End, Source, SourceInfo
 from pipelines.record import RecordSettings, record
 from pipelines.run_attributes import checked_run_attributes
-from sloshlab.errors import InputError, JournalError, RecordingError, RigError, SourceError
+from sloshlab.errors import (
+    InputError,
+    JournalError,
+    RecordingError,
+    RecordingInterruptedError,
+    RigError,
+    SourceError,
+)
 
 RIG = """
 [tank]
@@ -283,13 +290,22 @@ def test_a_full_disk_leaves_the_journal_and_says_how_to_go_on(place: Path, monke
         assert len(journal.entries[0, 0]) > 3
 
 
-@pytest.mark.parametrize("problem", [KeyboardInterrupt(), JournalError("assembly")])
-def test_the_journal_stays_when_the_recording_cannot_be_written(place: Path, monkeypatch, problem) -> None:
+@pytest.mark.parametrize(
+    ("problem", "error", "message"),
+    [
+        (KeyboardInterrupt(), RecordingInterruptedError, "interrupted before"),
+        (JournalError("assembly"), JournalError, "^assembly; "),
+    ],
+)
+def test_the_journal_stays_when_the_recording_cannot_be_written(
+    place: Path, monkeypatch, problem, error, message
+) -> None:
     def fail(*_: object) -> None:
         raise problem
 
     monkeypatch.setattr(pipelines.record, "assemble", fail)
-    with pytest.raises(type(problem)):
+    recovery = rf"{message}.*every sample is in .*run\.journal; .*sloshlab recover .*run\.journal -o .*run\.nc$"
+    with pytest.raises(error, match=recovery):
         record(settings_for(place), open_source=opening(FakeSource("fake:a", complete())))
     with read_journal(place / "run.journal") as journal:
         assert journal.closed_cleanly
@@ -318,7 +334,8 @@ def test_a_recording_that_cannot_be_read_back_keeps_the_journal(place: Path, mon
         return summary
 
     monkeypatch.setattr(pipelines.record, "assemble", damaging)
-    with pytest.raises(RecordingError, match="cannot be read back"):
+    # the damaged recording is in the way of the recovered one
+    with pytest.raises(JournalError, match=r"cannot be read back.*sloshlab recover .* --overwrite$"):
         record(settings_for(place), open_source=opening(FakeSource("fake:a", complete())))
     assert (place / "run.journal").exists()
 
