@@ -35,7 +35,7 @@ from acquisition.files.formats import read_table
 from acquisition.files.report import ImportReport, ImportResult, MappedChannel
 from acquisition.files.table import Column, FloatArray
 from sloshlab.errors import ChannelMapError, RecordingError
-from sloshlab.recording import CLIPPED, FORMAT, LOST, validate_recording
+from sloshlab.recording import CLIPPED, FORMAT, LOST, quality_attributes, validate_recording
 from sloshlab.rig import Rig
 
 _LARGEST_RECORDING_BYTES = 6 << 30
@@ -265,11 +265,7 @@ def _recording(
 ) -> xr.Dataset:
     variables: dict[str, Any] = {one.name: ("time", one.values, one.attributes) for one in converted}
     if quality.any():
-        meaning = {
-            "flag_masks": np.array([1, 2, 4, 8], dtype=np.uint8),
-            "flag_meanings": "lost clipped crc_repaired out_of_order",
-        }
-        variables["quality"] = ("time", quality, meaning)
+        variables["quality"] = ("time", quality, quality_attributes())
     run = channel_map.run
     start_time = run.start_time_utc or next(
         (t.table.start_time_utc for t in tables if t.table.start_time_utc), None

@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,12 +19,8 @@ from acquisition.recorder.source_alignment import SourceAlignment
 from acquisition.recorder.survey import ChannelSurvey, SourceSurvey
 from acquisition.sources.interface import Channel, attributes_of
 from sloshlab.errors import JournalError
-from sloshlab.recording import validate_recording
+from sloshlab.recording import quality_attributes, validate_recording
 
-QUALITY_ATTRIBUTES: Final[Mapping[str, Any]] = {
-    "flag_masks": np.array([1, 2, 4, 8, 16], dtype=np.uint8),
-    "flag_meanings": "lost clipped crc_repaired out_of_order stuck",
-}
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,127}")
 
 
@@ -140,7 +136,7 @@ def variables_of(parts: Sequence[Part]) -> list[Variable]:
             ]
         else:
             variables += _resampled_variables(part)
-    return [*variables, Variable("quality", "time", np.uint8, QUALITY_ATTRIBUTES)]
+    return [*variables, Variable("quality", "time", np.uint8, quality_attributes())]
 
 
 def dimensions_of(parts: Sequence[Part], n_samples: int) -> dict[str, int]:
@@ -162,7 +158,7 @@ def _resampled_variables(part: Part) -> list[Variable]:
     return [
         *values,
         *counts,
-        Variable(f"quality_{part.label}", dimension, np.uint8, {**QUALITY_ATTRIBUTES, **place}),
+        Variable(f"quality_{part.label}", dimension, np.uint8, {**quality_attributes(), **place}),
     ]
 
 
