@@ -18,6 +18,7 @@ from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
 from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus, StopReason
 from acquisition.sources.interface import Source
 from acquisition.sources.urls import open_source
+from pipelines.progress import amounts
 from pipelines.run_attributes import checked_run_attributes, require_rate
 from sloshlab.errors import (
     InputError,
@@ -229,14 +230,15 @@ def _assembled_or_kept(settings: RecordSettings) -> AssemblySummary:
 
 
 def _assembled(settings: RecordSettings) -> AssemblySummary:
-    with read_journal(settings.journal) as journal:
-        summary = assemble(journal, settings.output)
-    _require_readable(settings.output, summary.n_samples)
+    with read_journal(settings.journal) as journal, amounts("writing the recording") as watch:
+        summary = assemble(journal, settings.output, watch=watch)
+    with amounts("reading it back") as watch:
+        _require_readable(settings.output, summary.n_samples, watch)
     return summary
 
 
-def _require_readable(output: Path, n_samples: int) -> None:
-    """Read a recording back, every byte of it: its chunks carry checksums.
+def _require_readable(output: Path, n_samples: int, watch: Callable[[int, int], None]) -> None:
+    """Read a recording back, every byte of it: compressed chunks carry checksums.
 
     Raises
     ------
@@ -250,9 +252,12 @@ def _require_readable(output: Path, n_samples: int) -> None:
         with netCDF4.Dataset(output, mode="r") as file:
             file.set_auto_maskandscale(False)
             n_found = len(file.dimensions["time"])
-            for variable in file.variables.values():
+            for number, variable in enumerate(file.variables.values(), start=1):
+                # nothing is read twice, so a cache would only hold memory
+                variable.set_var_chunk_cache(1, 1, 1.0)
                 for start in range(0, len(variable) if variable.ndim else 0, _SAMPLES_READ_BACK):
                     variable[start : start + _SAMPLES_READ_BACK]
+                watch(number, len(file.variables))
     except (OSError, RuntimeError, KeyError) as error:
         raise RecordingError(
             f"recording {output}", got=f"a file that cannot be read back ({error})", remedy="recover the journal"

@@ -8,6 +8,7 @@ from typing import Any
 
 from acquisition.recorder.assembly import assemble
 from acquisition.recorder.journal import Journal, read_journal
+from pipelines.progress import amounts
 from sloshlab.errors import InputError
 
 _MOST_DAMAGE_NAMED = 20
@@ -44,7 +45,8 @@ def recover(journal_path: Path, output: Path, overwrite: bool = False) -> dict[s
             remedy="another name, or --overwrite" if not overwrite else "another name than the journal's",
         )
     with read_journal(journal_path) as journal:
-        summary = assemble(journal, output)
+        with amounts("writing the recording") as watch:
+            summary = assemble(journal, output, watch=watch)
         lines = [*_journal_lines(journal), *summary.lines]
         return {"lines": lines, "flags": list(summary.flags), "output": str(output), "report": summary.to_dict()}
 
