@@ -226,12 +226,13 @@ class CanSource(Source):
             self._link.close()
             self._link = None
         self._retried_ns = self._monotonic_ns()
+        given_up = self._receiver.break_off(self._retried_ns)
         if self._away or self._complete:
-            return []
+            return given_up
         if not self._reconnect:
             raise error
         self._away, self._heard = True, False
-        return [Trouble(TroubleKind.DISCONNECTED, error.got, 1, self._retried_ns)]
+        return [*given_up, Trouble(TroubleKind.DISCONNECTED, error.got, 1, self._retried_ns)]
 
     def _try_again(self, timeout_s: float) -> None:
         wait_s = _RETRY_S - (self._monotonic_ns() - self._retried_ns) * 1e-9

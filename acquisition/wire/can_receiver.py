@@ -82,6 +82,7 @@ class CanReceiver:
         self.n_unknown = 0
         self._layout = layout
         self._stream: int | None = 0 if layout.status is None else None
+        self._is_stream_known = layout.status is None
         self._n_restarts = 0
         self._held: list[tuple[FrameBatch, IntArray, IntArray]] = []
         self._ending_since_ns: int | None = None
@@ -123,9 +124,18 @@ class CanReceiver:
         now = int(monotonic[-1]) if n_frames else int(np.max(host_monotonic_ns))
         return deliveries + self._waited(now)
 
+    def break_off(self, host_monotonic_ns: int) -> list[Delivery]:
+        """Learn that the connection broke: only ``device_status`` tells whether the device starts anew meanwhile.
+
+        Frames wait for it from now on; those that waited for it already are given up.
+        """
+        deliveries = self._given_up(host_monotonic_ns)
+        self._is_stream_known = self._layout.status is None
+        return deliveries
+
     def finish(self, host_monotonic_ns: int) -> list[Delivery]:
         """Deliveries of all that waits, because no more frames will come."""
-        deliveries = self._adopted(0) if self._stream is None else []
+        deliveries = [] if self._is_stream_known else self._adopted(self._stream or 0)
         deliveries += self._flushed(host_monotonic_ns)
         if self._ending_since_ns is not None:
             deliveries += self._end()
@@ -134,9 +144,10 @@ class CanReceiver:
     def _samples(self, batch: FrameBatch, monotonic: IntArray, utc: IntArray) -> list[Delivery]:
         if not len(batch):
             return []
-        if self._stream is None:
+        if not self._is_stream_known:
             self._held.append((batch, monotonic, utc))
             return []
+        assert self._stream is not None
         deliveries: list[Delivery] = []
         n_known = 0
         for group in self._groups:
@@ -164,10 +175,13 @@ class CanReceiver:
         deliveries: list[Delivery] = []
         is_first = self._stream is None
         is_new = is_first or self._is_new(values["stream"], values["n_samples"])
-        if is_first:
-            deliveries += self._adopted(values["stream"])
-        elif is_new:
+        if is_new and values["n_samples"] < self._n_held():
+            # what waits was sent before the counter began anew
+            deliveries += self._given_up(now_ns)
+        if is_new and not is_first:
             deliveries += self._restarted(values["stream"], now_ns)
+        if not self._is_stream_known:
+            deliveries += self._adopted(values["stream"] if is_first else self._stream)
         ended = values["state"] == ENDED
         if is_new and not ended:
             for group in self._groups:
@@ -184,13 +198,35 @@ class CanReceiver:
         return tracker.is_behind(n_samples, 2 * tracker.reach + round(late_s))
 
     def _adopted(self, stream: int) -> list[Delivery]:
-        """Begin with the first stream: what came before its number was known belongs to it."""
-        self._stream = stream
+        """Know the stream: what came before its number was known belongs to it."""
+        self._stream, self._is_stream_known = stream, True
         held, self._held = self._held, []
         deliveries: list[Delivery] = []
         for batch, monotonic, utc in held:
             deliveries += self._samples(batch, monotonic, utc)
         return deliveries
+
+    def _n_held(self) -> int:
+        """Samples that wait for a status, at most, of any group."""
+        held = [batch for batch, _, _ in self._held]
+        return (
+            max(
+                group.message.samples_per_frame * (sum(int(_is(batch, group.message).sum()) for batch in held) - 1)
+                + 1
+                for group in self._groups
+            )
+            if held
+            else 0
+        )
+
+    def _given_up(self, now_ns: int) -> list[Delivery]:
+        """Frames of a stream that nobody can name."""
+        held, self._held = self._held, []
+        n_frames = sum(int(_is(batch, group.message).sum()) for batch, _, _ in held for group in self._groups)
+        if not n_frames:
+            return []
+        detail = f"{n_frames} frames between two connections, of a stream that cannot be known"
+        return [Trouble(TroubleKind.UNCERTAIN_COUNTER, detail, n_frames, now_ns)]
 
     def _restarted(self, stream: int, now_ns: int) -> list[Delivery]:
         deliveries = self._flushed(now_ns)
@@ -231,10 +267,10 @@ class CanReceiver:
 
     def _waited(self, now_ns: int) -> list[Delivery]:
         deliveries: list[Delivery] = []
-        if self._stream is None and self._held:
+        if not self._is_stream_known and self._held:
             n_held = sum(len(batch) for batch, _, _ in self._held)
             if n_held > _MOST_HELD or now_ns - int(self._held[0][1][0]) > _LONGEST_WAIT_NS:
-                deliveries += self._adopted(0)
+                deliveries += self._adopted(self._stream or 0)
         is_late = self._ending_since_ns is not None and now_ns - self._ending_since_ns > _END_WAIT_NS
         return deliveries + (self._end() if is_late else [])
 

@@ -186,6 +186,20 @@ def test_a_device_that_starts_anew_has_another_stream(dbc):
     assert before != after
 
 
+def test_a_device_that_started_anew_while_away_is_known_by_its_next_status(dbc):
+    """Its first status was not heard, and its counter runs through the place where the old one stopped."""
+    anew = [*run(60, 160, stream=12)[1:], *run(160, 400, stream=12), *[status(ENDED, 12, 400)] * 3]
+    script = (hanging_up_after(text(run(0, 100))), sending(text(anew)))
+    with ScriptedServer(*script) as server, open_source(url_of(server, dbc)) as source:
+        source.start()
+        deliveries = read_until(source, has_end)
+    first = [block for block in deliveries if isinstance(block, Block) and block.stream == 9]
+    second = [block for block in deliveries if isinstance(block, Block) and block.stream != 9]
+    assert set(delivered(first)) <= set(range(100))
+    assert {counter: counts_of(counter) for counter in range(80, 400)}.items() <= delivered(second).items()
+    assert [kind for kind, _ in troubles(deliveries)].count(TroubleKind.RESTARTED) == 1
+
+
 def test_hanging_up_after_the_end_is_no_trouble(dbc):
     script = hanging_up_after(text(run(0, 200) + ENDING))
     with ScriptedServer(script) as server, open_source(url_of(server, dbc)) as source:

@@ -177,3 +177,85 @@ def test_other_identifiers_are_left_alone() -> None:
     receiver = CanReceiver(described)
     receiver.take(batch_of([status(1, 0), (0x555, bytes(8)), (0x080, bytes(8))]), 0, 0)
     assert receiver.n_unknown == 2
+
+
+def fed(receiver: CanReceiver, frames: Frames, at_ns: int) -> list[Delivery]:
+    return receiver.take(batch_of(frames), at_ns, at_ns)
+
+
+@pytest.mark.parametrize("fd", [False, True])
+def test_after_a_break_samples_wait_until_the_device_says_which_stream_it_is(fd: bool) -> None:
+    described = layout(fd)
+    frames = stream_of(described, 0, 600)[1:-3]
+    per_sample = len(frames) / 600
+    before, after = frames[: round(200 * per_sample)], frames[round(260 * per_sample) :]
+    receiver = CanReceiver(described)
+    found = fed(receiver, [status(1, 0), *before], 0)
+    found += receiver.break_off(1)
+    assert fed(receiver, after[: len(after) // 2], 2) == []
+    found += fed(receiver, [status(1, 430), *after[len(after) // 2 :], *[status(2, 600)] * 3], 3)
+    counts = samples(described, found, 0, 600)
+    known = counts[:, 0] >= 0
+    # frames that span the edges of what was lost are not looked at
+    assert known[:196].all()
+    assert known[264:].all()
+    assert not known[204:256].any()
+    np.testing.assert_array_equal(counts[known], counts_of(600)[known])
+    assert kinds(found) == []
+
+
+@pytest.mark.parametrize("fd", [False, True])
+def test_samples_of_a_device_that_started_anew_unheard_are_not_those_of_the_stream_before(fd: bool) -> None:
+    """The new stream counts through the place where the old one stopped before it can be told apart."""
+    described = layout(fd)
+    old = stream_of(described, 0, 200)[:-3]
+    new = stream_of(described, 0, 600, stream=8, salt=5)[1:-3]
+    heard = new[len(new) // 6 :]
+    receiver = CanReceiver(described)
+    found = fed(receiver, old, 0) + receiver.break_off(1)
+    found += fed(receiver, heard[: len(heard) // 2], 2)
+    found += fed(receiver, [status(1, 350, 8), *heard[len(heard) // 2 :], *[status(2, 600, 8)] * 3], 3)
+    first = samples(described, found, 0, 600)
+    assert (first[200:] == -1).all()
+    assert (first[:180] == counts_of(600)[:180]).all()
+    second = samples(described, found, 0, 600, stream=8 + 256)
+    known = second[:, 0] >= 0
+    assert known[120:].all()  # 100 samples were not heard, and few beside them cannot be proved
+    np.testing.assert_array_equal(second[known], counts_of(600, salt=5)[known])
+    assert kinds(found).count(TroubleKind.RESTARTED) == 1
+
+
+def test_samples_between_two_breaks_that_nobody_can_place_are_given_up() -> None:
+    described = layout()
+    frames = stream_of(described, 0, 300)[:-3]
+    receiver = CanReceiver(described)
+    found = fed(receiver, frames[:201], 0) + receiver.break_off(1) + fed(receiver, frames[301:401], 2)
+    assert [(one.kind, one.count) for one in receiver.break_off(3) if isinstance(one, Trouble)] == [
+        (TroubleKind.UNCERTAIN_COUNTER, 100)
+    ]
+    found += fed(receiver, [*stream_of(described, 0, 100, stream=8, salt=5)], 4)
+    assert (samples(described, found, 0, 300)[100:] == -1).all()
+    np.testing.assert_array_equal(samples(described, found, 0, 100, stream=8 + 256), counts_of(100, salt=5))
+
+
+def test_samples_from_before_an_announced_start_are_not_taken_for_the_new_stream() -> None:
+    described = layout()
+    frames = stream_of(described, 0, 300)[:-3]
+    receiver = CanReceiver(described)
+    found = fed(receiver, frames[:201], 0) + receiver.break_off(1) + fed(receiver, frames[301:401], 2)
+    found += fed(receiver, stream_of(described, 0, 100, stream=8, salt=5), 3)
+    np.testing.assert_array_equal(samples(described, found, 0, 100, stream=8 + 256), counts_of(100, salt=5))
+    assert (samples(described, found, 0, 300)[100:] == -1).all()
+    uncertain = [one.count for one in found if isinstance(one, Trouble) and "stream that cannot" in one.detail]
+    assert uncertain == [100]
+
+
+def test_a_device_that_never_says_its_stream_again_goes_on_after_a_while() -> None:
+    described = layout()
+    frames = stream_of(described, 0, 400)[:-3]
+    receiver = CanReceiver(described)
+    found = fed(receiver, frames[:401], 0) + receiver.break_off(1) + fed(receiver, frames[401:601], 2)
+    assert (samples(described, found, 0, 400)[200:] == -1).all()
+    found += fed(receiver, frames[601:], 3_100_000_000) + receiver.finish(3_100_000_001)
+    counts = samples(described, found, 0, 400)
+    assert (counts[:380] == counts_of(400)[:380]).all()
