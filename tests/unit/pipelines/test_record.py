@@ -300,7 +300,7 @@ def test_a_full_disk_leaves_the_journal_and_says_how_to_go_on(place: Path, monke
 def test_the_journal_stays_when_the_recording_cannot_be_written(
     place: Path, monkeypatch, problem, error, message
 ) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise problem
 
     monkeypatch.setattr(pipelines.record, "assemble", fail)
@@ -325,8 +325,8 @@ def compressed_streams(data: bytes) -> Iterator[tuple[int, int]]:
 def test_a_recording_that_cannot_be_read_back_keeps_the_journal(place: Path, monkeypatch) -> None:
     original = pipelines.record.assemble
 
-    def damaging(journal, output: Path):
-        summary = original(journal, output)
+    def damaging(journal, output: Path, **more):
+        summary = original(journal, output, **more)
         data = bytearray(output.read_bytes())
         length, start = max(compressed_streams(bytes(data)))
         data[start + length // 2] ^= 0xFF
