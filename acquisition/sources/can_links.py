@@ -18,8 +18,14 @@ from acquisition.sources.serial_line import Line, LineLostError
 from acquisition.wire.can_batch import FrameBatch
 from sloshlab.errors import SourceError
 
-GATHERING_S: Final = 0.02
+GATHERING_S: Final = 0.05
 """After the first frame so much time is given to more: taking frames apart one by one costs a core."""
+
+BUS_GATHERING_S: Final = 0.02
+"""The same for python-can: an operating system holds a few hundred frames of a bus, and lines hold thousands."""
+
+ENOUGH_BYTES: Final = 32_768
+"""So much text is worth taking apart at once."""
 
 MOST_FRAMES_AT_ONCE: Final = 4096
 _SEND_TIMEOUT_S: Final = 1.0
@@ -104,7 +110,7 @@ class TextLink(CanLink):
     def receive(self, timeout_s: float) -> Received:
         """What the text of the line holds."""
         text = self._line.read(timeout_s)
-        if text:
+        if text and len(text) < ENOUGH_BYTES:
             self._sleep(GATHERING_S)
             with contextlib.suppress(LineLostError):  # the next call meets it again
                 text += self._line.read(0.0)
@@ -148,7 +154,7 @@ class PythonCanLink(CanLink):
         self._n_garbage = 0
         messages = [first] if (first := self._received(timeout_s)) is not None else []
         if messages:
-            self._sleep(GATHERING_S)
+            self._sleep(BUS_GATHERING_S)
         while messages and len(messages) < MOST_FRAMES_AT_ONCE:
             message = self._received(0.0)
             if message is None:

@@ -20,6 +20,8 @@ _OPEN: Final = b"O\r"
 _CLOSE: Final = b"C\r"
 _BUS_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,31}")
 _LONGEST_ANSWER_BYTES: Final = 1024
+_MADE_UP: Final = b"< frame 101 0.000000 00 >"
+"""Taken apart once before frames can come: what is compiled or loaded then takes seconds on a busy computer."""
 
 
 def open_socketcand(
@@ -50,6 +52,7 @@ def open_socketcand(
     name = f"can:socketcand?host={host}&port={port}&channel={bus}"
     if not _BUS_NAME.fullmatch(bus):
         raise SourceError(f"{name}: channel", got=repr(bus)[:80], allowed="the name of a bus, for example can0")
+    _parse_socketcand(_MADE_UP)
     line = open_line(f"socket://[{host}]:{port}" if ":" in host else f"socket://{host}:{port}", 0)
     deadline_ns = monotonic_ns() + int(timeout_s * 1e9)
     try:

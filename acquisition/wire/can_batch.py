@@ -43,6 +43,17 @@ class FrameBatch:
         """Some of the frames."""
         return FrameBatch(*(getattr(self, name)[wanted] for name in self.__dataclass_fields__))
 
+    def followed_by(self, other: FrameBatch) -> FrameBatch:
+        """These frames and then others."""
+        if not len(self) or not len(other):
+            return self if len(self) else other
+        width = max(self.data.shape[1], other.data.shape[1])
+        data = np.zeros((len(self) + len(other), width), np.uint8)
+        data[: len(self), : self.data.shape[1]] = self.data
+        data[len(self) :, : other.data.shape[1]] = other.data
+        names = [name for name in self.__dataclass_fields__ if name != "data"]
+        return FrameBatch(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names), data)
+
     @classmethod
     def empty(cls) -> Self:
         """No frames."""

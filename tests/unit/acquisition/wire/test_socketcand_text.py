@@ -25,6 +25,15 @@ FRAMES = st.lists(
     max_size=20,
 )
 
+UNUSUAL = {
+    b"< frame 1ab 1.5 0a 0B ff >": (False, 0x1AB, bytes([0x0A, 0x0B, 0xFF])),
+    b"<frame 101 1.5 >": (False, 0x101, b""),
+    b"<  frame  00000101  1.5  01 >": (True, 0x101, b"\x01"),
+    b"< frame FFFFFFFF 1.5 0102 > ": (True, 0x1FFFFFFF, b"\x01\x02"),
+    b"< error 04 1.5 >": None,
+    b"?": None,
+}
+
 
 def text_of(extended, number, content, microseconds):
     identifier = f"{number:08X}" if extended else f"{number & 0x7FF:03X}"
@@ -35,6 +44,20 @@ def text_of(extended, number, content, microseconds):
 def frames_of(batch):
     contents = [row[:length].tobytes() for row, length in zip(batch.data, batch.length, strict=True)]
     return list(zip(batch.extended.tolist(), batch.arbitration_id.tolist(), contents, strict=True))
+
+
+parse_socketcand(b"< frame 101 0.000000 00 >")  # compiled now, not within the time that a case has
+
+
+@given(FRAMES, st.lists(st.sampled_from(list(UNUSUAL)), max_size=5), st.randoms())
+def test_unusual_messages_among_usual_ones(frames, unusual, random):
+    usual = [(text_of(*one), (one[0], one[1] if one[0] else one[1] & 0x7FF, one[2])) for one in frames]
+    messages = usual + [(text, UNUSUAL[text]) for text in unusual]
+    random.shuffle(messages)
+    parsed = parse_socketcand(b"".join(text for text, _ in messages))
+    assert frames_of(parsed.batch) == [frame for _, frame in messages if frame is not None]
+    assert parsed.n_error_frames == unusual.count(b"< error 04 1.5 >")
+    assert parsed.n_garbage_bytes == unusual.count(b"?")
 
 
 @given(FRAMES)
