@@ -100,9 +100,9 @@ class DeviceLog:
         if not pending:
             return
         stamps_ns = np.array([round(message.timestamp * 1e9) for message in pending], np.int64)
-        try:
-            self._keep(self._receiver.take(FrameBatch.from_messages(pending), stamps_ns, stamps_ns))
-        except SourceError as error:
+        self._keep(self._receiver.take(FrameBatch.from_messages(pending), stamps_ns, stamps_ns))
+        error = self._receiver.failure
+        if error is not None:
             what = f"source {self._path}: {error.what}"
             raise FileFormatError(what, got=error.got, allowed=error.allowed, remedy=error.remedy) from error
 

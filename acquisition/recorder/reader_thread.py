@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
 
 from acquisition.recorder.delivery_queue import DeliveryQueue
 from acquisition.recorder.journal_format import is_in_file_range
-from acquisition.sources.interface import Block, Source
+from acquisition.sources.interface import Block, Delivery, Source
 from sloshlab.errors import SloshlabError, SourceError
 
 READ_TIMEOUT_S: Final = 0.1
@@ -83,15 +83,19 @@ class ReaderThread:
         while not self._is_stopping:
             if not self._read_once(READ_TIMEOUT_S):
                 return
-        self._read_once(0.0)
+        if self._read_once(0.0):
+            self._put(self._source.finish())
+
+    def _put(self, deliveries: Sequence[Delivery]) -> bool:
+        for delivery in deliveries:
+            if isinstance(delivery, Block):
+                self._check(delivery)
+        return self._queue.put(self.number, deliveries) if deliveries else True
 
     def _read_once(self, timeout_s: float) -> bool:
         deliveries = self._source.read(timeout_s)
         if deliveries:
-            for delivery in deliveries:
-                if isinstance(delivery, Block):
-                    self._check(delivery)
-            return self._queue.put(self.number, deliveries)
+            return self._put(deliveries)
         if timeout_s:
             # a source that has nothing more may return at once
             self._sleep(_PAUSE_S)

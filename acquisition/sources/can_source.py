@@ -33,6 +33,9 @@ _RETRY_S: Final = 0.2
 _RETRY_TIMEOUT_S: Final = 0.5
 """A server that does not answer must not keep `CanSource.read` for long."""
 
+_LAST_WORDS_NS: Final = 1_000_000_000
+"""So long a device may take to say its end after it was asked to stop."""
+
 _ASK_AGAIN_NS: Final = 500_000_000
 _SOCKETCAND_PORT: Final = 29536
 _MULTICAST_PORT: Final = 43113
@@ -140,9 +143,10 @@ class CanSource(Source):
             If the counter of the device makes no sense, or the bus was lost and ``reconnect=no``.
         """
         self._required_layout()
+        self._raise_failure()
         deadline_ns = self._monotonic_ns() + int(timeout_s * 1e9)
         deliveries, self._waiting = self._waiting, []
-        while not deliveries:
+        while not deliveries and self._receiver.failure is None:
             remaining_s = max(0.0, (deadline_ns - self._monotonic_ns()) * 1e-9)
             try:
                 received = self._received(min(remaining_s, _STEP_S))
@@ -152,6 +156,39 @@ class CanSource(Source):
                 deliveries = deliveries + self._lost(error)
             if not remaining_s:
                 break
+        if not deliveries:
+            self._raise_failure()
+        return deliveries
+
+    def finish(self) -> Sequence[Delivery]:
+        """Ask the device to stop, wait a moment for the end that it announces, and decide all that waits.
+
+        Raises
+        ------
+        SourceError
+            If the counter of the device makes no sense.
+        """
+        layout = self._required_layout()
+        deliveries, self._waiting = self._waiting, []
+        self._raise_failure()
+        try:
+            if self._started and self._heard and not self._complete and self._link is not None:
+                _command(self._link, layout, STOP)
+                deliveries += self._until_end() if layout.command is not None and layout.status is not None else []
+        except LineLostError:
+            pass  # what has come is decided below
+        return [*deliveries, *self._receiver.finish(self._monotonic_ns())]
+
+    def _until_end(self) -> list[Delivery]:
+        assert self._link is not None
+        deliveries: list[Delivery] = []
+        deadline_ns = self._monotonic_ns() + _LAST_WORDS_NS
+        while not self._complete and self._monotonic_ns() < deadline_ns and self._receiver.failure is None:
+            try:
+                received = self._link.receive(_STEP_S)
+            except LineLostError:
+                break
+            deliveries += self._delivered(received)
         return deliveries
 
     def close(self) -> None:
@@ -171,6 +208,13 @@ class CanSource(Source):
         if self._layout is None:
             raise SourceError(f"source {self.url}", got="a source that is not open", remedy="open it first")
         return self._layout
+
+    def _raise_failure(self) -> None:
+        """Raise what the last `read` met; what had come before it was delivered first."""
+        error = self._receiver.failure
+        if error is not None:
+            what = f"source {self.url}: {error.what}"
+            raise SourceError(what, got=error.got, allowed=error.allowed, remedy=error.remedy)
 
     def _received(self, timeout_s: float) -> Received:
         if self._link is None:

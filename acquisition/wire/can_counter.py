@@ -36,6 +36,9 @@ _PATIENCE_S: Final = 3.0
 _FEWEST_PATIENCE: Final = 1024
 _MOST_CONTRADICTIONS: Final = 2
 _PIECE: Final = 32
+_CLOCK_DOUBT: Final = 1.02
+"""A device may count so much faster than it should by the host's clock."""
+
 _NONE: Final = -1
 _NOTHING: Final = np.zeros(0, np.int64)
 
@@ -64,6 +67,14 @@ class Decided:
         accepted: NDArray[np.bool_] = self.counters >= 0
         return accepted
 
+    def followed_by(self, other: Decided) -> Decided:
+        """What was decided first and what next, as one."""
+        return Decided(
+            np.concatenate([self.counters, other.counters]),
+            self.n_uncertain + other.n_uncertain,
+            self.n_repeated + other.n_repeated,
+        )
+
 
 class CounterTracker:
     """Unwraps the sample counter of one message.
@@ -83,6 +94,8 @@ class CounterTracker:
         Longer gaps are refused. A gap of 2^bits samples of the whole counter cannot be seen at all.
     highest : int or None
         Largest counter proved so far.
+    failure : SourceError or None
+        For seconds no counter fitted what came before: a jump beyond the longest gap, or back.
     """
 
     def __init__(
@@ -99,6 +112,7 @@ class CounterTracker:
         self._horizon = self._wrap - 2 * coarsest - 4 * self.reach
         self.longest_gap_samples = min(round(longest_gap_s * sampling_rate_hz), self._horizon // 2)
         self._chunk = max(16, min(_MOST_WAITING, self._horizon // (8 * per_frame)))
+        self.failure: SourceError | None = None
         self._patience = max(_FEWEST_PATIENCE, round(_PATIENCE_S * sampling_rate_hz / per_frame))
         self.restart()
 
@@ -184,14 +198,35 @@ class CounterTracker:
         Decided
             The first `len(counters)` of all frames that waited and came, in order of arrival.
 
-        Raises
-        ------
-        SourceError
-            If for seconds no counter fits what came before: a jump beyond the longest gap, or back.
+        Notes
+        -----
+        After much that fits nothing `failure` says why; nothing is accepted from then on.
         """
         return self._in_pieces(value, known, self._chunk)
 
+    def refuse_after_silence(self, silence_s: float, sampling_rate_hz: float) -> None:
+        """Fail if the whole counter may have come round unseen in a silence of the device.
+
+        Parameters
+        ----------
+        silence_s : float
+            By a clock of the host; only short ones prove that nothing of the kind happened.
+        sampling_rate_hz : float
+        """
+        n_samples = _CLOCK_DOUBT * silence_s * sampling_rate_hz
+        if self.highest is None or n_samples < self._horizon:
+            return
+        self.failure = SourceError(
+            f"{self._name}: sample counter",
+            got=f"{silence_s:.3g} s of silence",
+            allowed=f"< {self._horizon / _CLOCK_DOUBT / sampling_rate_hz:.3g} s, as the counter may come round "
+            f"unseen after {self._wrap} samples",
+            remedy="record again; a device with more bits of counter can be silent longer",
+        )
+
     def _take(self, value: IntArray, known: IntArray) -> Decided:
+        if self.failure is not None:
+            return self._refused(len(value))
         waiting = self._value, self._known
         self._value = np.concatenate([self._value, value])
         self._known = np.concatenate([self._known, known])
@@ -268,12 +303,18 @@ class CounterTracker:
         self._n_impossible += n_frames
         if self._n_impossible > self._patience:
             limit = self.longest_gap_samples
-            raise SourceError(
+            self.failure = SourceError(
                 f"{self._name}: sample counter",
                 got=f"{self._n_impossible} frames that do not follow counter {self.highest}",
                 allowed=f"a gap of ≤ {limit} samples; a step back only with a new stream in device_status",
-                remedy="the device has started anew without saying so, or two devices send the same message",
+                remedy="record again; after a longer silence with a larger longest_gap_s; a device that starts "
+                "anew must send device_status, and no two devices the same identifier",
             )
+        return Decided(np.full(n_frames, _NONE), n_frames, 0)
+
+    def _refused(self, n_new: int) -> Decided:
+        n_frames = self.n_waiting + n_new
+        self._drop(self.n_waiting)
         return Decided(np.full(n_frames, _NONE), n_frames, 0)
 
     def _drop(self, n_decided: int) -> None:

@@ -20,6 +20,7 @@ from acquisition.wire.can_bits import IntArray
 from acquisition.wire.can_counter import LONGEST_GAP_S, CounterTracker, Decided
 from acquisition.wire.can_frames import ENDED, LOST_DATA, decode, read_control_frame
 from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage
+from sloshlab.errors import SourceError
 
 _LONGEST_WAIT_NS: Final = 3_000_000_000
 _MOST_HELD: Final = 65_536
@@ -27,6 +28,7 @@ _END_WAIT_NS: Final = 300_000_000
 _CLOCK_WRAP_BITS: Final = 62
 _STREAMS: Final = 256
 _STATUS_LATE_S: Final = 1.0
+_SHORTEST_SILENCE_NS: Final = 100_000_000
 
 HostTime = int | IntArray
 """One time for all frames of a batch, or one per frame, shape (n_frames,)."""
@@ -77,6 +79,11 @@ class CanReceiver:
         Frames of other identifiers.
     """
 
+    @property
+    def failure(self) -> SourceError | None:
+        """Why nothing more can be proved, None as long as all is well; to be raised after the deliveries."""
+        return next((group.tracker.failure for group in self._groups if group.tracker.failure is not None), None)
+
     def __init__(self, layout: CanLayout, longest_gap_s: float = LONGEST_GAP_S) -> None:
         self.n_repeated = 0
         self.n_unknown = 0
@@ -104,10 +111,9 @@ class CanReceiver:
         host_monotonic_ns, host_utc_ns : int or ndarray of int64, shape (n_frames,)
             When the frames came.
 
-        Raises
-        ------
-        SourceError
-            If the sample counter makes no sense for seconds.
+        Notes
+        -----
+        When the sample counter makes no sense for seconds, `failure` says so; what was proved is delivered.
         """
         n_frames = len(batch)
         monotonic = np.broadcast_to(np.asarray(host_monotonic_ns, np.int64), (n_frames,))
@@ -290,6 +296,8 @@ class _GroupReceiver:
         self.message = message
         self.tracker = CounterTracker(message, layout.sampling_rate_hz, longest_gap_s)
         self.n_repeated = 0
+        self._sampling_rate_hz = layout.sampling_rate_hz
+        self._last_ns: int | None = None
         self._group = group
         self._clock = clock
         self._waiting: _Frames | None = None
@@ -329,8 +337,19 @@ class _GroupReceiver:
             utc[right][good],
         )
         self._waiting = new if self._waiting is None else self._waiting.followed_by(new)
-        decided = self.tracker.take(frames.counter[good], frames.counter_known[good])
+        decided = self._placed(frames.counter[good], frames.counter_known[good], new.host_monotonic_ns)
         return deliveries + self._decided(decided, stream, now_ns, everything=self.tracker.end is not None)
+
+    def _placed(self, counter: IntArray, known: IntArray, monotonic: IntArray) -> Decided:
+        """Let the tracker decide, not beyond a silence after which nothing can be proved."""
+        before, self._last_ns = self._last_ns, int(monotonic[-1]) if len(monotonic) else self._last_ns
+        silences_ns = np.diff(monotonic, prepend=monotonic[:1] if before is None else before)
+        if not len(monotonic) or int(silences_ns.max()) < _SHORTEST_SILENCE_NS:
+            return self.tracker.take(counter, known)
+        at = int(silences_ns.argmax())
+        first = self.tracker.take(counter[:at], known[:at])
+        self.tracker.refuse_after_silence(int(silences_ns[at]) * 1e-9, self._sampling_rate_hz)
+        return first.followed_by(self.tracker.take(counter[at:], known[at:]))
 
     def ends_at(self, n_samples: int | None, stream: int, now_ns: int) -> list[Delivery]:
         """Learn where the stream ends; None takes it back."""

@@ -580,3 +580,19 @@ def test_what_had_arrived_when_the_stop_came_is_read() -> None:
     first, last, finished = queue.take(0.0)
     assert [item.deliveries[0].counter for item in (first, last)] == [0, 10]
     assert finished == Finished(0, None)
+
+
+def test_what_a_source_still_holds_is_asked_for_once_before_it_is_closed() -> None:
+    class Holding(FakeSource):
+        def finish(self) -> list[Block]:
+            assert not self.closed.is_set()
+            return [block(20)]
+
+    queue = DeliveryQueue(1)
+    source = Holding([[block(0)], lambda: reader.stop() or [block(10)]])
+    reader = ReaderThread(0, source, queue, threading.Barrier(1), lambda number, error: None)
+    reader.start()
+    assert reader.join(PATIENCE_S)
+    *delivered, finished = queue.take(0.0)
+    assert [one.counter for item in delivered for one in item.deliveries] == [0, 10, 20]
+    assert finished == Finished(0, None)

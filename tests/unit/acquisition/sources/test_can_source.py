@@ -53,6 +53,12 @@ def read_until(source, is_enough):
     return found
 
 
+def read_for_ever(source, deliveries):
+    """Add to the deliveries until the source fails."""
+    while True:
+        deliveries += source.read(0.1)
+
+
 def has_end(deliveries):
     return any(isinstance(delivery, End) for delivery in deliveries)
 
@@ -479,3 +485,50 @@ def test_silence_is_quiet_and_frames_of_nobody_are_nothing(dbc, tmp_path):
         other.send(can.Message(arbitration_id=0x101, data=samples(0, (1, 2))[1], is_extended_id=True))
         assert list(source.read(0.2)) == []
         assert list(source.read(0.0)) == []
+
+
+def test_a_device_that_is_asked_to_stop_loses_no_sample(dbc):
+    def stopping_when_told(server, connection):
+        server.handshake(connection)
+        connection.sendall(text(run(0, 150)))
+        while not server.heard[-1].endswith(b" 2 0 0 0 0 0 >"):
+            server.hear(connection)
+        connection.sendall(text(run(150, 200)[1:] + ENDING))
+        server.hear_to_the_end(connection)
+
+    with ScriptedServer(stopping_when_told) as server, open_source(url_of(server, dbc)) as source:
+        source.start()
+        deliveries = read_until(source, lambda found: len(delivered(found)) >= 100)
+        deliveries += source.finish()
+    assert delivered(deliveries) == complete(200)
+    assert deliveries[-1] == End(9, 200)
+    assert troubles(deliveries) == []
+
+
+def test_frames_that_nothing_proves_at_the_end_are_counted(dbc):
+    with ScriptedServer(sending(text(run(0, 200)))) as server, open_source(url_of(server, dbc)) as source:
+        source.start()
+        deliveries = read_until(source, lambda found: len(delivered(found)) >= 150)
+        n_read = len(delivered(deliveries))
+        deliveries += source.finish()
+    found = delivered(deliveries)
+    assert found == complete(len(found))
+    ((kind, n_uncertain),) = troubles(deliveries)
+    assert kind is TroubleKind.UNCERTAIN_COUNTER
+    assert len(found) + n_uncertain == 200
+    assert n_read < len(found)
+
+
+def test_what_came_before_a_senseless_counter_is_delivered_before_the_error(dbc):
+    frames = run(0, 300) + run(500_000, 504_000)[1:]
+    url = "&longest_gap_s=100"
+    with ScriptedServer(sending(text(frames))) as server, open_source(url_of(server, dbc, url)) as source:
+        source.start()
+        deliveries = []
+        with pytest.raises(SourceError) as caught:
+            read_for_ever(source, deliveries)
+    found = delivered(deliveries)
+    assert found == complete(len(found))
+    assert len(found) >= 270
+    assert str(caught.value).startswith(f"source can:socketcand?port={server.port}")
+    assert "longest_gap_s" in str(caught.value)

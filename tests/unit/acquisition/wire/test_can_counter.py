@@ -11,7 +11,6 @@ from acquisition.sources.interface import Channel
 from acquisition.wire.can_bits import BitField
 from acquisition.wire.can_counter import CounterTracker
 from acquisition.wire.can_layout import SampleMessage, Selected, device_database
-from sloshlab.errors import SourceError
 
 RATE_HZ = 1000.0
 MESSAGE = device_database("daq", RATE_HZ, None, [Channel("force_cell_1", "force", "N")]).messages[0]
@@ -158,16 +157,21 @@ class TestRestarts:
             assert not tracker.take(value[k : k + 40], known[k : k + 40]).accepted.any()
         assert tracker.highest == highest
         value, known = on_the_wire(np.arange(2000, 6000))  # past the place where the device was before
-        with pytest.raises(SourceError, match=f"frames that do not follow counter {highest}"):
-            tracker.take(value, known)
+        assert not tracker.take(value, known).accepted.any()
+        assert f"frames that do not follow counter {highest}" in str(tracker.failure)
 
     def test_jump_beyond_the_longest_gap_is_an_error(self) -> None:
         tracker = CounterTracker(MESSAGE, RATE_HZ, longest_gap_s=10.0)
         counters = np.concatenate([np.arange(800), np.arange(20_000, 26_000)])
         value, known = on_the_wire(counters)
         tracker.begins_at(0)
-        with pytest.raises(SourceError, match="allowed: a gap of ≤ 10000 samples"):
-            tracker.take(value, known)
+        found = tracker.take(value, known).counters
+        assert len(found) == len(counters)
+        # what was proved before the error is not lost with it
+        np.testing.assert_array_equal(found[:750], np.arange(750))
+        assert (found[800:] == -1).all()
+        assert "allowed: a gap of ≤ 10000 samples" in str(tracker.failure)
+        assert "larger longest_gap_s" in str(tracker.failure)
         assert tracker.highest is not None
         assert tracker.highest < 800
 
@@ -194,6 +198,16 @@ class TestOtherCounters:
         known = np.full(len(counters), 2**n_bits - 1)
         found = tracker.take(counters & known, known)
         np.testing.assert_array_equal(found.counters, counters)
+
+    def test_a_silence_in_which_the_counter_may_have_come_round_proves_nothing(self) -> None:
+        known = np.full(100, 2**16 - 1)
+        for silence_s, is_refused in ((60.0, False), (66.0, True), (6600.0, True)):
+            tracker = CounterTracker(self.whole(16), RATE_HZ)  # comes round every 65.536 s
+            tracker.take(np.arange(100), known)
+            tracker.refuse_after_silence(silence_s, RATE_HZ)
+            assert (tracker.failure is not None) == is_refused
+            assert tracker.take(np.arange(200, 300), known).accepted.any() != is_refused
+        assert "got 6.6e+03 s of silence" in str(tracker.failure)
 
     def test_many_samples_per_frame_may_come_late(self) -> None:
         tracker = CounterTracker(self.whole(32, per_frame=13), RATE_HZ)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import binascii
+import dataclasses
+import struct
+
 import numpy as np
 import pytest
 
 from acquisition.sources.interface import Block, Channel, Delivery, End, Trouble, TroubleKind
 from acquisition.wire.can_batch import FrameBatch
+from acquisition.wire.can_bits import BitField
 from acquisition.wire.can_frames import control_frame, encode_samples
-from acquisition.wire.can_layout import STATUS, STATUS_ID, CanLayout, device_database
+from acquisition.wire.can_layout import STATUS, STATUS_ID, CanLayout, Selected, device_database
 from acquisition.wire.can_receiver import CanReceiver
 
 CHANNELS = [Channel("force_cell_1", "force", "N"), Channel("force_cell_2", "force", "N", 24)]
@@ -259,3 +264,59 @@ def test_a_device_that_never_says_its_stream_again_goes_on_after_a_while() -> No
     found += fed(receiver, frames[601:], 3_100_000_000) + receiver.finish(3_100_000_001)
     counts = samples(described, found, 0, 400)
     assert (counts[:380] == counts_of(400)[:380]).all()
+
+
+def short_counter() -> CanLayout:
+    """A device whose whole counter has 16 bits and comes round every 65.536 s."""
+    described = device_database("daq", 1000.0, None, CHANNELS[:1])
+    counter = (Selected(BitField("sample_counter_0", 16, 16)),)
+    message = dataclasses.replace(described.messages[0], counter=counter, multiplexor=None, flags=None)
+    return dataclasses.replace(described, messages=(message,), status=None, command=None)
+
+
+def short_frames(first: int, n: int) -> FrameBatch:
+    frames: Frames = []
+    for counter in range(first, first + n):
+        content = (counter % 2**16).to_bytes(2, "little") + (counter % 1000).to_bytes(2, "little") + bytes(2)
+        crc = binascii.crc_hqx(struct.pack("<I", 0x101) + content, 0xFFFF)
+        frames.append((0x101, crc.to_bytes(2, "little") + content))
+    return batch_of(frames)
+
+
+@pytest.mark.parametrize("in_one_batch", [False, True])
+@pytest.mark.parametrize(("silence_s", "is_refused"), [(30.0, False), (70.0, True)])
+def test_a_silence_in_which_a_short_counter_comes_round_is_refused(
+    silence_s: float, is_refused: bool, in_one_batch: bool
+) -> None:
+    receiver = CanReceiver(short_counter())
+    before, after = short_frames(0, 200), short_frames(200 + round(1000 * silence_s), 200)
+    stamps = np.repeat([5, 5 + round(silence_s * 1e9)], 200)
+    if in_one_batch:
+        found = receiver.take(before.followed_by(after), stamps, stamps)
+    else:
+        found = receiver.take(before, 5, 5)
+        found += receiver.take(after, stamps[-1:].repeat(200), stamps[-1:].repeat(200))
+    found += receiver.finish(stamps[-1])
+    counters = np.concatenate(
+        [np.arange(b.counter, b.counter + len(b.counts)) for b in found if isinstance(b, Block)]
+    )
+    np.testing.assert_array_equal(counters[:200], np.arange(200))
+    assert (receiver.failure is not None) == is_refused
+    if is_refused:
+        assert len(counters) == 200
+        assert "70 s of silence" in str(receiver.failure)
+        assert kinds(found) == [TroubleKind.UNCERTAIN_COUNTER]
+    else:
+        np.testing.assert_array_equal(counters[200:], np.arange(30_200, 30_400))
+
+
+@pytest.mark.parametrize("n_before", [1, 8, 30, 63])
+def test_a_restart_within_the_first_frames_is_seen_by_its_status(n_before: int) -> None:
+    described = layout()
+    frames = stream_of(described, 0, n_before)[:-3] + stream_of(described, 0, 300, stream=8, salt=5)
+    found = received(described, frames)
+    np.testing.assert_array_equal(samples(described, found, 0, 300, stream=8 + 256), counts_of(300, salt=5))
+    first = samples(described, found, 0, n_before)
+    is_there = first >= 0
+    np.testing.assert_array_equal(first[is_there], counts_of(n_before)[is_there])
+    assert kinds(found).count(TroubleKind.RESTARTED) == 1
