@@ -51,8 +51,14 @@ class FrameBatch:
         data = np.zeros((len(self) + len(other), width), np.uint8)
         data[: len(self), : self.data.shape[1]] = self.data
         data[len(self) :, : other.data.shape[1]] = other.data
-        names = [name for name in self.__dataclass_fields__ if name != "data"]
-        return FrameBatch(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names), data)
+        return FrameBatch(
+            np.concatenate([self.arbitration_id, other.arbitration_id]),
+            np.concatenate([self.extended, other.extended]),
+            np.concatenate([self.remote, other.remote]),
+            np.concatenate([self.fd, other.fd]),
+            np.concatenate([self.length, other.length]),
+            data,
+        )
 
     @classmethod
     def empty(cls) -> Self:

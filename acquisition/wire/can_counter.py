@@ -327,7 +327,12 @@ class CounterTracker:
         proved = np.flatnonzero(counters >= 0)
         if not len(proved):
             return Decided(counters, n_uncertain, 0)
-        _, first = np.unique(counters[proved], return_index=True)
+        found = counters[proved]
+        if (self.highest is None or found[0] > self.highest) and (found[1:] > found[:-1]).all():
+            # nothing late and nothing twice, as nearly always
+            self._remember(found)
+            return Decided(counters, n_uncertain, 0)
+        _, first = np.unique(found, return_index=True)
         is_new = np.zeros(len(proved), np.bool_)
         is_new[first] = True
         is_new &= ~np.isin(counters[proved], self._recent)

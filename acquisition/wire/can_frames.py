@@ -94,12 +94,23 @@ def checksums(arbitration_id: int, data: FrameBytes, crc: BitField) -> NDArray[n
     62098
     """
     left_out = {piece.byte for piece in crc.pieces()}
+    used = np.array([byte for byte in range(data.shape[1]) if byte not in left_out], np.int64)
     start = binascii.crc_hqx(arbitration_id.to_bytes(4, "little"), _CRC_START)
-    value = np.full(len(data), start, np.uint16)
-    for byte in range(data.shape[1]):
-        if byte not in left_out:
-            value = (value << 8) ^ _CRC_TABLE[(value >> 8) ^ data[:, byte]]
-    return value
+    values = np.empty(len(data), np.uint16)
+    _sum_up(np.ascontiguousarray(data), used, start, _CRC_TABLE, values)
+    return values
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _sum_up(
+    data: FrameBytes, used: IntArray, start: int, table: NDArray[np.uint16], values: NDArray[np.uint16]
+) -> None:
+    """Checksum of the used bytes of every frame."""
+    for frame in range(data.shape[0]):
+        value = np.int64(start)
+        for k in range(used.size):
+            value = ((value << 8) & 0xFFFF) ^ np.int64(table[(value >> 8) ^ data[frame, used[k]]])
+        values[frame] = value
 
 
 def decode(message: SampleMessage, data: FrameBytes) -> DecodedFrames:

@@ -104,6 +104,10 @@ class SampleMessage:
     extended: bool = False
     fd: bool = False
 
+    def __hash__(self) -> int:
+        # all that belongs to a message is looked up by it for every batch: hundreds of fields take too long
+        return hash((self.name, self.arbitration_id, self.extended, self.length))
+
     @property
     def samples_per_frame(self) -> int:
         """Samples of each channel in a full frame."""

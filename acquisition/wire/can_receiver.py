@@ -36,25 +36,56 @@ HostTime = int | IntArray
 
 @dataclass(frozen=True, eq=False)
 class _Frames:
-    """Frames of one message with all that makes blocks of them."""
+    """Frames of one message with all that makes blocks of them.
 
-    counter: IntArray
+    `numbers` has one row each for counter, n_samples, clock, clock_known, host_monotonic_ns, host_utc_ns.
+    """
+
+    numbers: IntArray
     counts: CountArray
-    n_samples: IntArray
-    clock: IntArray
-    clock_known: IntArray
-    host_monotonic_ns: IntArray
-    host_utc_ns: IntArray
+
+    @property
+    def counter(self) -> IntArray:
+        row: IntArray = self.numbers[0]
+        return row
+
+    @property
+    def n_samples(self) -> IntArray:
+        row: IntArray = self.numbers[1]
+        return row
+
+    @property
+    def clock(self) -> IntArray:
+        row: IntArray = self.numbers[2]
+        return row
+
+    @property
+    def clock_known(self) -> IntArray:
+        row: IntArray = self.numbers[3]
+        return row
+
+    @property
+    def host_monotonic_ns(self) -> IntArray:
+        row: IntArray = self.numbers[4]
+        return row
+
+    @property
+    def host_utc_ns(self) -> IntArray:
+        row: IntArray = self.numbers[5]
+        return row
 
     def __len__(self) -> int:
-        return len(self.counter)
+        return len(self.counts)
 
     def __getitem__(self, wanted: slice | NDArray[Any]) -> _Frames:
-        return _Frames(*(getattr(self, name)[wanted] for name in self.__dataclass_fields__))
+        return _Frames(self.numbers[:, wanted], self.counts[wanted])
 
     def followed_by(self, other: _Frames) -> _Frames:
-        names = self.__dataclass_fields__
-        return _Frames(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+        if not len(self):
+            return other
+        return _Frames(
+            np.concatenate([self.numbers, other.numbers], axis=1), np.concatenate([self.counts, other.counts])
+        )
 
 
 class CanReceiver:
@@ -187,7 +218,7 @@ class CanReceiver:
         if is_new and not is_first:
             deliveries += self._restarted(values["stream"], now_ns)
         if not self._is_stream_known:
-            deliveries += self._adopted(values["stream"] if is_first else self._stream)
+            deliveries += self._adopted(self._stream if self._stream is not None else values["stream"])
         ended = values["state"] == ENDED
         if is_new and not ended:
             for group in self._groups:
@@ -327,15 +358,11 @@ class _GroupReceiver:
         ):
             if count:
                 deliveries.append(Trouble(kind, f"{self.message.name}: {count} frames {what}", count, now_ns))
-        new = _Frames(
-            np.full(int(good.sum()), -1, np.int64),
-            frames.counts[good],
-            frames.n_samples[good],
-            frames.clock[good],
-            frames.clock_known[good],
-            monotonic[right][good],
-            utc[right][good],
-        )
+        unknown = np.full(len(good), -1, np.int64)
+        rows = unknown, frames.n_samples, frames.clock, frames.clock_known, monotonic[right], utc[right]
+        new = _Frames(np.stack(rows), frames.counts)
+        if not good.all():
+            new = new[good]
         self._waiting = new if self._waiting is None else self._waiting.followed_by(new)
         decided = self._placed(frames.counter[good], frames.counter_known[good], new.host_monotonic_ns)
         return deliveries + self._decided(decided, stream, now_ns, everything=self.tracker.end is not None)
@@ -343,9 +370,12 @@ class _GroupReceiver:
     def _placed(self, counter: IntArray, known: IntArray, monotonic: IntArray) -> Decided:
         """Let the tracker decide, not beyond a silence after which nothing can be proved."""
         before, self._last_ns = self._last_ns, int(monotonic[-1]) if len(monotonic) else self._last_ns
-        silences_ns = np.diff(monotonic, prepend=monotonic[:1] if before is None else before)
-        if not len(monotonic) or int(silences_ns.max()) < _SHORTEST_SILENCE_NS:
+        if (
+            not len(monotonic)
+            or int(monotonic[-1]) - (int(monotonic[0]) if before is None else before) < _SHORTEST_SILENCE_NS
+        ):
             return self.tracker.take(counter, known)
+        silences_ns = np.diff(monotonic, prepend=monotonic[:1] if before is None else before)
         at = int(silences_ns.argmax())
         first = self.tracker.take(counter[:at], known[:at])
         self.tracker.refuse_after_silence(int(silences_ns[at]) * 1e-9, self._sampling_rate_hz)
@@ -402,16 +432,21 @@ class _GroupReceiver:
             timed = next((k for k in range(first, last) if int(frames.counter[k]) in ticks), first)
             if first < timed:
                 yield self._block(frames[first:timed], None, stream)
-            yield self._block(frames[timed:last], ticks.get(int(frames.counter[timed])), stream)
+            counter = int(frames.counter[timed])
+            clock = self._clock.unwrapped(counter, ticks[counter]) if counter in ticks else None
+            yield self._block(frames[timed:last], clock, stream)
 
     def _block(self, frames: _Frames, ticks: int | None, stream: int) -> Block:
         counts = frames.counts
-        valid = np.arange(counts.shape[1]) < frames.n_samples[:, np.newaxis]
+        if counts.shape[1] == 1:
+            counts = counts[:, 0].copy()
+        else:
+            counts = counts[np.arange(counts.shape[1]) < frames.n_samples[:, np.newaxis]]
         return Block(
             self._group,
             stream,
             int(frames.counter[0]),
-            counts[valid],
+            counts,
             ticks,
             int(frames.host_monotonic_ns[-1]),
             int(frames.host_utc_ns[-1]),
@@ -428,20 +463,22 @@ class _DeviceClock:
         self._last: tuple[int, int] | None = None
 
     def of(self, frames: _Frames, latch_samples: int) -> dict[int, int]:
-        """Sample counter → unwrapped clock at that sample, for each clock that is complete."""
+        """Sample counter → clock at that sample as it was sent, for each clock that is complete."""
         there = np.flatnonzero(frames.clock_known)
         if not self._n_bits or not len(there):
             return {}
         base = frames.counter[there] - frames.counter[there] % latch_samples
-        order = np.argsort(base, kind="stable")
-        bases, starts = np.unique(base[order], return_index=True)
-        value = np.bitwise_or.reduceat(frames.clock[there][order], starts)
-        known = np.bitwise_or.reduceat(frames.clock_known[there][order], starts)
+        if (base[1:] < base[:-1]).any():
+            order = np.argsort(base, kind="stable")
+            base, there = base[order], there[order]
+        starts = np.concatenate([[0], np.flatnonzero(base[1:] != base[:-1]) + 1])
+        value = np.bitwise_or.reduceat(frames.clock[there], starts)
+        known = np.bitwise_or.reduceat(frames.clock_known[there], starts)
         whole = known == (1 << self._n_bits) - 1
-        pairs = zip(bases[whole].tolist(), value[whole].tolist(), strict=True)
-        return {counter: self._unwrapped(counter, ticks) for counter, ticks in pairs}
+        return dict(zip(base[starts][whole].tolist(), value[whole].tolist(), strict=True))
 
-    def _unwrapped(self, counter: int, ticks: int) -> int:
+    def unwrapped(self, counter: int, ticks: int) -> int:
+        """Clock at a sample, as if it had never come round."""
         if self._last is not None and self._n_bits < _CLOCK_WRAP_BITS:
             wrap = 1 << self._n_bits
             expected = self._last[1] + (counter - self._last[0]) * self._ticks_per_sample
