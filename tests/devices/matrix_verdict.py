@@ -187,8 +187,8 @@ def _check_marks(
         said = samples[quality & bit > 0]
         if not len(said):
             continue
-        beside = [range(said.min(), wrong.min()), range(wrong.max() + 1, said.max() + 1)] if len(wrong) else [said]
-        if any(len(np.unique(run.expected[part, column])) > 1 for part in beside):
+        beside = [range(said.min(), wrong.min()), range(wrong.max() + 1, said.max() + 1)] if len(wrong) else []
+        if not beside or any(len(np.unique(run.expected[part, column])) > 1 for part in beside):
             found.complaints.append(f"samples {said.min()} … {said.max()} are flagged as {name} without cause")
     if found.n_late and not {"reorder", "corrupt"} & set(run.device):
         found.complaints.append(f"{found.n_late} samples are flagged as out of order without cause")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
+import netCDF4
 import numpy as np
 import pytest
 from fault_matrix import played_and_recorded, problems
 from matrix_cases import FAULTS, TRANSPORTS, Case, cases
 from matrix_recordings import NAMES, Motion, Pattern
+from matrix_verdict import verdict
 
 QUICK = ("serial socket", "CAN FD over slcan")
 """Transports on which all intensities are tried each time; on the others one of each fault is."""
@@ -55,3 +59,62 @@ def test_the_smallest_error_of_a_clock_shows_in_the_motion():
     for shifted in (places + 0.005 * 512, places * (1 + 1e-4)):
         off = np.abs(truth.counts(shifted) - truth.counts(places)).max(axis=0)
         assert (off > 20 * truth.tolerance()).all()
+
+
+def exchange(counts, quality, lost):
+    kept = np.flatnonzero(~lost)
+    counts[kept[5]], counts[kept[6]] = counts[kept[6]], counts[kept[5]]
+
+
+def off_by_one(counts, quality, lost):
+    counts[np.flatnonzero(~lost)[7]] += 1
+
+
+def lose(counts, quality, lost):
+    counts[np.flatnonzero(~lost)[7]] = counts[np.flatnonzero(lost)[0]]
+    quality[np.flatnonzero(~lost)[7]] = 1
+
+
+def lose_unflagged(counts, quality, lost):
+    quality[np.flatnonzero(lost)[3]] = 0
+
+
+def invent(counts, quality, lost):
+    counts[np.flatnonzero(lost)[3]] = 5
+
+
+def suspect(counts, quality, lost):
+    quality[np.flatnonzero(~lost)[9]] = 16
+
+
+@pytest.fixture(scope="module")
+def lossy(tmp_path_factory):
+    """A recording with a tenth of the frames dropped."""
+    return played_and_recorded(
+        Case("drop", FAULTS["drop"][1], TRANSPORTS["serial socket"]), tmp_path_factory.mktemp("lossy")
+    )
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (exchange, "some readings are silently wrong"),
+        (off_by_one, "some readings are silently wrong"),
+        (lose, "too many readings that were sent are lost"),
+        (lose_unflagged, "rows with lost readings are not flagged"),
+        (invent, "some readings are invented"),
+        (suspect, "flagged as stuck without cause"),
+    ],
+)
+def test_the_judge_sees_what_is_done_to_a_file(lossy, tmp_path, damage, said):
+    assert problems(lossy) == []
+    path = tmp_path / "run.nc"
+    path.write_bytes(lossy.recorded.path.read_bytes())
+    with netCDF4.Dataset(path, "a") as file:
+        file.set_auto_maskandscale(False)
+        counts, quality = file["force_cell_2"][:], file["quality"][:]
+        damage(counts, quality, counts == file["force_cell_2"].getncattr("_FillValue"))
+        file["force_cell_2"][:], file["quality"][:] = counts, quality
+    recorded = dataclasses.replace(lossy.recorded, path=path)
+    found = problems(dataclasses.replace(lossy, recorded=recorded, verdict=verdict(recorded)))
+    assert said in "; ".join(found)
