@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from acquisition.files.reading_limits import LARGEST_DECODED_BYTES, check_declared
 from acquisition.files.table import Column, RawCounts
-from acquisition.sources.interface import Block, Channel, CountArray, Delivery, Trouble, TroubleKind
+from acquisition.sources.interface import Block, Channel, CountArray, Delivery, Trouble, TroubleKind, attributes_of
 from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_database import read_layout
 from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage
@@ -169,6 +169,7 @@ class DeviceLog:
             step_s=1.0 / self._layout.sampling_rate_hz,
             raw=RawCounts(stored, channel.scale_factor, channel.add_offset),
             aliases=(channel.name,),
+            declared=_declared(channel),
         )
 
     def traps(self) -> list[str]:
@@ -199,6 +200,12 @@ class DeviceLog:
             if other != stream
         ]
         return traps
+
+
+def _declared(channel: Channel) -> dict[str, Any]:
+    """What the database says about the sensor."""
+    attributes = attributes_of(channel)
+    return {key: value for key, value in attributes.items() if key not in ("units", "quantity")}
 
 
 def _placed(blocks: list[Block], first: int, stop: int, n_channels: int) -> tuple[CountArray, NDArray[np.bool_]]:

@@ -18,6 +18,7 @@ from acquisition.files.channel_conversion import (
     clipped_samples,
     converted_values,
     scaling_of,
+    with_declared,
 )
 from acquisition.files.channel_map import ChannelMap, ChannelSection, read_channel_map
 from acquisition.files.column_selection import (
@@ -78,7 +79,7 @@ def import_recording(sources: Sequence[Path], map_path: Path, *, rig: Path | Non
     time = common_time(selected, jitter)
     _check_memory(time, len(selected))
     converted = [
-        _converted_channel(one, channel_map.channels[one.channel], first, time)
+        _converted_channel(one, with_declared(channel_map.channels[one.channel], one.column), first, time)
         for one, first in zip(selected, time.first_points, strict=True)
     ]
     quality = _quality(converted, tables, channel_map, time)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import binascii
+import dataclasses
 import struct
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from acquisition.files import import_recording
 from acquisition.sources.interface import Channel
 from acquisition.wire.can_layout import device_database
 from sloshlab.errors import FileFormatError
-from sloshlab.recording import LOST, read_recording, write_recording
+from sloshlab.recording import CLIPPED, LOST, read_recording, write_recording
 
 N_SAMPLES = 1001
 SCALE_N, OFFSET_N = 0.0078125, -3.5
@@ -232,3 +233,40 @@ def test_broken_convention_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="attribute SamplingRateHz") as caught:
         imported(tmp_path, log)
     assert "\n" not in str(caught.value)
+
+
+def described_database() -> str:
+    first = dataclasses.replace(
+        CHANNELS[0], range_min=-200.0, range_max=230.0, noise_std=0.25, x_m=0.5, block_from="a", block_to="b"
+    )
+    return device_database("daq", 500.0, 1e6, [first, *CHANNELS[1:]]).to_dbc()
+
+
+def test_what_the_database_says_about_a_sensor_stands_where_the_map_is_silent(tmp_path: Path) -> None:
+    log = write_log(tmp_path, frames_of_run())
+    (tmp_path / "daq.dbc").write_text(described_database(), encoding="cp1252")
+    recording = imported(tmp_path, log).recording
+    force = recording["force_cell_1"]
+    stated = {"range_min": -200.0, "range_max": 230.0, "noise_std": 0.25, "x_m": 0.5, "block_from": "a"}
+    assert {key: force.attrs.get(key) for key in stated} == stated
+    assert force.attrs["block_to"] == "b"
+    newtons = counts()[:, 0] * SCALE_N + OFFSET_N
+    is_beyond = (newtons >= 230.0) | (newtons <= -200.0)
+    assert is_beyond.any()
+    np.testing.assert_array_equal(recording["quality"].values & CLIPPED > 0, is_beyond)
+
+
+def test_the_map_is_right_where_it_says_something(tmp_path: Path) -> None:
+    log = write_log(tmp_path, frames_of_run())
+    (tmp_path / "daq.dbc").write_text(described_database(), encoding="cp1252")
+    text = MAP.format(extra="").replace('column = "force_cell_1"', 'column = "force_cell_1"\n{more}')
+    for more, expected in (
+        ("range_max = 1000.0\nx_m = 0.25", {"range_max": 1000.0, "noise_std": 0.25, "x_m": 0.25}),
+        ('units = "kN"\nunits_override = true', {"x_m": 0.5, "block_from": "a", "block_to": "b"}),
+        ("sign = -1", {"range_min": -230.0, "range_max": 200.0, "noise_std": 0.25}),
+    ):
+        (tmp_path / "map.toml").write_text(text.format(more=more), encoding="utf-8")
+        attributes = import_recording([log], tmp_path / "map.toml").recording["force_cell_1"].attrs
+        assert {key: attributes.get(key) for key in expected} == expected
+        if "kN" in more or "range_max" in more:
+            assert "range_min" not in attributes
