@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-LONGEST_WAIT_S = 90.0
+LONGEST_WAIT_S = 60.0
 RATE_HZ = 512.0
 FORCES = ("force_cell_1", "force_cell_2")
 ROOF = ("acceleration_roof_1", "acceleration_roof_2")
 
 
-def wait_until(condition: Callable[[], Any], what: str) -> Any:
-    """Wait for a condition as long as a loaded machine may need; its value."""
-    deadline_s = time.monotonic() + LONGEST_WAIT_S
+def wait_until(condition: Callable[[], Any], what: str, more_s: float = 0.0) -> Any:
+    """Wait for a condition as long as a loaded machine may need, and `more_s`; its value."""
+    deadline_s = time.monotonic() + LONGEST_WAIT_S + more_s
     while not (value := condition()):
         assert time.monotonic() < deadline_s, f"waited in vain for {what}"
         time.sleep(0.02)
@@ -70,9 +70,9 @@ class Command:
                 self.process.returncode, self.peak_kib = os.waitstatus_to_exitcode(status), usage.ru_maxrss
         return self.process.returncode is not None
 
-    def exit_code(self) -> int:
-        """Wait for the end."""
-        wait_until(self.poll, f"the end of {self.process.args}: {self.stderr[-500:]}")
+    def exit_code(self, duration_s: float = 0.0) -> int:
+        """Wait for the end of a command that needs `duration_s` by its nature."""
+        wait_until(self.poll, f"the end of {self.process.args}: {self.stderr[-500:]}", duration_s)
         assert "\x1b" not in self.stdout + self.stderr, "escape codes in a pipe"
         assert "Traceback" not in self.stderr, self.stderr
         return int(self.process.returncode)
