@@ -130,7 +130,7 @@ FAULTS: dict[str, tuple[Intensity, ...]] = {
     ),
     "corrupt": tuple(
         Intensity(
-            f"{n_bits} bits in {percent:g} % of the frames",
+            f"{n_bits} bit{'s' * (n_bits > 1)} in {percent:g} % of the frames",
             _frames("corrupt", f"n_bits = {n_bits}\n", percent=percent),
         )
         for percent, n_bits in ((1, 1), (10, 3), (50, 40))
@@ -172,7 +172,7 @@ FAULTS: dict[str, tuple[Intensity, ...]] = {
         for offset_s in (0.005, 0.05, 0.5)
     ),
     "clock drift": tuple(
-        Intensity(f"{ppm:g} ppm", f"[clock]\ndrift_ppm = {ppm}\n", Motion) for ppm in (100.0, -2000.0, 20_000.0)
+        Intensity(f"{ppm:+g} ppm", f"[clock]\ndrift_ppm = {ppm}\n", Motion) for ppm in (100.0, -2000.0, 20_000.0)
     ),
     "clock jitter": tuple(
         Intensity(f"{1e6 * jitter_s:g} µs", f"[clock]\njitter_s = {jitter_s}\n", Motion)
