@@ -29,7 +29,7 @@ from live_commands import (
     visible,
     wait_until,
 )
-from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, assert_one_line
+from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, assert_one_line, refusal
 
 import pipelines.record
 from pipelines.command_line import run
@@ -301,3 +301,128 @@ def test_a_full_disk(bench: Path, lab: Path) -> None:
     assert visible(lab) == ["new.journal"]
     assert run(["recover", str(lab / "new.journal"), "-o", str(lab / "new.nc")]) == DONE_BUT_FLAGGED
     assert 400 <= samples_that_agree(bench / "run.nc", lab / "new.nc") < N_SAMPLES
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["record"],
+        ["record", "--source", "file:RUN.nc", "-o", "NEW.nc"],
+        ["record", "--source", "file:RUN.nc", "--rig", "RIG.toml"],
+        ["record", "--rig", "RIG.toml", "-o", "NEW.nc"],
+        ["record", "--source", "file:RUN.nc", "--rig", "RIG.toml", "-o", "NEW.nc", "--duration", "soon"],
+        ["recover", "RUN.journal"],
+        ["recover", "-o", "NEW.nc"],
+        ["replay", "RUN.nc"],
+        ["replay", "--as", "serial:tty"],
+        ["replay", "RUN.nc", "--as", "serial:tty", "--wait-clients", "0"],
+        ["record", "--no-such-option"],
+    ],
+    ids=" ".join,
+)
+def test_usage_errors_exit_2(arguments: list[str], lab: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(lab)
+    assert run(arguments) == USAGE
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err
+    assert "Traceback" not in captured.err
+    assert visible(lab) == []
+
+
+REFUSED_RECORDINGS = {
+    "no scheme": (["--source", "{bench}/run.nc"], ("no scheme", "file:")),
+    "unknown scheme": (["--source", "tcp:127.0.0.1:7000"], ("'tcp'", "serial")),
+    "unknown option": (["--source", "serial:tty?baud=9600"], ("baud", "baudrate")),
+    "no such port": (["--source", "serial:{lab}/tty"], ("no such port",)),
+    "nobody listens": (["--source", "serial:socket://127.0.0.1:1"], ("127.0.0.1:1", "refused")),
+    "no socketcand": (["--source", "can:socketcand?port=1&dbc={bench}/run.nc"], ("run.nc",)),
+    "no DBC file": (["--source", "can:socketcand?port=1"], ("dbc",)),
+    "no such recording": (["--source", "file:{lab}/none.nc"], ("none.nc",)),
+    "one of two": (["--source", "file:{bench}/run.nc", "--source", "serial:{lab}/tty"], ("no such port",)),
+    "no such rig": (["--source", "file:{bench}/run.nc", "--rig", "{lab}/none.toml"], ("none.toml",)),
+    "a duration of nothing": (["--source", "file:{bench}/run.nc", "--duration", "0"], ("--duration", "0")),
+    "an endless duration": (["--source", "file:{bench}/run.nc", "--duration", "inf"], ("--duration", "inf")),
+    "unknown alignment": (["--source", "file:{bench}/run.nc", "--align", "guess"], ("--align", "'guess'")),
+    "another rate": (
+        ["--source", "file:{bench}/run.nc", "--attribute", "sampling_rate_hz=1000"],
+        ("sampling_rate_hz", "512"),
+    ),
+    "a folder that is a file": (
+        ["--source", "file:{bench}/run.nc", "-o", "{bench}/run.nc/new.nc"],
+        ("cannot be written",),
+    ),
+    "an existing recording": (["--source", "file:{bench}/run.nc", "-o", "{bench}/run.nc"], ("--overwrite",)),
+}
+
+
+@pytest.mark.parametrize("name", list(REFUSED_RECORDINGS))
+def test_a_recording_that_cannot_begin(name: str, bench: Path, lab: Path, capsys) -> None:
+    options, fragments = REFUSED_RECORDINGS[name]
+    known = [option.format(bench=bench, lab=lab) for option in options]
+    known += [] if "--rig" in known else ["--rig", str(bench / "rig.toml")]
+    known += [] if "-o" in known else ["-o", str(lab / "new.nc")]
+    refusal(capsys, ["record", *known], lab, *fragments)
+    assert visible(bench) == ["rig.toml", "run.nc"]
+
+
+def test_an_existing_journal_is_not_overwritten(bench: Path, lab: Path, capsys) -> None:
+    (lab / "new.journal").write_bytes(b"of a recording that was cut short")
+    arguments = record_arguments(["--source", f"file:{bench / 'run.nc'}"], bench, lab / "new.nc")
+    refusal(capsys, arguments, lab, "new.journal", "recover", "--overwrite")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is unwritable for this user")
+def test_a_folder_that_may_not_be_written(bench: Path, lab: Path, capsys) -> None:
+    lab.chmod(0o500)
+    try:
+        arguments = record_arguments(["--source", f"file:{bench / 'run.nc'}"], bench, lab / "new.nc")
+        refusal(capsys, arguments, lab, "cannot be written")
+    finally:
+        lab.chmod(0o700)
+
+
+@pytest.mark.parametrize("content", [b"", b"not a journal at all\n" * 400, b"\0" * 5000, None])
+def test_nothing_to_recover(content: bytes | None, bench: Path, lab: Path, capsys) -> None:
+    """An empty file, text, zeros, and a recording that is whole."""
+    journal = lab / "old.journal"
+    journal.write_bytes((bench / "run.nc").read_bytes() if content is None else content)
+    refusal(capsys, ["recover", str(journal), "-o", str(lab / "new.nc")], lab, "old.journal")
+
+
+def test_no_journal_to_recover(lab: Path, capsys) -> None:
+    refusal(capsys, ["recover", str(lab / "none.journal"), "-o", str(lab / "new.nc")], lab, "none.journal")
+
+
+REFUSED_DEVICES = {
+    "no such recording": (["{lab}/none.nc", "--as", "serial:{lab}/tty"], ("none.nc",)),
+    "no scheme": (["{bench}/run.nc", "--as", "{lab}/tty"], ("no scheme",)),
+    "no device": (["{bench}/run.nc", "--as", "sim:shaker"], ("'sim'", "serial, can")),
+    "no DBC file": (["{bench}/run.nc", "--as", "can:socketcand?port=0"], ("dbc",)),
+    "not this computer": (["{bench}/run.nc", "--as", "serial:socket://0.0.0.0:0"], ("0.0.0.0", "--expose")),
+    "no speed": (["{bench}/run.nc", "--as", "serial:{lab}/tty", "--speed", "warp"], ("--speed", "'warp'")),
+    "no such channel": (["{bench}/run.nc", "--as", "serial:{lab}/tty", "--channels", "force_9"], ("force_9",)),
+    "no faults": (["{bench}/run.nc", "--as", "serial:{lab}/tty", "--faults", "{lab}/none.toml"], ("none.toml",)),
+    "a port that is a file": (["{bench}/run.nc", "--as", "serial:{bench}/rig.toml"], ("rig.toml",)),
+}
+
+
+@pytest.mark.parametrize("name", list(REFUSED_DEVICES))
+def test_a_device_that_cannot_appear(name: str, bench: Path, lab: Path, capsys) -> None:
+    options, fragments = REFUSED_DEVICES[name]
+    arguments = [option.format(bench=bench, lab=lab) for option in options]
+    refusal(capsys, ["replay", *arguments], lab, *fragments)
+    assert visible(bench) == ["rig.toml", "run.nc"]
+
+
+def test_the_installed_commands_refuse_in_one_line(bench: Path, lab: Path) -> None:
+    arguments = record_arguments(["--source", f"serial:{lab / 'tty'}"], bench, lab / "new.nc", "--json")
+    with (
+        running(arguments, lab) as recorder,
+        running(["recover", lab / "x", "-o", lab / "new.nc"], lab) as recovery,
+    ):
+        for command in (recorder, recovery):
+            assert command.exit_code() == INPUT_IS_BAD
+            assert command.stdout == ""
+            assert_one_line(command.stderr)
+    assert visible(lab) == []
