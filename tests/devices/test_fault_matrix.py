@@ -12,7 +12,7 @@ from matrix_cases import FAULTS, TRANSPORTS, Case, cases
 from matrix_recordings import NAMES, Motion, Pattern
 from matrix_verdict import verdict
 
-QUICK = ("serial socket", "CAN FD over slcan")
+QUICK = ("serial socket",)
 """Transports on which all intensities are tried each time; on the others one of each fault is."""
 
 
