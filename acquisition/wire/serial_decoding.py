@@ -159,7 +159,9 @@ class SerialDecoder:
             for frame in parsed.frames:
                 self._take(frame, host)
         except SourceError as error:
-            self.failure = error
+            # of several sources, a person must know which one
+            what = error.what if self._url in error.what else f"source {self._url}: {error.what}"
+            self.failure = SourceError(what, got=error.got, allowed=error.allowed, remedy=error.remedy)
         self._finish_run()
         return self._deliveries + self._tally.troubles(host.monotonic_ns)
 

@@ -382,6 +382,14 @@ def test_a_folder_that_may_not_be_written(bench: Path, lab: Path, capsys) -> Non
         lab.chmod(0o700)
 
 
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no folder that nobody can write")
+def test_a_folder_that_takes_no_file(bench: Path, lab: Path, capsys) -> None:
+    """The permissions of this one promise that it can be written."""
+    arguments = record_arguments(["--source", f"file:{bench / 'run.nc'}"], bench, Path("/proc/new.nc"))
+    assert run(arguments) == INPUT_IS_BAD
+    assert_one_line(capsys.readouterr().err, "/proc/new.journal", "No such file or directory")
+
+
 @pytest.mark.parametrize("content", [b"", b"not a journal at all\n" * 400, b"\0" * 5000, None])
 def test_nothing_to_recover(content: bytes | None, bench: Path, lab: Path, capsys) -> None:
     """An empty file, text, zeros, and a recording that is whole."""
