@@ -211,7 +211,7 @@ def test_ctrl_c_while_a_device_is_away(bench: Path, lab: Path) -> None:
 def test_ctrl_c_while_the_recording_is_assembled(name: str, bench: Path, lab: Path, monkeypatch, capsys) -> None:
     """All samples are in the journal then; the one line says so, and what it says to type works."""
 
-    def interrupted(*_: Any) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patches:
@@ -230,14 +230,14 @@ def test_a_signal_while_the_recording_is_assembled(bench: Path, lab: Path) -> No
     """The same with a real signal; the assembly of this process waits for it."""
     program = (
         "import sys, pathlib, time, pipelines.record;"
-        "pipelines.record.assemble = lambda *_: (pathlib.Path(sys.argv.pop()).touch(), time.sleep(60));"
+        "pipelines.record.assemble = lambda *_, **__: (pathlib.Path(sys.argv.pop()).touch(), time.sleep(60));"
         "from pipelines.command_line import run; sys.exit(run(sys.argv[1:-1]))"
     )
     arguments = record_arguments(["--source", f"file:{bench / 'run.nc'}"], bench, lab / "new.nc")
     begun = lab.parent / "assembling"
     process = subprocess.Popen([sys.executable, "-c", program, *arguments, str(begun)], stderr=subprocess.PIPE)
     try:
-        wait_until(begun.exists, "the assembly")
+        wait_until(lambda: begun.exists() or process.poll() is not None, "the assembly")
         process.send_signal(signal.SIGINT)
         _, stderr = process.communicate(timeout=60)
     finally:
