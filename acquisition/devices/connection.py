@@ -13,8 +13,10 @@ import os
 import select
 import socket
 import termios
+import time
 import tty
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +24,8 @@ from sloshlab.errors import SourceError
 
 MOST_CONNECTIONS: Final = 8
 _AT_ONCE = 65536
+_PATIENCE_S = 0.5
+_MOST_WAITING = 128
 
 
 class Connection(ABC):
@@ -237,17 +241,30 @@ class SocketConnection(Connection):
 
 
 class ListeningSocket(Door):
-    """A TCP port; more than `most` connections at a time are closed at once.
+    """A TCP port; more than `most` connections at a time are turned away.
+
+    One that comes while another is still going waits a moment: a host that leaves and comes back at once must
+    not be turned away only because its farewell has not been read yet.
 
     Parameters
     ----------
     host, port : str, int
         Where to listen; port 0 takes a free one, and keeps it when opened again.
     most : int
+    now_s : callable
+        Monotonic clock [s].
     """
 
-    def __init__(self, host: str, port: int, *, most: int = MOST_CONNECTIONS) -> None:
-        self._host, self._port, self._most = host, port, most
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        most: int = MOST_CONNECTIONS,
+        now_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._host, self._port, self._most, self._now_s = host, port, most, now_s
+        self._waits_since_s: float | None = None
         self._listening: socket.socket | None = None
         self._hosts: list[SocketConnection] = []
 
@@ -268,7 +285,7 @@ class ListeningSocket(Door):
         try:
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listening.bind((self._host, self._port))
-            listening.listen(MOST_CONNECTIONS)
+            listening.listen(_MOST_WAITING)
             listening.setblocking(False)
         except OSError as error:
             listening.close()
@@ -280,24 +297,48 @@ class ListeningSocket(Door):
     def arrived(self) -> list[Connection]:
         """New connections, within the limit."""
         new: list[Connection] = []
-        self._hosts = [host for host in self._hosts if host.fileno() >= 0]
         for _ in range(MOST_CONNECTIONS):
+            if self._is_full() and not self._has_waited_enough():
+                break
             try:
                 connected = self._listening.accept()[0] if self._listening else None
             except OSError:
+                self._waits_since_s = None  # whoever comes next may wait again
                 break
             if connected is None:
                 break
-            if len(self._hosts) >= self._most:
+            if self._is_full():
                 connected.close()
                 continue
             self._hosts.append(SocketConnection(connected))
             new.append(self._hosts[-1])
         return new
 
+    def _is_full(self) -> bool:
+        self._hosts = [host for host in self._hosts if host.fileno() >= 0]
+        if len(self._hosts) < self._most:
+            self._waits_since_s = None
+            return False
+        return True
+
+    def _has_waited_enough(self) -> bool:
+        """Whether somebody has been standing at the full door for long enough to be turned away."""
+        if self._listening is None:
+            return False
+        waiting = select.poll()
+        waiting.register(self._listening.fileno(), select.POLLIN)
+        if not waiting.poll(0):
+            self._waits_since_s = None
+            return False
+        if self._waits_since_s is None:
+            self._waits_since_s = self._now_s()
+        return self._now_s() - self._waits_since_s >= _PATIENCE_S
+
     def waiting_on(self) -> int | None:
-        """The listening socket."""
-        return self._listening.fileno() if self._listening else None
+        """The listening socket; None while somebody waits at a full door, which would wake at once."""
+        if self._listening is None or self._is_full():
+            return None
+        return self._listening.fileno()
 
     def close(self) -> None:
         """Stop listening; connections are not touched."""

@@ -147,7 +147,9 @@ def test_two_devices_begin_together(tmp_path):
 
 
 def test_the_terminal_is_raw_and_leaves_nothing_behind(recording, tmp_path):
-    with playing(recording[0], f"serial:{tmp_path / 'tty'}") as (ready, _):
+    # far more than a terminal buffers, so that the device is not done when the first host goes
+    pattern = "pattern:channels=3&sampling_rate_hz=500&bits=16&duration_s=400"
+    with playing(pattern, f"serial:{tmp_path / 'tty'}") as (ready, _):
         slave = os.open(target(ready[0]), os.O_RDWR | os.O_NOCTTY)  # as it comes, without setting anything
         os.write(slave, command(START))
         data = b""
