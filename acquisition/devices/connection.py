@@ -24,7 +24,7 @@ from sloshlab.errors import SourceError
 
 MOST_CONNECTIONS: Final = 8
 _AT_ONCE = 65536
-_PATIENCE_S = 0.5
+_PATIENCE_S = 2.0
 _MOST_WAITING = 128
 
 
