@@ -147,8 +147,6 @@ def quality(run_id: str) -> RunQuality:
     gap = Gap(17.0, 17.024, 12)
     cut = ("force_cell_1: cut",)
     return RunQuality(run_id, 500.0, 240.0, 120000, channels, (gap,), 0, 0, 0, 0, agreed, (), cut)
-        run_id, 500.0, 240.0, 120000, channels, (gap,), 0, 0, 0, 0, agreed, (), ("force_cell_1: cut",)
-    )
 
 
 def shaker_experiment(
