@@ -28,6 +28,7 @@ from sloshlab.errors import (
     SloshlabError,
     SourceError,
 )
+from sloshlab.netcdf_lock import NETCDF_LOCK
 from sloshlab.recording import read_attributes
 from sloshlab.rig import Rig
 
@@ -249,7 +250,7 @@ def _require_readable(output: Path, n_samples: int, watch: Callable[[int, int], 
 
     read_attributes(output)
     try:
-        with netCDF4.Dataset(output, mode="r") as file:
+        with NETCDF_LOCK, netCDF4.Dataset(output, mode="r") as file:
             file.set_auto_maskandscale(False)
             n_found = len(file.dimensions["time"])
             for number, variable in enumerate(file.variables.values(), start=1):

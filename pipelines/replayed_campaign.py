@@ -23,6 +23,7 @@ import xarray as xr
 
 from pipelines.progress import progress
 from sloshlab.errors import RecordingError, SourceError
+from sloshlab.netcdf_lock import NETCDF_LOCK
 
 CHANNELS_OF_A_DEVICE: Final = {"force": "serial", "acceleration": "can"}
 _LONGEST_RECORDING_S = 600.0
@@ -167,7 +168,7 @@ def _equal(one: Any, other: Any) -> bool:
 
 @contextlib.contextmanager
 def _stored(path: Path) -> Iterator[xr.Dataset]:
-    with xr.open_dataset(path, engine="netcdf4", mask_and_scale=False, decode_times=False) as dataset:
+    with NETCDF_LOCK, xr.open_dataset(path, engine="netcdf4", mask_and_scale=False, decode_times=False) as dataset:
         yield dataset
 
 

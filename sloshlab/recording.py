@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from sloshlab import atomic_file
 from sloshlab.errors import RecordingError, UnitsError
 from sloshlab.file_structure import require_sound_structure
+from sloshlab.netcdf_lock import NETCDF_LOCK
 from sloshlab.units import SI_UNITS, factor_to_si
 
 FORMAT: Final = "1"
@@ -181,7 +182,7 @@ def _opened(file: Path) -> Iterator[Any]:
         raise RecordingError(f"recording {file}", got=got, allowed="a netCDF-4 file", remedy="check the path")
     try:
         require_sound_structure(file)
-        with netCDF4.Dataset(file, mode="r") as source:
+        with NETCDF_LOCK, netCDF4.Dataset(file, mode="r") as source:
             source.set_auto_maskandscale(False)
             yield source
     except RecordingError:

@@ -13,6 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from sloshlab import atomic_file
 from sloshlab.errors import RecordingError, SloshlabError
+from sloshlab.netcdf_lock import NETCDF_LOCK
 from sloshlab.recording import MAXIMUM_DECODED_BYTES
 
 SAMPLES_PER_CHUNK: Final = 1 << 17
@@ -103,7 +104,7 @@ def written_recording(
     import netCDF4
 
     with _refusals_named(path), atomic_file.replaced(path) as temporary:
-        with netCDF4.Dataset(temporary, mode="w", format="NETCDF4") as dataset:
+        with NETCDF_LOCK, netCDF4.Dataset(temporary, mode="w", format="NETCDF4") as dataset:
             dataset.set_auto_maskandscale(False)
             for name, size in dimensions.items():
                 dataset.createDimension(name, size)

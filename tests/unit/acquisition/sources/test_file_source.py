@@ -1,5 +1,8 @@
 """Recordings as sources: the counts that are stored, floats to 30 bits of full scale, in real time or at once."""
 
+import subprocess
+import sys
+
 import netCDF4
 import numpy as np
 import pytest
@@ -358,3 +361,29 @@ def test_damage_that_reading_meets_is_one_line(tmp_path):
     path.write_bytes(content)
     with opened(path) as source, pytest.raises(SourceError, match="cannot be read"):
         everything(source)
+
+
+READ_AT_ONCE = """
+import sys, threading
+from acquisition.sources.stored_counts import StoredCounts
+
+def read(path):
+    for _ in range(200):
+        with StoredCounts(path) as stored:
+            for start in range(0, stored.n_samples, 1000):
+                stored.counts(start, min(start + 1000, stored.n_samples))
+
+threads = [threading.Thread(target=read, args=(path,)) for path in sys.argv[1:]]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+print("read")
+"""
+
+
+def test_several_recordings_are_read_at_once_in_threads(tmp_path):
+    values = np.arange(20_000, dtype=np.int16)
+    paths = [write(tmp_path / f"{k}.nc", {"force_1": (values, force())}, chunk=1000) for k in range(4)]
+    done = subprocess.run([sys.executable, "-c", READ_AT_ONCE, *map(str, paths)], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "read\n"), done.stderr
