@@ -19,14 +19,14 @@ from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_bits import IntArray
 from acquisition.wire.can_counter import LONGEST_GAP_S, CounterTracker, Decided
 from acquisition.wire.can_frames import ENDED, LOST_DATA, decode, read_control_frame
-from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage
+from acquisition.wire.can_layout import STREAM_BITS, CanLayout, ControlMessage, SampleMessage
 from sloshlab.errors import SourceError
 
 _LONGEST_WAIT_NS: Final = 3_000_000_000
 _MOST_HELD: Final = 65_536
 _END_WAIT_NS: Final = 300_000_000
 _CLOCK_WRAP_BITS: Final = 62
-_STREAMS: Final = 256
+_STREAMS: Final = 1 << STREAM_BITS
 _STATUS_LATE_S: Final = 1.0
 _SHORTEST_SILENCE_NS: Final = 100_000_000
 

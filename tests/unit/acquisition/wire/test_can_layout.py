@@ -113,6 +113,14 @@ def replaced(old: str, new: str, fd: bool = False) -> str:
     return text.replace(old, new)
 
 
+LONG_CLOCK = """VERSION ""
+BU_: x
+BO_ 257 m: 16 x
+ SG_ sample_counter_0 : 0|32@1+ (1,0) [0|0] "" x
+ SG_ force_cell_1 : 32|16@1- (1,0) [0|0] "N" x
+ SG_ device_clock_0 : 64|64@1+ (1,0) [0|0] "" x
+"""
+
 BREACHES = {
     "no counter": (replaced("sample_counter_0", "frame_counter"), "messages: got none with channels and sample_c"),
     "no channel": (replaced("force_cell", "loads"), "messages: got none with channels and sample_counter_0"),
@@ -135,6 +143,15 @@ BREACHES = {
     "multiplexed channel": (replaced("force_cell_1 :", "force_cell_1 m3 :"), "in every frame"),
     "device name": (replaced('"DeviceName" "daq"', '"DeviceName" "a b"'), "device"),
     "status without stream": (replaced(" SG_ stream", " SG_ strom"), "device_status: got no stream"),
+    "stream of 16 bits": (
+        replaced("SG_ stream : 24|8", "SG_ stream : 24|16").replace("n_samples : 32|32", "n_samples : 40|24"),
+        "device_status.stream: got 16 bits; allowed: ≤ 8 bits",
+    ),
+    "status that counts less far": (
+        replaced("n_samples : 32|32", "n_samples : 32|31"),
+        "device_status.n_samples: got 31 bits; allowed: 32 … 62 bits, all of the sample counter",
+    ),
+    "clock too long": (LONG_CLOCK, "m.device_clock: got 64 bits; allowed: ≤ 62"),
 }
 
 
