@@ -47,6 +47,12 @@ OutputFile = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print a machine-readable summary as the last line.")]
 HalfWidth = Annotated[int, typer.Option("--p", min=1, help="P: a window averages 2P cycles.")]
 Spacing = Annotated[int, typer.Option("--m", min=1, help="M: cycles between the centres of windows.")]
+Redundant = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--redundant", metavar="A:B", help="Channels of two devices that show the same motion.", show_default=False
+    ),
+]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Write windows.nc and maps.nc only.")]
 
 
@@ -196,10 +202,7 @@ def record(
         list[str] | None, typer.Option(metavar="KEY=VALUE", help="An attribute of the run.", show_default=False)
     ] = None,
     align: Annotated[str, typer.Option(help="Clocks of several devices: host, device or counter.")] = "host",
-    redundant: Annotated[
-        list[str] | None,
-        typer.Option(metavar="A:B", help="Channels of two devices that show the same motion.", show_default=False),
-    ] = None,
+    redundant: Redundant = None,
     keep_journal: Annotated[bool, typer.Option("--keep-journal", help="Keep RUN.journal.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
     as_json: Json = False,
@@ -232,13 +235,19 @@ def recover(
         Path, typer.Argument(metavar="RUN.journal", help="Journal of a recorder.", show_default=False)
     ],
     output: OutputFile,
+    align: Annotated[
+        str | None,
+        typer.Option(help="host, device or counter; as it was recorded if not given.", show_default=False),
+    ] = None,
+    redundant: Redundant = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
     as_json: Json = False,
 ) -> None:
     """A journal left by a crash to a recording: everything up to the last complete block."""
     from pipelines.recover import recover as recover_journal
 
-    _finish(recover_journal(journal, output, overwrite), as_json)
+    summary = recover_journal(journal, output, overwrite, align=align, redundant=redundant or ())
+    _finish(summary, as_json)
 
 
 @app.command()

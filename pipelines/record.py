@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from acquisition.recorder.assembly import ALIGNMENTS, assemble
+from acquisition.recorder.assembly import assemble
 from acquisition.recorder.assembly_summary import AssemblySummary
 from acquisition.recorder.journal import JournalWriter, existing_journal, read_journal
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
+from acquisition.recorder.source_alignment import require_alignable
 from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus, StopReason
 from acquisition.sources.interface import Source
 from acquisition.sources.urls import open_source
+from pipelines.alignment_choice import channel_pairs, checked_align
 from pipelines.progress import amounts
 from pipelines.run_attributes import checked_run_attributes, require_rate
 from sloshlab.errors import (
@@ -77,21 +79,6 @@ class RecordSettings:
         """Where the journal is."""
         return self.output.with_suffix(".journal")
 
-    @property
-    def pairs(self) -> list[list[str]]:
-        """Names of redundant channels.
-
-        Raises
-        ------
-        InputError
-            If one is not ``A:B``.
-        """
-        pairs = [text.split(":") for text in self.redundant]
-        for text, pair in zip(self.redundant, pairs, strict=True):
-            if len(pair) != 2 or not all(pair) or pair[0] == pair[1]:
-                raise InputError("--redundant", got=repr(text)[:80], allowed="A:B, two different channels")
-        return pairs
-
 
 def record(
     settings: RecordSettings,
@@ -122,7 +109,9 @@ def record(
     metadata = _checked_metadata(settings)
     _require_free_place(settings)
     with opened([open_source(url) for url in settings.sources]) as sources:
-        require_rate(metadata["attributes"], sources[0].info.sampling_rate_hz)
+        infos = [source.info for source in sources]
+        require_rate(metadata["attributes"], infos[0].sampling_rate_hz)
+        require_alignable(infos, settings.align, metadata["redundant"])
         outcome = _recorded(sources, settings, metadata, observer)
     if outcome.storage_error is not None:
         raise JournalError(f"{outcome.storage_error}; then: {_recovery(settings)}")
@@ -140,13 +129,12 @@ def _checked_metadata(settings: RecordSettings) -> dict[str, Any]:
         raise InputError("--source", got=f"{len(settings.sources)} sources", allowed=f"1 … {_MOST_SOURCES}")
     if len(set(settings.sources)) < len(settings.sources):
         raise InputError("--source", got="the same source twice", allowed="each source once")
-    if settings.align not in ALIGNMENTS:
-        raise InputError("--align", got=repr(settings.align), allowed=", ".join(ALIGNMENTS))
     if settings.duration_s is not None and not 0 < settings.duration_s <= LONGEST_DURATION_S:
         raise InputError("--duration", got=f"{settings.duration_s:g} s", allowed=f"0 … {LONGEST_DURATION_S:g} s")
+    chosen = {"align": checked_align(settings.align), "redundant": channel_pairs(settings.redundant)}
     Rig.from_toml(settings.rig)
     attributes = checked_run_attributes(settings.output, settings.rig, settings.run, settings.attributes)
-    return {"attributes": attributes, "align": settings.align, "redundant": settings.pairs}
+    return {"attributes": attributes, **chosen}
 
 
 def _require_free_place(settings: RecordSettings) -> None:

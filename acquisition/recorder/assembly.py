@@ -45,7 +45,7 @@ Align = Literal["host", "device", "counter"]
 Watch = Callable[[int, int], None]
 """Called with samples done and samples to do, while a recording is assembled."""
 
-ALIGNMENTS: Final = ("host", "device", "counter")
+ALIGNMENTS: Final[tuple[Align, ...]] = ("host", "device", "counter")
 
 
 @dataclass(frozen=True)

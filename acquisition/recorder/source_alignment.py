@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.recorder.placement import SourcePlacement
 from acquisition.recorder.survey import SourceSurvey
+from acquisition.sources.interface import SourceInfo
 from sloshlab.conditioning.device_clock import ClockStatus
 from sloshlab.conditioning.time_alignment import (
     PHASE_ERROR_AT_HZ,
@@ -90,6 +91,60 @@ class SourceAlignment:
         }
 
 
+def require_alignable(infos: Sequence[SourceInfo], align: str, redundant: Sequence[tuple[str, str]]) -> None:
+    """Refuse devices that cannot be aligned in the way asked for, whatever they will deliver.
+
+    Parameters
+    ----------
+    infos : sequence of SourceInfo
+        The first is the time base.
+    align : {"host", "device", "counter"}
+    redundant : sequence of (str, str)
+        Channels, one of the first device and one of another.
+
+    Raises
+    ------
+    InputError
+        If the rates differ under a common trigger, a device has no clock to be aligned by, or a pair does not
+        name a channel of the first device and one of another.
+    """
+    for other in infos[1:]:
+        if align == "counter":
+            _require_equal_rates(infos[0], other)
+        elif align == "device":
+            _require_clock(infos[0])
+            _require_clock(other)
+    own, *others = ({channel.name for channel in info.channels} for info in infos)
+    for first, second in redundant:
+        if not any((first in own and second in names) or (second in own and first in names) for names in others):
+            raise InputError(
+                f"redundant channels {first}:{second}",
+                got="no such pair",
+                allowed="a channel of the first device and one of another",
+                remedy=f"the first, {infos[0].device}, has {', '.join(sorted(own))}"[:300],
+            )
+
+
+def _require_equal_rates(base: SourceInfo, other: SourceInfo) -> None:
+    if abs(other.sampling_rate_hz / base.sampling_rate_hz - 1) > _LARGEST_STEP_DIFFERENCE:
+        raise InputError(
+            f"alignment by counter of {other.device}",
+            got=f"{other.sampling_rate_hz:g} Hz beside {base.sampling_rate_hz:g} Hz",
+            allowed="equal sampling rates",
+            remedy="--align host, or device where the device clocks are synchronised",
+        )
+
+
+def _require_clock(info: SourceInfo) -> None:
+    if info.clock_hz is None:
+        raise InputError(
+            f"alignment by device clock of {info.device}",
+            got="no device clock",
+            allowed="a device that sends its clock with its samples",
+            remedy="--align host, or counter for a common trigger",
+        )
+
+
 def first_source(placement: SourcePlacement) -> SourceAlignment:
     """The time base itself."""
     return SourceAlignment(AlignmentMethod.FIRST, 0.0, 1.0 / placement.info.sampling_rate_hz, 0.0)
@@ -103,14 +158,8 @@ def aligned_by_counter(base: SourcePlacement, other: SourcePlacement) -> SourceA
     InputError
         If the rates differ.
     """
-    rate_hz, other_hz = base.info.sampling_rate_hz, other.info.sampling_rate_hz
-    if abs(other_hz / rate_hz - 1) > _LARGEST_STEP_DIFFERENCE:
-        raise InputError(
-            f"alignment by counter of {other.info.device}",
-            got=f"{other_hz:g} Hz beside {rate_hz:g} Hz",
-            allowed="equal sampling rates",
-            remedy="align by host or device clock",
-        )
+    _require_equal_rates(base.info, other.info)
+    rate_hz = base.info.sampling_rate_hz
     shift = _counter_at_place_0(other) - _counter_at_place_0(base)
     return SourceAlignment(AlignmentMethod.COUNTER, shift / rate_hz, 1.0 / rate_hz, 0.0)
 
@@ -215,13 +264,14 @@ def _counter_at_place_0(placement: SourcePlacement) -> int:
 
 def _device_time(placement: SourcePlacement) -> tuple[float, float, float]:
     """Device clock at place 0 [s], between places, and the RMS of what a line leaves."""
+    _require_clock(placement.info)
     ticks, places = _ticks(placement)
-    if placement.info.clock_hz is None or places.size < 2 or places[0] == places[-1]:
+    if places.size < 2 or places[0] == places[-1]:
         raise InputError(
             f"alignment by device clock of {placement.info.device}",
-            got="no device clock" if placement.info.clock_hz is None else f"{places.size} readings of its clock",
-            allowed="a device that sends its clock with its samples",
-            remedy="align by host or counter",
+            got=f"{places.size} readings of its clock",
+            allowed="at least two, of different samples",
+            remedy="--align host, or counter for a common trigger",
         )
     time = (ticks - ticks[0]) / placement.info.clock_hz
     middle = places.mean()

@@ -344,6 +344,14 @@ REFUSED_RECORDINGS = {
     "a duration of nothing": (["--source", "file:{bench}/run.nc", "--duration", "0"], ("--duration", "0")),
     "an endless duration": (["--source", "file:{bench}/run.nc", "--duration", "inf"], ("--duration", "inf")),
     "unknown alignment": (["--source", "file:{bench}/run.nc", "--align", "guess"], ("--align", "'guess'")),
+    "clocks that are not there": (
+        ["--source", "file:{bench}/run.nc", "--source", "file:{bench}/run.nc?speed=10", "--align", "device"],
+        ("no device clock", "--align host"),
+    ),
+    "a pair of one device": (
+        ["--source", "file:{bench}/run.nc", "--redundant", "acceleration_roof_1:acceleration_roof_2"],
+        ("acceleration_roof_1:acceleration_roof_2", "one of another"),
+    ),
     "another rate": (
         ["--source", "file:{bench}/run.nc", "--attribute", "sampling_rate_hz=1000"],
         ("sampling_rate_hz", "512"),
@@ -396,6 +404,11 @@ def test_nothing_to_recover(content: bytes | None, bench: Path, lab: Path, capsy
     journal = lab / "old.journal"
     journal.write_bytes((bench / "run.nc").read_bytes() if content is None else content)
     refusal(capsys, ["recover", str(journal), "-o", str(lab / "new.nc")], lab, "old.journal")
+
+
+@pytest.mark.parametrize("options", [["--align", "guess"], ["--redundant", "a"]], ids=" ".join)
+def test_a_journal_cannot_be_aligned_by_anything(options: list[str], lab: Path, capsys) -> None:
+    refusal(capsys, ["recover", str(lab / "old.journal"), "-o", str(lab / "new.nc"), *options], lab, options[0])
 
 
 def test_no_journal_to_recover(lab: Path, capsys) -> None:

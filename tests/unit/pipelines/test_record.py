@@ -52,12 +52,19 @@ def true_counts(counter: int, n_samples: int) -> np.ndarray:
 class FakeSource(Source):
     """Two force channels at 1 kHz; deliveries, or an error, one per read."""
 
-    def __init__(self, url: str, steps: Sequence[Any] = (), on_open: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self,
+        url: str,
+        steps: Sequence[Any] = (),
+        on_open: Callable[[], None] | None = None,
+        rate_hz: float = 1000.0,
+        clock_hz: float | None = None,
+    ) -> None:
         self.url, self._steps, self._on_open = url, iter(steps), on_open
         device = url.partition(":")[2]
         channels = tuple(Channel(f"force_{device}_{k}", "force", "N", 16, 0.01) for k in range(2))
-        self._info = SourceInfo(device, url, 1000.0, channels, ((0, 1),))
-        self.n_opened = self.n_closed = 0
+        self._info = SourceInfo(device, url, rate_hz, channels, ((0, 1),), clock_hz)
+        self.n_opened = self.n_closed = self.n_started = 0
 
     def open(self) -> None:
         self.n_opened += 1
@@ -67,6 +74,9 @@ class FakeSource(Source):
     @property
     def info(self) -> SourceInfo:
         return self._info
+
+    def start(self) -> None:
+        self.n_started += 1
 
     def read(self, timeout_s: float) -> Sequence[Delivery]:
         step = next(self._steps, ())
@@ -199,6 +209,41 @@ def test_refused_before_a_device_is_touched(place: Path, options: dict, error: t
     known = {"sources": ("fake:a",), "rig": place.parent / "rig.toml", "output": place / "run.nc"}
     with pytest.raises(error, match=message):
         record(RecordSettings(**{**known, **options}), open_source=never)
+
+
+@pytest.mark.parametrize(
+    ("options", "second", "message"),
+    [
+        (
+            {"align": "counter"},
+            {"rate_hz": 999.0},
+            "alignment by counter of b: got 999 Hz beside 1000 Hz.*--align",
+        ),
+        ({"align": "device"}, {"clock_hz": None}, "alignment by device clock of b: got no device clock.*--align"),
+        ({"redundant": ("force_a_0:force_b_9",)}, {}, "force_a_0:force_b_9.*force_a_0, force_a_1"),
+        ({"redundant": ("force_b_0:force_b_1",)}, {}, "one of another"),
+    ],
+)
+def test_what_cannot_be_aligned_is_refused_before_a_device_starts(
+    place: Path, options: dict, second: dict, message: str
+) -> None:
+    sources = [
+        FakeSource("fake:a", complete(), clock_hz=1e6),
+        FakeSource("fake:b", complete(), **{"clock_hz": 1e6, **second}),
+    ]
+    with pytest.raises(InputError, match=message) as error:
+        record(settings_for(place, "fake:a", "fake:b", **options), open_source=opening(*sources))
+    assert "\n" not in str(error.value)
+    assert [source.n_started for source in sources] == [0, 0]
+    assert all(source.n_closed for source in sources)
+    assert not place.exists()
+
+
+@pytest.mark.parametrize("pair", ["force_a_0:force_b_1", "force_b_1:force_a_0"])
+def test_a_pair_may_be_named_in_either_order(place: Path, pair: str) -> None:
+    sources = opening(FakeSource("fake:a", complete()), FakeSource("fake:b", complete()))
+    record(settings_for(place, "fake:a", "fake:b", redundant=(pair,), align="counter"), open_source=sources)
+    assert np.array_equal(stored_counts(place / "run.nc", "b"), true_counts(0, N_SAMPLES))
 
 
 @pytest.mark.parametrize("name", ["run.nc", "run.journal"])

@@ -9,10 +9,23 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-from journals import ACCELERATION, FORCE, RATE_HZ, STREAM, Made, block, blocks, device, ended, made, write
+from journals import (
+    ACCELERATION,
+    ATTRIBUTES,
+    FORCE,
+    RATE_HZ,
+    STREAM,
+    Made,
+    block,
+    blocks,
+    device,
+    ended,
+    made,
+    write,
+)
 
 from acquisition.recorder.assembly import AssemblyOptions, assemble
-from acquisition.recorder.journal import read_journal
+from acquisition.recorder.journal import JournalWriter, read_journal
 from acquisition.sources.interface import Block, Channel, Delivery, End, SourceInfo, Trouble, TroubleKind
 from pipelines.recover import recover
 from sloshlab.errors import InputError, JournalError, RecordingError
@@ -456,6 +469,52 @@ def test_recovery_overwrites_only_when_told(cut_short: Path, tmp_path: Path) -> 
     assert (tmp_path / "run.nc").read_bytes() == b"precious"
     recover(cut_short, tmp_path / "run.nc", overwrite=True)
     assert read_recording(tmp_path / "run.nc").sizes["time"] == 320
+
+
+def two_devices_that_were_to_have_one_trigger(folder: Path) -> Path:
+    """The journal of two accelerometers of one motion at 512 Hz and 640 Hz, recorded by counter."""
+    roof = replace(ACCELERATION, name="acceleration_roof_2")
+    sent: list[tuple[int, Delivery]] = []
+    for source, rate_hz in enumerate((RATE_HZ, 640.0)):
+        counts = np.round(8000 * np.sin(2 * np.pi * 0.5 * np.arange(0, 20, 1 / rate_hz) ** 2))[:, None]
+        sent += [(source, one) for _, one in second(counts, rate_hz=rate_hz)]
+    journal = JournalWriter(
+        folder / "two.journal",
+        {"attributes": ATTRIBUTES, "align": "counter"},
+        [device(ACCELERATION), device(roof, name="can", rate_hz=640.0)],
+    )
+    for source, one in sent:
+        journal.append(source, one)
+    journal.close()
+    return folder / "two.journal"
+
+
+def test_a_journal_that_cannot_be_aligned_as_recorded_is_recovered_in_another_way(tmp_path: Path) -> None:
+    journal = two_devices_that_were_to_have_one_trigger(tmp_path)
+    with pytest.raises(InputError, match="--align host"):
+        recover(journal, tmp_path / "run.nc")
+    assert not (tmp_path / "run.nc").exists()
+    summary = recover(journal, tmp_path / "run.nc", align="host")
+    assert summary["report"]["alignment"]["can"]["method"] == "host"
+    redundant = ("acceleration_roof_1:acceleration_roof_2",)
+    summary = recover(journal, tmp_path / "run.nc", overwrite=True, align="host", redundant=redundant)
+    assert summary["report"]["alignment"]["can"]["method"] == "signals"
+    assert abs(summary["report"]["alignment"]["can"]["start_s"]) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"align": "guess"}, "--align"),
+        ({"redundant": ("a",)}, "--redundant"),
+        ({"align": "host", "redundant": ("acceleration_roof_1:none",)}, "one of another"),
+    ],
+)
+def test_recovery_refuses_what_recording_refuses(tmp_path: Path, options: dict, message: str) -> None:
+    journal = two_devices_that_were_to_have_one_trigger(tmp_path)
+    with pytest.raises(InputError, match=message):
+        recover(journal, tmp_path / "run.nc", **options)
+    assert [path.name for path in tmp_path.iterdir()] == ["two.journal"]
 
 
 def test_recovery_never_replaces_the_journal(cut_short: Path) -> None:
