@@ -106,9 +106,6 @@ class CanSource(Source):
             raise SourceError(f"source {self.url}: {self._dbc}", got="messages of CAN FD", allowed=allowed)
         self._receiver = CanReceiver(layout, self._longest_gap_s)
         _load_decoder(layout)
-        self._identifiers = [message.arbitration_id for message in layout.messages]
-        if layout.status is not None:
-            self._identifiers.append(layout.status.arbitration_id)
         self._link = self._connect(self._timeout_s)
         self._layout = layout
 
@@ -225,7 +222,7 @@ class CanSource(Source):
     def _delivered(self, received: Received) -> list[Delivery]:
         now_ns, utc_ns = self._monotonic_ns(), self._utc_ns()
         deliveries: list[Delivery] = []
-        if not self._heard and np.isin(received.batch.arbitration_id, self._identifiers).any():
+        if not self._heard and self._receiver.knows_any(received.batch):
             self._heard = True
             if self._away:
                 self._away = False

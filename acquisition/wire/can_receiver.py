@@ -161,6 +161,12 @@ class CanReceiver:
         now = int(monotonic[-1]) if n_frames else int(np.max(host_monotonic_ns))
         return deliveries + self._waited(now)
 
+    def knows_any(self, batch: FrameBatch) -> bool:
+        """Whether the device has sent any of the frames, as far as identifiers tell."""
+        messages: list[SampleMessage | ControlMessage] = [group.message for group in self._groups]
+        messages += [self._layout.status] if self._layout.status is not None else []
+        return any(bool(_is(batch, message).any()) for message in messages)
+
     def break_off(self, host_monotonic_ns: int) -> list[Delivery]:
         """Learn that the connection broke: only ``device_status`` tells whether the device starts anew meanwhile.
 

@@ -287,11 +287,18 @@ def test_without_reconnecting_a_broken_connection_is_an_error(dbc):
             read_until(source, has_end)
 
 
-def test_start_is_said_again_until_the_device_is_heard(dbc):
+FRAMES_OF_OTHERS = [b"", b"< frame 00000101 12.0 0000000000000000 >", b"< frame 555 12.0 00 >"]
+
+
+@pytest.mark.parametrize("between", FRAMES_OF_OTHERS)
+def test_start_is_said_again_until_the_device_is_heard(dbc, between):
+    """The second of the others has the number of the device's frames, but with 29 bits."""
+
     def deaf(server, connection):
         server.handshake(connection)
         for _ in range(3):
             server.hear(connection)
+            connection.sendall(between)
         connection.sendall(text(run(0, 200) + ENDING))
         server.hear_to_the_end(connection)
 
