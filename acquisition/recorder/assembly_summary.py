@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +16,7 @@ from sloshlab.conditioning.device_clock import ClockStatus
 
 MOST_LOSSES_NAMED: Final = 1000
 MOST_TROUBLES_NAMED: Final = 100
+_MOST_MESSAGES_NAMED: Final = 8
 
 _GRAVE = frozenset(
     kind.name
@@ -208,12 +209,7 @@ def _part_flags(part: Part, losses: Sequence[Loss]) -> Iterator[str]:
     rate_hz = placement.info.sampling_rate_hz
     own = [loss for loss in losses if loss.source == placement.source]
     if own:
-        longest = max(own, key=lambda loss: loss.n_samples)
-        counter = "between two streams" if longest.counter is None else f"from counter {longest.counter}"
-        yield (
-            f"{label}: {sum(loss.n_samples for loss in own)} samples lost in {len(own)} gaps, the longest "
-            f"{longest.n_samples} samples {counter} ({longest.index / rate_hz:.6g} s)"
-        )
+        yield f"{label}: {_lost(own, len(placement.groups), rate_hz)}"
     for name, one in zip(part.names, survey.channels, strict=True):
         if one.n_missing:
             yield f"{name}: {one.n_missing} samples without a reading, says the device"
@@ -234,6 +230,43 @@ def _part_flags(part: Part, losses: Sequence[Loss]) -> Iterator[str]:
     yield from _restart_flags(part)
     if part.alignment.method in (AlignmentMethod.NONE, AlignmentMethod.HOST):
         yield f"{label}: aligned by {part.alignment.method.value}"
+
+
+def _lost(losses: Sequence[Loss], n_messages: int, rate_hz: float) -> str:
+    """What one device lost, for a person: a sample that is lost in several CAN messages is one sample."""
+    gaps = _gaps(losses)
+    n_samples = sum(gap.n_samples for gap in gaps)
+    longest = max(gaps, key=lambda gap: gap.n_samples)
+    counter = "between two streams" if longest.counter is None else f"from counter {longest.counter}"
+    text = (
+        f"{n_samples} samples lost in {len(gaps)} gap{'s' * (len(gaps) > 1)}, the longest "
+        f"{longest.n_samples} samples {counter} ({longest.index / rate_hz:.6g} s)"
+    )
+    if n_messages == 1:
+        return text
+    by_message = [sum(loss.n_samples for loss in losses if loss.group == k) for k in range(n_messages)]
+    if all(n == n_samples for n in by_message):
+        return f"{text}, in each of its {n_messages} messages"
+    named = [f"message {k} lost {n}" for k, n in enumerate(by_message) if n]
+    more = (
+        [f"{len(named) - _MOST_MESSAGES_NAMED} more messages lost some"]
+        if len(named) > _MOST_MESSAGES_NAMED
+        else []
+    )
+    return "; ".join([text, *named[:_MOST_MESSAGES_NAMED], *more])
+
+
+def _gaps(losses: Sequence[Loss]) -> list[Loss]:
+    """Losses by place, with those that overlap, of several messages, as one."""
+    gaps: list[Loss] = []
+    for loss in sorted(losses, key=lambda one: one.index):
+        reached = gaps[-1].index + gaps[-1].n_samples if gaps else 0
+        if gaps and loss.index < reached:
+            stop = max(reached, loss.index + loss.n_samples)
+            gaps[-1] = replace(gaps[-1], n_samples=stop - gaps[-1].index)
+        else:
+            gaps.append(loss)
+    return gaps
 
 
 def _damage_flags(journal: Journal, part: Part) -> Iterator[str]:

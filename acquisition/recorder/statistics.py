@@ -284,8 +284,8 @@ class SourceMeters:
 
     @property
     def n_lost(self) -> int:
-        """Samples lost, summed over the channels' groups."""
-        return sum(loss.n_lost for loss in self.losses)
+        """Samples lost, the most of any group: a sample that is lost in all of them is one."""
+        return max(loss.n_lost for loss in self.losses)
 
     @property
     def n_spanned(self) -> int:

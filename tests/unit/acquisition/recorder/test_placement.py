@@ -41,7 +41,7 @@ def test_lost_blocks_leave_a_flagged_gap_of_their_length(tmp_path: Path) -> None
     np.testing.assert_array_equal(result.raw["force_cell_1"], expected)
     np.testing.assert_array_equal(np.flatnonzero(result.quality == LOST), np.arange(80, 112))
     assert result.losses == [[0, 0, 80, 32, 80]]
-    assert "32 samples lost in 1 gaps" in result.flags
+    assert "32 samples lost in 1 gap, " in result.flags
     assert result.summary.n_lost == {"force_cell_1": 32, "acceleration_roof_1": 32}
 
 
@@ -143,6 +143,37 @@ def test_groups_are_placed_each_by_its_own_counter(tmp_path: Path) -> None:
     assert (result.raw["acceleration_roof_1"][64:80] == FILL).all()
     assert result.losses == [[0, 1, 64, 16, 64]]
     assert result.summary.n_lost == {"force_cell_1": 0, "acceleration_roof_1": 16}
+
+
+def test_a_sample_that_all_messages_lost_is_one_lost_sample(tmp_path: Path) -> None:
+    sent = [one for k in range(0, 320, 16) for one in both_groups(k, k + 16)]
+    # both of 64 … 79, and the second of 128 … 143
+    lost = [sent.pop(17), sent.pop(9), sent.pop(8)]
+    assert [(one.group, one.counter) for one in lost] == [(1, 128), (1, 64), (0, 64)]
+    result = made(tmp_path, ended(sent, 320), TWO_GROUPS)
+    assert result.summary.flags == (
+        "daq: 32 samples lost in 2 gaps, the longest 16 samples from counter 64 (0.125 s); "
+        "message 0 lost 16; message 1 lost 32",
+    )
+    assert result.summary.record["losses"]["n_samples"] == 48
+
+
+def test_messages_that_lost_the_same_samples_are_said_at_once(tmp_path: Path) -> None:
+    sent = [one for k in range(0, 320, 16) for one in both_groups(k, k + 16)]
+    del sent[8:10], sent[20:24]
+    result = made(tmp_path, ended(sent, 320), TWO_GROUPS)
+    assert result.summary.flags == (
+        "daq: 48 samples lost in 2 gaps, the longest 32 samples from counter 176 (0.34375 s), "
+        "in each of its 2 messages",
+    )
+
+
+def test_gaps_of_messages_that_overlap_are_one(tmp_path: Path) -> None:
+    first = [block(0, 100, group=0, n_channels=1), block(200, 320, group=0, n_channels=1)]
+    other = [block(0, 150, group=1, n_channels=1), block(260, 320, group=1, n_channels=1)]
+    result = made(tmp_path, ended([first[0], other[0], first[1], other[1]], 320), TWO_GROUPS)
+    assert "160 samples lost in 1 gap, the longest 160 samples from counter 100" in result.flags
+    assert "message 0 lost 100; message 1 lost 110" in result.flags
 
 
 def test_ragged_ends_of_a_running_device_are_cut_to_what_all_groups_have(tmp_path: Path) -> None:

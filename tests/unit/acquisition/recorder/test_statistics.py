@@ -186,3 +186,6 @@ def test_a_source_with_several_groups() -> None:
     # the group furthest behind has 80 of every 100
     assert (meters.n_samples, meters.n_lost, meters.n_spanned) == (240, 40, 280)
     assert meters.measured_rate_hz == pytest.approx(100.0)
+    # a sample that is lost in both groups is one lost sample
+    meters.arrived(Block(0, 1, 330, np.zeros((1, 2), np.int32), None, 3 * SECOND_NS, 0))
+    assert (meters.losses[0].n_lost, meters.losses[1].n_lost, meters.n_lost) == (30, 40, 40)
