@@ -300,7 +300,8 @@ class CanSource(Source):
             group = options.text("channel") or DEFAULT_GROUP
             port = options.integer("port", _MULTICAST_PORT, lowest=1, highest=65535)
             exposed = options.yes("expose", False)
-            return lambda _: self._python_can(open_multicast_bus(group, port, fd=True, exposed=exposed))
+            name = f"source {self.url}"
+            return lambda _: self._python_can(open_multicast_bus(group, port, fd=True, exposed=exposed, name=name))
         return self._hardware(options, url, fd)
 
     def _socketcand(self, options: URLOptions) -> Callable[[float], CanLink]:
@@ -308,7 +309,13 @@ class CanSource(Source):
         port = options.integer("port", _SOCKETCAND_PORT, lowest=1, highest=65535)
         bus = options.text("channel") or "can0"
         return lambda timeout_s: open_socketcand(
-            host, port, bus, timeout_s=timeout_s, monotonic_ns=self._monotonic_ns, sleep=self._sleep
+            host,
+            port,
+            bus,
+            url=self.url,
+            timeout_s=timeout_s,
+            monotonic_ns=self._monotonic_ns,
+            sleep=self._sleep,
         )
 
     def _slcan(self, options: URLOptions) -> Callable[[float], CanLink]:
@@ -319,7 +326,7 @@ class CanSource(Source):
         bitrate = options.integer("bitrate", 0, lowest=0, highest=1_000_000)
         if bitrate and bitrate not in SLCAN_BITRATES:
             raise options.error("bitrate", str(bitrate), ", ".join(map(str, SLCAN_BITRATES)))
-        return lambda _: open_slcan(port, baudrate, bitrate, sleep=self._sleep)
+        return lambda _: open_slcan(port, baudrate, bitrate, url=self.url, sleep=self._sleep)
 
     def _hardware(self, options: URLOptions, url: SourceURL, fd: bool) -> Callable[[float], CanLink]:
         configuration: dict[str, Any] = {"interface": self._interface, **({"fd": True} if fd else {})}

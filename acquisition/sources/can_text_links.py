@@ -29,6 +29,7 @@ def open_socketcand(
     port: int,
     bus: str,
     *,
+    url: str,
     timeout_s: float,
     monotonic_ns: Callable[[], int] = time.monotonic_ns,
     sleep: Callable[[float], None] = time.sleep,
@@ -40,6 +41,8 @@ def open_socketcand(
     host, port : str, int
     bus : str
         Name of the bus at the server, for example ``can0``.
+    url : str
+        Of the source, for error messages.
     timeout_s : float
         For all of the handshake.
     monotonic_ns, sleep : callable
@@ -49,11 +52,13 @@ def open_socketcand(
     SourceError
         If nobody listens, it is no socketcand, or it has no such bus.
     """
-    name = f"can:socketcand?host={host}&port={port}&channel={bus}"
     if not _BUS_NAME.fullmatch(bus):
-        raise SourceError(f"{name}: channel", got=repr(bus)[:80], allowed="the name of a bus, for example can0")
+        allowed = "the name of a bus, for example can0"
+        raise SourceError(f"source {url}: channel", got=repr(bus)[:80], allowed=allowed)
     _parse_socketcand(_MADE_UP)
-    line = open_line(f"socket://[{host}]:{port}" if ":" in host else f"socket://{host}:{port}", 0)
+    address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    name = f"source {url}: {address}"
+    line = open_line(f"socket://{address}", 0, name=name)
     deadline_ns = monotonic_ns() + int(timeout_s * 1e9)
     try:
         rest = _answered(name, line, b"", b"hi", lambda: deadline_ns - monotonic_ns())
@@ -105,7 +110,9 @@ def _parse_socketcand(text: bytes) -> tuple[Received, bytes]:
     return Received(parsed.batch, parsed.n_error_frames, parsed.n_garbage_bytes), parsed.rest
 
 
-def open_slcan(port: str, baudrate: int, bitrate: int, *, sleep: Callable[[float], None] = time.sleep) -> TextLink:
+def open_slcan(
+    port: str, baudrate: int, bitrate: int, *, url: str, sleep: Callable[[float], None] = time.sleep
+) -> TextLink:
     """Open the port of an slcan adapter; frames come after `TextLink.start`.
 
     Parameters
@@ -116,6 +123,8 @@ def open_slcan(port: str, baudrate: int, bitrate: int, *, sleep: Callable[[float
         Of the port.
     bitrate : int
         Of the bus, one of `SLCAN_BITRATES`; 0 leaves the adapter's own.
+    url : str
+        Of the source, for error messages.
     sleep : callable
 
     Raises
@@ -125,7 +134,7 @@ def open_slcan(port: str, baudrate: int, bitrate: int, *, sleep: Callable[[float
     """
     speed = f"S{SLCAN_BITRATES.index(bitrate)}\r".encode() if bitrate else b""
     return TextLink(
-        open_line(port, baudrate),
+        open_line(port, baudrate, name=f"source {url}"),
         _parse_slcan,
         slcan_send,
         # an adapter that a killed program left open refuses everything else until it is closed

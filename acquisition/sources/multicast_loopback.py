@@ -24,7 +24,7 @@ _LOOPBACK_INTERFACE: Final = b"lo\0"
 _LOOPBACK_ADDRESS: Final = "127.0.0.1"
 
 
-def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool) -> Any:
+def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool, name: str | None = None) -> Any:
     """A bus of python-can over multicast.
 
     Parameters
@@ -36,6 +36,8 @@ def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool) -> Any
         Whether CAN FD frames are taken.
     exposed : bool
         Speak and listen on the network, one hop far, instead of on this computer only.
+    name : str, optional
+        For error messages; ``can:udp_multicast?channel=GROUP&port=PORT`` by default.
 
     Returns
     -------
@@ -48,7 +50,7 @@ def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool) -> Any
     """
     import can
 
-    name = f"can:udp_multicast?channel={group}&port={port}"
+    name = name or f"can:udp_multicast?channel={group}&port={port}"
     _check_group(name, group, exposed)
     try:
         bus = can.Bus(

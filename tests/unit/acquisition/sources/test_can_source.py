@@ -283,8 +283,9 @@ def test_without_reconnecting_a_broken_connection_is_an_error(dbc):
     script = hanging_up_after(text(run(0, 50)))
     with ScriptedServer(script) as server, open_source(url_of(server, dbc, "&reconnect=no")) as source:
         source.start()
-        with pytest.raises(SourceError, match="the connection was lost"):
+        with pytest.raises(SourceError, match="the connection was lost") as caught:
             read_until(source, has_end)
+    assert str(caught.value).startswith(f"source {source.url}: 127.0.0.1:{server.port}: got")
 
 
 FRAMES_OF_OTHERS = [b"", b"< frame 00000101 12.0 0000000000000000 >", b"< frame 555 12.0 00 >"]
@@ -338,6 +339,7 @@ def test_what_is_no_socketcand_is_one_line(dbc, script, said):
         with pytest.raises(SourceError, match=said) as caught:
             source.open()
         assert "\n" not in str(caught.value)
+        assert str(caught.value).startswith(f"source {source.url}: 127.0.0.1:{server.port}: got")
         source.close()
 
 
@@ -356,9 +358,9 @@ class EndlessLine:
 
 
 def test_a_handshake_without_end_is_broken_off(monkeypatch):
-    monkeypatch.setattr("acquisition.sources.can_text_links.open_line", lambda *_: EndlessLine())
+    monkeypatch.setattr("acquisition.sources.can_text_links.open_line", lambda *_, **__: EndlessLine())
     with pytest.raises(SourceError, match="allowed: '< hi >'"):
-        open_socketcand("127.0.0.1", 1, "can0", timeout_s=60.0)
+        open_socketcand("127.0.0.1", 1, "can0", url="can:socketcand", timeout_s=60.0)
 
 
 def test_a_server_that_never_stops_talking_costs_no_memory(dbc):
@@ -387,7 +389,10 @@ def test_a_server_that_never_stops_talking_costs_no_memory(dbc):
         ("can:socketcand?dbc=DBC&bus.x=1", "bus.x: got '1'"),
         ("can:socketcand?host=no.such.host.invalid&dbc=DBC", "no.such.host.invalid"),
         ("can:socketcand?dbc=nowhere.dbc", "nowhere.dbc"),
+        ("can:socketcand?port=1&dbc=DBC", "127.0.0.1:1: got .*refused"),
         ("can:slcan?dbc=DBC", "channel: got ''; allowed: the port of the adapter"),
+        ("can:slcan?channel=/no/such/port&dbc=DBC", "got no such port"),
+        ("can:slcan?channel=socket://127.0.0.1:1&dbc=DBC", "got .*refused"),
         ("can:slcan?channel=/dev/null&bitrate=123&dbc=DBC", "bitrate: got '123'; allowed: 10000, 20000"),
         ("can:udp_multicast?channel=127.0.0.1&dbc=DBC", "allowed: a multicast address"),
         ("can:udp_multicast?channel=ff15::42&dbc=DBC", "allowed: a multicast address"),
@@ -397,9 +402,13 @@ def test_a_server_that_never_stops_talking_costs_no_memory(dbc):
     ],
 )
 def test_what_cannot_be_opened_is_one_line(dbc, url, said):
+    url = url.replace("DBC", str(dbc))
     with pytest.raises(SourceError, match=said) as caught:
-        CanSource(parse_url(url.replace("DBC", str(dbc)))).open()
+        CanSource(parse_url(url)).open()
     assert "\n" not in str(caught.value)
+    # of several sources, a person must know which one
+    assert str(caught.value).startswith((f"source {url}: ", "nowhere.dbc: "))
+    assert "serial:" not in str(caught.value)
 
 
 def test_socketcand_carries_no_can_fd(tmp_path):
