@@ -14,6 +14,7 @@ from typing import Any, Final
 from acquisition.recorder.assembly import assemble
 from acquisition.recorder.assembly_summary import AssemblySummary
 from acquisition.recorder.journal import JournalWriter, existing_journal, read_journal
+from acquisition.recorder.longest_recording import longest_duration_s
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
 from acquisition.recorder.source_alignment import require_alignable
 from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus, StopReason
@@ -112,7 +113,9 @@ def record(
         infos = [source.info for source in sources]
         require_rate(metadata["attributes"], infos[0].sampling_rate_hz)
         require_alignable(infos, settings.align, metadata["redundant"])
-        outcome = _recorded(sources, settings, metadata, observer)
+        longest_s = longest_duration_s(infos, settings.align)
+        _require_readable_duration(settings.duration_s, longest_s)
+        outcome = _recorded(sources, settings, metadata, longest_s, observer)
     if outcome.storage_error is not None:
         raise JournalError(f"{outcome.storage_error}; then: {_recovery(settings)}")
     if not any(source.n_samples for source in outcome.status.sources):
@@ -155,8 +158,22 @@ def _require_free_place(settings: RecordSettings) -> None:
         )
 
 
+def _require_readable_duration(duration_s: float | None, longest_s: float) -> None:
+    if duration_s is not None and duration_s > longest_s:
+        raise InputError(
+            "--duration",
+            got=f"{duration_s:g} s",
+            allowed=f"≤ {longest_s:.6g} s of these devices: longer recordings cannot be read",
+            remedy="several recordings, one after the other",
+        )
+
+
 def _recorded(
-    sources: Sequence[Source], settings: RecordSettings, metadata: dict[str, Any], observer: Observer | None
+    sources: Sequence[Source],
+    settings: RecordSettings,
+    metadata: dict[str, Any],
+    longest_s: float,
+    observer: Observer | None,
 ) -> RecordingOutcome:
     journal_path = settings.journal
     journal_path.parent.mkdir(parents=True, exist_ok=True)
@@ -167,7 +184,7 @@ def _recorded(
         infos = [source.info for source in sources]
         journal = JournalWriter(journal_path, metadata, infos, overwrite=settings.overwrite)
         until_started.callback(journal.abandon)
-        recorder = Recorder(sources, journal, RecorderSettings(duration_s=settings.duration_s))
+        recorder = Recorder(sources, journal, RecorderSettings(settings.duration_s, longest_s=longest_s))
         with _signals_stop(recorder):
             until_started.pop_all()
             return recorder.run(observer)
@@ -261,7 +278,7 @@ def _summary(settings: RecordSettings, outcome: RecordingOutcome, assembled: Ass
     lines = [*assembled.lines, f"ended: {outcome.reason.value}"]
     lines += [f"journal: {settings.journal}"] if settings.keep_journal else []
     flags = list(assembled.flags)
-    if outcome.reason in (StopReason.SILENCE, StopReason.SOURCES_FAILED):
+    if outcome.reason in (StopReason.SILENCE, StopReason.SOURCES_FAILED, StopReason.TOO_LONG):
         flags.append(f"recording ended: {outcome.reason.value}")
     return {
         "lines": lines,

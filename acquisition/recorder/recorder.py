@@ -50,6 +50,8 @@ class RecorderSettings:
         A source that brings nothing for so long is called silent.
     silence_limit_s : float
         With a duration: the recording ends when no source has brought anything for so long.
+    longest_s : float or None
+        The recording ends when a device has sampled so much [s], see `longest_duration_s`.
     bytes_per_source : int
         Held in memory at most, per source, between reading and writing.
     """
@@ -58,6 +60,7 @@ class RecorderSettings:
     margin_s: float = 0.25
     silence_warning_s: float = 5.0
     silence_limit_s: float = 60.0
+    longest_s: float | None = None
     bytes_per_source: int = BYTES_PER_SOURCE
 
 
@@ -266,12 +269,17 @@ class Recorder:
             return StopReason.SOURCES_FAILED
         if all(record.state is SourceState.ENDED for record in running):
             return StopReason.END
-        if self._settings.duration_s is None:
-            return None
-        if self._has_recorded(self._settings.duration_s, running):
+        return self._reason_to_stop_running(running)
+
+    def _reason_to_stop_running(self, running: list[SourceRecord]) -> StopReason | None:
+        settings = self._settings
+        if settings.duration_s is not None and self._has_recorded(settings.duration_s, running):
             return StopReason.DURATION
+        if settings.longest_s is not None and max(record.recorded_s for record in running) >= settings.longest_s:
+            return StopReason.TOO_LONG
         quiet_s = min(record.quiet_s for record in running)
-        return StopReason.SILENCE if quiet_s > self._settings.silence_limit_s else None
+        is_over = settings.duration_s is not None and quiet_s > settings.silence_limit_s
+        return StopReason.SILENCE if is_over else None
 
     def _has_recorded(self, duration_s: float, running: list[SourceRecord]) -> bool:
         """Whether the first source has recorded enough, and the others cover it or bring nothing more."""

@@ -20,7 +20,9 @@ SAMPLES_PER_CHUNK: Final = 1 << 17
 COMPRESSION_LEVEL: Final = 1
 """Higher levels take several times as long and save a few per cent."""
 
-_BYTES_PER_VALUE = 8
+BYTES_PER_VALUE: Final = 8
+"""Readers decode to 64 bits, whatever is on the disk."""
+
 _FORMAT_REMEDY = "split the run; the journal keeps everything"
 
 
@@ -72,11 +74,11 @@ def require_readable_size(n_values: int, *, what: str, explanation: str = "") ->
     RecordingError
         If more memory were needed than `read_recording` grants.
     """
-    if _BYTES_PER_VALUE * n_values <= MAXIMUM_DECODED_BYTES:
+    if BYTES_PER_VALUE * n_values <= MAXIMUM_DECODED_BYTES:
         return
     raise RecordingError(
         what,
-        got=f"{_BYTES_PER_VALUE * n_values / 2**30:.3g} GiB decoded{explanation and f' ({explanation})'}",
+        got=f"{BYTES_PER_VALUE * n_values / 2**30:.3g} GiB decoded{explanation and f' ({explanation})'}",
         allowed=f"≤ {MAXIMUM_DECODED_BYTES / 2**30:.1f} GiB",
         remedy=_FORMAT_REMEDY,
     )
@@ -147,7 +149,7 @@ def _create(dataset: Any, variable: Variable, size: int) -> None:
     )
     created.set_auto_maskandscale(False)
     # chunks are written whole: a cache would only hold memory
-    created.set_var_chunk_cache(2 * _BYTES_PER_VALUE * chunk, 11, 1.0)
+    created.set_var_chunk_cache(2 * BYTES_PER_VALUE * chunk, 11, 1.0)
     created.setncatts(dict(variable.attributes))
 
 

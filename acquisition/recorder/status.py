@@ -31,6 +31,7 @@ class StopReason(enum.Enum):
     REQUESTED = "stopped on request"
     SOURCES_FAILED = "no source was left"
     SILENCE = "no source delivered anything for too long"
+    TOO_LONG = "a longer recording could not be read; record the rest into another"
     STORAGE = "the journal could not be written"
 
 

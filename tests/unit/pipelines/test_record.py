@@ -239,6 +239,33 @@ def test_what_cannot_be_aligned_is_refused_before_a_device_starts(
     assert not place.exists()
 
 
+def test_a_duration_that_no_reader_takes_is_refused_before_a_device_starts(place: Path) -> None:
+    # two channels, time and quality at 1 kHz, eight bytes each: 6 GiB are 201 326.6 s, of which 2 % are kept back
+    source = FakeSource("fake:a", complete())
+    with pytest.raises(InputError, match=r"--duration: got 201000 s; allowed: ≤ 197300 s.*several recordings"):
+        record(settings_for(place, duration_s=201_000.0), open_source=opening(source))
+    assert source.n_started == 0
+    assert not place.exists()
+    record(settings_for(place, duration_s=197_300.0), open_source=opening(FakeSource("fake:a", complete())))
+
+
+def test_a_recording_ends_before_no_reader_takes_it(place: Path, monkeypatch) -> None:
+    """A device without an end, and room for 300 samples of time and quality and two channels."""
+    monkeypatch.setattr("acquisition.recorder.longest_recording.MAXIMUM_DECODED_BYTES", int(300 * 4 * 8 / 0.98))
+
+    def endless() -> Iterator[list[Block]]:
+        for k in range(10**9):
+            yield [block(10 * k)]
+            time.sleep(0.001)
+
+    summary = record(settings_for(place), open_source=opening(FakeSource("fake:a", endless())))
+    assert summary["reason"] == "too_long"
+    assert any("could not be read" in flag for flag in summary["flags"])
+    n_samples = summary["report"]["n_samples"]
+    assert n_samples >= 300
+    assert np.array_equal(stored_counts(place / "run.nc"), true_counts(0, n_samples))
+
+
 @pytest.mark.parametrize("pair", ["force_a_0:force_b_1", "force_b_1:force_a_0"])
 def test_a_pair_may_be_named_in_either_order(place: Path, pair: str) -> None:
     sources = opening(FakeSource("fake:a", complete()), FakeSource("fake:b", complete()))
