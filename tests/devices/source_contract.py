@@ -57,10 +57,6 @@ class SourceContract:
         """Device number 1 or 2, with samples of its own."""
         raise NotImplementedError
 
-    def source(self, url: str) -> Source:
-        """The source of a URL."""
-        return open_source(url)
-
     @pytest.fixture
     def devices(self, tmp_path) -> Iterator[Callable[[int], WorkingDevice]]:
         """Makes devices and lets them go at the end."""
@@ -68,7 +64,7 @@ class SourceContract:
             yield lambda number=1: stack.enter_context(self.device(tmp_path, number))
 
     def test_it_says_nothing_before_it_is_open(self, devices):
-        source = self.source(devices().url)
+        source = open_source(devices().url)
         with pytest.raises(SourceError):
             _ = source.info
         with pytest.raises(SourceError):
@@ -77,7 +73,7 @@ class SourceContract:
 
     def test_it_says_what_the_device_is(self, devices):
         device = devices()
-        with self.source(device.url) as source:
+        with open_source(device.url) as source:
             info = source.info
             assert info.url == source.url == device.url
             assert [channel.name for channel in info.channels] == device.channels
@@ -90,14 +86,14 @@ class SourceContract:
 
     def test_every_sample_is_delivered_once_in_its_place(self, devices):
         device = devices()
-        with self.source(device.url) as source:
+        with open_source(device.url) as source:
             source.start()
             delivered = everything(source, device)
         assert_complete(delivered, device)
 
     def test_a_read_in_silence_takes_its_time_and_no_processor(self, devices):
         device = devices()
-        with self.source(device.url) as source:
+        with open_source(device.url) as source:
             source.start()
             everything(source, device)
             began_s, used_s = time.monotonic(), time.thread_time()
@@ -110,7 +106,7 @@ class SourceContract:
 
     def test_a_read_without_patience_returns_at_once(self, devices):
         device = devices()
-        with self.source(device.url) as source:
+        with open_source(device.url) as source:
             source.start()
             everything(source, device)
             used_s = time.thread_time()
@@ -119,7 +115,7 @@ class SourceContract:
             assert time.thread_time() - used_s < 1.0
 
     def test_it_can_be_closed_twice_and_is_closed_then(self, devices):
-        source = self.source(devices().url)
+        source = open_source(devices().url)
         source.open()
         source.close()
         source.close()
@@ -127,11 +123,11 @@ class SourceContract:
             source.read(0.0)
 
     def test_nothing_is_left_of_it(self, tmp_path):
-        with self.device(tmp_path, 1) as device, self.source(device.url) as source:
+        with self.device(tmp_path, 1) as device, open_source(device.url) as source:
             source.start()
             everything(source, device)
         descriptors, threads = open_descriptors(), set(threading.enumerate())
-        with self.device(tmp_path, 2) as device, self.source(device.url) as source:
+        with self.device(tmp_path, 2) as device, open_source(device.url) as source:
             source.start()
             everything(source, device)
         assert open_descriptors() == descriptors
@@ -139,7 +135,7 @@ class SourceContract:
 
     def test_an_error_of_the_user_closes_it(self, devices):
         url = devices().url
-        source = self.source(url)
+        source = open_source(url)
         with pytest.raises(ZeroDivisionError):
             start_and_fail(source)
         with pytest.raises(SourceError):
@@ -148,14 +144,14 @@ class SourceContract:
     def test_an_unknown_target_is_one_line(self, tmp_path):
         descriptors = open_descriptors()
         with pytest.raises(SourceError) as caught:
-            self.source(self.unknown_url.replace("FOLDER", str(tmp_path))).open()
+            open_source(self.unknown_url.replace("FOLDER", str(tmp_path))).open()
         assert "\n" not in str(caught.value)
         assert len(str(caught.value)) > 20
         assert open_descriptors() == descriptors
 
     def test_two_sources_do_not_disturb_each_other(self, devices):
         first, second = devices(1), devices(2)
-        with self.source(first.url) as one, self.source(second.url) as other:
+        with open_source(first.url) as one, open_source(second.url) as other:
             one.start()
             other.start()
             collecting = [Collector(first, one), Collector(second, other)]

@@ -6,10 +6,12 @@ import contextlib
 import math
 import re
 import socket
+import sys
 import threading
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 from source_contract import SourceContract, WorkingDevice
 
@@ -102,60 +104,53 @@ class TestVirtualLaboratory(SourceContract):
         yield WorkingDevice(url, counts.astype(np.int64), list(CHANNELS), 512.0)
 
 
-class TestPseudoTerminal(SourceContract):
+class SimulatedDeviceContract(SourceContract):
+    """The contract on a simulated device."""
+
+    appears_as: str
+    """URL with ``{folder}``, ``{number}`` of the device, and ``{port}`` for a UDP port that is free."""
+
+    def device(self, folder: Path, number: int):
+        return simulated(self.appears_as.format(folder=folder, number=number, port=free_port()), number)
+
+
+class TestPseudoTerminal(SimulatedDeviceContract):
     unknown_url = "serial:FOLDER/no_port"
-
-    def device(self, folder: Path, number: int):
-        return simulated(f"serial:{folder}/port_{number}", number)
+    appears_as = "serial:{folder}/port_{number}"
 
 
-class TestSerialOverTCP(SourceContract):
+class TestSerialOverTCP(SimulatedDeviceContract):
     unknown_url = "serial:socket://127.0.0.1:1"
-
-    def device(self, folder: Path, number: int):
-        return simulated("serial:socket://127.0.0.1:0", number)
+    appears_as = "serial:socket://127.0.0.1:0"
 
 
-class TestVirtualBus(SourceContract):
+class TestVirtualBus(SimulatedDeviceContract):
     unknown_url = "can:virtual?channel=nowhere&dbc=FOLDER/no.dbc"
-
-    def device(self, folder: Path, number: int):
-        return simulated(f"can:virtual?channel={folder.name}_{number}&dbc={folder}/bus_{number}.dbc", number)
+    appears_as = "can:virtual?channel={folder.name}_{number}&dbc={folder}/bus_{number}.dbc"
 
 
-class TestVirtualBusFD(SourceContract):
+class TestVirtualBusFD(SimulatedDeviceContract):
     unknown_url = "can:no_such_interface?channel=nowhere&dbc=FOLDER/no.dbc"
-
-    def device(self, folder: Path, number: int):
-        url = f"can:virtual?channel={folder.name}_{number}&dbc={folder}/bus_{number}.dbc&fd=yes"
-        return simulated(url, number)
+    appears_as = f"{TestVirtualBus.appears_as}&fd=yes"
 
 
-class TestSocketcand(SourceContract):
+class TestSocketcand(SimulatedDeviceContract):
     unknown_url = "can:socketcand?port=1&dbc=FOLDER/no.dbc"
-
-    def device(self, folder: Path, number: int):
-        return simulated(f"can:socketcand?port=0&channel=can{number}&dbc={folder}/bus_{number}.dbc", number)
+    appears_as = "can:socketcand?port=0&channel=can{number}&dbc={folder}/bus_{number}.dbc"
 
 
-class TestSlcan(SourceContract):
+class TestSlcan(SimulatedDeviceContract):
     unknown_url = "can:slcan?channel=FOLDER/no_port&dbc=FOLDER/no.dbc"
-
-    def device(self, folder: Path, number: int):
-        return simulated(f"can:slcan?channel={folder}/adapter_{number}&dbc={folder}/bus_{number}.dbc", number)
+    appears_as = "can:slcan?channel={folder}/adapter_{number}&dbc={folder}/bus_{number}.dbc"
 
 
 class TestSlcanFD(TestSlcan):
-    def device(self, folder: Path, number: int):
-        url = f"can:slcan?channel={folder}/adapter_{number}&dbc={folder}/bus_{number}.dbc&fd=yes"
-        return simulated(url, number)
+    appears_as = f"{TestSlcan.appears_as}&fd=yes"
 
 
-class TestMulticast(SourceContract):
+class TestMulticast(SimulatedDeviceContract):
     unknown_url = "can:udp_multicast?channel=10.1.2.3&dbc=FOLDER/no.dbc"
-
-    def device(self, folder: Path, number: int):
-        return simulated(f"can:udp_multicast?port={free_port()}&dbc={folder}/bus_{number}.dbc", number)
+    appears_as = "can:udp_multicast?port={port}&dbc={folder}/bus_{number}.dbc"
 
 
 class TestRamp(SourceContract):
@@ -169,20 +164,24 @@ class TestRamp(SourceContract):
         url = f"ramp:pressure_{number}?n_samples={len(counts)}"
         yield WorkingDevice(url, counts, [f"voltage_pressure_{number}"], RATE_HZ)
 
-    def source(self, url: str):
-        return DOCUMENTED["RampSource"](parse_url(url))
-
-
-def documented_backend() -> dict:
-    """What the Python of docs/sources.md defines."""
-    page = Path(__file__).resolve().parents[2] / "docs" / "sources.md"
-    (code,) = re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    defined: dict = {"__name__": "documented"}
-    exec(compile(code, str(page), "exec"), defined)
-    return defined
-
-
-DOCUMENTED = documented_backend()
+    @pytest.fixture(autouse=True)
+    def installed(self, repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+        """The package of the page, installed as far as Python looks."""
+        page = (repository / "docs" / "sources.md").read_text(encoding="utf-8")
+        ((group, entry, package, module),) = re.findall(
+            r'^\[project\.entry-points\."(.+)"\]\n(\w+ = "(\w+)\.(\w+):\w+")$', page, re.MULTILINE
+        )
+        (code,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+        (tmp_path / package).mkdir()
+        (tmp_path / package / f"{module}.py").write_text(code, encoding="utf-8")
+        metadata = tmp_path / f"{package}-1.0.dist-info"
+        metadata.mkdir()
+        (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        (metadata / "entry_points.txt").write_text(f"[{group}]\n{entry.replace(chr(34), '')}\n")
+        monkeypatch.syspath_prepend(tmp_path)
+        yield
+        for name in (f"{package}.{module}", package):
+            sys.modules.pop(name, None)
 
 
 def free_port() -> int:
