@@ -16,6 +16,7 @@ from acquisition.recorder.assembly_summary import AssemblySummary
 from acquisition.recorder.journal import JournalWriter, existing_journal, read_journal
 from acquisition.recorder.longest_recording import longest_duration_s
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
+from acquisition.recorder.recording_plan import require_recordable
 from acquisition.recorder.source_alignment import require_alignable
 from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus, StopReason
 from acquisition.sources.interface import Source
@@ -112,6 +113,7 @@ def record(
     with opened([open_source(url) for url in settings.sources]) as sources:
         infos = [source.info for source in sources]
         require_rate(metadata["attributes"], infos[0].sampling_rate_hz)
+        require_recordable(infos, metadata["attributes"], f"recording {settings.output}")
         require_alignable(infos, settings.align, metadata["redundant"])
         longest_s = longest_duration_s(infos, settings.align)
         _require_readable_duration(settings.duration_s, longest_s)

@@ -120,7 +120,8 @@ def assemble(
     parts = _parts(journal, placements, chosen, str(attributes["experiment"]), advance)
     n_samples = _n_samples(parts, chosen)
     _require_size(parts, n_samples, output)
-    attributes = checked_attributes(attributes, parts, str(output), rate_hz)
+    named_channels = [pair for part in parts for pair in part.named_channels]
+    attributes = checked_attributes(attributes, named_channels, str(output), rate_hz)
     doubts = doubtful_sensors(parts, str(attributes["experiment"]))
     record = acquisition_record(journal, parts, losses)
     variables = variables_of(parts)
@@ -221,8 +222,9 @@ def _parts(
     base = placements[0]
     pairs = [common_motion_pairs(base, other, options.redundant, experiment) for other in placements[1:]]
     for_alignment = {name for own in pairs for pair in own for name in pair}
-    labels = device_labels(placements)
-    names = channel_names(placements, labels)
+    infos = [one.info for one in placements]
+    labels = device_labels(infos)
+    names = channel_names(infos, labels)
     samples = [PlacedSamples(journal, placement) for placement in placements]
     surveys = [_survey(one, for_alignment, experiment, advance) for one in samples]
     alignments = [first_source(base)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,9 +17,9 @@ from acquisition.recorder.placement import SourcePlacement
 from acquisition.recorder.recording_file import Variable
 from acquisition.recorder.source_alignment import SourceAlignment
 from acquisition.recorder.survey import ChannelSurvey, SourceSurvey
-from acquisition.sources.interface import Channel, attributes_of
+from acquisition.sources.interface import Channel, SourceInfo, attributes_of
 from sloshlab.errors import JournalError
-from sloshlab.recording import quality_attributes, validate_recording
+from sloshlab.recording import FORMAT, quality_attributes, validate_recording
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,127}")
 
@@ -59,16 +59,21 @@ class Part:
         return self.placement.info.channels
 
     @property
+    def named_channels(self) -> list[tuple[str, Channel]]:
+        """Names in the recording and channels."""
+        return list(zip(self.names, self.channels, strict=True))
+
+    @property
     def shift(self) -> int:
         """Steps between the first place of the time base and its own, where it is sampled on it."""
         return round(self.alignment.start_s / self.alignment.step_s)
 
 
-def device_labels(placements: Sequence[SourcePlacement]) -> list[str]:
+def device_labels(infos: Sequence[SourceInfo]) -> list[str]:
     """Unique names that may be part of a variable's name."""
     labels: list[str] = []
-    for placement in placements:
-        plain = re.sub(r"[^A-Za-z0-9_]+", "_", placement.info.device)[:40] or "device"
+    for info in infos:
+        plain = re.sub(r"[^A-Za-z0-9_]+", "_", info.device)[:40] or "device"
         label, number = plain, 2
         while label in labels:
             label, number = f"{plain}_{number}", number + 1
@@ -76,7 +81,7 @@ def device_labels(placements: Sequence[SourcePlacement]) -> list[str]:
     return labels
 
 
-def channel_names(placements: Sequence[SourcePlacement], labels: Sequence[str]) -> list[tuple[str, ...]]:
+def channel_names(infos: Sequence[SourceInfo], labels: Sequence[str]) -> list[tuple[str, ...]]:
     """Names in the recording; the second device to use a name gets its own appended.
 
     Raises
@@ -86,13 +91,13 @@ def channel_names(placements: Sequence[SourcePlacement], labels: Sequence[str]) 
     """
     taken: set[str] = {"time", "quality"}
     named = []
-    for placement, label in zip(placements, labels, strict=True):
+    for info, label in zip(infos, labels, strict=True):
         own = []
-        for channel in placement.info.channels:
+        for channel in info.channels:
             name = channel.name if channel.name not in taken else f"{channel.name}_{label}"
             if name in taken or not _NAME.fullmatch(channel.name):
                 raise JournalError(
-                    f"channel of {placement.info.device}",
+                    f"channel of {info.device}",
                     got=repr(channel.name)[:80],
                     allowed="letters, digits and underscores; each name once",
                 )
@@ -167,8 +172,33 @@ def _scaling(channel: Channel) -> dict[str, float]:
     return {"scale_factor": float(channel.scale_factor), **offset}
 
 
+def require_recordable(infos: Sequence[SourceInfo], attributes: Mapping[str, Any], what: str) -> None:
+    """Refuse devices whose channels no recording can hold, before anything is recorded.
+
+    Parameters
+    ----------
+    infos : sequence of SourceInfo
+        The first is the time base.
+    attributes : mapping
+        Of the run, as far as they are known.
+    what : str
+        For the message.
+
+    Raises
+    ------
+    JournalError, RecordingError
+        As at the assembly.
+    """
+    measured = {"start_time_utc": "2026-01-01T00:00:00Z", "sampling_rate_hz": infos[0].sampling_rate_hz}
+    names = channel_names(infos, device_labels(infos))
+    named = [pair for own, info in zip(names, infos, strict=True) for pair in zip(own, info.channels, strict=True)]
+    checked_attributes(
+        {"sloshlab_format": FORMAT, **measured, **attributes}, named, what, infos[0].sampling_rate_hz
+    )
+
+
 def checked_attributes(
-    attributes: Mapping[str, Any], parts: Sequence[Part], what: str, rate_hz: float
+    attributes: Mapping[str, Any], named_channels: Iterable[tuple[str, Channel]], what: str, rate_hz: float
 ) -> dict[str, Any]:
     """Global attributes as they can be written.
 
@@ -178,11 +208,7 @@ def checked_attributes(
         If they, or a channel's, are not those of a recording: found out before anything is written.
     """
     plain = {key: _plain(value) for key, value in attributes.items() if value is not None}
-    empty = {
-        name: ("time", np.zeros(2), attributes_of(channel))
-        for part in parts
-        for name, channel in zip(part.names, part.channels, strict=True)
-    }
+    empty = {name: ("time", np.zeros(2), attributes_of(channel)) for name, channel in named_channels}
     validate_recording(xr.Dataset(empty, coords={"time": [0.0, 1.0 / rate_hz]}, attrs=plain), name=what)
     return plain
 

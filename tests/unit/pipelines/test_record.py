@@ -9,6 +9,7 @@ import signal
 import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -236,6 +237,28 @@ def test_what_cannot_be_aligned_is_refused_before_a_device_starts(
     assert "\n" not in str(error.value)
     assert [source.n_started for source in sources] == [0, 0]
     assert all(source.n_closed for source in sources)
+    assert not place.exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"units": "m"}, "force_b_0: units of a force: got 'm'"),
+        ({"units": ""}, "force_b_0: units of a force: got ''"),
+        ({"quantity": "pressure"}, "force_b_0.*pressure"),
+        ({"name": "force/b"}, "force/b.*letters, digits"),
+    ],
+)
+def test_channels_that_no_recording_can_hold_are_refused_before_a_device_starts(
+    place: Path, change: dict, message: str
+) -> None:
+    sources = [FakeSource("fake:a", complete()), FakeSource("fake:b", complete())]
+    first, second = sources[1].info.channels
+    sources[1]._info = replace(sources[1].info, channels=(replace(first, **change), second))
+    with pytest.raises(InputError, match=message) as error:
+        record(settings_for(place, "fake:a", "fake:b"), open_source=opening(*sources))
+    assert "\n" not in str(error.value)
+    assert [source.n_started for source in sources] == [0, 0]
     assert not place.exists()
 
 
