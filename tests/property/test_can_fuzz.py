@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import binascii
+import dataclasses
+import struct
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.sources.interface import Block, Channel, End
+from acquisition.sources.interface import Block, Channel, Delivery, End, Trouble, TroubleKind
 from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_counter import CounterTracker
 from acquisition.wire.can_frames import control_frame, encode_samples
 from acquisition.wire.can_layout import STATUS, STATUS_ID, device_database
 from acquisition.wire.can_receiver import CanReceiver
 from acquisition.wire.slcan_text import LONGEST_LINE_BYTES, parse_slcan, slcan_send
-from sloshlab.errors import SourceError
 
 RATE_HZ = 1000.0
 LAYOUT = device_database("daq", RATE_HZ, None, [Channel("force_cell_1", "force", "N", 32)])
@@ -49,7 +52,7 @@ def disturbed(draw: st.DrawFn) -> tuple[int, np.ndarray]:
     return start, counters
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(disturbed(), st.integers(1, 400), st.booleans())
 def test_whatever_is_accepted_has_its_true_counter(
     stream: tuple[int, np.ndarray], per_call: int, has_status: bool
@@ -76,7 +79,7 @@ def test_whatever_is_accepted_has_its_true_counter(
         assert not turns.any()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 900), st.integers(1, 1000))
 def test_clean_stream_is_accepted_whole(start: int, n_frames: int, per_call: int) -> None:
     counters = np.arange(start, start + n_frames)
@@ -102,7 +105,7 @@ def batch_of(frames: list[tuple[int, bytes]]) -> FrameBatch:
 
 
 class TestReceiver:
-    @settings(max_examples=20, deadline=None)
+    @settings(max_examples=20, deadline=None, derandomize=True)
     @given(
         st.integers(0, 2**32),
         st.sampled_from([0.0, 0.02, 0.3]),
@@ -142,26 +145,51 @@ class TestReceiver:
         if not corrupted and not lost:
             assert seen == set(range(600))
 
-    @settings(max_examples=100, deadline=None)
+    @settings(max_examples=100, deadline=None, derandomize=True)
     @given(st.lists(st.tuples(st.sampled_from([0x100, 0x101, 0x102, 0x80]), st.binary(max_size=64)), max_size=40))
     def test_any_frames_make_troubles_at_most(self, frames: list[tuple[int, bytes]]) -> None:
         receiver = CanReceiver(LAYOUT)
         deliveries = receiver.take(batch_of(frames), 0, 0) + receiver.finish(1)
         assert not any(isinstance(one, Block | End) for one in deliveries)
 
-    @settings(max_examples=30, deadline=None)
-    @given(st.lists(st.binary(min_size=6, max_size=6), min_size=1, max_size=300))
-    def test_sealed_nonsense_stays_bounded(self, bodies: list[bytes]) -> None:
-        import binascii
-        import struct
+    @settings(max_examples=20, deadline=None, derandomize=True)
+    @given(
+        st.integers(0, 2**32), st.sampled_from([0.01, 0.3, 1.0]), st.booleans(), st.sampled_from([50, 701, 9000])
+    )
+    def test_sealed_nonsense_is_accounted_for_in_bounded_memory(
+        self, seed: int, share: float, is_stuck: bool, per_call: int
+    ) -> None:
+        """Counters that make no sense under good checksums, from a device that announces nothing."""
+        rng = np.random.default_rng(seed)
+        (sent,) = encode_samples(LAYOUT, 0, None, np.zeros((9000, 1), np.int64))
+        nonsense = rng.random(9000) < share
+        sent.data[nonsense, 2:] = rng.integers(0, 256, (int(nonsense.sum()), 6))
+        if is_stuck:
+            sent.data[nonsense, 2] = 5  # without the high bits of the counter: such frames prove nothing
+        frames = [(0x101, sealed(row[2:].tobytes())) for row in sent.data]
+        receiver = CanReceiver(dataclasses.replace(LAYOUT, status=None))
+        n_accounted = 0
+        for k in range(0, len(frames), per_call):
+            n_accounted += n_frames_of(receiver.take(batch_of(frames[k : k + per_call]), k, k))
+            n_waiting = min(k + per_call, len(frames)) - n_accounted - receiver.n_repeated
+            assert 0 <= n_waiting <= MOST_WAITING
+        n_accounted += n_frames_of(receiver.finish(len(frames)))
+        assert n_accounted + receiver.n_repeated == len(frames)
 
-        receiver = CanReceiver(LAYOUT)
-        for body in bodies:
-            crc = binascii.crc_hqx(struct.pack("<I", 0x101) + body, 0xFFFF)
-            try:
-                receiver.take(batch_of([(0x101, struct.pack("<H", crc) + body)]), 0, 0)
-            except SourceError:
-                return
+
+MOST_WAITING = 4096 + 8
+"""Frames that wait to be proved, and those of one turn of the clock."""
+
+
+def n_frames_of(deliveries: list[Delivery]) -> int:
+    """Frames that they account for, each with one sample."""
+    n_delivered = sum(len(one.counts) for one in deliveries if isinstance(one, Block))
+    uncertain = TroubleKind.UNCERTAIN_COUNTER
+    return n_delivered + sum(one.count for one in deliveries if isinstance(one, Trouble) and one.kind is uncertain)
+
+
+def sealed(body: bytes) -> bytes:
+    return struct.pack("<H", binascii.crc_hqx(struct.pack("<I", 0x101) + body, 0xFFFF)) + body
 
 
 slcan_frames = st.builds(
@@ -174,7 +202,7 @@ slcan_frames = st.builds(
 
 
 class TestSlcan:
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=200, deadline=None, derandomize=True)
     @given(
         st.binary(max_size=400) | st.text(alphabet="tTrRdDbB0189aF\r\a\n", max_size=400).map(str.encode), st.data()
     )
@@ -190,7 +218,7 @@ class TestSlcan:
         assert whole.n_bells == first.n_bells + second.n_bells
         assert whole.n_garbage_bytes == first.n_garbage_bytes + second.n_garbage_bytes
 
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=200, deadline=None, derandomize=True)
     @given(st.lists(slcan_frames, max_size=12), st.binary(max_size=30).map(lambda b: b.translate(None, b"\r\n\a")))
     def test_frames_between_garbage_are_all_found(
         self, frames: list[tuple[int, bytes, bool, bool]], garbage: bytes

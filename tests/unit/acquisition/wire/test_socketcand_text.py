@@ -9,12 +9,13 @@ from can.interfaces.socketcand.socketcand import (
     convert_ascii_message_to_can_message,
     convert_can_message_to_ascii_message,
 )
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition.wire.socketcand_text import LONGEST_MESSAGE_BYTES, parse_socketcand, socketcand_send
 from sloshlab.errors import InputError
 
+FUZZ = settings(deadline=None, derandomize=True)
 FRAMES = st.lists(
     st.tuples(
         st.booleans(),
@@ -46,9 +47,7 @@ def frames_of(batch):
     return list(zip(batch.extended.tolist(), batch.arbitration_id.tolist(), contents, strict=True))
 
 
-parse_socketcand(b"< frame 101 0.000000 00 >")  # compiled now, not within the time that a case has
-
-
+@FUZZ
 @given(FRAMES, st.lists(st.sampled_from(list(UNUSUAL)), max_size=5), st.randoms())
 def test_unusual_messages_among_usual_ones(frames, unusual, random):
     usual = [(text_of(*one), (one[0], one[1] if one[0] else one[1] & 0x7FF, one[2])) for one in frames]
@@ -60,6 +59,7 @@ def test_unusual_messages_among_usual_ones(frames, unusual, random):
     assert parsed.n_garbage_bytes == unusual.count(b"?")
 
 
+@FUZZ
 @given(FRAMES)
 def test_frames_are_those_that_python_can_reads(frames):
     texts = [text_of(*frame) for frame in frames]
@@ -72,6 +72,7 @@ def test_frames_are_those_that_python_can_reads(frames):
     assert parsed.batch.data.dtype == np.uint8
 
 
+@FUZZ
 @given(FRAMES, st.lists(st.integers(0, 2000), max_size=10))
 def test_text_may_be_cut_anywhere(frames, cuts):
     content = b" ".join(text_of(*frame) for frame in frames)
@@ -85,6 +86,7 @@ def test_text_may_be_cut_anywhere(frames, cuts):
     assert (rest, n_garbage) == (b"", 0)
 
 
+@FUZZ
 @given(st.binary(max_size=400))
 def test_any_bytes_are_taken_apart_in_bounded_memory(content):
     parsed = parse_socketcand(content + b"< frame 101 1.0 0102 >")
@@ -134,6 +136,7 @@ def test_error_frames_and_answers_are_no_garbage():
     assert (len(parsed.batch), parsed.n_error_frames, parsed.n_garbage_bytes) == (0, 2, 0)
 
 
+@FUZZ
 @given(st.booleans(), st.integers(0, 0x7FF), st.binary(max_size=8))
 def test_frames_to_send_are_those_of_python_can(extended, number, content):
     message = can.Message(arbitration_id=number, is_extended_id=extended, data=content)
