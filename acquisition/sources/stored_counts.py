@@ -263,9 +263,15 @@ def _as_stored(dtype: np.dtype[Any], channel: Channel, fill: float | None) -> _S
         channel,
         bits=bits,
         add_offset=channel.add_offset + channel.scale_factor * shift,
-        missing_count=None if fill is None else int(fill) - shift,
+        missing_count=int(fill) - shift if fill is not None and _is_count(fill, dtype) else None,
     )
     return _StoredChannel(described, lambda raw: (raw.astype(np.int64) - shift).astype(np.int32))
+
+
+def _is_count(fill: float, dtype: np.dtype[Any]) -> bool:
+    """Whether a stored integer can equal the fill value; half a count, NaN, or one beyond the type marks none."""
+    limits = np.iinfo(dtype)
+    return bool(limits.min <= fill <= limits.max and fill == int(fill))
 
 
 def _step(full_scale: float) -> float:

@@ -122,6 +122,18 @@ def test_the_fill_value_is_the_missing_count_and_attributes_are_kept(tmp_path):
     assert (channel.block_from, channel.block_to, channel.sensor_serial) == ("shaker", "tank", "A-7")
 
 
+@pytest.mark.parametrize(
+    ("fill", "expected"), [(-9.0, -9), (0.5, None), (70_000.0, None), (1e30, None), (np.nan, None), (np.inf, None)]
+)
+def test_a_missing_value_that_no_count_can_be_marks_none(tmp_path, fill, expected):
+    stored = np.array([0, -9, 1, 4464], np.int16)
+    path = write(tmp_path / "run.nc", {"force_a": (stored, force(missing_value=fill))})
+    with opened(path) as source:
+        assert source.info.channels[0].missing_count == expected
+        counts, _ = everything(source)
+    assert counts[:, 0].tolist() == stored.tolist()
+
+
 @pytest.mark.parametrize("full_scale", [1.0, 20.0, 1023.9, 1e-12, 3e30])
 def test_floats_keep_thirty_bits_of_the_full_scale(tmp_path, full_scale):
     values = np.random.default_rng(8).uniform(-full_scale, full_scale, 70_000)
