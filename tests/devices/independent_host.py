@@ -36,7 +36,8 @@ def playing(source, *urls, speed="max", **settings):
             errors.append(error)
             lines.put("failed")
 
-    thread = threading.Thread(target=run)
+    # a device that waits in vain fails its test; it must not keep the tests from ending
+    thread = threading.Thread(target=run, daemon=True)
     thread.start()
     ready = []
     try:
