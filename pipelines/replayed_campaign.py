@@ -251,5 +251,5 @@ def _analysed(recordings: Path, rigs: Path, output: Path) -> xr.Dataset:
     code = run([*shaker_arguments(recordings, output, rigs), "--no-report"])
     if code not in (0, DONE_BUT_FLAGGED):
         raise RecordingError(f"analysis of {recordings}", got=f"exit code {code}", allowed="0 or 3")
-    with xr.open_dataset(output / "windows.nc", engine="netcdf4", decode_times=False) as windows:
+    with NETCDF_LOCK, xr.open_dataset(output / "windows.nc", engine="netcdf4", decode_times=False) as windows:
         return windows.load()
