@@ -102,7 +102,7 @@ class GroupReceiver:
     message : SampleMessage
     tracker : CounterTracker
     n_repeated : int
-        Frames of the last call that had come before.
+        Frames that had come before.
     """
 
     def __init__(
@@ -176,7 +176,7 @@ class GroupReceiver:
 
     def _decided(self, decided: Decided, stream: int, now_ns: int, *, everything: bool) -> list[Delivery]:
         deliveries: list[Delivery] = []
-        self.n_repeated = decided.n_repeated
+        self.n_repeated += decided.n_repeated
         n_decided = len(decided.counters)
         if self._waiting is not None and n_decided:
             frames = self._waiting[:n_decided]

@@ -46,14 +46,11 @@ class CanReceiver:
 
     Attributes
     ----------
-    n_repeated : int
-        Frames that came twice; they are dropped and do no harm.
     n_unknown : int
         Frames of other identifiers.
     """
 
     def __init__(self, layout: CanLayout, longest_gap_s: float = LONGEST_GAP_S) -> None:
-        self.n_repeated = 0
         self.n_unknown = 0
         self._layout = layout
         self._stream: int | None = 0 if layout.status is None else None
@@ -68,6 +65,11 @@ class CanReceiver:
             GroupReceiver(number, message, layout, longest_gap_s, clock)
             for number, message in enumerate(layout.messages)
         ]
+
+    @property
+    def n_repeated(self) -> int:
+        """Frames that came twice; they are dropped and do no harm."""
+        return sum(group.n_repeated for group in self._groups)
 
     @property
     def failure(self) -> SourceError | None:
@@ -140,7 +142,6 @@ class CanReceiver:
             n_known += len(mine)
             if len(mine):
                 deliveries += group.take(batch[mine], monotonic[mine], utc[mine], self._stream)
-                self.n_repeated += group.n_repeated
         self.n_unknown += len(batch) - n_known
         self._share_epoch()
         return deliveries
