@@ -39,6 +39,11 @@ class Endpoint(ABC):
         """Whether enough hosts have asked the device to begin."""
 
     @property
+    def awaited(self) -> str:
+        """What is missing for the device to begin, for a person."""
+        return "a host that starts it"
+
+    @property
     @abstractmethod
     def is_stopped(self) -> bool:
         """Whether a host has asked the device to end."""
@@ -131,9 +136,18 @@ class StreamEndpoint(Endpoint):
     @property
     def is_started(self) -> bool:
         """Once as many hosts as are waited for have asked at the same time."""
-        started = [line for line in self._lines if line.host.has_started and self._listens(line)]
-        self._is_started = self._is_started or self._runs_freely or len(started) >= self._n_hosts
+        self._is_started = self._is_started or self._runs_freely or self._n_missing <= 0
         return self._is_started
+
+    @property
+    def awaited(self) -> str:
+        """How many hosts have not asked yet."""
+        return super().awaited if self._n_hosts == 1 else f"{self._n_missing} more of {self._n_hosts} clients"
+
+    @property
+    def _n_missing(self) -> int:
+        started = [line for line in self._lines if line.host.has_started and self._listens(line)]
+        return self._n_hosts - len(started)
 
     @property
     def is_stopped(self) -> bool:

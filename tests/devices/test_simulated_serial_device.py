@@ -228,6 +228,9 @@ def test_many_connections_do_no_harm(recording):
         ({"channels": ["a", "b"]}, "--channels"),
         ({"channels": ["force_cell_9"]}, "force_cell_9"),
         ({"loop_duration_s": -1.0}, "--loop-duration"),
+        ({"wait_clients": 0}, "--wait-clients"),
+        ({"wait_clients": 2}, "--wait-clients.*socketcand"),
+        ({"wait_clients": 9}, "--wait-clients.* 1 … 8"),
     ],
 )
 def test_wrong_settings_are_refused_in_one_line(recording, tmp_path, settings, message):
