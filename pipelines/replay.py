@@ -16,6 +16,7 @@ from typing import Any
 
 from acquisition.devices.appearance import Appearance, appearance
 from acquisition.devices.connection import MOST_CONNECTIONS
+from acquisition.devices.endpoint import Awaited
 from acquisition.devices.faults import Faults
 from acquisition.devices.laboratory_time import LaboratoryTime
 from acquisition.devices.played_signal import played_signal
@@ -91,8 +92,8 @@ def replay(
         Called with ``ready URL`` for each device as soon as a host can open that URL, in the order of
         `urls`, and with a line for each port that is exposed. Standard output if not given.
     remind : callable, optional
-        Called with a line for each device that nobody has started after 5 s, and again whenever what it waits
-        for changes. Standard error if not given.
+        Called with a line for each device that still waits for hosts, if others have come and none has for 5 s.
+        Standard error if not given.
 
     Returns
     -------
@@ -195,22 +196,25 @@ def _faults(settings: ReplaySettings, number: int) -> Faults | None:
 
 
 class _Reminder:
-    """Says what devices wait for, after a while and whenever that changes."""
+    """Says who is missing when some hosts have asked their devices to begin and others have not for a while."""
 
     def __init__(self, devices: Sequence[str], say: Callable[[str], None]) -> None:
         self._devices, self._say = devices, say
-        self._told = [""] * len(devices)
-        self._quiet_until_s = time.monotonic() + _PATIENCE_S
+        self._seen: list[Awaited] = []
+        self._since_s, self._has_told = 0.0, True
 
     def look(self, players: Sequence[Player]) -> None:
-        """Tell what is new."""
-        if time.monotonic() < self._quiet_until_s:
+        """Tell what has not changed for too long, once."""
+        awaited = [player.awaited for player in players]
+        if awaited != self._seen:
+            self._seen, self._since_s, self._has_told = awaited, time.monotonic(), False
+        has_begun = any(one.n_missing < one.n_hosts for one in awaited)
+        if self._has_told or not has_begun or time.monotonic() - self._since_s < _PATIENCE_S:
             return
-        for k, player in enumerate(players):
-            awaits = player.awaits
-            if awaits not in ("", self._told[k]):
-                self._say(f"waiting: {self._devices[k]} for {awaits}; Ctrl-C ends")
-                self._told[k] = awaits
+        self._has_told = True
+        for device, one in zip(self._devices, awaited, strict=True):
+            if one.n_missing > 0:
+                self._say(f"waiting: {device} for {one.n_missing} of {one.n_hosts} hosts; Ctrl-C ends")
 
 
 def _run(players: Sequence[Player], reminder: _Reminder) -> None:

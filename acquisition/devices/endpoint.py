@@ -8,7 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from acquisition.devices.connection import Connection, Door
 from acquisition.devices.conversation import Conversation, Host
@@ -20,6 +20,13 @@ LONGEST_STALL_S: Final = 30.0
 _LARGEST_ANSWERS_BYTES = 1 << 20
 _DOOR_STEP_S = 0.01
 _STEP_S = 0.05
+
+
+class Awaited(NamedTuple):
+    """How many hosts a device still waits for, of how many."""
+
+    n_missing: int
+    n_hosts: int
 
 
 class Endpoint(ABC):
@@ -39,9 +46,9 @@ class Endpoint(ABC):
         """Whether enough hosts have asked the device to begin."""
 
     @property
-    def awaited(self) -> str:
-        """What is missing for the device to begin, for a person."""
-        return "a host that starts it"
+    def awaited(self) -> Awaited:
+        """Hosts that have yet to ask the device to begin."""
+        return Awaited(0 if self.is_started else 1, 1)
 
     @property
     @abstractmethod
@@ -140,9 +147,9 @@ class StreamEndpoint(Endpoint):
         return self._is_started
 
     @property
-    def awaited(self) -> str:
-        """How many hosts have not asked yet."""
-        return super().awaited if self._n_hosts == 1 else f"{self._n_missing} more of {self._n_hosts} clients"
+    def awaited(self) -> Awaited:
+        """Hosts that have yet to ask."""
+        return Awaited(0 if self.is_started else self._n_missing, self._n_hosts)
 
     @property
     def _n_missing(self) -> int:
