@@ -1,0 +1,118 @@
+"""A model with feedback running free, sample by sample, with the sensitivities that training it needs.
+
+y(k) depends on earlier ŷ, so nothing can be done for all samples at once; this is compiled. The derivative of
+ŷ(k) by the parameters follows from ∂g/∂θ and from the derivatives of the ŷ that are fed back (real-time
+recurrent learning, Williams & Zipser 1989).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+NORMALISED, PLAIN = 0, 1
+
+
+@njit(cache=True)
+def evaluate(kind, theta, phi, features, factors):  # type: ignore[no-untyped-def]
+    """Output of a radial basis network for one sample; fills features (n_neurons) and G (n_neurons)."""
+    p, m = phi.size, features.size
+    largest = -1e300
+    for i in range(m):
+        squared = 0.0
+        for a in range(p):
+            difference = phi[a] - theta[i * p + a]
+            squared += difference * difference
+        features[i] = -squared
+        largest = max(largest, -squared)
+    total = 0.0
+    for i in range(m):
+        features[i] = np.exp(features[i] - (largest if kind == NORMALISED else 0.0))
+        total += features[i]
+    offset = 0 if kind == NORMALISED else 1
+    output = 0.0 if kind == NORMALISED else theta[m * p]
+    for i in range(m):
+        if kind == NORMALISED:
+            features[i] /= total
+        output += theta[m * p + offset + i] * features[i]
+    for i in range(m):
+        weight = theta[m * p + offset + i]
+        factors[i] = 2 * features[i] * (weight - output if kind == NORMALISED else weight)
+    return output
+
+
+@njit(cache=True)
+def fill_regressors(phi, x, y, k, input_delays, output_delays):  # type: ignore[no-untyped-def]
+    """Write φ(k) into `phi`; y may hold model outputs."""
+    n = input_delays.size
+    for a in range(n):
+        phi[a] = x[k - input_delays[a]]
+    for b in range(output_delays.size):
+        phi[n + b] = y[k - output_delays[b]]
+
+
+@njit(cache=True)
+def run_free(kind, theta, m, x, y, first, last, input_delays, output_delays, bound):  # type: ignore[no-untyped-def]
+    """Overwrite y[first:last] with the model's own outputs; return how far it got before |ŷ| > bound."""
+    phi = np.empty(input_delays.size + output_delays.size)
+    features, factors = np.empty(m), np.empty(m)
+    for k in range(first, last):
+        fill_regressors(phi, x, y, k, input_delays, output_delays)
+        y[k] = evaluate(kind, theta, phi, features, factors)
+        if not abs(y[k]) <= bound:
+            return k
+    return last
+
+
+@njit(cache=True)
+def free_run_sums(  # type: ignore[no-untyped-def]
+    kind, theta, m, x, y, first, last, input_delays, output_delays, bound, matrix, gradient
+):
+    """Add Σ S Sᵀ to `matrix` (lower triangle) and Σ S e to `gradient`; return Σ e², infinite if it runs away."""
+    p, n_in, n_out = input_delays.size + output_delays.size, input_delays.size, output_delays.size
+    n_theta = theta.size
+    offset = 0 if kind == NORMALISED else 1
+    longest = 0
+    for b in range(n_out):
+        longest = max(longest, output_delays[b])
+    history = np.zeros((longest + 1, n_theta))
+    model = y.copy()
+    phi, features, factors, slope = np.empty(p), np.empty(m), np.empty(m), np.empty(n_out)
+    squares = 0.0
+    for k in range(first, last):
+        fill_regressors(phi, x, model, k, input_delays, output_delays)
+        model[k] = evaluate(kind, theta, phi, features, factors)
+        if not abs(model[k]) <= bound:
+            return np.inf
+        now = history[k % (longest + 1)]
+        for b in range(n_out):
+            slope[b] = 0.0
+            for i in range(m):
+                slope[b] -= factors[i] * (phi[n_in + b] - theta[i * p + n_in + b])
+        for i in range(m):
+            for a in range(p):
+                now[i * p + a] = factors[i] * (phi[a] - theta[i * p + a])
+            now[m * p + offset + i] = features[i]
+        if offset:
+            now[m * p] = 1.0
+        for b in range(n_out):
+            before = history[(k - output_delays[b]) % (longest + 1)]
+            if k - output_delays[b] >= first:
+                for j in range(n_theta):
+                    now[j] += slope[b] * before[j]
+        error = y[k] - model[k]
+        squares += error * error
+        for j in range(n_theta):
+            gradient[j] += error * now[j]
+            for i in range(j + 1):
+                matrix[j, i] += now[j] * now[i]
+    return squares
+
+
+def kind_of(network: Any) -> int:
+    """Return the number of a radial basis network for the compiled loops."""
+    return PLAIN if network.has_offset else NORMALISED

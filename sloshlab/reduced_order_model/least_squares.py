@@ -1,0 +1,130 @@
+"""Levenberg–Marquardt with the linear parameters solved for.
+
+All samples are gone through block by block, so memory does not grow with their number. After every step the
+parameters that enter linearly are solved for exactly (variable projection, Golub & Pereyra 1973): the step of
+the others is then that of the reduced problem, because the gradient of the linear ones is zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend
+from sloshlab.reduced_order_model.networks.network import Network, NormalSums
+
+FIRST_DAMPING: Final = 1e-3
+LARGEST_DAMPING: Final = 1e10
+_SMALLEST_DAMPING: Final = 1e-12
+_RIDGE: Final = 1e-10
+_FLOOR: Final = 1e-9
+
+
+class LeastSquaresProblem(Protocol):
+    """A sum of squares of a parameter vector."""
+
+    def normal_sums(self, theta: Array) -> NormalSums:
+        """Return Σ J Jᵀ, Σ J e, Σ e²."""
+        ...
+
+    def improved(self, theta: Array) -> tuple[Array, float]:
+        """Return θ with what is cheap to solve for solved for, and Σ e²."""
+        ...
+
+
+@dataclass(frozen=True)
+class OneStepProblem:
+    """One-step prediction of a network over blocks of samples.
+
+    Attributes
+    ----------
+    backend : ArrayBackend
+    network : Network
+    blocks : callable
+        Returns an iterator over (regressors, outputs), the same at every call.
+    """
+
+    backend: ArrayBackend
+    network: Network
+    blocks: Callable[[], Iterator[tuple[Any, Any]]]
+
+    def normal_sums(self, theta: Array) -> NormalSums:
+        """Return Σ J Jᵀ, Σ J e, Σ e²."""
+        sums = self.network.normal_sums(self.backend.xp, theta)
+        for phi, target in self.blocks():
+            sums.add(self.backend.asarray(phi), self.backend.asarray(target))
+        return sums.sums()
+
+    def improved(self, theta: Array) -> tuple[Array, float]:
+        """Return θ with the best linear parameters, and Σ e²."""
+        xp, n_linear = self.backend.xp, self.network.n_linear
+        matrix: Array = 0.0
+        moments: Array = 0.0
+        squares = 0.0
+        for phi, target in self.blocks():
+            wanted = self.backend.asarray(target)
+            features = self.network.linear_features(xp, theta, self.backend.asarray(phi))
+            matrix = matrix + features @ features.T
+            moments = moments + features @ wanted
+            squares += float(xp.sum(wanted * wanted))
+        diagonal = xp.eye(n_linear, dtype=matrix.dtype, device=self.backend.device)
+        ridged = matrix + (_RIDGE * float(xp.sum(matrix * diagonal)) / n_linear) * diagonal
+        linear = xp.linalg.solve(ridged, moments[:, None])[:, 0]
+        squares += float(linear @ (matrix @ linear)) - 2 * float(linear @ moments)
+        return xp.concat([theta[:-n_linear], linear]), squares
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where Levenberg–Marquardt stands.
+
+    Attributes
+    ----------
+    theta : array
+    squares : float
+        Σ e².
+    damping : float
+        λ of the next step.
+    """
+
+    theta: Array
+    squares: float
+    damping: float = FIRST_DAMPING
+
+
+def next_step(problem: LeastSquaresProblem, at: Step, xp: Any) -> Step | None:
+    """Return a better θ, or None if there is none within reach.
+
+    Parameters
+    ----------
+    problem : LeastSquaresProblem
+    at : Step
+    xp : module
+        Namespace of the arrays.
+
+    Notes
+    -----
+    (H + λ diag H) Δθ = g; λ falls to a tenth after a step and grows tenfold until there is one (Marquardt 1963).
+    """
+    sums = problem.normal_sums(at.theta)
+    diagonal = xp.linalg.diagonal(sums.matrix)
+    scale = xp.maximum(diagonal, _FLOOR * xp.max(diagonal))
+    damping = at.damping
+    while damping <= LARGEST_DAMPING:
+        damped = sums.matrix + xp.eye(scale.shape[0], dtype=scale.dtype, device=xp_device(scale)) * (
+            damping * scale[None, :]
+        )
+        change = xp.linalg.solve(damped, sums.gradient[:, None])[:, 0]
+        theta, squares = problem.improved(at.theta + change)
+        if squares < at.squares:
+            return Step(theta, squares, max(damping / 10, _SMALLEST_DAMPING))
+        damping *= 10
+    return None
+
+
+def xp_device(array: Array) -> Any:
+    """Return the device of an array."""
+    from array_api_compat import device
+
+    return device(array)

@@ -1,0 +1,167 @@
+"""A trained model: what it sees, how it is scaled, and its parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
+from sloshlab.reduced_order_model.networks.network import Network
+from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
+from sloshlab.reduced_order_model.regressors import Delays, Run, regressors, segments
+
+FloatArray = NDArray[np.float64]
+_BLOCK: Final = 4096
+RUNAWAY: Final = 100.0
+"""A free run has run away when its output is this many times the scale of the training outputs."""
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """From physical to the network's values: (value − offset)/scale.
+
+    Attributes
+    ----------
+    input_offset, input_scale, output_offset, output_scale : float
+    """
+
+    input_offset: float = 0.0
+    input_scale: float = 1.0
+    output_offset: float = 0.0
+    output_scale: float = 1.0
+
+    def scaled(self, run: Run) -> Run:
+        """Return the run in the network's values."""
+        return Run(
+            (run.x - self.input_offset) / self.input_scale,
+            (run.y - self.output_offset) / self.output_scale,
+            run.name,
+        )
+
+    def output_of(self, values: FloatArray) -> FloatArray:
+        """Return outputs of the network in physical values."""
+        return values * self.output_scale + self.output_offset
+
+
+@dataclass(frozen=True)
+class ReducedOrderModel:
+    """NFIR (no output delays) or NARX/NOE model of one input and one output.
+
+    Attributes
+    ----------
+    network : Network
+    theta : ndarray, shape (n_parameters,)
+    delays : Delays
+    scaling : Scaling
+    sampling_rate_hz : float
+        Of the samples that the delays count.
+    facts : dict
+        What it was trained on, and how; kept with it.
+    """
+
+    network: Network
+    theta: FloatArray
+    delays: Delays
+    scaling: Scaling
+    sampling_rate_hz: float
+    facts: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.theta.shape != (self.network.n_parameters,) or not np.isfinite(self.theta).all():
+            raise InputError(
+                "parameters of the model",
+                got=f"{self.theta.shape}",
+                allowed=f"{self.network.n_parameters} finite numbers",
+            )
+        if self.network.n_inputs != self.delays.n_regressors:
+            raise InputError(
+                "model", got=f"{self.network.n_inputs} inputs", allowed=f"{self.delays.n_regressors} regressors"
+            )
+
+    @property
+    def has_feedback(self) -> bool:
+        """Whether it sees its own outputs."""
+        return bool(self.delays.outputs)
+
+    def predict(self, x: ArrayLike, y: ArrayLike, backend: ArrayBackend | None = None) -> FloatArray:
+        """Return ŷ one step ahead; past outputs are the measured ones.
+
+        Parameters
+        ----------
+        x, y : array_like, shape (n,)
+            Measured input and output; NaN where nothing is known.
+        backend : ArrayBackend, optional
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            NaN where a regressor is not known.
+        """
+        chosen = backend or array_backend()
+        run = self.scaling.scaled(Run.of(x, y))
+        known = Run(run.x, np.nan_to_num(run.y) if not self.has_feedback else run.y)
+        theta, predicted = chosen.asarray(self.theta), np.full(run.x.size, np.nan)
+        for first, last in segments(known, self.delays):
+            for start in range(first, last, _BLOCK):
+                stop = min(start + _BLOCK, last)
+                phi = chosen.asarray(regressors(known, self.delays, start, stop))
+                predicted[start:stop] = chosen.to_numpy(self.network.output(chosen.xp, theta, phi))
+        return self.scaling.output_of(predicted)
+
+    def simulate(self, x: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
+        """Return ŷ of a free run: the model sees the input and its own outputs.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,)
+            Input; NaN where nothing is known.
+        start : array_like, shape (n,), optional
+            Outputs to start from, at the beginning and after every gap; zero by default.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            NaN where the input of the delay lines is not known.
+
+        Raises
+        ------
+        AnalysisError
+            If a model with feedback runs away.
+        """
+        values = np.asarray(x, np.float64)
+        if not self.has_feedback:
+            return self.predict(values, np.zeros_like(values))
+        outputs = np.zeros_like(values) if start is None else np.nan_to_num(np.asarray(start, np.float64))
+        run = self.scaling.scaled(Run.of(values, outputs))
+        theta, n_neurons, kind = self._compiled()
+        simulated, delays = np.full(values.size, np.nan), self.delays
+        for first, last in segments(run, delays):
+            own = run.y.copy()
+            reached = free_run.run_free(
+                kind, theta, n_neurons, run.x, own, first, last, *delay_arrays(delays), RUNAWAY
+            )
+            if reached < last:
+                raise AnalysisError(
+                    "free run of the model",
+                    got=f"it runs away at {reached / self.sampling_rate_hz:.3f} s",
+                    remedy="take a model without feedback, or train this one further",
+                )
+            simulated[first:last] = own[first:last]
+        return self.scaling.output_of(simulated)
+
+    def _compiled(self) -> tuple[FloatArray, int, int]:
+        if not isinstance(self.network, NormalisedRadialBasis | RadialBasis):
+            raise AnalysisError(
+                "model with feedback", got=self.network.kind, allowed="normalised_rbf, rbf", remedy="use NFIR"
+            )
+        return self.theta, self.network.n_neurons, free_run.kind_of(self.network)
+
+
+def delay_arrays(delays: Delays) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return input and output delays as arrays for the compiled loops."""
+    return np.array(delays.inputs, np.int64), np.array(delays.outputs, np.int64)

@@ -1,0 +1,355 @@
+"""Fitting a model to recordings: scaling, starts, epochs, early stop."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend, array_backend
+from sloshlab.reduced_order_model.least_squares import LeastSquaresProblem, OneStepProblem, Step, next_step
+from sloshlab.reduced_order_model.model import RUNAWAY, ReducedOrderModel, Scaling, delay_arrays
+from sloshlab.reduced_order_model.network_list import network_of
+from sloshlab.reduced_order_model.networks.network import Network, NormalSums
+from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
+
+FloatArray = NDArray[np.float64]
+BLOCK: Final = 1024
+_LARGEST_INITIAL: Final = 20_000
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """How a model is trained.
+
+    Attributes
+    ----------
+    n_epochs : int
+        At most.
+    patience : int
+        Rises of the validation error one after another after which training stops.
+    n_starts : int
+        Trainings from different random starts; the best by validation error is kept.
+    seed : int
+    input_spread : float
+        Standard deviation of the regressors in the network's values, all of them together: √Σ var. With Σ⁻¹ = I
+        it says how many neurons a sample feels.
+    """
+
+    n_epochs: int = 100
+    patience: int = 6
+    n_starts: int = 1
+    seed: int = 0
+    input_spread: float = 2.0
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """What a person is told after an epoch.
+
+    Attributes
+    ----------
+    start, number : int
+        Which start, and epoch within it; 0 is before the first step.
+    training_mse, validation_mse : float
+        Mean squares of the errors, in the square of the output's unit.
+    elapsed_s : float
+        Since the beginning of training.
+    """
+
+    start: int
+    number: int
+    training_mse: float
+    validation_mse: float
+    elapsed_s: float
+
+
+@dataclass(frozen=True)
+class TrainingRecord:
+    """How a training went.
+
+    Attributes
+    ----------
+    epochs : list of Epoch
+        Of all starts.
+    best : Epoch
+        The one whose model was kept.
+    ended : str
+        Why the start with the best model ended.
+    interrupted : bool
+        Whether a person stopped it.
+    """
+
+    epochs: list[Epoch]
+    best: Epoch
+    ended: str
+    interrupted: bool = False
+
+
+@dataclass
+class _Best:
+    """The best parameters so far, and all epochs."""
+
+    epochs: list[Epoch] = field(default_factory=list)
+    theta: FloatArray | None = None
+    epoch: Epoch | None = None
+    ended: str = ""
+
+    def take(self, epoch: Epoch, theta: FloatArray) -> None:
+        self.epochs.append(epoch)
+        better = self.epoch is None or epoch.validation_mse < self.epoch.validation_mse
+        if np.isfinite(epoch.validation_mse) and better:
+            self.epoch, self.theta = epoch, theta
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Scaled runs and what is trained on them."""
+
+    network: Network
+    delays: Delays
+    training: list[Run]
+    validation: list[Run]
+    output_scale: float
+    backend: ArrayBackend
+
+
+def fit(
+    kind: str,
+    settings_of_network: dict[str, Any],
+    delays: Delays,
+    training: Sequence[Run],
+    validation: Sequence[Run],
+    sampling_rate_hz: float,
+    settings: TrainingSettings | None = None,
+    *,
+    backend: ArrayBackend | None = None,
+    told: Callable[[Epoch], None] | None = None,
+) -> tuple[ReducedOrderModel, TrainingRecord]:
+    """Train a model; with output delays first one step ahead (NARX), then running free (NOE).
+
+    Parameters
+    ----------
+    kind : str
+        One of `NETWORKS`.
+    settings_of_network : dict
+        Such as ``{"n_neurons": 35}``.
+    delays : Delays
+    training, validation : sequence of Run
+        Each run stays apart from the others.
+    sampling_rate_hz : float
+    settings : TrainingSettings, optional
+    backend : ArrayBackend, optional
+        NumPy by default.
+    told : callable, optional
+        Takes every epoch as it ends. A KeyboardInterrupt within training keeps the best model so far.
+
+    Returns
+    -------
+    model : ReducedOrderModel
+    record : TrainingRecord
+
+    Raises
+    ------
+    InputError
+        If there is nothing to train on or nothing to validate with.
+    AnalysisError
+        If input or output is constant, or no start gave a stable model.
+    """
+    chosen = settings or TrainingSettings()
+    network = network_of(kind, {**settings_of_network, "n_inputs": delays.n_regressors})
+    scaling = _scaling(training, validation, delays, chosen)
+    task = _Task(
+        network,
+        delays,
+        [scaling.scaled(run) for run in training],
+        [scaling.scaled(run) for run in validation],
+        scaling.output_scale,
+        backend or array_backend(),
+    )
+    best, started, interrupted = _Best(), time.monotonic(), False
+    try:
+        for start in range(chosen.n_starts):
+            _train_once(task, chosen, start, best, started, told or (lambda epoch: None))
+    except KeyboardInterrupt:
+        interrupted = True
+        if best.theta is None:
+            raise
+    if best.theta is None or best.epoch is None:
+        raise AnalysisError("training", got="no stable model from any start", remedy="fewer output delays")
+    ended = "interrupted" if interrupted else best.ended
+    model = ReducedOrderModel(network, best.theta, delays, scaling, sampling_rate_hz)
+    return model, TrainingRecord(best.epochs, best.epoch, ended, interrupted)
+
+
+def _train_once(
+    task: _Task,
+    settings: TrainingSettings,
+    start: int,
+    best: _Best,
+    started: float,
+    told: Callable[[Epoch], None],
+) -> None:
+    """One start: one step ahead, then free if there is feedback."""
+    rng = np.random.default_rng([settings.seed, start])
+    theta = task.backend.asarray(task.network.initial(*_initial_samples(task, rng), rng))
+    one_step = OneStepProblem(task.backend, task.network, lambda: blocks(task.training, task.delays, BLOCK))
+    problems: list[LeastSquaresProblem] = [one_step]
+    if task.delays.outputs:
+        problems.append(_FreeRunProblem(task.network, task.delays, task.training))
+    number = 0
+    for problem in problems:
+        is_last = problem is problems[-1]
+        own = best if is_last else _Best()
+        own_settings = settings if is_last else replace(settings, patience=settings.n_epochs)
+        theta, number = _descend(task, problem, theta, own_settings, own, (start, number, started), told)
+
+
+def _descend(
+    task: _Task,
+    problem: LeastSquaresProblem,
+    theta: Array,
+    settings: TrainingSettings,
+    best: _Best,
+    place: tuple[int, int, float],
+    told: Callable[[Epoch], None],
+) -> tuple[Array, int]:
+    """Epoch after epoch until the validation error keeps rising, nothing improves, or the epochs are used up."""
+    start, number, started = place
+    n_training, n_validation = n_samples(task.training, task.delays), n_samples(task.validation, task.delays)
+    unit = task.output_scale**2
+    step: Step | None = Step(*problem.improved(theta))
+    rises, before, ended = 0, math.inf, "epochs used up"
+    for done in range(settings.n_epochs + 1):
+        assert step is not None
+        theta = step.theta
+        parameters = task.backend.to_numpy(theta)
+        validation = _free_squares(task.network, task.delays, parameters, task.validation) / n_validation
+        epoch = Epoch(
+            start,
+            number,
+            step.squares / n_training * unit,
+            validation * unit,
+            time.monotonic() - started,
+        )
+        best.take(epoch, parameters)
+        told(epoch)
+        number += 1
+        rises = rises + 1 if validation > before else 0
+        before = validation
+        if rises >= settings.patience:
+            ended = f"validation error rose {rises} times"
+            break
+        if done == settings.n_epochs:
+            break
+        step = next_step(problem, step, task.backend.xp)
+        if step is None:
+            ended = "no further improvement"
+            break
+    if best.epoch is not None and best.epoch.start == start:
+        best.ended = ended
+    return theta, number
+
+
+@dataclass(frozen=True)
+class _FreeRunProblem:
+    """The error of a model running free from measured outputs at the start of every stretch."""
+
+    network: Any
+    delays: Delays
+    runs: list[Run]
+
+    def _stretches(self) -> Iterator[tuple[Run, int, int]]:
+        for run in self.runs:
+            for first, last in segments(run, self.delays):
+                yield run, first, last
+
+    def normal_sums(self, theta: Array) -> NormalSums:
+        n = self.network.n_parameters
+        matrix, gradient, squares = np.zeros((n, n)), np.zeros(n), 0.0
+        for run, first, last in self._stretches():
+            squares += free_run.free_run_sums(
+                free_run.kind_of(self.network),
+                theta,
+                self.network.n_neurons,
+                run.x,
+                run.y,
+                first,
+                last,
+                *delay_arrays(self.delays),
+                RUNAWAY,
+                matrix,
+                gradient,
+            )
+        return NormalSums(matrix + np.tril(matrix, -1).T, gradient, squares)
+
+    def improved(self, theta: Array) -> tuple[Array, float]:
+        return theta, _free_squares(self.network, self.delays, theta, self.runs)
+
+
+def _free_squares(network: Network, delays: Delays, theta: FloatArray, runs: Sequence[Run]) -> float:
+    """Σ e² of free runs; infinite if one runs away."""
+    if not delays.outputs:
+        squares = 0.0
+        for phi, target in blocks(runs, delays, BLOCK):
+            error = target - network.output(np, theta, phi)
+            squares += float(error @ error)
+        return squares
+    squares = 0.0
+    radial: Any = network
+    for run in runs:
+        for first, last in segments(run, delays):
+            own = run.y.copy()
+            reached = free_run.run_free(
+                free_run.kind_of(radial), theta, radial.n_neurons, run.x, own, first, last,
+                *delay_arrays(delays), RUNAWAY,
+            )  # fmt: skip
+            if reached < last:
+                return math.inf
+            squares += float(np.sum((run.y[first:last] - own[first:last]) ** 2))
+    return squares
+
+
+def _scaling(
+    training: Sequence[Run], validation: Sequence[Run], delays: Delays, settings: TrainingSettings
+) -> Scaling:
+    """Scale so that all regressors together have the wanted spread and the output is of size one."""
+    for what, runs in (("training", training), ("validation", validation)):
+        if not n_samples(runs, delays):
+            longest = max((run.x.size for run in runs), default=0)
+            raise InputError(
+                f"{what} runs",
+                got=f"no stretch longer than the delays ({delays.longest} samples; longest run {longest})",
+                remedy="take fewer delays or longer runs",
+            )
+    x = np.concatenate([run.x for run in training])
+    y = np.concatenate([run.y for run in training])
+    found = []
+    for what, values in (("input", x), ("output", y)):
+        mean, spread = float(np.nanmean(values)), float(np.nanstd(values))
+        if not spread > 1e-12 * max(abs(mean), 1e-300):
+            raise AnalysisError(f"{what} of the training runs", got="a constant", remedy="train on runs that move")
+        found.append((mean, spread))
+    (x_mean, x_spread), (y_mean, y_spread) = found
+    return Scaling(x_mean, x_spread * math.sqrt(delays.n_regressors) / settings.input_spread, y_mean, y_spread)
+
+
+def _initial_samples(task: _Task, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Some samples of the training runs, evenly drawn."""
+    total = n_samples(task.training, task.delays)
+    share = min(1.0, _LARGEST_INITIAL / total)
+    parts = []
+    for phi, target in blocks(task.training, task.delays, BLOCK):
+        kept = rng.random(target.size) < share
+        parts.append((phi[:, kept], target[kept]))
+    phi, target = np.concatenate([p for p, _ in parts], axis=1), np.concatenate([t for _, t in parts])
+    if not target.size:
+        phi, target = next(iter(blocks(task.training, task.delays, BLOCK)))
+    return phi, target
