@@ -1,0 +1,233 @@
+"""Training on systems whose answer is known; gaps, borders of runs, bad input, files."""
+
+import numpy as np
+import pytest
+
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.fit_quality import fit_quality
+from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
+from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
+from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
+from sloshlab.reduced_order_model.storage import load_model, save_model
+from sloshlab.reduced_order_model.training import TrainingSettings, fit
+
+RATE_HZ = 100.0
+TRUE = NormalisedRadialBasis(2, 3)
+TRUE_THETA = np.array([-1.0, 0.2, 0.3, 1.0, 1.0, -0.6, -2.0, 0.5, 1.5])
+
+
+def network_run(n: int, seed: int, noise: float = 0.0) -> Run:
+    """y(k) from x(k−1), x(k−2) by three neurons, computed sample by sample."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.normal(size=n), np.full(n, np.nan)
+    centres, weights = TRUE_THETA[:6].reshape(3, 2), TRUE_THETA[6:]
+    for k in range(2, n):
+        gaussians = [np.exp(-np.sum((np.array([x[k - 1], x[k - 2]]) - c) ** 2)) for c in centres]
+        y[k] = np.dot(weights, gaussians) / np.sum(gaussians) + noise * rng.normal()
+    return Run(x, y, f"seed {seed}")
+
+
+def feedback_run(n: int, seed: int) -> Run:
+    """y(k) = 0.6 y(k−1) − 0.3 tanh y(k−2) + x(k−1)."""
+    x, y = np.random.default_rng(seed).normal(size=n), np.zeros(n)
+    for k in range(2, n):
+        y[k] = 0.6 * y[k - 1] - 0.3 * np.tanh(y[k - 2]) + x[k - 1]
+    return Run(x, y)
+
+
+def trained(training, validation, delays=Delays.tapped(2), neurons=3, **settings):
+    chosen = TrainingSettings(**{"n_epochs": 60, "n_starts": 3, **settings})
+    return fit("normalised_rbf", {"n_neurons": neurons}, delays, training, validation, RATE_HZ, chosen)
+
+
+def test_a_known_network_is_recovered():
+    # √Σ var of two inputs of variance 1: the network's values are then the physical ones
+    training = [network_run(400, 1), network_run(300, 2)]
+    spread = np.sqrt(2) * np.nanstd(np.concatenate([run.x for run in training]))
+    model, record = trained(training, [network_run(300, 3)], input_spread=spread)
+    unseen = network_run(500, 4)
+    assert record.best.validation_mse < 1e-12
+    assert np.nanmax(np.abs(model.simulate(unseen.x) - unseen.y)) < 1e-5
+
+
+def test_a_model_with_feedback_learns_to_run_free():
+    training, validation = [feedback_run(600, 1)], [feedback_run(300, 2)]
+    model, record = trained(training, validation, Delays.tapped(1, 2), 8, n_starts=2, n_epochs=30)
+    unseen = feedback_run(400, 3)
+    simulated = model.simulate(unseen.x, unseen.y)
+    assert fit_quality(unseen.y, simulated).fit_percent > 97
+    assert model.has_feedback
+    assert any(epoch.number > 30 for epoch in record.epochs)  # one step ahead first, then free
+
+
+def test_training_ends_after_rises_of_the_validation_error():
+    noisy = [network_run(60, 1, noise=0.5)]
+    _, record = trained(noisy, [network_run(60, 2, noise=0.5)], neurons=10, n_starts=1, patience=3)
+    errors = [epoch.validation_mse for epoch in record.epochs]
+    assert record.ended == "validation error rose 3 times"
+    assert errors[-4] < errors[-3] < errors[-2] < errors[-1]
+    assert record.best.validation_mse == min(errors)
+
+
+def test_an_interrupt_keeps_the_best_model_so_far():
+    def stop(epoch):
+        if epoch.number == 2:
+            raise KeyboardInterrupt
+
+    model, record = fit(
+        "rbf",
+        {"n_neurons": 4},
+        Delays.tapped(2),
+        [network_run(200, 1)],
+        [network_run(100, 2)],
+        RATE_HZ,
+        told=stop,
+    )
+    assert record.interrupted
+    assert len(record.epochs) == 3
+    assert np.isfinite(model.theta).all()
+
+
+@pytest.mark.parametrize("network", [NormalisedRadialBasis(3, 3), RadialBasis(3, 3)], ids=["normalised", "plain"])
+def test_free_run_sensitivities_are_difference_quotients(network):
+    """Σ S e and the diagonal of Σ S Sᵀ against runs with one parameter moved."""
+    rng = np.random.default_rng(5)
+    theta, run = 0.5 * rng.normal(size=network.n_parameters), feedback_run(60, 6)
+    arguments = (np.array([1]), np.array([1, 2]))
+    kind = free_run.kind_of(network)
+
+    def outputs(parameters):
+        y = run.y.copy()
+        assert free_run.run_free(kind, parameters, 3, run.x, y, 2, 60, *arguments, 1e3) == 60
+        return y
+
+    matrix, gradient = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
+    squares = free_run.free_run_sums(kind, theta, 3, run.x, run.y, 2, 60, *arguments, 1e3, matrix, gradient)
+    steps = 1e-6 * np.eye(theta.size)
+    slopes = np.array([(outputs(theta + d) - outputs(theta - d)) / 2e-6 for d in steps])
+    error = run.y - outputs(theta)
+    assert squares == pytest.approx(error @ error)
+    assert gradient == pytest.approx(slopes @ error, rel=1e-5, abs=1e-6)
+    assert np.tril(matrix) == pytest.approx(np.tril(slopes @ slopes.T), rel=1e-5, abs=1e-6)
+
+
+def test_simulation_without_feedback_is_prediction():
+    model = ReducedOrderModel(TRUE, TRUE_THETA, Delays.tapped(2), Scaling(), RATE_HZ)
+    run = network_run(100, 7)
+    assert model.simulate(run.x)[2:] == pytest.approx(run.y[2:], abs=1e-12)
+    assert model.predict(run.x, run.y)[2:] == pytest.approx(run.y[2:], abs=1e-12)
+    assert np.isnan(model.simulate(run.x)[:2]).all()
+
+
+def test_a_runaway_is_told():
+    network = RadialBasis(2, 1)
+    growing = np.array([0.0, 5.0, 0.0, -1000.0])  # the output leaves at once and stays
+    model = ReducedOrderModel(network, growing, Delays((1,), (1,)), Scaling(), RATE_HZ)
+    with pytest.raises(AnalysisError, match=r"runs away at 0\.0"):
+        model.simulate(np.zeros(50), np.full(50, 5.0))
+
+
+def test_gaps_are_gone_around_never_across():
+    run = network_run(50, 8)
+    run.x[20:23] = np.nan
+    run.y[40] = np.nan
+    delays = Delays.tapped(2)
+    assert segments(run, delays) == [(2, 21), (25, 40), (41, 50)]  # k = 20 needs x(19) and x(18) only
+    assert n_samples([run, run], delays) == 2 * (19 + 15 + 9)
+    for phi, target in blocks([run, run], delays, 7):
+        assert np.isfinite(phi).all()
+        assert np.isfinite(target).all()
+        assert phi.shape == (2, target.size)
+        assert target.size <= 7
+
+
+def test_what_lies_in_a_gap_or_before_a_run_does_not_matter():
+    """A model with feedback: a gap in the output stops the delay line, too."""
+    run = feedback_run(80, 9)
+    cut = Run(run.x.copy(), run.y.copy())
+    cut.y[30:33] = np.nan
+    assert segments(cut, Delays.tapped(1, 2)) == [(2, 30), (35, 80)]
+
+
+def test_regressors_are_the_values_before():
+    run = Run.of([10, 11, 12, 13, 14], [0, 1, 2, 3, 4])
+    (phi, target), = blocks([run], Delays((0, 2), (1,)), 100)  # fmt: skip
+    assert phi.tolist() == [[12, 13, 14], [10, 11, 12], [1, 2, 3]]
+    assert target.tolist() == [2, 3, 4]
+
+
+def test_fit_is_that_of_the_definition_and_of_the_printed_formula():
+    y, model = np.array([3.0, 1.0, 3.0, 1.0]), np.array([2.0, 0.0, 2.0, 0.0])
+    quality = fit_quality([*y, np.nan], [*model, 5.0])
+    assert quality.rms_error == pytest.approx(1.0)
+    assert quality.fit_percent == pytest.approx(0.0)  # ‖e‖ = 2, ‖y − 2‖ = 2
+    assert quality.fit_percent_as_printed == pytest.approx(100 * (1 - 2 / np.sqrt(8)))
+    assert quality.n_samples == 4
+
+
+@pytest.mark.parametrize(
+    ("training", "validation", "message"),
+    [
+        ([Run(np.ones(50), np.arange(50.0))], [network_run(50, 1)], "input of the training runs"),
+        ([Run(np.arange(50.0), np.zeros(50))], [network_run(50, 1)], "output of the training runs"),
+        ([network_run(2, 1)], [network_run(50, 1)], "training runs"),
+        ([network_run(50, 1)], [network_run(2, 1)], "validation runs"),
+        ([], [network_run(50, 1)], "training runs"),
+    ],
+)
+def test_what_cannot_be_trained_on_is_refused_in_one_line(training, validation, message):
+    with pytest.raises((InputError, AnalysisError), match=message) as error:
+        trained(training, validation)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs"), [((), ()), ((1, 1), ()), ((-1,), ()), ((1,), (0,)), ((1, 5000), ())]
+)
+def test_impossible_delays_are_refused(inputs, outputs):
+    with pytest.raises(InputError, match="delays"):
+        Delays(inputs, outputs)
+
+
+@pytest.fixture
+def model():
+    return ReducedOrderModel(
+        RadialBasis(3, 2),
+        np.linspace(-1, 1, 9),
+        Delays((0, 3), (1,)),
+        Scaling(0.1, 2.0, -0.3, 4.0),
+        256.0,
+        {"trained_on": ["a.nc", "ü.nc"], "validation_mse": 1e-300},
+    )
+
+
+def test_a_saved_model_is_the_same_and_gives_the_same_bytes(model, tmp_path):
+    save_model(model, tmp_path / "one.nc")
+    again = load_model(tmp_path / "one.nc")
+    save_model(again, tmp_path / "two.nc")
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+    assert again.theta.tobytes() == model.theta.tobytes()
+    assert (again.network, again.delays, again.scaling, again.facts) == (
+        model.network,
+        model.delays,
+        model.scaling,
+        model.facts,
+    )
+    x = np.sin(np.arange(40.0))
+    assert again.simulate(x).tobytes() == model.simulate(x).tobytes()
+
+
+def test_damaged_models_are_refused_in_one_line(model, tmp_path):
+    path = tmp_path / "model.nc"
+    save_model(model, path)
+    content = path.read_bytes()
+    wrong = [content[:k] for k in range(0, len(content) - 1, 37)]
+    wrong += [content.replace(b"rbf", b"xyz"), content.replace(b'"n_neurons": 2', b'"n_neurons": 9'), b"no file"]
+    for damaged in wrong:
+        path.write_bytes(damaged)
+        with pytest.raises(InputError) as error:
+            load_model(path)
+        assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="absent"):
+        load_model(tmp_path / "absent.nc")
