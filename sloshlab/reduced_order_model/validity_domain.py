@@ -196,4 +196,5 @@ class ValidityDomain:
 
 
 def _bins(frequency_hz: FloatArray) -> NDArray[np.int64]:
-    return np.floor(BINS_PER_OCTAVE * np.log2(np.maximum(frequency_hz, 1e-6))).astype(np.int64)
+    octaves = np.log2(np.maximum(frequency_hz, 1e-6))
+    return np.asarray(np.floor(BINS_PER_OCTAVE * octaves), np.int64)
