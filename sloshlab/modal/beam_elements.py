@@ -68,13 +68,17 @@ def element_modes(
     mass[-2, -1] += beam.tip_mass_kg * tip_offset_m
     mass[-1, -1] += tip_inertia_kg_m2 + beam.tip_mass_kg * tip_offset_m**2
     free = slice(2, None)
-    squares, vectors = eigh(stiffness[free, free], mass[free, free], subset_by_index=[0, n_modes - 1])
-    vectors = vectors / vectors[-2]
+    # M v = ω⁻² K v: the lowest modes are the largest values here and lose no digits to the highest
+    size = mass.shape[0] - 2
+    inverse_squares, vectors = eigh(
+        mass[free, free], stiffness[free, free], subset_by_index=[size - n_modes, size - 1]
+    )
+    vectors = vectors[:, ::-1] / vectors[-2, ::-1]
     rigid = np.zeros(mass.shape[0])
     rigid[0::2] = 1.0
     shape = np.vstack([np.zeros((2, n_modes)), vectors])
     return BeamModes(
-        frequency_hz=np.sqrt(squares) / (2 * np.pi),
+        frequency_hz=1 / np.sqrt(inverse_squares[::-1]) / (2 * np.pi),
         modal_mass_kg=np.einsum("im,ij,jm->m", shape, mass, shape),
         base_factor_kg=rigid @ mass @ shape,
         x_m=np.linspace(0, beam.length_m, n_elements + 1),

@@ -82,7 +82,7 @@ def fit_decaying_sine(
         jacobian = _jacobian(time, basis, linear)
         step = np.linalg.lstsq(jacobian, signal - basis @ linear, rcond=None)[0][:2]
         nonlinear = np.asarray(nonlinear + np.clip(step, -largest, largest), dtype=np.float64)
-        if np.abs(step).max() <= 1e-13 * nonlinear[1]:
+        if np.abs(step).max() <= 1e-8 * nonlinear[1]:
             break
     basis = _basis(time, nonlinear)
     linear = _solved(basis, signal)

@@ -44,12 +44,11 @@ def log_decrement(
     InstantaneousDamping
         One value per half cycle; values within `n_cycles` of each other share extrema.
     """
-    peaks = _extrema(signal, sampling_rate_hz, frequency_hz)
-    time, value, unit_value_std, unit_time_std = peaks
+    time, value, sign, unit_time_std, unit_value_std = _extrema(signal, sampling_rate_hz, frequency_hz)
     apart = 2 * n_cycles
-    sign = np.sign(value)
     amplitude = sign[1:-1] * np.convolve(value, _NEIGHBOURS, mode="valid")
-    amplitude = np.maximum(amplitude, 1e-300)
+    lost = 1e-6 * np.abs(amplitude).max()
+    amplitude = np.maximum(amplitude, lost)
     first, last = slice(0, amplitude.size - apart), slice(apart, amplitude.size)
     when = time[1:-1]
     duration = when[last] - when[first]
@@ -69,7 +68,9 @@ def log_decrement(
         frequency_hz=omega / (2 * np.pi),
         frequency_hz_std=omega * time_std / duration / (2 * np.pi),
         coverage_factor=np.full(duration.size, noise.coverage_factor),
-        trust=np.where(relative > LARGEST_AMPLITUDE_ERROR, str(Trust.NOISE), str(Trust.USED)),
+        trust=np.where(
+            (relative > LARGEST_AMPLITUDE_ERROR) | (amplitude[last] <= lost), str(Trust.NOISE), str(Trust.USED)
+        ),
     )
 
 
@@ -82,39 +83,29 @@ def _log_ratio_std(first: FloatArray, last: FloatArray, apart: int) -> FloatArra
 
 def _extrema(
     signal: FloatArray, sampling_rate_hz: float, frequency_hz: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Times [s], values, and the standard errors of both for white noise of standard deviation 1."""
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Times [s], values, ±1 for maximum or minimum, standard errors of times and values for white noise of 1."""
     phase = np.unwrap(np.angle(analytic_signal(signal, sampling_rate_hz, frequency_hz=frequency_hz)))
     phase = np.maximum.accumulate(phase)
     halves = np.arange(np.ceil(phase[0] / np.pi), np.floor(phase[-1] / np.pi) + 1)
-    guesses = np.interp(halves * np.pi, phase, np.arange(signal.size))
     half_width = max(2, round(_HALF_WIDTH_SHARE * sampling_rate_hz / frequency_hz))
-    rows = []
-    for guess in guesses:
-        row = _extremum(signal, float(guess), half_width)
-        if row is not None:
-            rows.append(row)
-    sample, value, value_std, sample_std = np.array(rows).reshape(-1, 4).T
-    return sample / sampling_rate_hz, value, value_std, sample_std / sampling_rate_hz
-
-
-def _extremum(signal: FloatArray, guess: float, half_width: int) -> tuple[float, float, float, float] | None:
-    """Vertex of the parabola around a guess, fitted twice: the second time centred on the first vertex."""
-    for _ in range(2):
-        centre = round(guess)
-        if centre < half_width or centre + half_width >= signal.size:
-            return None
-        offset = np.arange(-half_width, half_width + 1, dtype=np.float64)
-        design = np.stack([np.ones_like(offset), offset, offset**2], axis=1)
-        part = signal[centre - half_width : centre + half_width + 1]
-        constant, slope, curvature = np.linalg.lstsq(design, part, rcond=None)[0]
-        if curvature == 0:
-            return None
-        shift = float(np.clip(-slope / (2 * curvature), -half_width, half_width))
-        guess = centre + shift
+    offset = np.arange(-half_width, half_width + 1)
+    design = np.stack([np.ones_like(offset), offset, offset**2], axis=1).astype(np.float64)
     covariance = np.linalg.inv(design.T @ design)
-    at_vertex = np.array([1.0, shift, shift**2])
-    to_shift = np.array([0.0, -1 / (2 * curvature), slope / (2 * curvature**2)])
+    vertex = np.interp(halves * np.pi, phase, np.arange(signal.size))
+    for _ in range(2):  # the second time centred on the first vertex
+        centre = np.round(vertex).astype(int)
+        whole = (centre >= half_width) & (centre + half_width < signal.size)
+        centre, halves = centre[whole], halves[whole]
+        constant, slope, curvature = covariance @ design.T @ signal[centre[:, None] + offset].T
+        curvature = np.where(curvature == 0, np.finfo(float).tiny, curvature)
+        shift = np.clip(-slope / (2 * curvature), -half_width, half_width)
+        vertex = centre + shift
+    at_vertex = np.stack([np.ones_like(shift), shift, shift**2])
+    to_shift = np.stack([np.zeros_like(shift), -1 / (2 * curvature), slope / (2 * curvature**2)])
+    value_std, shift_std = (
+        np.sqrt(np.einsum("ip,ij,jp->p", row, covariance, row)) for row in (at_vertex, to_shift)
+    )
     value = constant + slope * shift + curvature * shift**2
-    value_std, shift_std = (float(np.sqrt(row @ covariance @ row)) for row in (at_vertex, to_shift))
-    return guess, float(value), value_std, shift_std
+    sign = np.where(halves % 2 == 0, 1.0, -1.0)
+    return vertex / sampling_rate_hz, value, sign, shift_std / sampling_rate_hz, value_std

@@ -83,7 +83,9 @@ def find_release(
             allowed="at least 5 cycles of at least 8 samples",
             remedy="record longer or faster, or state the mode's frequency range",
         )
-    shares = _unexplained_shares(values[start:], sampling_rate_hz, frequency, min(n_cycles, 3 * _N_LATER))
+    shares = _unexplained_shares(
+        values[start:], sampling_rate_hz, frequency, min(n_cycles, _LARGEST_N_CYCLES + _N_LATER)
+    )
     end = start + _n_transient(shares) * per_cycle
     return Release(float(start / sampling_rate_hz), float(end / sampling_rate_hz), frequency, shares)
 

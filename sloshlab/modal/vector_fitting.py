@@ -76,7 +76,7 @@ def vector_fit(
     weights: FloatArray | None = None,
     stable: bool = True,
     proportional: bool = False,
-    n_iterations: int = 30,
+    n_iterations: int = 20,
 ) -> RationalFit:
     """Fit a rational function to frequency responses.
 
@@ -138,7 +138,7 @@ def vector_fit(
             moved = np.where(moved.real > 0, -moved.conj(), moved)
         change = _largest_move(poles, moved)
         poles = np.asarray(moved, dtype=np.complex128)
-        if change < 1e-12:
+        if change < 1e-10:
             status = FitStatus.CONVERGED
     residues, constant, slope = _residues(s, h, w, poles, proportional)
     fit = RationalFit(
