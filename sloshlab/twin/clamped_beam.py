@@ -1,7 +1,7 @@
 """Uniform Euler–Bernoulli beam, clamped at its root, with a mass at its tip: shapes in closed form.
 
-ψ(x) = cosh κ − cos κ − r (sinh κ − sin κ), κ = λ x/l, with 1 + cos λ cosh λ + µ λ (cos λ sinh λ − sin λ cosh λ) = 0,
-µ = tip mass over mass of the beam.
+ψ(x) = cosh κ − cos κ − r (sinh κ − sin κ), κ = λ x/l, with
+1 + cos λ cosh λ + µ λ (cos λ sinh λ − sin λ cosh λ) = 0, µ = tip mass over mass of the beam.
 """
 
 from __future__ import annotations

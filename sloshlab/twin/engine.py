@@ -5,10 +5,12 @@
 Classical Runge–Kutta of order 4 on the smooth pieces between events. Within a step every switch is held, so
 that no stage looks across a discontinuity; at the end of a step the signs of the event functions are compared with
 the switches, and where they differ the step is repeated shorter until its end is the event (regula falsi,
-Illinois). The order therefore survives contacts and friction. Two events that undo each other within one step pass unseen.
+Illinois). The order therefore survives contacts and friction. Two events that undo each
+other within one step pass unseen.
 
 Dry friction at one place slides (the laws are asked with DIRECTION = ±1) or sticks: then the acceleration is
-that of the structure held at this place, and the holding force λ must lie between the sliding forces of both directions.
+that of the structure held at this place, and the holding force λ must lie between the sliding forces
+of both directions.
 Constant masses of terms are part of M; a law that depends on the acceleration otherwise is solved for by
 Newton's method at every stage.
 """
@@ -19,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -30,7 +32,6 @@ from sloshlab.twin.law import (
     DIRECTION,
     DISPLACEMENT,
     FREQUENCY,
-    N_MOTION,
     PHASE,
     TIME,
     VELOCITY,
@@ -243,7 +244,7 @@ def _eliminate(matrix: FloatArray, unknown: FloatArray) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def _hold(m: Model, y: FloatArray, dy: FloatArray, s: Scratch) -> None:
-    """Holding force of sticking friction and its bounds, shared among the friction terms; adds it to the forces."""
+    """Holding force of sticking friction and its bounds, shared among the friction terms."""
     f, n = m.friction_place, m.stiffness.size
     a = m.absolute[f] * s.inputs[2]
     for j in range(n):

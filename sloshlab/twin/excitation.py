@@ -1,7 +1,7 @@
 """What drives a twin: motion of the base (or of the tank, where there is no structure), and a force on the tank.
 
 The engine needs values at samples and half-way between them. Motions given by formula are evaluated there; a
-recording is interpolated band-limited. Velocity and displacement of a recorded acceleration come from its integration.
+recording is interpolated band-limited. Velocity and displacement of the same motion are given with it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Excitation:
             raise InputError("n_samples", got=str(self.n_samples), allowed="2 … 50000000")
 
     def half_steps(self, n_substeps: int) -> FloatArray:
-        """Inputs at steps and half-way between, shape (2 (n − 1) n_substeps + 1, 6); empty where nothing drives."""
+        """Inputs at steps and half-way between, (2 (n − 1) n_substeps + 1, 6); empty where nothing drives."""
         if self.inputs is None:
             return np.empty((0, len(INPUTS)))
         n = 2 * (self.n_samples - 1) * n_substeps + 1
@@ -68,7 +68,7 @@ def free(duration_s: float, sampling_rate_hz: float) -> Excitation:
 
 
 def harmonic(amplitude_m: float, frequency_hz: float, duration_s: float, sampling_rate_hz: float) -> Excitation:
-    """Base motion u = −u₀ cos φ, so that the acceleration is a₀ cos φ and the start is the lowest point at rest."""
+    """Base motion u = −u₀ cos φ, so that the acceleration is a₀ cos φ; it starts at the lowest point."""
     omega = 2 * pi * frequency_hz
 
     def inputs(time: FloatArray) -> FloatArray:

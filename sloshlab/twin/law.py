@@ -1,6 +1,6 @@
 """The one form of every force in the twin, so that the engine is compiled once and never for a new force.
 
-A law is a plain function of four arrays, compiled on its first use to a C function whose address the engine calls::
+A law is a plain function of four arrays, compiled on first use to a C function whose address the engine calls::
 
     @law
     def quadratic_drag(motion, parameters, memory, rates):
@@ -64,7 +64,8 @@ class Law:
 
     def __init__(self, function: Callable[..., float]) -> None:
         self.function = function
-        functools.update_wrapper(self, function)
+        self.__module__ = function.__module__
+        self.__name__, self.__doc__ = function.__name__, function.__doc__
 
     @functools.cached_property
     def _compiled(self) -> Any:

@@ -48,7 +48,7 @@ _SENSOR_NUMBERS = (
 def save_twin(twin: Twin, path: str | os.PathLike[str]) -> None:
     """Write the twin to `path` (TOML) and, where its forces have tables, to the same name with `.nc`.
 
-    Both files are written completely or not at all; the text last, so that it never names arrays that are not there.
+    Each file is written completely or not at all; the text last, so that it never names arrays that are absent.
     """
     file = Path(path)
     tables = {f"term_{i}": term.table for i, term in enumerate(twin.terms) if term.table.size}

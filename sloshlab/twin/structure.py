@@ -1,7 +1,7 @@
 """What carries the tank: modes, the tank's and the guide's places on them, and how base motion drives them.
 
-The liquid is part of the structure as if it were frozen: Table 2.4 and every modal test of the beam contain it, and
-on the one-degree-of-freedom rig it is added to the moving mass. Forces of the liquid are Δf, beyond that.
+The liquid is part of the structure as if it were frozen: Table 2.4 and every modal test of the beam contain it,
+and on the one-degree-of-freedom rig it is added to the moving mass. Forces of the liquid are Δf, beyond that.
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ def modal_structure(
 
     Parameters
     ----------
-    frequencies_hz, damping_ratios, modal_masses_kg, mode_shape, base_participation_kg : array_like, shape (n_modes,)
+    frequencies_hz, damping_ratios, modal_masses_kg, mode_shape, base_participation_kg : array_like
+        Shape (n_modes,).
     """
     f, zeta, mass, shape = (
         np.atleast_1d(np.asarray(values, dtype=np.float64))

@@ -22,7 +22,7 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 
 FloatArray = npt.NDArray[np.float64]
 _G = GRAVITY_M_PER_S2
-_RADIUS, _STIFFNESS, _DAMPING, _HARDENING, _FROZEN, _LIQUID, _HEIGHT = range(7)
+_RADIUS, _STIFFNESS, _DAMPING, _HARDENING, _FROZEN, _LIQUID, _HEIGHT, _IN_FLIGHT = range(8)
 
 
 @law
@@ -32,18 +32,19 @@ def _nothing(motion, parameters, memory, rates):
 
 @law
 def _bouncing_ball(motion, parameters, memory, rates):
-    """Force of the ball on the tank (2.3, 2.4) and its own motion (2.1, with the sign of the contact force put right)."""
+    """Force of the ball on the tank (2.3, 2.4) and its motion (2.1, with the right sign of F_b)."""
     radius = parameters[_RADIUS]
     mass = (1.0 - parameters[_FROZEN]) * parameters[_LIQUID]
     height = memory[0] - motion[DISPLACEMENT]
-    contact = 0.0
+    closing = memory[1] - motion[VELOCITY]
+    contact = parameters[_IN_FLIGHT] * parameters[_DAMPING] * closing
     for side in range(2):
         if memory[2 + side] < 0:
             overlap = height - radius if side == 0 else height - parameters[_HEIGHT] + radius
             stiffness = parameters[_STIFFNESS] * (
                 1.0 + parameters[_HARDENING] * overlap * overlap / (radius - abs(overlap))
             )
-            contact += stiffness * overlap + parameters[_DAMPING] * (memory[1] - motion[VELOCITY])
+            contact = stiffness * overlap + parameters[_DAMPING] * closing
     rates[0], rates[1] = memory[1], -_G - contact / mass
     return contact + mass * _G
 
@@ -101,6 +102,8 @@ BOUNCING_BALL = register(
             Parameter("beta", "1", 0.0, 0.999),
             Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
             Parameter("height_m", "m", 1e-6, 100.0),
+            # share of the damping that acts in flight too: 0 while in contact only, 1 as (2.3) is printed
+            Parameter("damping_in_flight", "1", 0.0, 1.0, 0.0),
         ),
         _bouncing_ball,
         events=_bouncing_ball_events,

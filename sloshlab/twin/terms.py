@@ -9,6 +9,7 @@ A user's own force is a law and one `ForceKind`; nothing else has to change::
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -109,6 +110,9 @@ class ForceKind:
     check: Callable[[Mapping[str, float]], None] | None = None
     equation: str = ""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _kind_of_module, (self.law.function.__module__, self.name)
+
     def __call__(self, *, place: str | None = None, table: npt.ArrayLike = (), **numbers: float) -> Term:
         """Term of this kind; `table` is what its law reads after its parameters, for maps and networks.
 
@@ -174,6 +178,12 @@ class Term:
 
 
 _KINDS: dict[str, ForceKind] = {}
+
+
+def _kind_of_module(module: str, name: str) -> ForceKind:
+    """The kind in another process, whose module may not be imported there yet."""
+    importlib.import_module(module)
+    return kind_named(name)
 
 
 def register(kind: ForceKind) -> ForceKind:

@@ -231,7 +231,7 @@ class Simulation:
 
     @property
     def work_of_terms_j(self) -> FloatArray:
-        """Work of each term in the frame of its place since the start, shape (n, n_terms); dissipated is negative."""
+        """Work of each term in the frame of its place, shape (n, n_terms); dissipated is negative."""
         return self.works_j[:, 1 : 2 * len(self.twin.terms) : 2]
 
     @property
@@ -419,7 +419,8 @@ def _run(twin: Twin, prepared: _Prepared, y: FloatArray, excitation: Excitation,
     forces, memory, works = np.empty((rows, n_terms)), np.empty((rows, n_memory)), np.empty((rows, n_works))
     works[0] = 0.0
     largest = np.concatenate([
-        np.full(n, _LARGEST_DISPLACEMENT_M), np.full(n, _LARGEST_VELOCITY_M_PER_S), np.full(n_memory, _LARGEST_MEMORY)
+        np.full(n, _LARGEST_DISPLACEMENT_M), np.full(n, _LARGEST_VELOCITY_M_PER_S),
+        np.full(n_memory, _LARGEST_MEMORY),
     ])  # fmt: skip
     n_event_functions = max((t.kind.n_switches + len(t.kind.limits) for t in twin.terms), default=0)
     log = np.empty((_LARGEST_EVENT_LOG, 4))
