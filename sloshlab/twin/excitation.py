@@ -31,8 +31,9 @@ class Excitation:
         Rate of the output.
     n_samples : int
     inputs : callable or None
-        Times [s], shape (n,) → array (n, 6): displacement, velocity, acceleration of the base, phase and
-        frequency of the excitation, force on the tank. None where nothing drives.
+        Times [s] of the samples and of as many instants between each two, shape (n,) → array (n, 6):
+        displacement, velocity, acceleration of the base, phase and frequency of the excitation, force on
+        the tank. None where nothing drives.
     moves_base : bool
         Whether the base moves.
     """
@@ -200,7 +201,7 @@ def recorded(
     def inputs(time: FloatArray) -> FloatArray:
         table = np.zeros((time.size, len(INPUTS)))
         for column, values in given.items():
-            table[:, column] = _between(values, time * sampling_rate_hz)
+            table[:, column] = _between(values, (time.size - 1) // (values.size - 1))
         return table
 
     (shape,) = lengths
@@ -208,10 +209,19 @@ def recorded(
     return Excitation(sampling_rate_hz, shape[0], inputs, moves_base=moves)
 
 
-def _between(values: FloatArray, positions: FloatArray) -> FloatArray:
-    """Band-limited values; beyond its ends the series is continued by point reflection."""
-    pad = min(HALF_WIDTH + 1, values.size - 1)
+def _between(values: FloatArray, n_between: int) -> FloatArray:
+    """Band-limited values at `n_between` instants per sample; beyond the ends the series is reflected there.
+
+    The kernel of `resampled` at these few offsets is taken from its answer to a unit impulse.
+    """
+    pad = min(HALF_WIDTH, values.size - 1)
     before, after = 2 * values[0] - values[pad:0:-1], 2 * values[-1] - values[-2 : -pad - 2 : -1]
-    constant = (HALF_WIDTH + 1 - pad) if pad < HALF_WIDTH + 1 else 0
-    padded = np.pad(np.concatenate([before, values, after]), constant, mode="edge")
-    return resampled(padded, positions + pad + constant)
+    padded = np.pad(np.concatenate([before, values, after]), HALF_WIDTH - pad, mode="edge")
+    centre, offsets = 3 * HALF_WIDTH, np.arange(-HALF_WIDTH, HALF_WIDTH + 1)
+    impulse = np.zeros(2 * centre + 1)
+    impulse[centre] = 1.0
+    between = np.empty((values.size, n_between))
+    for i in range(n_between):
+        weights = resampled(impulse, centre + i / n_between - offsets)
+        between[:, i] = np.correlate(padded, weights, mode="valid")
+    return between.ravel()[: (values.size - 1) * n_between + 1]

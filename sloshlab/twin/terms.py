@@ -50,10 +50,12 @@ class Parameter:
 
 
 def _no_mass(parameters: Mapping[str, float]) -> float:
+    """Adds no mass."""
     return 0.0
 
 
 def _no_memory(parameters: Mapping[str, float], table: FloatArray) -> tuple[float, ...]:
+    """Has no states."""
     return ()
 
 
