@@ -34,6 +34,8 @@ class DecayingSine:
         Standard errors of s, ω and the amplitude for white noise of standard deviation 1.
     residual : ndarray, shape (n,)
         Signal minus fit.
+    jacobian : ndarray, shape (n, 5)
+        Derivatives of the fit by s, ω, A, B and c: the directions in which it takes up noise.
     """
 
     decay_per_s: float
@@ -41,6 +43,7 @@ class DecayingSine:
     amplitude: float
     unit_std: FloatArray
     residual: FloatArray
+    jacobian: FloatArray
 
     @property
     def noise_std(self) -> float:
@@ -113,4 +116,4 @@ def _result(nonlinear: FloatArray, linear: FloatArray, jacobian: FloatArray, res
     direction = linear[:2] / amplitude if amplitude > 0 else np.zeros(2)
     variances = [covariance[0, 0], covariance[1, 1], direction @ covariance[2:4, 2:4] @ direction]
     unit_std = np.sqrt(np.maximum(variances, 0.0))
-    return DecayingSine(float(nonlinear[0]), float(nonlinear[1]), amplitude, unit_std, residual)
+    return DecayingSine(float(nonlinear[0]), float(nonlinear[1]), amplitude, unit_std, residual, jacobian)

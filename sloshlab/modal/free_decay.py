@@ -129,13 +129,13 @@ def _completed(
 
 
 def _refuse_without_decay(reading: InstantaneousDamping) -> None:
-    """A decay falls: the weighted mean of ζ is above zero by more than its interval, amplitudes end lower."""
+    """A decay falls: the weighted mean of ζ is above zero by more than its interval."""
     clear = reading.used
     amplitude = reading.acceleration_amplitude_m_per_s2
     if clear.sum() >= 1:
         weight = 1 / np.maximum(reading.damping_ratio_std[clear], 1e-12) ** 2
         mean = float((weight * reading.damping_ratio[clear]).sum() / weight.sum())
-        if mean > reading.coverage_factor[0] / np.sqrt(weight.sum()) and amplitude[-1] < amplitude[0]:
+        if mean > reading.coverage_factor[0] / np.sqrt(weight.sum()):
             return
     raise AnalysisError(
         "free decay",

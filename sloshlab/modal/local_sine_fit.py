@@ -113,19 +113,25 @@ def _values(fits: list[DecayingSine], noise: DecayNoise) -> InstantaneousDamping
 def _noise(fits: list[DecayingSine], time_s: FloatArray, n_cycles: int) -> DecayNoise:
     """Noise per stretch, coloured as the residual's lines beside the fundamental are.
 
-    Lines n_cycles ± 1 are taken up by the fit, line 2 n_cycles holds the second harmonic: both are left out.
+    Lines n_cycles ± 1 are taken up by the fit, line 2 n_cycles holds the second harmonic: both are left out. With
+    two cycles no line is left, and the noise counts as white.
     """
     lines = np.arange(1, int(1.75 * n_cycles) + 1)
     lines = lines[np.abs(lines - n_cycles) > 1]
     lines = lines[lines >= 0.5 * n_cycles]
     levels = np.array([fit.noise_std for fit in fits])
-    white = np.maximum(levels, np.finfo(float).tiny)
-    shares = [
-        np.abs(np.fft.rfft(fit.residual)[lines[lines <= fit.residual.size // 2]]) ** 2
-        / (fit.residual.size * level**2)
-        for fit, level in zip(fits, white, strict=True)
-    ]
+    shares = [_line_shares(fit, lines[lines <= fit.residual.size // 2]) for fit in fits]
     pooled = np.concatenate(shares) if shares else np.ones(1)
     colour = float(pooled.mean()) if pooled.size else 1.0
-    n_free = min(2.0 * max(pooled.size, 1), sum(fit.residual.size - N_PARAMETERS for fit in fits))
+    n_free = float(sum(fit.residual.size - N_PARAMETERS for fit in fits))
+    if pooled.size:
+        n_free = min(2.0 * pooled.size, n_free)
     return DecayNoise(time_s, levels * np.sqrt(colour), max(n_free, 1.0))
+
+
+def _line_shares(fit: DecayingSine, lines: npt.NDArray[np.int64]) -> FloatArray:
+    """Power of the residual at lines, over what a fit to white noise of the same level leaves there."""
+    taken_up = np.linalg.qr(fit.jacobian)[0]
+    left = 1 - (np.abs(np.fft.rfft(taken_up, axis=0)[lines]) ** 2).sum(axis=1) / fit.residual.size
+    power = np.abs(np.fft.rfft(fit.residual)[lines]) ** 2 / fit.residual.size
+    return np.asarray(power / (left * max(fit.noise_std, 1e-150) ** 2))

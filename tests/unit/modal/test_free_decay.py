@@ -72,6 +72,33 @@ def test_what_is_no_decay_is_refused_in_one_line(signal: np.ndarray, match: str)
     assert "\n" not in str(error.value)
 
 
+def test_a_steady_motion_in_noise_is_no_decay() -> None:
+    """By chance it falls a little in half of the cases; that is no decay before it exceeds its interval."""
+    generator = np.random.default_rng(7)
+    refused = 0
+    for _ in range(20):
+        steady = np.cos(2 * np.pi * 10.0 * TIME_S[:1500]) + generator.normal(0, 0.1, 1500)
+        try:
+            analyse_free_decay(steady, RATE_HZ)
+        except AnalysisError:
+            refused += 1
+    assert refused >= 17
+
+
+def test_a_motion_that_is_driven_again_is_no_decay() -> None:
+    envelope = np.interp(TIME_S, [0.0, 4.0, 6.0], [0.0, -2.0, 0.2])
+    with pytest.raises(AnalysisError, match="an amplitude that falls"):
+        analyse_free_decay(np.exp(envelope) * np.cos(2 * np.pi * 10.0 * TIME_S), RATE_HZ)
+
+
+def test_a_burst_within_the_decay_spoils_only_itself() -> None:
+    burst = np.where((TIME_S > 1.2) & (TIME_S < 2.0), 60.0, 0.0)
+    disturbed = DECAY + burst * np.random.default_rng(4).normal(size=DECAY.size)
+    fit = analyse_free_decay(disturbed, RATE_HZ).local_sine_fit
+    later = (fit.time_s > 2.3) & (fit.time_s < 5.5)
+    assert fit.frequency_hz[later] == pytest.approx(10.0, rel=1e-6)
+
+
 def test_a_range_without_lines_is_refused() -> None:
     with pytest.raises(AnalysisError, match="frequency range of the mode"):
         analyse_free_decay(DECAY, RATE_HZ, frequency_range_hz=(900.0, 950.0))
@@ -83,3 +110,11 @@ def test_data_sets_carry_units_from_the_table() -> None:
         assert dataset.acceleration_amplitude_m_per_s2.attrs["units"] == "m s-2"
         assert dataset.modal_frequency_hz_std.attrs["units"] == "Hz"
         assert str(dataset.decay_method.values) == method
+
+
+def test_two_cycles_per_stretch_are_the_fewest() -> None:
+    fit = analyse_free_decay(DECAY, RATE_HZ, n_cycles=2).local_sine_fit
+    assert fit.used.all()
+    assert (fit.coverage_factor < 1.7).all()
+    with pytest.raises(AnalysisError, match="at least 2 cycles"):
+        analyse_free_decay(DECAY, RATE_HZ, n_cycles=1)
