@@ -254,7 +254,8 @@ def _hold(m: Model, y: FloatArray, dy: FloatArray, s: Scratch) -> None:
     velocity = s.motion[f, VELOCITY]
     s.motion[f, VELOCITY] = 0.0
     for side in range(2):
-        s.motion[f, DIRECTION] = 1.0 - 2.0 * side
+        for p in range(m.absolute.size):
+            s.motion[p, DIRECTION] = 1.0 - 2.0 * side
         s.friction[2 + side] = 0.0
         for i in range(m.law.size):
             if m.kind[i] & DRY_FRICTION:
@@ -266,7 +267,9 @@ def _hold(m: Model, y: FloatArray, dy: FloatArray, s: Scratch) -> None:
     for i in range(m.law.size):
         if m.kind[i] & DRY_FRICTION:
             s.force[i] *= holding / bound if bound != 0.0 else 0.0
-    s.motion[f, VELOCITY], s.motion[f, DIRECTION] = velocity, STICKS
+    s.motion[f, VELOCITY] = velocity
+    for p in range(m.absolute.size):
+        s.motion[p, DIRECTION] = STICKS
     s.friction[1] = holding
     for j in range(n):
         s.generalised[j] += m.psi[f, j] * holding
