@@ -1,0 +1,184 @@
+"""Keeping the particles well arranged and the volume true.
+
+The continuity equation only knows how the arrangement of the particles changes. Whatever else changes
+their density or their places (diffusion, shifting, surfaces that open and close) lets the density
+forget how closely the particles are packed, and the liquid slowly gains or loses volume although mass
+and mean force look healthy. Two corrections are made every few steps, from one more sum over pairs:
+
+packing
+    s relaxes towards ln of how closely the particles are really packed, Σ V₀ W over what the surface
+    leaves of it (`coverage_table`). The rate is a fraction of (root mean square speed)/h, so that a
+    liquid at rest is left alone.
+arrangement
+    Particles are shifted from crowded to empty places, without change of velocity, so that no momentum
+    is made; beside a surface only along it.
+
+References
+----------
+Sun, Colagrossi, Marrone & Zhang (2017), Comput. Methods Appl. Mech. Eng. 315, 25, doi:10.1016/j.cma.2016.10.028 (shift).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from acquisition.numerical_tank.equations import FAST
+from acquisition.numerical_tank.particles import AnyFloatArray, Constants, Pairs, Particles
+
+LARGEST_PACKING_ERROR = 0.05
+"""The correction of one packing error is bounded by this, in s."""
+RAREFACTION = (0.05, 0.15)
+"""A kernel sum that is too small by more than this begins to be, and is, no rarefaction but a thin piece of liquid."""
+LARGEST_SHARE = 0.5
+"""One correction takes away at most this share of the error."""
+SHIFT_LIMIT = 0.1
+"""Longest shift at once, over the smoothing length."""
+NEAR_SURFACE = (0.08, 0.2)
+"""h |Σ V ∇W| where the shift across the surface begins to fade, and where it is gone."""
+
+
+@njit(cache=True, fastmath=FAST)
+def _clear(particles, constants, n_all):  # type: ignore[no-untyped-def]
+    zero = constants.one - constants.one
+    for i in range(n_all):
+        particles.packing[i] = constants.peak
+        particles.nx[i] = zero
+        particles.nz[i] = zero
+        particles.qx[i] = zero
+        particles.qz[i] = zero
+        particles.bxx[i] = zero
+        particles.bxz[i] = zero
+        particles.bzz[i] = zero
+
+
+@njit(cache=True, fastmath=FAST)
+def sum_arrangement(particles: Particles, pairs: Pairs, constants: Constants, n_all: int) -> None:
+    """Sum kernel, its gradient, the crowding and the gradient correction over the pairs as measured."""
+    _clear(particles, constants, n_all)
+    packing, nx, nz, qx, qz = particles.packing, particles.nx, particles.nz, particles.qx, particles.qz
+    bxx, bxz, bzz = particles.bxx, particles.bxz, particles.bzz
+    one, two = constants.one, constants.two
+    for i in range(constants.n):
+        for k in range(pairs.near_start[i], pairs.near_start[i + 1]):
+            j = pairs.near_j[k]
+            rx, rz, f = pairs.rx[k], pairs.rz[k], pairs.f[k]
+            q = np.sqrt(rx * rx + rz * rz) / constants.smoothing
+            t = one - constants.half * q
+            weight = constants.peak * t * t * t * t * (two * q + one)
+            packing[i] += weight
+            packing[j] += weight
+            gx, gz = f * rx, f * rz
+            nx[i] += gx
+            nz[i] += gz
+            nx[j] -= gx
+            nz[j] -= gz
+            crowd = weight / constants.spacing_kernel
+            crowd = crowd * crowd
+            crowd = one + constants.crowding * crowd * crowd
+            qx[i] += crowd * gx
+            qz[i] += crowd * gz
+            qx[j] -= crowd * gx
+            qz[j] -= crowd * gz
+            bxx[i] -= gx * rx
+            bxz[i] -= gx * rz
+            bzz[i] -= gz * rz
+            bxx[j] -= gx * rx
+            bxz[j] -= gx * rz
+            bzz[j] -= gz * rz
+
+
+@njit(cache=True, fastmath=FAST)
+def _invert(particles, i, constants):  # type: ignore[no-untyped-def]
+    """Invert the gradient correction of a particle in place; none where too few neighbours define it."""
+    xx, xz, zz = particles.bxx[i], particles.bxz[i], particles.bzz[i]
+    determinant = xx * zz - xz * xz
+    zero = constants.one - constants.one
+    if determinant < constants.smallest_determinant:
+        particles.bxx[i], particles.bxz[i], particles.bzz[i] = zero, zero, zero
+        return
+    particles.bxx[i], particles.bxz[i], particles.bzz[i] = zz / determinant, -xz / determinant, xx / determinant
+
+
+@njit(cache=True, fastmath=FAST)
+def _explained(size, table, scale):  # type: ignore[no-untyped-def]
+    """Kernel sum that a flat surface leaves where the gradient has this size."""
+    place = min(size * scale, table.size - 1.0)
+    k = min(int(place), table.size - 2)
+    return table[k] + (place - k) * (table[k + 1] - table[k])
+
+
+@njit(cache=True, fastmath=FAST)
+def _rarefaction(missing):  # type: ignore[no-untyped-def]
+    """Take what is missing from the kernel sum as rarefaction only if it is little; else it is a drop or a sheet."""
+    if missing >= -RAREFACTION[0]:
+        return missing
+    return missing * max(0.0, (missing + RAREFACTION[1]) / (RAREFACTION[1] - RAREFACTION[0]))
+
+
+@njit(cache=True, fastmath=FAST)
+def correct_density(
+    particles: Particles, constants: Constants, table: AnyFloatArray, scale: float, speed_m_per_s: float
+) -> float:
+    """Let s relax towards the true packing, and invert the gradient corrections.
+
+    Parameters
+    ----------
+    particles, constants
+        Changed; as they are.
+    table, scale
+        From `coverage_table`, and entries per unit of h |Σ V ∇W|.
+    speed_m_per_s : float
+        Root mean square speed.
+
+    Returns
+    -------
+    float
+        Σ ½ s² that it took away; negative where it gave.
+    """
+    share = min(constants.relaxation * speed_m_per_s, LARGEST_SHARE)
+    lost = 0.0
+    for i in range(constants.n):
+        s = particles.s[i]
+        size = constants.smoothing * math.hypot(particles.nx[i], particles.nz[i])
+        packing = particles.packing[i] / constants.lattice_packing
+        error = _rarefaction(math.log(packing / _explained(size, table, scale))) - s
+        error = min(max(error, -LARGEST_PACKING_ERROR), LARGEST_PACKING_ERROR)
+        new = s + share * error
+        particles.s[i] = new
+        lost += 0.5 * (s * s - new * new)
+        _invert(particles, i, constants)
+    return lost
+
+
+@njit(cache=True, fastmath=FAST)
+def _away_from_surface(particles, i, constants):  # type: ignore[no-untyped-def]
+    """Take the part across the surface from the shift of a particle that feels one."""
+    nx, nz = particles.nx[i], particles.nz[i]
+    size = math.hypot(nx, nz) * constants.smoothing
+    if size <= NEAR_SURFACE[0]:
+        return particles.qx[i], particles.qz[i]
+    share = min((size - NEAR_SURFACE[0]) / (NEAR_SURFACE[1] - NEAR_SURFACE[0]), 1.0)
+    across = share * (particles.qx[i] * nx + particles.qz[i] * nz) / (nx * nx + nz * nz)
+    return particles.qx[i] - across * nx, particles.qz[i] - across * nz
+
+
+@njit(cache=True, fastmath=FAST)
+def shift(particles: Particles, constants: Constants, characteristic_speed_m_per_s: float) -> float:
+    """Shift all particles; return the sum of their heights gained [m]."""
+    strength = constants.spread * characteristic_speed_m_per_s
+    limit = SHIFT_LIMIT * constants.smoothing
+    raised = 0.0
+    for i in range(constants.n):
+        qx, qz = _away_from_surface(particles, i, constants)
+        dx, dz = -strength * qx, -strength * qz
+        length = math.hypot(dx, dz)
+        if length > limit:
+            dx, dz = dx * limit / length, dz * limit / length
+        particles.qx[i], particles.qz[i] = dx, dz
+        particles.x[i] += dx
+        particles.z[i] += dz
+        raised += dz
+    return raised
