@@ -60,7 +60,9 @@ def load(path: str | os.PathLike[str]) -> NumericalTank:
         tank = NumericalTank(_setup(bytes(arrays.pop("setup"))))
         tank.restore(arrays)
     except (KeyError, TypeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}", got=f"a checkpoint without valid {error}", remedy="start the run again") from error
+        raise InputError(
+            f"{path}", got=f"a checkpoint without valid {error}", remedy="start the run again"
+        ) from error
     return tank
 
 
@@ -79,7 +81,9 @@ def _arrays(path: Path) -> dict[str, Any]:
         with np.load(io.BytesIO(body), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except (ValueError, OSError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}", got="a checkpoint that cannot be unpacked", remedy="go on from an earlier one") from error
+        raise InputError(
+            f"{path}", got="a checkpoint that cannot be unpacked", remedy="go on from an earlier one"
+        ) from error
 
 
 def _setup(text: bytes) -> TankSetup:

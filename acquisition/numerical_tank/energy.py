@@ -22,10 +22,9 @@ TERMS: Final = (
     "density_diffusion",
     "packing",
     "shift",
-    "tension_control",
 )
 """Order of the sums that the compiled loop keeps."""
-(TANK_WORK, VISCOSITY, DENSITY_DIFFUSION, PACKING, SHIFT, TENSION_CONTROL) = range(len(TERMS))
+(TANK_WORK, VISCOSITY, DENSITY_DIFFUSION, PACKING, SHIFT) = range(len(TERMS))
 
 
 @dataclass(frozen=True)
@@ -44,8 +43,6 @@ class EnergyAccount:
         Elastic energy taken away by the packing correction; negative where it gives some.
     shift_j_per_m : float
         Potential energy taken away by shifting.
-    tension_control_j_per_m : float
-        Taken away by what keeps particles under tension apart.
     """
 
     kinetic_j_per_m: float
@@ -56,7 +53,6 @@ class EnergyAccount:
     density_diffusion_j_per_m: float
     packing_j_per_m: float
     shift_j_per_m: float
-    tension_control_j_per_m: float
 
     @property
     def gained_j_per_m(self) -> float:
@@ -66,13 +62,7 @@ class EnergyAccount:
     @property
     def lost_j_per_m(self) -> float:
         """Sum of all losses."""
-        return (
-            self.viscosity_j_per_m
-            + self.density_diffusion_j_per_m
-            + self.packing_j_per_m
-            + self.shift_j_per_m
-            + self.tension_control_j_per_m
-        )
+        return self.viscosity_j_per_m + self.density_diffusion_j_per_m + self.packing_j_per_m + self.shift_j_per_m
 
     @property
     def residual_j_per_m(self) -> float:
@@ -127,7 +117,7 @@ def account(
     ----------
     stored_j_per_m : sequence of float
         What the liquid gained: kinetic, potential, elastic.
-    sums : ndarray, shape (6,)
+    sums : ndarray, shape (5,)
         In the order of `TERMS`.
     mass_kg_per_m : float
         Mass of one particle.
@@ -136,8 +126,9 @@ def account(
         c₀ and g.
     """
     scale = np.full(len(TERMS), mass_kg_per_m)
-    scale[[TANK_WORK, VISCOSITY, TENSION_CONTROL]] *= step_s
+    scale[[TANK_WORK, VISCOSITY]] *= step_s
     scale[[DENSITY_DIFFUSION, PACKING]] *= speed_of_sound_m_per_s**2
     scale[SHIFT] *= g_m_per_s2
-    work, viscosity, diffusion, packing, shift, control = (float(value) for value in sums * scale)
-    return EnergyAccount(*stored_j_per_m, work, viscosity, diffusion, packing, shift, control)
+    work, viscosity, diffusion, packing, shift = (float(value) for value in sums * scale)
+    kinetic, potential, elastic = stored_j_per_m
+    return EnergyAccount(kinetic, potential, elastic, work, viscosity, diffusion, packing, shift)

@@ -56,10 +56,6 @@ def measure_pairs(particles: Particles, pairs: Pairs, constants: Constants) -> N
                 pairs.near_j[near] = j
                 pairs.rx[near], pairs.rz[near], pairs.f[near] = dx, dz, factor
                 pairs.viscous[near] = constants.viscous * factor / (r2 + soft)
-                q = constants.two * (one - t)
-                close = constants.stress * t * t * t * t * (constants.two * q + one)
-                close = close * close
-                pairs.stress[near] = close * close
                 near += 1
         if middle == pairs.start[i + 1]:
             pairs.near_middle[i] = near
@@ -99,10 +95,10 @@ def _clear(particles, n_all, zero):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=FAST)
 def _sum_over_partners(particles, pairs, constants, i, first, last):  # type: ignore[no-untyped-def]
-    """Add the terms of particle i with partners first … last; return the powers of viscosity and tension control."""
+    """Add the terms of particle i with partners first … last; return Σ viscous·(v⃗·r⃗)² [m²/s³], at most zero."""
     s, vx, vz, gx, gz = particles.s, particles.vx, particles.vz, particles.gx, particles.gz
     zero = constants.one - constants.one
-    power, control, sum_ax, sum_az, sum_gx, sum_gz, sum_diffusion = zero, zero, zero, zero, zero, zero, zero
+    power, sum_ax, sum_az, sum_gx, sum_gz, sum_diffusion = zero, zero, zero, zero, zero, zero
     si, vxi, vzi, gxi, gzi = s[i], vx[i], vz[i], gx[i], gz[i]
     for k in range(first, last):
         j = pairs.near_j[k]
@@ -110,11 +106,7 @@ def _sum_over_partners(particles, pairs, constants, i, first, last):  # type: ig
         closing = (vxi - vx[j]) * rx + (vzi - vz[j]) * rz
         drag = pairs.viscous[k] * closing
         power += drag * closing
-        squeeze = constants.speed_squared * f * (si + s[j])
-        if squeeze > 0:  # f < 0: the pair is under tension
-            control += squeeze * pairs.stress[k] * closing
-            squeeze -= squeeze * pairs.stress[k]
-        push = drag - squeeze
+        push = drag - constants.speed_squared * f * (si + s[j])
         sum_ax += push * rx
         sum_az += push * rz
         particles.ax[j] -= push * rx
@@ -134,31 +126,27 @@ def _sum_over_partners(particles, pairs, constants, i, first, last):  # type: ig
     particles.gx_sum[i] += sum_gx
     particles.gz_sum[i] += sum_gz
     particles.diffusion[i] += sum_diffusion
-    return power, control
+    return power
 
 
 @njit(cache=True, fastmath=FAST)
-def accelerate(particles: Particles, pairs: Pairs, constants: Constants, n_all: int) -> tuple[float, float]:
+def accelerate(particles: Particles, pairs: Pairs, constants: Constants, n_all: int) -> float:
     """Set accelerations, density diffusion and the sums of the gradient of s.
 
     Returns
     -------
-    viscosity, tension_control : float
-        Power that they take from the liquid, per mass of one particle [m²/s³].
+    float
+        Power that viscosity takes from the liquid, per mass of one particle [m²/s³], not negative.
     """
     _clear(particles, n_all, constants.one - constants.one)
-    viscosity, control = 0.0, 0.0
+    inside, at_walls = 0.0, 0.0
     for i in range(constants.n):
         first, middle, last = pairs.near_start[i], pairs.near_middle[i], pairs.near_start[i + 1]
-        drag, squeeze = _sum_over_partners(particles, pairs, constants, i, first, middle)
-        viscosity -= drag
-        control -= squeeze
+        inside += _sum_over_partners(particles, pairs, constants, i, first, middle)
         if last > middle:
-            # a pair of particle and image belongs half to the liquid, half to its image
-            drag, squeeze = _sum_over_partners(particles, pairs, constants, i, middle, last)
-            viscosity -= 0.5 * drag
-            control -= 0.5 * squeeze
-    return viscosity, control
+            at_walls += _sum_over_partners(particles, pairs, constants, i, middle, last)
+    # a pair of particle and image belongs half to the liquid, half to its image
+    return -(inside + 0.5 * at_walls)
 
 
 @njit(cache=True, fastmath=FAST)

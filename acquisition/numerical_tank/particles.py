@@ -40,6 +40,8 @@ class Particles(NamedTuple):
         Matrix that corrects a gradient [1].
     packing : ndarray
         Σ V W, with mirror images.
+    error, error_sum : ndarray
+        What s lacks to agree with the packing, and its kernel sum over the neighbours.
     nx, nz : ndarray
         Σ V ∇W [1/m], into the liquid where there is a surface.
     qx, qz : ndarray
@@ -65,6 +67,8 @@ class Particles(NamedTuple):
     bxz: AnyFloatArray
     bzz: AnyFloatArray
     packing: AnyFloatArray
+    error: AnyFloatArray
+    error_sum: AnyFloatArray
     nx: AnyFloatArray
     nz: AnyFloatArray
     qx: AnyFloatArray
@@ -93,8 +97,6 @@ class Pairs(NamedTuple):
         V₀ F(r): V₀ ∇ᵢW = f r⃗ [1/m²].
     viscous : ndarray, shape (capacity,)
         Factor of the viscous acceleration, (v⃗·r⃗) r⃗ times this.
-    stress : ndarray, shape (capacity,)
-        Share of a tension between the two that is taken away.
     """
 
     start: IndexArray
@@ -107,7 +109,6 @@ class Pairs(NamedTuple):
     rz: AnyFloatArray
     f: AnyFloatArray
     viscous: AnyFloatArray
-    stress: AnyFloatArray
 
 
 class Images(NamedTuple):
@@ -162,8 +163,6 @@ class Constants(NamedTuple):
         8ν [m²/s].
     softening : floating
         r² + this · h² stands under the viscous term, so that touching particles do no harm.
-    stress : floating
-        (share at the mean spacing)^¼ W(0)/W(mean spacing), of the tension taken away.
     diffusion : floating
         2 δ h c₀ [m²/s].
     spread : floating
@@ -178,6 +177,8 @@ class Constants(NamedTuple):
         Σ V₀ W of the undisturbed lattice.
     relaxation : floating
         Share of the packing error that one correction takes away, over the characteristic speed [s/m].
+    least_speed : floating
+        Added to that speed, so that even a liquid at rest finds its volume [m/s].
     largest_speed : floating
         A particle faster than this means that the run has become unstable [m/s].
     """
@@ -199,7 +200,6 @@ class Constants(NamedTuple):
     peak: float
     viscous: float
     softening: float
-    stress: float
     diffusion: float
     spread: float
     crowding: float
@@ -207,4 +207,5 @@ class Constants(NamedTuple):
     spacing_kernel: float
     lattice_packing: float
     relaxation: float
+    least_speed: float
     largest_speed: float

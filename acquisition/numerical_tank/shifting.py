@@ -15,7 +15,8 @@ arrangement
 
 References
 ----------
-Sun, Colagrossi, Marrone & Zhang (2017), Comput. Methods Appl. Mech. Eng. 315, 25, doi:10.1016/j.cma.2016.10.028 (shift).
+Sun, Colagrossi, Marrone & Zhang (2017), Comput. Methods Appl. Mech. Eng. 315, 25,
+doi:10.1016/j.cma.2016.10.028 (shift).
 """
 
 from __future__ import annotations
@@ -30,8 +31,12 @@ from acquisition.numerical_tank.particles import AnyFloatArray, Constants, Pairs
 
 LARGEST_PACKING_ERROR = 0.05
 """The correction of one packing error is bounded by this, in s."""
-RAREFACTION = (0.05, 0.15)
-"""A kernel sum that is too small by more than this begins to be, and is, no rarefaction but a thin piece of liquid."""
+LITTLE = 0.05
+"""A kernel sum that is too small by less than this is rarefaction."""
+ROUND = (0.5, 0.7)
+"""Roundness at which a smaller kernel sum begins to be, and is, rarefaction and no thin piece of liquid."""
+TENSION_SHARE = 1.0
+"""Weight of the tension in the speed of shifting."""
 LARGEST_SHARE = 0.5
 """One correction takes away at most this share of the error."""
 SHIFT_LIMIT = 0.1
@@ -68,6 +73,7 @@ def sum_arrangement(particles: Particles, pairs: Pairs, constants: Constants, n_
             q = np.sqrt(rx * rx + rz * rz) / constants.smoothing
             t = one - constants.half * q
             weight = constants.peak * t * t * t * t * (two * q + one)
+            pairs.viscous[k] = weight
             packing[i] += weight
             packing[j] += weight
             gx, gz = f * rx, f * rz
@@ -111,18 +117,26 @@ def _explained(size, table, scale):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST)
-def _rarefaction(missing):  # type: ignore[no-untyped-def]
-    """Take what is missing from the kernel sum as rarefaction only if it is little; else it is a drop or a sheet."""
-    if missing >= -RAREFACTION[0]:
-        return missing
-    return missing * max(0.0, (missing + RAREFACTION[1]) / (RAREFACTION[1] - RAREFACTION[0]))
+def _roundness(particles, i):  # type: ignore[no-untyped-def]
+    """How equally the neighbours surround a particle: 1 in the bulk and in a foam, 0 in a thread."""
+    half_trace = 0.5 * (particles.bxx[i] + particles.bzz[i])
+    determinant = particles.bxx[i] * particles.bzz[i] - particles.bxz[i] * particles.bxz[i]
+    root = math.sqrt(max(half_trace * half_trace - determinant, 0.0))
+    return max(half_trace - root, 0.0) / (half_trace + root + 1e-6)
 
 
 @njit(cache=True, fastmath=FAST)
-def correct_density(
-    particles: Particles, constants: Constants, table: AnyFloatArray, scale: float, speed_m_per_s: float
-) -> float:
-    """Let s relax towards the true packing, and invert the gradient corrections.
+def _rarefaction(particles, i, missing):  # type: ignore[no-untyped-def]
+    """Take what is missing from the kernel sum as rarefaction where neighbours are all around; else as a sheet."""
+    if missing >= -LITTLE:
+        return missing
+    share = (_roundness(particles, i) - ROUND[0]) / (ROUND[1] - ROUND[0])
+    return missing * min(max(share, 0.0), 1.0)
+
+
+@njit(cache=True, fastmath=FAST)
+def find_packing_errors(particles: Particles, constants: Constants, table: AnyFloatArray, scale: float) -> None:
+    """Find what s lacks to agree with the packing, and invert the gradient corrections.
 
     Parameters
     ----------
@@ -130,6 +144,25 @@ def correct_density(
         Changed; as they are.
     table, scale
         From `coverage_table`, and entries per unit of h |Σ V ∇W|.
+    """
+    for i in range(constants.n):
+        size = constants.smoothing * math.hypot(particles.nx[i], particles.nz[i])
+        packing = particles.packing[i] / constants.lattice_packing
+        error = _rarefaction(particles, i, math.log(packing / _explained(size, table, scale))) - particles.s[i]
+        particles.error[i] = min(max(error, -LARGEST_PACKING_ERROR), LARGEST_PACKING_ERROR)
+        _invert(particles, i, constants)
+
+
+@njit(cache=True, fastmath=FAST)
+def correct_density(particles: Particles, pairs: Pairs, constants: Constants, speed_m_per_s: float) -> float:
+    """Let s relax towards the packing, by the mean error of the neighbourhood.
+
+    The mean leaves the disorder of single particles alone; making pressure of it would heat the liquid.
+
+    Parameters
+    ----------
+    particles, pairs, constants
+        Changed; as measured; as they are.
     speed_m_per_s : float
         Root mean square speed.
 
@@ -138,18 +171,21 @@ def correct_density(
     float
         Σ ½ s² that it took away; negative where it gave.
     """
-    share = min(constants.relaxation * speed_m_per_s, LARGEST_SHARE)
+    share = min(constants.relaxation * (speed_m_per_s + constants.least_speed), LARGEST_SHARE)
+    error, error_sum = particles.error, particles.error_sum
+    for i in range(error.size):
+        error_sum[i] = constants.peak * error[i]
+    for i in range(constants.n):
+        for k in range(pairs.near_start[i], pairs.near_start[i + 1]):
+            j = pairs.near_j[k]
+            error_sum[i] += pairs.viscous[k] * error[j]
+            error_sum[j] += pairs.viscous[k] * error[i]
     lost = 0.0
     for i in range(constants.n):
         s = particles.s[i]
-        size = constants.smoothing * math.hypot(particles.nx[i], particles.nz[i])
-        packing = particles.packing[i] / constants.lattice_packing
-        error = _rarefaction(math.log(packing / _explained(size, table, scale))) - s
-        error = min(max(error, -LARGEST_PACKING_ERROR), LARGEST_PACKING_ERROR)
-        new = s + share * error
+        new = s + share * error_sum[i] / particles.packing[i]
         particles.s[i] = new
         lost += 0.5 * (s * s - new * new)
-        _invert(particles, i, constants)
     return lost
 
 
@@ -163,6 +199,27 @@ def _away_from_surface(particles, i, constants):  # type: ignore[no-untyped-def]
     share = min((size - NEAR_SURFACE[0]) / (NEAR_SURFACE[1] - NEAR_SURFACE[0]), 1.0)
     across = share * (particles.qx[i] * nx + particles.qz[i] * nz) / (nx * nx + nz * nz)
     return particles.qx[i] - across * nx, particles.qz[i] - across * nz
+
+
+@njit(cache=True, fastmath=FAST)
+def characteristic_speeds(particles: Particles, constants: Constants) -> tuple[float, float]:
+    """Return the speeds [m/s] at which density and arrangement are corrected.
+
+    Returns
+    -------
+    motion : float
+        Root mean square speed.
+    motion_and_tension : float
+        With √(2 |p|/ρ) of the liquid under tension added: at that speed tension tears particles apart.
+    """
+    square, tension = 0.0, 0.0
+    for i in range(constants.n):
+        square += particles.vx[i] * particles.vx[i] + particles.vz[i] * particles.vz[i]
+        tension += max(-particles.s[i], 0.0)
+    square /= constants.n
+    return math.sqrt(square), math.sqrt(
+        square + TENSION_SHARE * 2.0 * constants.speed_squared * tension / constants.n
+    )
 
 
 @njit(cache=True, fastmath=FAST)

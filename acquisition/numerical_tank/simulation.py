@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquisition.numerical_tank import energy, stepping
 from acquisition.numerical_tank.energy import EnergyAccount
+from acquisition.numerical_tank.initial_state import constants_of, particles_at_rest
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.numerical_tank.kernel import coverage_table, surface_gradient
 from acquisition.numerical_tank.neighbours import list_neighbours
 from acquisition.numerical_tank.particles import Images, Pairs, Particles
-from acquisition.numerical_tank.tank import TankSetup, constants_of, particles_at_rest
+from acquisition.numerical_tank.tank import TankSetup
 from sloshlab.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -256,7 +257,12 @@ class NumericalTank:
         """Return copies of everything that a later step depends on, for `checkpoint.save`."""
         n = self.setup.n_particles
         kept = {f"particles_{name}": getattr(self._particles, name)[:n].copy() for name in _KEPT}
-        return {**kept, "sums": self._sums.copy(), "counters": self._counters.copy(), "start": np.array(self._start)}
+        return {
+            **kept,
+            "sums": self._sums.copy(),
+            "counters": self._counters.copy(),
+            "start": np.array(self._start),
+        }
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Take up the state that `checkpoint_arrays` returned.
@@ -278,7 +284,11 @@ class NumericalTank:
         for name, target in targets.items():
             given = arrays[name]
             if given.shape != target.shape or given.dtype != target.dtype or not np.isfinite(given).all():
-                raise InputError(f"checkpoint, {name}", got=f"{given.dtype} {given.shape}", allowed=f"finite {target.dtype} {target.shape}")
+                raise InputError(
+                    f"checkpoint, {name}",
+                    got=f"{given.dtype} {given.shape}",
+                    allowed=f"finite {target.dtype} {target.shape}",
+                )
             target[...] = given
         self._start = (float(targets["start"][0]), float(targets["start"][1]), float(targets["start"][2]))
         self._relist()
@@ -320,7 +330,7 @@ def _allocated(setup: TankSetup) -> tuple[Particles, Pairs, Images]:
         Particles(*(reals(n + n_images) for _ in Particles._fields)),
         Pairs(
             *(indices(size) for size in (n + 1, n, n_pairs, n + 1, n, n_pairs)),
-            *(reals(n_pairs) for _ in range(5)),
+            *(reals(n_pairs) for _ in range(4)),
         ),
         Images(np.zeros(1, np.int64), indices(n_images), *(reals(n_images) for _ in range(4))),
     )

@@ -24,7 +24,6 @@ from acquisition.numerical_tank.energy import (
     PACKING,
     SHIFT,
     TANK_WORK,
-    TENSION_CONTROL,
     VISCOSITY,
 )
 from acquisition.numerical_tank.equations import (
@@ -36,10 +35,17 @@ from acquisition.numerical_tank.equations import (
 )
 from acquisition.numerical_tank.neighbours import list_is_stale, list_neighbours
 from acquisition.numerical_tank.particles import AnyFloatArray, Constants, Images, Pairs, Particles
-from acquisition.numerical_tank.shifting import correct_density, shift, sum_arrangement
+from acquisition.numerical_tank.shifting import (
+    characteristic_speeds,
+    correct_density,
+    find_packing_errors,
+    shift,
+    sum_arrangement,
+)
 from acquisition.numerical_tank.walls import (
     exchange_with_images,
     mirror_density,
+    mirror_packing_errors,
     mirror_velocity,
     place_images,
 )
@@ -125,12 +131,11 @@ def correct(
     place_images(particles, images, constants.n)
     measure_pairs(particles, pairs, constants)
     sum_arrangement(particles, pairs, constants, n_all)
-    square = 0.0
-    for i in range(constants.n):
-        square += particles.vx[i] * particles.vx[i] + particles.vz[i] * particles.vz[i]
-    speed = (square / constants.n) ** 0.5
-    sums[PACKING] += correct_density(particles, constants, table, scale, speed)
-    sums[SHIFT] -= shift(particles, constants, speed)
+    speed, shift_speed = characteristic_speeds(particles, constants)
+    find_packing_errors(particles, constants, table, scale)
+    mirror_packing_errors(particles, images, constants.n)
+    sums[PACKING] += correct_density(particles, pairs, constants, speed)
+    sums[SHIFT] -= shift(particles, constants, shift_speed)
 
 
 @njit(cache=True)
@@ -146,7 +151,7 @@ def _step(particles, pairs, images, constants, body_x, body_z, force, sums):  # 
     rate_of_density(particles, pairs, constants)
     _compress(particles, n, half)
     mirror_density(particles, images, n)
-    viscosity, control = accelerate(particles, pairs, constants, n_all)
+    viscosity = accelerate(particles, pairs, constants, n_all)
     correct_gradient(particles, n)
     sum_x, sum_z, largest, fastest = _kick(particles, constants, body_x, body_z)
     mirror_velocity(particles, images, n)
@@ -154,7 +159,6 @@ def _step(particles, pairs, images, constants, body_x, body_z, force, sums):  # 
     _compress(particles, n, half)
     sums[DENSITY_DIFFUSION] += _diffuse(particles, constants)
     sums[VISCOSITY] += viscosity
-    sums[TENSION_CONTROL] += control
     _force_on_walls(particles, images, constants, force)
     _move(particles, n, half)
     return sum_x, sum_z, largest, fastest
@@ -189,7 +193,7 @@ def advance(
     forces : ndarray, shape (n_steps, 4)
         Written: force of the liquid on the tank, divided by the mass of a particle [m/s²]; horizontal,
         vertical, of which on floor and roof.
-    sums : ndarray, shape (6,)
+    sums : ndarray, shape (5,)
         Energies divided by the mass of a particle, in the order of `energy.TERMS`; elastic ones
         also divided by c₀², potential ones by g, powers by the time step. Added to.
     counters : ndarray of int64, shape (3,)

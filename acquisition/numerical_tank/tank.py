@@ -1,4 +1,4 @@
-"""What is to be computed: box, liquid, resolution. And the particles at rest that it starts from."""
+"""What is to be computed: box, liquid, resolution. What is impossible is refused here, in one line."""
 
 from __future__ import annotations
 
@@ -6,19 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from acquisition.numerical_tank.kernel import (
-    SUPPORT,
-    gradient_factor_at_zero,
-    kernel,
-    kernel_at_zero,
-)
-from acquisition.numerical_tank.particles import Constants
 from sloshlab.errors import InputError
-
-FloatArray = NDArray[np.float64]
 
 MOST_PARTICLES: Final = 200_000
 FEWEST_LAYERS: Final = 4
@@ -87,8 +75,6 @@ class Numerics:
         α; adds α h c₀/8 to the viscosity of the liquid.
     density_diffusion : float
         δ.
-    tension_control : float
-        Share of a tension that is taken away between particles at the mean spacing.
     packing_strength : float
         Rate at which the density relaxes towards the packing, over the root mean square of the
         particles' speed divided by h.
@@ -104,12 +90,11 @@ class Numerics:
         Floating-point type of the particles.
     """
 
-    smoothing_over_spacing: float = 1.33
-    courant_number: float = 0.4
+    smoothing_over_spacing: float = 1.5
+    courant_number: float = 0.7
     artificial_viscosity: float = 0.02
     density_diffusion: float = 0.1
-    tension_control: float = 0.2
-    packing_strength: float = 0.3
+    packing_strength: float = 1.0
     shift_strength: float = 1.0
     n_slow: int = 8
     skin_over_spacing: float = 0.4
@@ -205,8 +190,14 @@ class TankSetup:
 
 
 def filled_tank(
-    box: Box, filling_level: float, layers_per_height: int, *, liquid: Liquid | None = None,
-    numerics: Numerics | None = None, seed: int = 0, sampling_rate_hz: float | None = None,
+    box: Box,
+    filling_level: float,
+    layers_per_height: int,
+    *,
+    liquid: Liquid | None = None,
+    numerics: Numerics | None = None,
+    seed: int = 0,
+    sampling_rate_hz: float | None = None,
 ) -> TankSetup:
     """Describe a tank filled to a level.
 
@@ -235,8 +226,13 @@ def filled_tank(
     if not 1 <= layers_per_height <= 10_000:
         raise InputError("layers of particles over the height", got=f"{layers_per_height}", allowed="1 … 10000")
     return TankSetup(
-        box, LiquidColumn(box.length_m, filling_level * box.height_m), box.height_m / layers_per_height,
-        liquid or Liquid(), numerics or Numerics(), seed=seed, sampling_rate_hz=sampling_rate_hz,
+        box,
+        LiquidColumn(box.length_m, filling_level * box.height_m),
+        box.height_m / layers_per_height,
+        liquid or Liquid(),
+        numerics or Numerics(),
+        seed=seed,
+        sampling_rate_hz=sampling_rate_hz,
     )
 
 
@@ -247,11 +243,12 @@ _POSITIVE: Final = {
     "numerics": ("skin_over_spacing", "n_slow"),
 }
 _RANGES: Final = {
-    "smoothing_over_spacing": (1.0, 2.0),
+    "smoothing_over_spacing": (1.0, 2.5),
     "courant_number": (0.01, 0.8),
     "artificial_viscosity": (0.0, 1.0),
     "density_diffusion": (0.0, 0.2),
     "shift_strength": (0.0, 4.0),
+    "packing_strength": (0.0, 10.0),
     "jitter": (0.0, 0.2),
 }
 
@@ -283,15 +280,21 @@ def _check_sizes(setup: TankSetup) -> None:
     for name in ("length_m", "height_m"):
         if getattr(column, name) > getattr(box, name):
             raise InputError(
-                f"column.{name}", got=f"{getattr(column, name):g}", allowed=f"at most box.{name} = {getattr(box, name):g}"
+                f"column.{name}",
+                got=f"{getattr(column, name):g}",
+                allowed=f"at most box.{name} = {getattr(box, name):g}",
             )
     ratio = column.length_m / setup.spacing_m * (column.height_m / setup.spacing_m)
     if not ratio <= MOST_PARTICLES:
-        raise InputError("particles", got=f"{ratio:.0f}", allowed=f"at most {MOST_PARTICLES}", remedy="take a larger spacing")
+        raise InputError(
+            "particles", got=f"{ratio:.0f}", allowed=f"at most {MOST_PARTICLES}", remedy="take a larger spacing"
+        )
     if min(setup.n_layers, setup.n_columns) < FEWEST_LAYERS:
         raise InputError(
-            "layers of particles in the liquid", got=f"{min(setup.n_layers, setup.n_columns)}",
-            allowed=f"at least {FEWEST_LAYERS}", remedy="take a smaller spacing",
+            "layers of particles in the liquid",
+            got=f"{min(setup.n_layers, setup.n_columns)}",
+            allowed=f"at least {FEWEST_LAYERS}",
+            remedy="take a smaller spacing",
         )
     _check_sound(setup)
 
@@ -301,70 +304,8 @@ def _check_sound(setup: TankSetup) -> None:
     slowest = 10 * math.sqrt(setup.gravity_m_per_s2 * depth)
     if setup.liquid.speed_of_sound_m_per_s < slowest:
         raise InputError(
-            "liquid.speed_of_sound_m_per_s", got=f"{setup.liquid.speed_of_sound_m_per_s:g}",
-            allowed=f"at least 10 √(g h) = {slowest:.3g}", remedy="a slower one would compress the liquid visibly",
+            "liquid.speed_of_sound_m_per_s",
+            got=f"{setup.liquid.speed_of_sound_m_per_s:g}",
+            allowed=f"at least 10 √(g h) = {slowest:.3g}",
+            remedy="a slower one would compress the liquid visibly",
         )
-
-
-def particles_at_rest(setup: TankSetup) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return x [m], z [m] and s = ln ρ/ρ₀ of the liquid at rest, slightly disturbed.
-
-    Parameters
-    ----------
-    setup : TankSetup
-    """
-    step_x = setup.column.length_m / setup.n_columns
-    step_z = setup.column.height_m / setup.n_layers
-    x, z = np.meshgrid((np.arange(setup.n_columns) + 0.5) * step_x, (np.arange(setup.n_layers) + 0.5) * step_z)
-    generator = np.random.default_rng(setup.seed)
-    x, z = x.ravel(), z.ravel()
-    s = setup.gravity_m_per_s2 * (setup.column.height_m - z) / setup.liquid.speed_of_sound_m_per_s**2
-    shift = setup.numerics.jitter * math.sqrt(setup.particle_volume_m2)
-    return x + shift * generator.uniform(-1, 1, x.size), z + shift * generator.uniform(-1, 1, x.size), s
-
-
-def constants_of(setup: TankSetup) -> Constants:
-    """Return the numbers that the compiled loops take, in the precision of the run.
-
-    Parameters
-    ----------
-    setup : TankSetup
-    """
-    real = np.float32 if setup.numerics.precision == "single" else np.float64
-    h, numerics = setup.smoothing_length_m, setup.numerics
-    spacing, speed = math.sqrt(setup.particle_volume_m2), setup.liquid.speed_of_sound_m_per_s
-    values = {
-        "one": 1.0,
-        "half": 0.5,
-        "two": 2.0,
-        "step": setup.step_s,
-        "length": setup.box.length_m,
-        "height": setup.box.height_m,
-        "support": SUPPORT * h,
-        "skin": numerics.skin_over_spacing * spacing,
-        "volume": setup.particle_volume_m2,
-        "smoothing": h,
-        "speed_squared": speed**2,
-        "gradient": setup.particle_volume_m2 * gradient_factor_at_zero(h),
-        "peak": setup.particle_volume_m2 * kernel_at_zero(h),
-        "viscous": 8 * setup.effective_viscosity_m2_per_s,
-        "softening": 0.01,
-        "stress": numerics.tension_control**0.25 * kernel_at_zero(h) / float(kernel(spacing, h)),
-        "diffusion": 2 * numerics.density_diffusion * h * speed,
-        "spread": numerics.shift_strength * 2 * h * numerics.n_slow * setup.step_s,
-        "crowding": 0.2,
-        "smallest_determinant": 0.2,
-        "spacing_kernel": setup.particle_volume_m2 * float(kernel(spacing, h)),
-        "lattice_packing": _lattice_packing(setup),
-        "relaxation": numerics.packing_strength * numerics.n_slow * setup.step_s / h,
-        "largest_speed": speed,
-    }
-    return Constants(n=setup.n_particles, n_slow=int(numerics.n_slow), **{k: real(v) for k, v in values.items()})
-
-
-def _lattice_packing(setup: TankSetup) -> float:
-    """Σ V₀ W at a particle of the undisturbed lattice."""
-    step_x = setup.column.length_m / setup.n_columns
-    step_z = setup.column.height_m / setup.n_layers
-    x, z = np.meshgrid(np.arange(-5, 6) * step_x, np.arange(-5, 6) * step_z)
-    return setup.particle_volume_m2 * float(kernel(np.hypot(x, z), setup.smoothing_length_m).sum())

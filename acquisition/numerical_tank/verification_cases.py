@@ -83,7 +83,9 @@ def hydrostatic_rest(n_layers: int, duration_s: float, numerics: Numerics | None
     ]
 
 
-def _wave_tank(n_layers: int, mode: int, numerics: Numerics | None, liquid: Liquid | None, seed: int = 0) -> NumericalTank:
+def _wave_tank(
+    n_layers: int, mode: int, numerics: Numerics | None, liquid: Liquid | None, seed: int = 0
+) -> NumericalTank:
     """A square-ish liquid, twice as long as deep: 100 mm × 50 mm, kh = mode·π/2."""
     box = Box(0.1, 0.1)
     liquid = liquid or Liquid(speed_of_sound_m_per_s=10.0)
@@ -149,7 +151,11 @@ def _damped_cosine(times_s: FloatArray, values: FloatArray, omega: float) -> tup
 
 
 def standing_wave(
-    n_layers: int, mode: int = 1, n_periods: float = 6.0, numerics: Numerics | None = None, liquid: Liquid | None = None
+    n_layers: int,
+    mode: int = 1,
+    n_periods: float = 6.0,
+    numerics: Numerics | None = None,
+    liquid: Liquid | None = None,
 ) -> list[Finding]:
     """Compare a small standing wave with ω² = g k tanh kh and the decay 2νk² of a slipping tank.
 
@@ -233,7 +239,9 @@ def dam_break(n_layers: int, numerics: Numerics | None = None) -> list[Finding]:
     published_t, published_z = np.array(MARTIN_MOYCE_SQUARE).T
     z = np.interp(published_t, times, front)
     inner = (published_z >= 1.44) & (published_z <= 3.9)
-    speed = np.polyfit(times[(times > 1.19) & (times < 3.11)], np.array(front)[(times > 1.19) & (times < 3.11)], 1)[0]
+    speed = np.polyfit(
+        times[(times > 1.19) & (times < 3.11)], np.array(front)[(times > 1.19) & (times < 3.11)], 1
+    )[0]
     published_speed = np.polyfit(published_t[inner], published_z[inner], 1)[0]
     name = f"dam break, {n_layers} layers"
     return [
@@ -244,7 +252,11 @@ def dam_break(n_layers: int, numerics: Numerics | None = None) -> list[Finding]:
 
 
 def shaken_volume(
-    acceleration_g: float, duration_s: float, layers_per_height: int = 16, numerics: Numerics | None = None, seed: int = 0
+    acceleration_g: float,
+    duration_s: float,
+    layers_per_height: int = 16,
+    numerics: Numerics | None = None,
+    seed: int = 0,
 ) -> list[Finding]:
     """Shake a half-filled tank at 11.4 Hz, let it settle, and see whether all the liquid is still there.
 
@@ -264,7 +276,10 @@ def shaken_volume(
     impulse, time = 0.0, 0.0
     for block in moved(tank, motion, round(duration_s * 11.4) / 11.4, block_s=1.0):
         mass = tank.setup.liquid_mass_kg
-        impulse += float((-block.forces.vertical_n - mass * (G_M_PER_S2 + block.acceleration_m_per_s2)).sum() * tank.setup.step_s)
+        impulse += float(
+            (-block.forces.vertical_n - mass * (G_M_PER_S2 + block.acceleration_m_per_s2)).sum()
+            * tank.setup.step_s
+        )
         time += block.time_s.size * tank.setup.step_s
     imbalance = tank.vertical_momentum_kg_m_per_s() - momentum_start - impulse
     weight = tank.setup.liquid_mass_kg * G_M_PER_S2
@@ -279,4 +294,3 @@ def shaken_volume(
         Finding(name, "(wall force − momentum balance) / weight", imbalance / time / weight, 0.0, 1e-6),
         Finding(name, "energy residual", account.residual_share, 0.0, 0.05 if acceleration_g > 2 else 0.02),
     ]
-

@@ -82,6 +82,13 @@ def mirror_density(particles: Particles, images: Images, n: int) -> None:
         particles.gz[n + k] = images.bz[k] * particles.gz[i]
 
 
+@njit(cache=True)
+def mirror_packing_errors(particles: Particles, images: Images, n: int) -> None:
+    """Give every image the packing error of its particle."""
+    for k in range(images.count[0]):
+        particles.error[n + k] = particles.error[images.parent[k]]
+
+
 @njit(cache=True, inline="always")
 def _into_box(place, size):  # type: ignore[no-untyped-def]
     """Return the place of whichever of particle and image is inside, and whether it is the image."""
