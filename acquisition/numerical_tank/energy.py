@@ -71,9 +71,15 @@ class EnergyAccount:
 
     @property
     def residual_share(self) -> float:
-        """Residual over the largest of what was given, gained and lost; 0 where nothing happened."""
-        given = max(abs(self.tank_work_j_per_m), abs(self.lost_j_per_m), abs(self.gained_j_per_m))
-        return self.residual_j_per_m / given if given > 0 else 0.0
+        """Residual over the largest term of the account; 0 where nothing happened."""
+        largest = max(
+            abs(self.tank_work_j_per_m),
+            abs(self.lost_j_per_m),
+            abs(self.kinetic_j_per_m),
+            abs(self.potential_j_per_m),
+            abs(self.elastic_j_per_m),
+        )
+        return self.residual_j_per_m / largest if largest > 0 else 0.0
 
     def __sub__(self, earlier: EnergyAccount) -> EnergyAccount:
         """Return the account of the time between two accounts of one run."""

@@ -14,8 +14,8 @@ from acquisition.numerical_tank.tank import TankSetup
 
 FloatArray = NDArray[np.float64]
 
-LEAST_SPEED: Final = 0.0005
-"""Characteristic speed that is added in the packing correction, over √(g h)."""
+QUIET_SPEED: Final = 0.01
+"""Root mean square speed, over √(g h), below which the density is not corrected."""
 CROWDING: Final = 0.2
 """R of Sun et al. (2017)."""
 
@@ -64,7 +64,7 @@ def constants_of(setup: TankSetup) -> Constants:
         "viscous": 8 * setup.effective_viscosity_m2_per_s,
         "softening": 0.01,
         "diffusion": 2 * numerics.density_diffusion * h * speed,
-        "least_speed": LEAST_SPEED * math.sqrt(setup.gravity_m_per_s2 * setup.column.height_m),
+        "quiet_speed": QUIET_SPEED * math.sqrt(setup.gravity_m_per_s2 * setup.column.height_m),
         "spread": numerics.shift_strength * 2 * h * numerics.n_slow * setup.step_s,
         "crowding": CROWDING,
         "smallest_determinant": 0.2,

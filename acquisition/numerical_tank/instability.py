@@ -26,8 +26,8 @@ class InstabilityError(SloshlabError, ArithmeticError):
 
     Examples
     --------
-    >>> print(InstabilityError("a particle moves faster than sound", 1.25, (0.1, 0.02), None))  # doctest: +ELLIPSIS
-    numerical tank: a particle moves faster than sound at 1.25 s, x = 0.1 m, z = 0.02 m; remedy: ...
+    >>> str(InstabilityError("a particle is too fast", 1.25, (0.1, 0.02), None))[:74]
+    'numerical tank: a particle is too fast at 1.25 s, x = 0.1 m, z = 0.02 m; r'
     """
 
     def __init__(self, reason: str, time_s: float, place_m: tuple[float, float], valid: WallForces | None) -> None:

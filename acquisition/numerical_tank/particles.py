@@ -177,8 +177,8 @@ class Constants(NamedTuple):
         Σ V₀ W of the undisturbed lattice.
     relaxation : floating
         Share of the packing error that one correction takes away, over the characteristic speed [s/m].
-    least_speed : floating
-        Added to that speed, so that even a liquid at rest finds its volume [m/s].
+    quiet_speed : floating
+        Taken from that speed; a slower liquid is left alone [m/s].
     largest_speed : floating
         A particle faster than this means that the run has become unstable [m/s].
     """
@@ -207,5 +207,5 @@ class Constants(NamedTuple):
     spacing_kernel: float
     lattice_packing: float
     relaxation: float
-    least_speed: float
+    quiet_speed: float
     largest_speed: float

