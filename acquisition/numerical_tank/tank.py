@@ -97,7 +97,7 @@ class Numerics:
     packing_strength: float = 1.0
     shift_strength: float = 1.0
     n_slow: int = 8
-    skin_over_spacing: float = 0.4
+    skin_over_spacing: float = 0.8
     jitter: float = 0.01
     precision: Literal["double", "single"] = "double"
 

@@ -1,4 +1,4 @@
-"""Run the verification cases and tabulate their findings: ``python -m acquisition.numerical_tank.verification``."""
+"""Run the verification cases, tabulate their findings: ``python -m acquisition.numerical_tank.verification``."""
 
 from __future__ import annotations
 
