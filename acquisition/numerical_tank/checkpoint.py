@@ -38,7 +38,8 @@ def save(tank: NumericalTank, path: str | os.PathLike[str]) -> None:
     """
     setup = np.frombuffer(json.dumps(asdict(tank.setup)).encode(), np.uint8)
     content = io.BytesIO()
-    np.savez(content, setup=setup, **tank.checkpoint_arrays())
+    arrays: dict[str, Any] = {"setup": setup, **tank.checkpoint_arrays()}
+    np.savez(content, **arrays)
     body = content.getvalue()
     write_bytes(path, MAGIC + hashlib.sha256(body).digest() + body)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,9 +73,8 @@ def constants_of(setup: TankSetup) -> Constants:
         "relaxation": numerics.packing_strength * numerics.n_slow * setup.step_s / h,
         "largest_speed": speed,
     }
-    return Constants(  # type: ignore[arg-type]
-        n=setup.n_particles, n_slow=int(numerics.n_slow), **{name: real(value) for name, value in values.items()}
-    )
+    typed: dict[str, Any] = {name: real(value) for name, value in values.items()}
+    return Constants(n=setup.n_particles, n_slow=int(numerics.n_slow), **typed)
 
 
 def _lattice_packing(setup: TankSetup) -> float:

@@ -92,7 +92,7 @@ def coverage_table(n: int = 65) -> FloatArray:
     step = depth[1] - depth[0]
     filled = 0.5 + np.concatenate([[0.0], np.cumsum((line[1:] + line[:-1]) / 2 * step)])
     filled = 0.5 + (filled - 0.5) * 0.5 / (filled[-1] - 0.5)
-    return np.interp(np.linspace(0.0, line[0], n), line[::-1], filled[::-1])
+    return np.asarray(np.interp(np.linspace(0.0, line[0], n), line[::-1], filled[::-1]))
 
 
 def surface_gradient(depth_over_smoothing_length: float) -> float:

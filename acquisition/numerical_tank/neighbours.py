@@ -82,7 +82,8 @@ def list_neighbours(particles: Particles, pairs: Pairs, images: Images, constant
     for i in range(constants.n):
         particles.x_listed[i] = particles.x[i]
         particles.z_listed[i] = particles.z[i]
-    return _list_pairs(particles, pairs, constants, constants.n + images.count[0])
+    fits: bool = _list_pairs(particles, pairs, constants, constants.n + images.number[0])
+    return fits
 
 
 @njit(cache=True)

@@ -116,7 +116,7 @@ class Images(NamedTuple):
 
     Attributes
     ----------
-    count : ndarray of int64, shape (1,)
+    number : ndarray of int64, shape (1,)
         How many there are.
     parent : ndarray of int32, shape (capacity,)
         Index of the fluid particle.
@@ -126,7 +126,7 @@ class Images(NamedTuple):
         b = −1 across a mirrored direction, else 1.
     """
 
-    count: NDArray[np.int64]
+    number: NDArray[np.int64]
     parent: IndexArray
     ax: AnyFloatArray
     az: AnyFloatArray

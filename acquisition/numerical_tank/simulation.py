@@ -153,7 +153,7 @@ class NumericalTank:
         ----------
         n_steps : int
         """
-        return (self.n_steps + np.arange(n_steps) + 0.5) * self.setup.step_s
+        return np.asarray((self.n_steps + np.arange(n_steps) + 0.5) * self.setup.step_s, np.float64)
 
     def advance(self, acceleration_m_per_s2: ArrayLike) -> WallForces:
         """Take one step for each acceleration.
@@ -216,7 +216,8 @@ class NumericalTank:
         return WallForces(*(np.ascontiguousarray(column) for column in scaled.T))
 
     def _unstable(self, status: int, valid: WallForces) -> InstabilityError:
-        which = int(self._counters[stepping.PARTICLE])
+        crowded = int(np.argmax(self._particles.packing[: self.setup.n_particles]))
+        which = crowded if status == stepping.NO_ROOM else int(self._counters[stepping.PARTICLE])
         place = float(self._particles.x[which]), float(self._particles.z[which])
         return InstabilityError(_REASONS[status], self.time_s, place, valid)
 

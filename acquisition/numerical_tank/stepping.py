@@ -105,7 +105,7 @@ def _force_on_walls(particles, images, constants, force):  # type: ignore[no-unt
     """Sum the reaction of the liquid on the images [m/s²]: all, below the floor, above the roof."""
     n = constants.n
     all_x, all_z, floor, roof = 0.0, 0.0, 0.0, 0.0
-    for k in range(images.count[0]):
+    for k in range(images.number[0]):
         all_x += particles.ax[n + k]
         all_z += particles.az[n + k]
         if images.bz[k] < 0:
@@ -127,7 +127,7 @@ def correct(
     sums: NDArray[np.float64],
 ) -> None:
     """Make the slow corrections of density and arrangement, at the end of a step; see `advance`."""
-    n_all = constants.n + images.count[0]
+    n_all = constants.n + images.number[0]
     place_images(particles, images, constants.n)
     measure_pairs(particles, pairs, constants)
     sum_arrangement(particles, pairs, constants, n_all)
@@ -142,7 +142,7 @@ def correct(
 def _step(particles, pairs, images, constants, body_x, body_z, force, sums):  # type: ignore[no-untyped-def]
     """One symmetric step; returns Σ of the mean vertical velocity, the largest speed squared and whose it is."""
     n = constants.n
-    n_all = n + images.count[0]
+    n_all = n + images.number[0]
     half = constants.half * constants.step
     _move(particles, n, half)
     place_images(particles, images, n)

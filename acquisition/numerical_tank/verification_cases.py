@@ -143,7 +143,7 @@ def _damped_cosine(times_s: FloatArray, values: FloatArray, omega: float) -> tup
     """Fit a e^{−γt} cos(ωt + φ); return ω [rad/s] and γ [1/s]."""
 
     def misfit(p: FloatArray) -> FloatArray:
-        return p[0] * np.exp(-p[1] * times_s) * np.cos(p[2] * times_s + p[3]) - values
+        return np.asarray(p[0] * np.exp(-p[1] * times_s) * np.cos(p[2] * times_s + p[3]) - values)
 
     scale = np.abs(values).max()
     best = least_squares(misfit, [scale, 0.02 * omega, omega, 0.0], x_scale=[scale, omega, omega, 1.0])
@@ -206,7 +206,7 @@ def hanging_surface(n_layers: int, numerics: Numerics | None = None) -> list[Fin
     history = modal_history(tank, 1, 0.004 * rate / k, -2 * G_M_PER_S2, times)
 
     def misfit(p: FloatArray) -> FloatArray:
-        return np.log(np.abs(p[0]) * np.cosh(p[1] * times)) - np.log(np.maximum(history, 1e-9))
+        return np.asarray(np.log(np.abs(p[0]) * np.cosh(p[1] * times)) - np.log(np.maximum(history, 1e-9)))
 
     measured = float(least_squares(misfit, [history[0], rate]).x[1])
     state = tank.state()

@@ -50,14 +50,14 @@ def list_images(particles: Particles, images: Images, constants: Constants) -> b
                 images.ax[count] = constants.two * constants.length if across_x == 2 else zero
                 images.az[count] = constants.two * constants.height if across_z == 2 else zero
                 count += 1
-    images.count[0] = count
+    images.number[0] = count
     return True
 
 
 @njit(cache=True)
 def place_images(particles: Particles, images: Images, n: int) -> None:
     """Put every image where its particle's mirror image is."""
-    for k in range(images.count[0]):
+    for k in range(images.number[0]):
         i = images.parent[k]
         particles.x[n + k] = images.ax[k] + images.bx[k] * particles.x[i]
         particles.z[n + k] = images.az[k] + images.bz[k] * particles.z[i]
@@ -66,7 +66,7 @@ def place_images(particles: Particles, images: Images, n: int) -> None:
 @njit(cache=True)
 def mirror_velocity(particles: Particles, images: Images, n: int) -> None:
     """Give every image the mirrored velocity of its particle."""
-    for k in range(images.count[0]):
+    for k in range(images.number[0]):
         i = images.parent[k]
         particles.vx[n + k] = images.bx[k] * particles.vx[i]
         particles.vz[n + k] = images.bz[k] * particles.vz[i]
@@ -75,7 +75,7 @@ def mirror_velocity(particles: Particles, images: Images, n: int) -> None:
 @njit(cache=True)
 def mirror_density(particles: Particles, images: Images, n: int) -> None:
     """Give every image the density of its particle and the mirrored gradient of it."""
-    for k in range(images.count[0]):
+    for k in range(images.number[0]):
         i = images.parent[k]
         particles.s[n + k] = particles.s[i]
         particles.gx[n + k] = images.bx[k] * particles.gx[i]
@@ -85,7 +85,7 @@ def mirror_density(particles: Particles, images: Images, n: int) -> None:
 @njit(cache=True)
 def mirror_packing_errors(particles: Particles, images: Images, n: int) -> None:
     """Give every image the packing error of its particle."""
-    for k in range(images.count[0]):
+    for k in range(images.number[0]):
         particles.error[n + k] = particles.error[images.parent[k]]
 
 
