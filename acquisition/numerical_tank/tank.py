@@ -58,7 +58,7 @@ class Liquid:
 
     density_kg_per_m3: float = 998.2
     viscosity_m2_per_s: float = 1.0e-6
-    speed_of_sound_m_per_s: float = 15.0
+    speed_of_sound_m_per_s: float = 12.0
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Numerics:
 
     smoothing_over_spacing: float = 1.5
     courant_number: float = 0.7
-    artificial_viscosity: float = 0.02
+    artificial_viscosity: float = 0.0
     density_diffusion: float = 0.1
     packing_strength: float = 1.0
     shift_strength: float = 1.0
