@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 RESULTS := results
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker campaign test test-all lint format type bench docs clean
+.PHONY: help setup shaker replay campaign test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -23,6 +23,9 @@ $(STAMP): pyproject.toml
 
 shaker: setup  ## the shaker experiment on raw_data: maps and report
 	$(BIN)/python -m pipelines.experiments shaker raw_data/shaker $(RESULTS)/shaker
+
+replay: setup  ## every recording of raw_data through simulated serial and CAN devices
+	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay
 
 campaign: setup  ## make the recordings of raw_data again
 	$(BIN)/sloshlab virtual campaign -o raw_data/shaker
@@ -47,6 +50,9 @@ type: setup  ## static types
 
 bench: setup  ## speed and memory as ratios in one run
 	$(BIN)/python -m tests.benchmarks
+
+soak: setup  ## ten minutes of recording at full load, by serial, socketcand and slcan
+	for transport in serial socketcand slcan; do $(BIN)/python -m tests.benchmarks.sustained $$transport --duration 600 || exit 1; done
 
 docs: setup  ## the documentation as a web site in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

@@ -76,7 +76,7 @@ def _table(path: Path, quality: RunQuality) -> list[str]:
         header,
         *(_row(channel) for channel in quality.channels),
         f"gaps: {len(quality.gaps)} ({quality.n_lost} samples); CRC repaired: {quality.n_crc_repaired}; "
-        f"out of order: {quality.n_out_of_order}",
+        f"out of order: {quality.n_out_of_order}; stuck: {quality.n_stuck}",
     ]
     lines += [_agreement(pair) for pair in (quality.accelerometers.pairs if quality.accelerometers else ())]
     return lines

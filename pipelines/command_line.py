@@ -17,7 +17,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from sloshlab import __version__
-from sloshlab.errors import SloshlabError
+from sloshlab.errors import RecordingInterruptedError, SloshlabError
 
 INPUT_IS_BAD, USAGE, DONE_BUT_FLAGGED, INTERRUPTED = 1, 2, 3, 130
 
@@ -47,6 +47,12 @@ OutputFile = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print a machine-readable summary as the last line.")]
 HalfWidth = Annotated[int, typer.Option("--p", min=1, help="P: a window averages 2P cycles.")]
 Spacing = Annotated[int, typer.Option("--m", min=1, help="M: cycles between the centres of windows.")]
+Redundant = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--redundant", metavar="A:B", help="Channels of two devices that show the same motion.", show_default=False
+    ),
+]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Write windows.nc and maps.nc only.")]
 
 
@@ -175,6 +181,136 @@ def virtual(
     _finish(make_virtual_run(run, rig, output), as_json)
 
 
+@app.command()
+def record(
+    sources: Annotated[
+        list[str],
+        typer.Option("--source", metavar="URL", help="A device; the first is the time base.", show_default=False),
+    ],
+    rig: Annotated[
+        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig the run belongs to.", show_default=False)
+    ],
+    output: OutputFile,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Seconds of samples; until the end if not given.", show_default=False),
+    ] = None,
+    run_table: Annotated[
+        Path | None, typer.Option("--run", metavar="RUN.toml", help="Attributes of the run.", show_default=False)
+    ] = None,
+    attribute: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="An attribute of the run.", show_default=False)
+    ] = None,
+    align: Annotated[str, typer.Option(help="Clocks of several devices: host, device or counter.")] = "host",
+    redundant: Redundant = None,
+    keep_journal: Annotated[bool, typer.Option("--keep-journal", help="Keep RUN.journal.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Live devices – serial, CAN, simulated – to one recording, through a crash-safe journal."""
+    from pipelines.live_view import LiveView
+    from pipelines.record import RecordSettings
+    from pipelines.record import record as record_run
+
+    settings = RecordSettings(
+        sources=tuple(sources),
+        rig=rig,
+        output=output,
+        duration_s=duration,
+        run=run_table,
+        attributes=tuple(attribute or ()),
+        align=align,
+        redundant=tuple(redundant or ()),
+        keep_journal=keep_journal,
+        overwrite=overwrite,
+    )
+    with LiveView(output.absolute().parent, len(sources)) as view:
+        summary = record_run(settings, view)
+    _finish(summary, as_json)
+
+
+@app.command()
+def recover(
+    journal: Annotated[
+        Path, typer.Argument(metavar="RUN.journal", help="Journal of a recorder.", show_default=False)
+    ],
+    output: OutputFile,
+    align: Annotated[
+        str | None,
+        typer.Option(help="host, device or counter; as it was recorded if not given.", show_default=False),
+    ] = None,
+    redundant: Redundant = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
+    as_json: Json = False,
+) -> None:
+    """A journal left by a crash to a recording: everything up to the last complete block."""
+    from pipelines.recover import recover as recover_journal
+
+    summary = recover_journal(journal, output, overwrite, align=align, redundant=redundant or ())
+    _finish(summary, as_json)
+
+
+@app.command()
+def replay(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN.nc",
+            help="A recording, virtual:EXPERIMENT?rig=RIG.toml or pattern:channels=8.",
+            show_default=False,
+        ),
+    ],
+    urls: Annotated[
+        list[str], typer.Option("--as", metavar="URL", help="Where a device appears.", show_default=False)
+    ],
+    channels: Annotated[
+        list[str] | None, typer.Option(metavar="A,B", help="Channels; once per --as.", show_default=False)
+    ] = None,
+    speed: Annotated[str, typer.Option(help="Factor of real time, or 'max'.")] = "1",
+    faults: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FAULTS.toml", help="Faults or 'none'; once per --as.", show_default=False),
+    ] = None,
+    samples_per_frame: Annotated[int | None, typer.Option(help="Of a serial device.", show_default=False)] = None,
+    expose: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Listen here, for more than this computer: whoever reaches it reads every sample.",
+        ),
+    ] = "",
+    free_run: Annotated[bool, typer.Option("--free-run", help="Begin without being started by a host.")] = False,
+    wait_clients: Annotated[int, typer.Option(min=1, help="Clients a socketcand device waits for.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    loop_duration: Annotated[
+        float | None, typer.Option(help="Repeat the recording up to so many seconds.", show_default=False)
+    ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Write what each fault touched.", show_default=False)
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """A recording, the virtual rig or a test pattern, played as serial or CAN devices."""
+    from pipelines.replay import ReplaySettings
+    from pipelines.replay import replay as play
+
+    settings = ReplaySettings(
+        source=source,
+        urls=urls,
+        channels=channels or (),
+        speed=speed,
+        faults=[None if str(path) == "none" else path for path in faults or ()],
+        samples_per_frame=samples_per_frame,
+        expose=expose or None,
+        free_run=free_run,
+        wait_clients=wait_clients,
+        seed=seed,
+        loop_duration_s=loop_duration,
+        truth=truth,
+    )
+    _finish(play(settings), as_json)
+
+
 def _finish(summary: dict[str, Any], as_json: bool) -> None:
     """Say what a command has to say: ``lines`` for people; ``flags`` make the exit code 3."""
     for line in summary.pop("lines", []):
@@ -199,6 +335,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if code == INTERRUPTED:  # some versions of typer turn Ctrl-C into this code without a word
             raise KeyboardInterrupt
         return code
+    except RecordingInterruptedError as error:
+        print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
+        return INTERRUPTED
     except SloshlabError as error:
         print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
         return INPUT_IS_BAD

@@ -4,29 +4,48 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Final
 
 from pipelines.command_line import DONE_BUT_FLAGGED, run
 
 
-def shaker_arguments(folder: Path, output: Path) -> list[str]:
+def shaker_arguments(folder: Path, output: Path, rigs_folder: Path | None = None) -> list[str]:
     """Arguments of `sloshlab shaker` for all runs and rigs of a folder; the rig filled half comes first."""
     recordings = sorted(str(path) for path in folder.glob("*.nc"))
-    rigs = sorted(folder.glob("rig*.toml"), key=lambda path: ("0.50" not in path.name, path.name))
+    rigs = sorted((rigs_folder or folder).glob("rig*.toml"), key=lambda path: ("0.50" not in path.name, path.name))
     options = [part for rig in rigs for part in ("--rig", str(rig))]
     return ["shaker", *recordings, *options, "-o", str(output)]
 
 
 def main() -> int:
-    """Run ``shaker FOLDER OUTPUT`` and say where the report is; a flagged result is a result."""
+    """Run ``EXPERIMENT FOLDER OUTPUT``."""
     experiment, folder, output = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
-    if experiment != "shaker":
-        print(f"unknown experiment {experiment!r}; allowed: shaker", file=sys.stderr)  # noqa: T201
+    if experiment not in EXPERIMENTS:
+        print(f"unknown experiment {experiment!r}; allowed: {', '.join(EXPERIMENTS)}", file=sys.stderr)  # noqa: T201
         return 2
+    return EXPERIMENTS[experiment](folder, output)
+
+
+def _shaker(folder: Path, output: Path) -> int:
+    """Maps and report; a flagged result is a result."""
     code = run(shaker_arguments(folder, output))
     if code in (0, DONE_BUT_FLAGGED):
         print(f"The report is {(output / 'report.html').resolve()}")  # noqa: T201
         return 0
     return code
+
+
+def _replay(folder: Path, output: Path) -> int:
+    """Every recording through simulated devices; any difference is a failure."""
+    from pipelines.replayed_campaign import replayed_campaign
+
+    summary = replayed_campaign(folder, output)
+    for line in [*summary["lines"], *(f"differs: {flag}" for flag in summary["flags"])]:
+        print(line)  # noqa: T201
+    return 1 if summary["flags"] else 0
+
+
+EXPERIMENTS: Final = {"shaker": _shaker, "replay": _replay}
 
 
 if __name__ == "__main__":

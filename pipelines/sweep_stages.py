@@ -17,7 +17,7 @@ from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import integrated
 from sloshlab.conditioning.quality import RunQuality, quality_of
 from sloshlab.errors import AnalysisError, InputError
-from sloshlab.recording import CLIPPED, CRC_REPAIRED, LOST, RunAttributes, run_attributes
+from sloshlab.recording import CLIPPED, CRC_REPAIRED, LOST, STUCK, RunAttributes, run_attributes
 from sloshlab.rig import Rig
 from sloshlab.sweep.cycles import Cycles, evaluate_cycles
 from sloshlab.sweep.law import SweepLaw, identify_law, stated_law
@@ -49,7 +49,7 @@ class SweepSignals:
     phase_motion : ndarray, optional
         What the phase is taken from, as an acceleration; None means `motion`.
     not_measured : ndarray of bool, optional
-        True where a sample that enters `force_n` or `motion` is clipped, lost or repaired.
+        True where a sample that enters `force_n` or `motion` is clipped, lost, repaired or stuck.
     inertia_kg : float
         Mass removed to get the dynamic force.
     noise_power : float
@@ -102,11 +102,11 @@ def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
 
 
 def not_measured(recording: xr.Dataset, names: list[str], quality: RunQuality) -> BoolArray | None:
-    """True where a channel is clipped, or the recorder flags a sample as lost, clipped or repaired."""
+    """True where a channel is clipped, or the recorder flags a sample as lost, clipped, repaired or stuck."""
     suffers = {channel.name for channel in quality.channels if channel.clipping.n_clipped}
     mask: BoolArray | None = None
     if "quality" in recording:
-        mask = (recording["quality"].values & (LOST | CLIPPED | CRC_REPAIRED)) != 0
+        mask = (recording["quality"].values & (LOST | CLIPPED | CRC_REPAIRED | STUCK)) != 0
     for name in names:
         if name in suffers:
             clipped = clipped_samples(recording[name])

@@ -106,5 +106,12 @@ class JournalError(InputError):
     """A journal cannot be read, or holds nothing that can be recovered."""
 
 
+class RecordingInterruptedError(SloshlabError):
+    """A person interrupted a recording whose samples are safe in the journal and whose file is not complete.
+
+    The message says so, and how to get the recording.
+    """
+
+
 class FaultsError(InputError):
     """A description of faults to simulate is malformed."""

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from sloshlab import atomic_file
 from sloshlab.errors import RecordingError, UnitsError
 from sloshlab.file_structure import require_sound_structure
+from sloshlab.netcdf_lock import NETCDF_LOCK
 from sloshlab.units import SI_UNITS, factor_to_si
 
 FORMAT: Final = "1"
@@ -29,14 +30,39 @@ MAXIMUM_DECODED_BYTES: Final = 6 * 2**30
 JITTER_ALLOWED_STEPS: Final = 1e-6
 """Largest deviation of the time coordinate from a uniform one, in steps."""
 
-LOST, CLIPPED, CRC_REPAIRED, OUT_OF_ORDER = 1, 2, 4, 8
+LOST, CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, STUCK = 1, 2, 4, 8, 16
 """Bits of `quality(time)`."""
+
+_QUALITY_MEANINGS: Final = {
+    LOST: "lost",
+    CLIPPED: "clipped",
+    CRC_REPAIRED: "crc_repaired",
+    OUT_OF_ORDER: "out_of_order",
+    STUCK: "stuck",
+}
 
 _TIME_CHUNK = 1 << 18
 _DECODING_BLOCK = 1 << 20
 
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def quality_attributes() -> dict[str, Any]:
+    """Attributes of `quality(time)` that say what its bits mean, in CF's words.
+
+    Returns
+    -------
+    dict
+        ``flag_masks`` (ndarray of uint8) and ``flag_meanings`` (str), in the same order.
+
+    Examples
+    --------
+    >>> quality_attributes()["flag_masks"].tolist(), quality_attributes()["flag_meanings"]
+    ([1, 2, 4, 8, 16], 'lost clipped crc_repaired out_of_order stuck')
+    """
+    masks = np.array(list(_QUALITY_MEANINGS), dtype=np.uint8)
+    return {"flag_masks": masks, "flag_meanings": " ".join(_QUALITY_MEANINGS.values())}
 
 
 class RunAttributes(BaseModel):
@@ -156,7 +182,7 @@ def _opened(file: Path) -> Iterator[Any]:
         raise RecordingError(f"recording {file}", got=got, allowed="a netCDF-4 file", remedy="check the path")
     try:
         require_sound_structure(file)
-        with netCDF4.Dataset(file, mode="r") as source:
+        with NETCDF_LOCK, netCDF4.Dataset(file, mode="r") as source:
             source.set_auto_maskandscale(False)
             yield source
     except RecordingError:

@@ -1,5 +1,6 @@
 """CAN logs (.asc, .blf, .trc), read by python-can and decoded with a DBC by cantools.
 
+Messages with a sample counter are placed by it (`acquisition.files.can_device_log`), all others by time stamps.
 Error frames, remote frames and frames without a description are counted, never passed over.
 """
 
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from acquisition.files.can_device_log import DeviceLog
 from acquisition.files.channel_map import SourceSection
 from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
 from acquisition.files.table import Column, Table
@@ -69,11 +71,15 @@ def read(path: Path, settings: SourceSection) -> Table:
     if kind == "blf":
         _check_blf(path)
     database = _database(Path(settings.database)) if settings.database else None
+    device = _device(path, settings.database, database)
     log = _Log()
     with ReaderGuard(path, f"CAN {kind}", loggers=("can",)) as guard:
         for message in _messages(path, kind):
-            _take(message, log, database, settings.can_channel)
-    if not log.times:
+            _take(message, log, database, settings.can_channel, device)
+        if device is not None:
+            device.finish()
+    counted = tuple(device.columns()) if device is not None else ()
+    if not log.times and not counted:
         raise FileFormatError(
             f"source {path}",
             got=_counts(log),
@@ -82,8 +88,8 @@ def read(path: Path, settings: SourceSection) -> Table:
         )
     return Table(
         kind,
-        tuple(_columns(log, database, kind)),
-        traps=tuple(_traps(log, database, kind, guard.traps)),
+        (*counted, *_columns(log, database, kind)),
+        traps=(*(device.traps() if device is not None else ()), *_traps(log, database, kind, guard.traps)),
         unusable={f"frame {name}": f"{n} frames, not in the database" for name, n in log.unknown.items()},
         jitter_allowed_steps=_JITTER_ALLOWED_STEPS,
         hint="" if database is not None else "state database = 'FILE.dbc' in [source] to decode signals",
@@ -101,7 +107,14 @@ def _messages(path: Path, kind: str) -> Iterator[Any]:
         yield from can.ASCReader(stream) if kind == "asc" else can.TRCReader(stream)
 
 
-def _take(message: Any, log: _Log, database: Any, wanted_bus: int | None) -> None:
+def _device(path: Path, name: str | None, database: Any) -> DeviceLog | None:
+    if name is None or database is None:
+        return None
+    signals = {signal.name for message in database.values() for signal in message.signals}
+    return DeviceLog.of_database(path, Path(name), signals)
+
+
+def _take(message: Any, log: _Log, database: Any, wanted_bus: int | None, device: DeviceLog | None) -> None:
     log.n_frames += 1
     if log.first_time_s is None:
         log.first_time_s = float(message.timestamp)
@@ -114,6 +127,8 @@ def _take(message: Any, log: _Log, database: Any, wanted_bus: int | None) -> Non
         log.n_remote += 1
         return
     if wanted_bus is not None and message.channel != wanted_bus:
+        return
+    if device is not None and device.takes(message):
         return
     identifier = f"0x{message.arbitration_id:X}{'x' if message.is_extended_id else ''}"
     if database is None:
@@ -204,7 +219,7 @@ def _traps(log: _Log, database: Any, kind: str, reader_traps: list[str]) -> list
     ]
     if log.n_backwards:
         traps.append(f"{log.n_backwards} frames have an earlier time stamp than the one before")
-    if log.first_time_s is not None and kind == "blf":
+    if log.times and kind == "blf":
         traps.append("time counts from the first frame")
     if database is None:
         traps.append("no database: bytes of frames are listed, not signals")

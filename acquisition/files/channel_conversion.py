@@ -14,6 +14,7 @@ from sloshlab.errors import ChannelMapError, UnitsError
 from sloshlab.units import SI_UNITS, factor_to_si
 
 _LIMIT_TOLERANCE = 1e-9
+_IN_UNITS = ("range_min", "range_max", "noise_std")
 _GRAVITY_NAMES = ("gravity", "standard_free_fall", "gn")
 
 
@@ -62,6 +63,23 @@ def scaling_of(channel: str, section: ChannelSection, column: Column) -> Scaling
         ) from error
     signed = to_si * section.sign
     return Scaling(final_units, gain * signed, zero * signed, gain, zero, signed, tuple(traps))
+
+
+def with_declared(section: ChannelSection, column: Column) -> ChannelSection:
+    """The section of the map, with what the file says about the sensor where the map says nothing.
+
+    Ranges and noise of the file are in its units: they are left out where the map reads other units or calibrates.
+    """
+    declared = dict(column.declared)
+    is_same = column.units is not None and (section.units is None or same_units(section.units, column.units))
+    if section.calibration is not None or not is_same:
+        declared = {key: value for key, value in declared.items() if key not in _IN_UNITS}
+    if section.range_min is not None or section.range_max is not None:
+        declared = {key: value for key, value in declared.items() if not key.startswith("range_")}
+    known = {key: value for key, value in declared.items() if key in ChannelSection.model_fields}
+    missing = {key: value for key, value in known.items() if getattr(section, key) is None}
+    free = {key: value for key, value in declared.items() if key not in known}
+    return section.model_copy(update={**missing, "attributes": {**free, **section.attributes}})
 
 
 def _agreed_units(

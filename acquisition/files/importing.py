@@ -18,6 +18,7 @@ from acquisition.files.channel_conversion import (
     clipped_samples,
     converted_values,
     scaling_of,
+    with_declared,
 )
 from acquisition.files.channel_map import ChannelMap, ChannelSection, read_channel_map
 from acquisition.files.column_selection import (
@@ -35,7 +36,7 @@ from acquisition.files.formats import read_table
 from acquisition.files.report import ImportReport, ImportResult, MappedChannel
 from acquisition.files.table import Column, FloatArray
 from sloshlab.errors import ChannelMapError, RecordingError
-from sloshlab.recording import CLIPPED, FORMAT, LOST, validate_recording
+from sloshlab.recording import CLIPPED, FORMAT, LOST, quality_attributes, validate_recording
 from sloshlab.rig import Rig
 
 _LARGEST_RECORDING_BYTES = 6 << 30
@@ -78,7 +79,7 @@ def import_recording(sources: Sequence[Path], map_path: Path, *, rig: Path | Non
     time = common_time(selected, jitter)
     _check_memory(time, len(selected))
     converted = [
-        _converted_channel(one, channel_map.channels[one.channel], first, time)
+        _converted_channel(one, with_declared(channel_map.channels[one.channel], one.column), first, time)
         for one, first in zip(selected, time.first_points, strict=True)
     ]
     quality = _quality(converted, tables, channel_map, time)
@@ -213,10 +214,11 @@ def _raw_encoding(column: Column, scaling: Scaling, values: FloatArray, compensa
     raw = column.raw
     if raw is None or compensated_s or raw.counts.dtype.name not in ("int16", "int32", "uint16", "int8", "uint8"):
         return {}
-    if np.isnan(values).any() or raw.scale_factor * scaling.factor == 0:
+    if raw.scale_factor * scaling.factor == 0 or np.isinf(column.values).any():
         return {}
     limits = np.iinfo(raw.counts.dtype)
-    unused = [code for code in (limits.min, limits.max) if not (raw.counts == code).any()]
+    used = raw.counts[~np.isnan(column.values)]
+    unused = [code for code in (limits.min, limits.max) if not (used == code).any()]
     if not unused:
         return {}
     return {
@@ -264,11 +266,7 @@ def _recording(
 ) -> xr.Dataset:
     variables: dict[str, Any] = {one.name: ("time", one.values, one.attributes) for one in converted}
     if quality.any():
-        meaning = {
-            "flag_masks": np.array([1, 2, 4, 8], dtype=np.uint8),
-            "flag_meanings": "lost clipped crc_repaired out_of_order",
-        }
-        variables["quality"] = ("time", quality, meaning)
+        variables["quality"] = ("time", quality, quality_attributes())
     run = channel_map.run
     start_time = run.start_time_utc or next(
         (t.table.start_time_utc for t in tables if t.table.start_time_utc), None

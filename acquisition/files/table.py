@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,8 @@ class Column:
         Other names by which a map may call the column.
     number : int
         Place in the file, from 1; 0 where the reader leaves it to the order of columns.
+    declared : mapping of str to object
+        What the file says about the sensor, by the keys of a channel in a map; in the units of the file.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Column:
     raw: RawCounts | None = None
     aliases: tuple[str, ...] = ()
     number: int = 0
+    declared: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -44,11 +44,20 @@ _MOST_BLOCKS_JOINED: Final = 20_000
 class JournalFile(Protocol):
     """What a journal needs of a file; tests give one that runs full."""
 
-    def write(self, data: bytes | memoryview, /) -> int | None: ...
-    def truncate(self, size: int, /) -> int: ...
-    def seek(self, offset: int, /) -> int: ...
-    def fileno(self) -> int: ...
-    def close(self) -> None: ...
+    def write(self, data: bytes | memoryview, /) -> int | None:
+        """Append bytes; how many were taken."""
+
+    def truncate(self, size: int, /) -> int:
+        """Cut the file to `size` bytes."""
+
+    def seek(self, offset: int, /) -> int:
+        """Go on writing at `offset`."""
+
+    def fileno(self) -> int:
+        """Descriptor, for forcing the file to the disk."""
+
+    def close(self) -> None:
+        """Let the file go."""
 
 
 def _new_file(path: Path, overwrite: bool) -> JournalFile:

@@ -214,6 +214,13 @@ class Source(ABC):
         whatever the device sends.
         """
 
+    def finish(self) -> Sequence[Delivery]:
+        """Stop the device where it can be stopped and hand over what still waits for later samples.
+
+        Called once, after the last `read` and before `close`. Nothing waits in most sources.
+        """
+        return ()
+
     @abstractmethod
     def close(self) -> None:
         """Stop the device where it can be stopped and let it go; may be called twice."""

@@ -106,7 +106,7 @@ class DescriptorLine:
         Raises
         ------
         LineLostError
-            If they cannot be sent within a second.
+            If they cannot be sent: at once by a socket, within a second by a port.
         """
         try:
             self._send(data)
@@ -149,7 +149,7 @@ class PolledLine:
         self._port.close()
 
 
-def open_line(target: str, baudrate: int) -> Line:
+def open_line(target: str, baudrate: int, *, name: str | None = None) -> Line:
     """Open a port by name, or by a URL of pyserial.
 
     Parameters
@@ -158,44 +158,44 @@ def open_line(target: str, baudrate: int) -> Line:
         ``/dev/ttyUSB0``, a pseudo-terminal, ``socket://127.0.0.1:7000``, ``rfc2217://…``
     baudrate : int
         Means nothing to pseudo-terminals and sockets.
+    name : str, optional
+        For error messages; ``serial:TARGET`` by default.
 
     Raises
     ------
     SourceError
         If there is no such port, somebody else has it, or nobody listens.
     """
+    name = name or f"serial:{target}"
     if target.startswith("socket://"):
-        return _socket_line(target)
-    return _port_line(target, baudrate)
+        return _socket_line(target, name)
+    return _port_line(target, baudrate, name)
 
 
-def _socket_line(target: str) -> Line:
+def _socket_line(target: str, name: str) -> Line:
     try:
         parts = urlsplit(target)
         address = (parts.hostname or "", parts.port or 0)
     except ValueError:
         address = ("", 0)
     if not address[0] or not address[1]:
-        raise SourceError(f"serial:{target}", got="no host and port", allowed="socket://HOST:PORT")
+        raise SourceError(name, got="no host and port", allowed="socket://HOST:PORT")
     try:
         connection = socket.create_connection(address, _CONNECT_TIMEOUT_S)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:  # the latter for host names that cannot be one
         raise SourceError(
-            f"serial:{target}",
-            got=error.strerror or str(error) or "no answer",
+            name,
+            got=getattr(error, "strerror", None) or str(error) or "no answer",
             remedy="start the device that listens there, or correct host and port",
         ) from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setblocking(False)
-    return DescriptorLine(
-        f"serial:{target}", connection.fileno(), connection.recv, connection.sendall, connection.close
-    )
+    return DescriptorLine(name, connection.fileno(), connection.recv, connection.sendall, connection.close)
 
 
-def _port_line(target: str, baudrate: int) -> Line:
+def _port_line(target: str, baudrate: int, name: str) -> Line:
     import serial  # type: ignore[import-untyped]
 
-    name = f"serial:{target}"
     try:
         port = serial.serial_for_url(
             target, baudrate=baudrate, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True

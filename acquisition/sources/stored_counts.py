@@ -23,6 +23,7 @@ import xarray as xr
 from acquisition.sources.interface import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel, CountArray
 from sloshlab.errors import RecordingError
 from sloshlab.file_structure import require_sound_structure
+from sloshlab.netcdf_lock import NETCDF_LOCK
 from sloshlab.recording import JITTER_ALLOWED_STEPS, read_attributes, validate_recording
 from sloshlab.units import SI_UNITS
 
@@ -55,7 +56,7 @@ class _StoredChannel:
 
 
 class StoredCounts:
-    """A recording opened for its counts; a context manager.
+    """A recording opened for its counts; a context manager. Several may be read at once, each in its thread.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ class StoredCounts:
 
     def __init__(self, path: str | os.PathLike[str], chosen: Sequence[str] | None = None) -> None:
         self._file = Path(path)
-        with contextlib.ExitStack() as closing:
+        with NETCDF_LOCK, contextlib.ExitStack() as closing:
             attributes = read_attributes(self._file)
             require_sound_structure(self._file)
             with self._as_recording_error():
@@ -104,7 +105,8 @@ class StoredCounts:
 
     def close(self) -> None:
         """Close the file; may be called twice."""
-        self._closing.close()
+        with NETCDF_LOCK:
+            self._closing.close()
         self._piece = self._piece[:0]
 
     def counts(self, start: int, stop: int) -> CountArray:
@@ -137,7 +139,7 @@ class StoredCounts:
     def _load_piece(self, sample: int) -> None:
         first = sample // self._piece_length * self._piece_length
         rows = slice(first, min(first + self._piece_length, self.n_samples))
-        with self._as_recording_error():
+        with NETCDF_LOCK, self._as_recording_error():
             columns = [stored.to_counts(self._dataset[stored.channel.name][rows]) for stored in self._stored]
         self._piece_start, self._piece = first, np.stack(columns, axis=1)
 
@@ -261,9 +263,15 @@ def _as_stored(dtype: np.dtype[Any], channel: Channel, fill: float | None) -> _S
         channel,
         bits=bits,
         add_offset=channel.add_offset + channel.scale_factor * shift,
-        missing_count=None if fill is None else int(fill) - shift,
+        missing_count=int(fill) - shift if fill is not None and _is_count(fill, dtype) else None,
     )
     return _StoredChannel(described, lambda raw: (raw.astype(np.int64) - shift).astype(np.int32))
+
+
+def _is_count(fill: float, dtype: np.dtype[Any]) -> bool:
+    """Whether a stored integer can equal the fill value; half a count, NaN, or one beyond the type marks none."""
+    limits = np.iinfo(dtype)
+    return bool(limits.min <= fill <= limits.max and fill == int(fill))
 
 
 def _step(full_scale: float) -> float:

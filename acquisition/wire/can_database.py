@@ -14,7 +14,7 @@ from typing import Any, Final, NoReturn
 
 from acquisition.sources.interface import MOST_CHANNELS, Channel
 from acquisition.wire.can_bits import BitField
-from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage, Selected
+from acquisition.wire.can_layout import STREAM_BITS, CanLayout, ControlMessage, SampleMessage, Selected
 from acquisition.wire.serial_calibration import channels_from_calibration
 from sloshlab.errors import FileFormatError, SourceError
 from sloshlab.units import SI_UNITS
@@ -22,6 +22,8 @@ from sloshlab.units import SI_UNITS
 LARGEST_DATABASE_BYTES: Final = 4 << 20
 FEWEST_COUNTER_BITS: Final = 16
 MOST_COUNTER_BITS: Final = 48
+MOST_CLOCK_BITS: Final = 62
+"""What an int64 holds; also of the number of samples in ``device_status``."""
 
 _TEXT_ATTRIBUTES: Final = {"block_from": "BlockFrom", "block_to": "BlockTo", "sensor_serial": "SensorSerial"}
 _FLOAT_ATTRIBUTES: Final = {"noise_std": "NoiseStd", "x_m": "XM", "range_min": "RangeMin", "range_max": "RangeMax"}
@@ -234,7 +236,7 @@ class _DatabaseReader:
             self._one_number(described, "DeviceClockHz", needed=any(message.clock for message in messages)),
             tuple(self._channels),
             messages,
-            self._control("device_status", ("state", "stream", "n_samples")),
+            self._status(messages),
             self._control("host_command", ("command",)),
         )
         return self._checked(layout)
@@ -322,8 +324,9 @@ class _DatabaseReader:
                     f"{message.name}.{part.field.name}", f"bit {part.bit}", f"bit {reached}, which is missing"
                 )
             reached += part.field.length
-        if reached > (MOST_COUNTER_BITS if kind == "sample_counter" else 62):
-            self._refuse(f"{message.name}.{kind}", f"{reached} bits", f"≤ {MOST_COUNTER_BITS}")
+        most = MOST_COUNTER_BITS if kind == "sample_counter" else MOST_CLOCK_BITS
+        if reached > most:
+            self._refuse(f"{message.name}.{kind}", f"{reached} bits", f"≤ {most}")
         return tuple(parts)
 
     def _check_counter(self, message: SampleMessage) -> None:
@@ -332,7 +335,7 @@ class _DatabaseReader:
             self._refuse(
                 f"{message.name}: sample counter",
                 f"{n_bits} bits",
-                f"≥ {FEWEST_COUNTER_BITS}, of which 3 in every frame",
+                f"≥ {FEWEST_COUNTER_BITS} bits",
             )
         if message.counter[0].selectors:
             self._refuse(f"{message.name}.sample_counter_0", "multiplexed", "in every frame")
@@ -397,6 +400,20 @@ class _DatabaseReader:
                 "one value, the same in every message",
             )
         return values.pop() if values else None
+
+    def _status(self, messages: Sequence[SampleMessage]) -> ControlMessage | None:
+        """``device_status``; one that counts less far than its samples would announce restarts without end."""
+        status = self._control("device_status", ("state", "stream", "n_samples"))
+        if status is None:
+            return None
+        _, stream, n_samples = status.fields[-3:]
+        if stream.length > STREAM_BITS:
+            self._refuse("device_status.stream", f"{stream.length} bits", f"≤ {STREAM_BITS} bits")
+        needed = max(sum(part.field.length for part in message.counter) for message in messages)
+        if not needed <= n_samples.length <= MOST_CLOCK_BITS:
+            allowed = f"{needed} … {MOST_CLOCK_BITS} bits, all of the sample counter"
+            self._refuse("device_status.n_samples", f"{n_samples.length} bits", allowed)
+        return status
 
     def _control(self, name: str, needed: tuple[str, ...]) -> ControlMessage | None:
         message = next((message for message in self._messages if message.name == name), None)

@@ -9,9 +9,11 @@ from __future__ import annotations
 import binascii
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acquisition.sources.interface import CountArray
@@ -26,6 +28,7 @@ STOP: Final = 2
 LOST_DATA: Final = 1
 """Bit of ``device_flags``: the device lost data since it last sent its flags."""
 
+_SELECTOR, _CRC, _COUNTER, _COUNTER_KNOWN, _CLOCK, _CLOCK_KNOWN, _FLAGS, _N_SAMPLES, _N_NUMBERS = range(9)
 _CRC_START: Final = 0xFFFF
 _CRC_TABLE: Final = np.array([binascii.crc_hqx(bytes([n]), 0) for n in range(256)], np.uint16)
 
@@ -91,12 +94,23 @@ def checksums(arbitration_id: int, data: FrameBytes, crc: BitField) -> NDArray[n
     62098
     """
     left_out = {piece.byte for piece in crc.pieces()}
+    used = np.array([byte for byte in range(data.shape[1]) if byte not in left_out], np.int64)
     start = binascii.crc_hqx(arbitration_id.to_bytes(4, "little"), _CRC_START)
-    value = np.full(len(data), start, np.uint16)
-    for byte in range(data.shape[1]):
-        if byte not in left_out:
-            value = (value << 8) ^ _CRC_TABLE[(value >> 8) ^ data[:, byte]]
-    return value
+    values = np.empty(len(data), np.uint16)
+    _sum_up(np.ascontiguousarray(data), used, start, _CRC_TABLE, values)
+    return values
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _sum_up(
+    data: FrameBytes, used: IntArray, start: int, table: NDArray[np.uint16], values: NDArray[np.uint16]
+) -> None:
+    """Checksum of the used bytes of every frame."""
+    for frame in range(data.shape[0]):
+        value = np.int64(start)
+        for k in range(used.size):
+            value = ((value << 8) & 0xFFFF) ^ np.int64(table[(value >> 8) ^ data[frame, used[k]]])
+        values[frame] = value
 
 
 def decode(message: SampleMessage, data: FrameBytes) -> DecodedFrames:
@@ -114,42 +128,74 @@ def decode(message: SampleMessage, data: FrameBytes) -> DecodedFrames:
     """
     if data.ndim != 2 or data.shape[1] != message.length:
         raise InputError(f"frames of {message.name}", got=str(data.shape), allowed=f"(n, {message.length})")
-    n_frames = len(data)
-    selector = message.multiplexor.read(data) if message.multiplexor is not None else np.zeros(n_frames, np.int64)
+    n_frames, columns = len(data), message.samples_per_frame * len(message.channels)
+    numbers = np.zeros((_N_NUMBERS + columns, n_frames), np.int64)
     intact = np.ones(n_frames, np.bool_)
+    plan = _plan(message)
+    _take_apart(np.ascontiguousarray(data), plan.pieces, plan.signs, numbers)
     if message.crc is not None:
-        intact = message.crc.read(data) == checksums(message.arbitration_id, data, message.crc)
-    counter, counter_known = _joined(message.counter, selector, data)
-    clock, clock_known = _joined(message.clock, selector, data)
-    flags, _ = _joined((message.flags,) if message.flags is not None else (), selector, data)
-    full = np.full(n_frames, message.samples_per_frame, np.int64)
-    n_samples = message.n_samples.read(data) if message.n_samples is not None else full
+        intact = numbers[_CRC] == checksums(message.arbitration_id, data, message.crc)
+    n_samples = numbers[_N_SAMPLES]
+    if message.n_samples is None:
+        n_samples[:] = message.samples_per_frame
+    counts = numbers[_N_NUMBERS:].T.astype(np.int32, order="C")
     return DecodedFrames(
-        intact, counter, counter_known, clock, clock_known, flags, n_samples, _counts(message, data)
+        intact,
+        numbers[_COUNTER],
+        numbers[_COUNTER_KNOWN],
+        numbers[_CLOCK],
+        numbers[_CLOCK_KNOWN],
+        numbers[_FLAGS],
+        n_samples,
+        counts.reshape(n_frames, message.samples_per_frame, len(message.channels)),
     )
 
 
-def _joined(parts: Sequence[Selected], selector: IntArray, data: FrameBytes) -> tuple[IntArray, IntArray]:
-    value = np.zeros(len(data), np.int64)
-    known = np.zeros(len(data), np.int64)
-    for part in parts:
-        bits = ((1 << part.field.length) - 1) << part.bit
-        if not part.selectors:
-            value |= part.field.read(data) << part.bit
-            known |= bits
-            continue
-        there = np.flatnonzero(np.isin(selector, part.selectors))
-        value[there] |= part.field.read(data[there]) << part.bit
-        known[there] |= bits
-    return value, known
+class _Plan(NamedTuple):
+    """Pieces of all fields: row of the number, selector (−1 for always), byte, shift, bits, weight."""
+
+    pieces: IntArray
+    signs: IntArray
 
 
-def _counts(message: SampleMessage, data: FrameBytes) -> CountArray:
-    counts = np.empty((len(data), message.samples_per_frame, len(message.channels)), np.int32)
-    for channel, fields in enumerate(message.samples):
-        for k, field in enumerate(fields):
-            counts[:, k, channel] = field.read(data)
-    return counts
+@lru_cache(maxsize=512)
+def _plan(message: SampleMessage) -> _Plan:
+    fields: list[tuple[int, Selected]] = []
+    for row, field in ((_SELECTOR, message.multiplexor), (_CRC, message.crc), (_N_SAMPLES, message.n_samples)):
+        fields += [(row, Selected(field))] if field is not None else []
+    fields += [(_COUNTER, part) for part in message.counter] + [(_CLOCK, part) for part in message.clock]
+    fields += [(_FLAGS, message.flags)] if message.flags is not None else []
+    signs: list[int] = []
+    for k in range(message.samples_per_frame):
+        for samples in message.samples:
+            fields.append((_N_NUMBERS + len(signs), Selected(samples[k])))
+            signs.append(samples[k].length if samples[k].signed else 0)
+    pieces = [
+        (row, selector, byte, shift, n_bits, weight + part.bit)
+        for row, part in fields
+        for selector in part.selectors or (-1,)
+        for byte, shift, n_bits, weight in part.field.pieces()
+    ]
+    return _Plan(np.array(pieces, np.int64), np.array(signs, np.int64))
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _take_apart(data: FrameBytes, pieces: IntArray, signs: IntArray, numbers: IntArray) -> None:
+    """Numbers of every frame, one row each; the multiplexor's pieces come first."""
+    for frame in range(data.shape[0]):
+        for k in range(pieces.shape[0]):
+            row, selector, weight = pieces[k, 0], pieces[k, 1], pieces[k, 5]
+            if selector >= 0 and selector != numbers[_SELECTOR, frame]:
+                continue
+            mask = (np.int64(1) << pieces[k, 4]) - 1
+            value = (np.int64(data[frame, pieces[k, 2]]) >> pieces[k, 3]) & mask
+            numbers[row, frame] |= value << weight
+            if row in (_COUNTER, _CLOCK):
+                numbers[row + 1, frame] |= mask << weight
+        for column in range(signs.size):
+            length = signs[column]
+            if length and numbers[_N_NUMBERS + column, frame] >> (length - 1):
+                numbers[_N_NUMBERS + column, frame] -= np.int64(1) << length
 
 
 def encode_samples(

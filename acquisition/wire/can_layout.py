@@ -20,6 +20,9 @@ from sloshlab.errors import SourceError
 STATUS_ID: Final = 0x100
 FIRST_SAMPLES_ID: Final = 0x101
 COMMAND_ID: Final = 0x080
+STREAM_BITS: Final = 8
+"""Of the number of the stream in ``device_status``, at most."""
+
 FD_LENGTHS: Final = (8, 12, 16, 20, 24, 32, 48, 64)
 """Lengths of a CAN FD frame from 8 bytes up."""
 
@@ -103,6 +106,10 @@ class SampleMessage:
     flags: Selected | None = None
     extended: bool = False
     fd: bool = False
+
+    def __hash__(self) -> int:
+        # all that belongs to a message is looked up by it for every batch: hundreds of fields take too long
+        return hash((self.name, self.arbitration_id, self.extended, self.length))
 
     @property
     def samples_per_frame(self) -> int:
@@ -237,7 +244,7 @@ STATUS: Final = ControlMessage(
     STATUS_ID,
     False,
     8,
-    (_CRC, BitField("state", 16, 8), BitField("stream", 24, 8), BitField("n_samples", 32, 32)),
+    (_CRC, BitField("state", 16, 8), BitField("stream", 24, STREAM_BITS), BitField("n_samples", 32, 32)),
 )
 """State 1 is running, 2 ended; `n_samples` is the counter that the next sample has."""
 

@@ -131,6 +131,7 @@ class SerialDecoder:
         self.sampling = False
         self.failure: SourceError | None = None
         self._current: tuple[bytes, Calibration] | None = None
+        self._widest_bits = 0
         self._rest = b""
         self._held: list[tuple[Frame, HostTime]] = []
         self._n_held_bytes = 0
@@ -158,7 +159,9 @@ class SerialDecoder:
             for frame in parsed.frames:
                 self._take(frame, host)
         except SourceError as error:
-            self.failure = error
+            # of several sources, a person must know which one
+            what = error.what if self._url in error.what else f"source {self._url}: {error.what}"
+            self.failure = SourceError(what, got=error.got, allowed=error.allowed, remedy=error.remedy)
         self._finish_run()
         return self._deliveries + self._tally.troubles(host.monotonic_ns)
 
@@ -200,6 +203,7 @@ class SerialDecoder:
         if self._current is None:
             calibration = channels_from_calibration(text)
             self.calibration, self._current = calibration, (text, calibration)
+            self._widest_bits = max(channel.bits for channel in calibration.channels)
             held, self._held = self._held, []
             for frame, arrival in held:
                 self._take(frame, arrival)
@@ -238,13 +242,12 @@ class SerialDecoder:
     def _fits_calibration(self, frame: SamplesFrame) -> bool:
         assert self.calibration is not None
         n_channels = len(self.calibration.channels)
-        widest = max(channel.bits for channel in self.calibration.channels)
-        fits = frame.counts.shape[1] == n_channels and 8 * frame.bytes_per_count >= widest
+        fits = frame.counts.shape[1] == n_channels and 8 * frame.bytes_per_count >= self._widest_bits
         if not fits:
             self._tally.add(
                 TroubleKind.MALFORMED_FRAME,
                 f"samples of {frame.counts.shape[1]} channels × {frame.bytes_per_count} bytes, "
-                f"the calibration has {n_channels} channels of up to {widest} bits",
+                f"the calibration has {n_channels} channels of up to {self._widest_bits} bits",
             )
         return fits
 

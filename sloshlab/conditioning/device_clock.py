@@ -9,6 +9,7 @@ way through the buffers costs cannot be known from arrivals and stays in the off
 from __future__ import annotations
 
 import enum
+import itertools
 import math
 from dataclasses import asdict, dataclass
 from typing import Any, Final
@@ -182,12 +183,15 @@ def _checked_pairs(
         )
     order = np.lexsort((host_ns, counter))
     origin_ns = int(host_ns.min())
-    return counter[order].astype(np.float64), (host_ns[order] - origin_ns) * 1e-9, origin_ns
+    arrival = np.asarray((host_ns[order] - origin_ns) * 1e-9, dtype=np.float64)
+    return counter[order].astype(np.float64), arrival, origin_ns
 
 
 def _undetermined(n_pairs: int, origin_ns: int, first_s: float, period_s: float) -> DeviceClock:
     return DeviceClock(
-        ClockStatus.UNDETERMINED, n_pairs, 0.0, origin_ns, first_s, period_s, 0.0, *([math.inf] * 2), *([math.nan] * 4)
+        ClockStatus.UNDETERMINED, n_pairs, 0.0, origin_ns, first_s, period_s,
+        drift_ppm=0.0, offset_error_s=math.inf, drift_error_ppm=math.inf,
+        latency_median_s=math.nan, latency_95_s=math.nan, latency_max_s=math.nan, residual_rms_s=math.nan,
     )  # fmt: skip
 
 
@@ -279,9 +283,7 @@ def _earliest_per_segment(counter: FloatArray, latency: FloatArray) -> tuple[Flo
     n_segments = min(_N_SEGMENTS, max(1, counter.size // _PAIRS_PER_SEGMENT))
     edges = np.linspace(counter[0], counter[-1], n_segments + 1)
     bounds = np.unique(np.append(np.searchsorted(counter, edges[:-1]), counter.size))
-    lowest = np.array(
-        [start + int(latency[start:stop].argmin()) for start, stop in zip(bounds, bounds[1:], strict=False)]
-    )
+    lowest = np.array([start + int(latency[start:stop].argmin()) for start, stop in itertools.pairwise(bounds)])
     return counter[lowest] - counter.mean(), latency[lowest]
 
 

@@ -15,7 +15,7 @@ from sloshlab.conditioning.clipping import Clipping, clipping
 from sloshlab.conditioning.gaps import Gap, gaps, sampling_step_s
 from sloshlab.conditioning.redundancy import SensorAgreement, agreement, redundant_accelerometers
 from sloshlab.errors import AnalysisError
-from sloshlab.recording import CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, channels
+from sloshlab.recording import CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, STUCK, channels
 
 LARGEST_LOST_FRACTION = 0.5
 """A channel with more lost samples than this share makes the run unusable."""
@@ -76,7 +76,7 @@ class RunQuality:
         By name.
     gaps : tuple of Gap
         Where any channel is lost.
-    n_flagged_clipped, n_crc_repaired, n_out_of_order : int
+    n_flagged_clipped, n_crc_repaired, n_out_of_order, n_stuck : int
         Samples with these bits in `quality`.
     accelerometers : SensorAgreement or None
         Agreement of the redundant accelerometers; None where there are fewer than two or they cannot be
@@ -96,6 +96,7 @@ class RunQuality:
     n_flagged_clipped: int
     n_crc_repaired: int
     n_out_of_order: int
+    n_stuck: int
     accelerometers: SensorAgreement | None
     reasons: tuple[str, ...]
     remarks: tuple[str, ...]
@@ -145,6 +146,7 @@ def quality_of(recording: xr.Dataset) -> RunQuality:
         n_flagged_clipped=flags[CLIPPED],
         n_crc_repaired=flags[CRC_REPAIRED],
         n_out_of_order=flags[OUT_OF_ORDER],
+        n_stuck=flags[STUCK],
         accelerometers=agreed,
         reasons=tuple(reasons),
         remarks=tuple(remarks),
@@ -169,7 +171,7 @@ def channel_quality(channel: xr.DataArray) -> ChannelQuality:
 
 
 def _flag_counts(recording: xr.Dataset) -> dict[int, int]:
-    bits = (CLIPPED, CRC_REPAIRED, OUT_OF_ORDER)
+    bits = (CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, STUCK)
     if "quality" not in recording:
         return dict.fromkeys(bits, 0)
     flags = recording["quality"].values
@@ -231,6 +233,7 @@ def _gap_remarks(lost: tuple[Gap, ...], flags: dict[int, int]) -> list[str]:
         CLIPPED: "flagged as clipped",
         CRC_REPAIRED: "repaired after a CRC error",
         OUT_OF_ORDER: "out of order",
+        STUCK: "of a sensor that did not move",
     }
     remarks += [f"{flags[bit]} samples {text}" for bit, text in texts.items() if flags[bit]]
     return remarks

@@ -73,9 +73,7 @@ def resampled(values: npt.ArrayLike, positions: npt.ArrayLike, *, rate_ratio: fl
     True
     """
     if not 1e6 * rate_ratio > HALF_WIDTH:
-        raise AnalysisError(
-            "ratio of sampling rates", got=f"{rate_ratio:g}", allowed=f"> {1e-6 * HALF_WIDTH:g}"
-        )
+        raise AnalysisError("ratio of sampling rates", got=f"{rate_ratio:g}", allowed=f"> {1e-6 * HALF_WIDTH:g}")
     samples = np.ascontiguousarray(values, dtype=np.float64)
     instants = np.ascontiguousarray(positions, dtype=np.float64)
     return np.asarray(_interpolated(samples, instants, min(1.0, float(rate_ratio)), _kernel()))

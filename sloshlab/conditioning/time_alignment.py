@@ -129,7 +129,7 @@ class _Line:
     middle_s: float
     slope: float
 
-    def at(self, time_s: FloatArray) -> FloatArray:
+    def at(self, time_s: Any) -> Any:
         return self.middle_s + self.slope * (time_s - self.centre_s)
 
     def plus(self, middle_s: float, slope: float) -> _Line:
@@ -210,7 +210,7 @@ def _stated(fit: _Fit, status: AlignmentStatus) -> ClockDelay:
         n_windows=fit.n_windows,
         n_windows_left_out=fit.n_left_out,
         centre_s=fit.centroid_s,
-        delay_s=float(fit.line.at(np.float64(fit.centroid_s))),
+        delay_s=float(fit.line.at(fit.centroid_s)),
         drift_ppm=1e6 * fit.line.slope,
         delay_std_s=fit.middle_std_s,
         drift_std_ppm=1e6 * fit.slope_std,
@@ -225,8 +225,10 @@ def _stated(fit: _Fit, status: AlignmentStatus) -> ClockDelay:
 def _nothing_in_common(reference: SampledSignal) -> ClockDelay:
     unknown = math.inf
     return ClockDelay(
-        AlignmentStatus.NO_COMMON_MOTION, 0, 0, reference.start_s, 0.0, 0.0, *([unknown] * 5), math.nan, 0.0
-    )
+        AlignmentStatus.NO_COMMON_MOTION, 0, 0, reference.start_s, delay_s=0.0, drift_ppm=0.0,
+        delay_std_s=unknown, drift_std_ppm=unknown, residual_rms_s=unknown, error_s=unknown,
+        phase_error_at_20_hz_rad=unknown, gain_ratio=math.nan, correlation=0.0,
+    )  # fmt: skip
 
 
 def _require_common_time(reference: SampledSignal, other: SampledSignal) -> None:
@@ -241,7 +243,7 @@ def _require_common_time(reference: SampledSignal, other: SampledSignal) -> None
 
 def _highest_frequency_hz(signal: SampledSignal) -> float:
     """Below this lie 99 % of the power."""
-    values = np.nan_to_num(signal.values - np.nanmean(signal.values))
+    values = _centred(signal)
     power = np.cumsum(np.abs(np.fft.rfft(values)) ** 2)
     line = int(np.searchsorted(power, 0.99 * power[-1]))
     return min(_HIGHEST_FREQUENCY_HZ, max(_LOWEST_FREQUENCY_HZ, line / (values.size * signal.step_s)))
@@ -253,7 +255,7 @@ def _candidates(
     """Lines at the highest maxima of the correlation, over the drifts that change it noticeably."""
     step_s = max(reference.step_s, 1.0 / _COARSE_RATE_HZ)
     n = int(reference.values.size * reference.step_s / step_s)
-    time = reference.start_s + step_s * np.arange(n)
+    time = np.asarray(reference.start_s + step_s * np.arange(n), dtype=np.float64)
     centre_s = float(time.mean())
     x = _interpolated(reference, time)
     n_lags = max(1, round(largest_delay_s / step_s))
@@ -277,9 +279,16 @@ def _drifts(largest_ppm: float, duration_s: float, frequency_hz: float) -> Float
 
 def _interpolated(signal: SampledSignal, time: FloatArray) -> FloatArray:
     """Good enough for a coarse search: linear, lost samples and what is outside at the mean."""
-    values = np.nan_to_num(signal.values - np.nanmean(signal.values))
+    values = _centred(signal)
     places = signal.start_s + signal.step_s * np.arange(values.size)
-    return np.interp(time, places, values, left=0.0, right=0.0)
+    return np.asarray(np.interp(time, places, values, left=0.0, right=0.0))
+
+
+def _centred(signal: SampledSignal) -> FloatArray:
+    """Values about their mean; lost samples at the mean."""
+    there = np.isfinite(signal.values)
+    mean = float(signal.values[there].mean()) if there.any() else 0.0
+    return np.where(there, signal.values - mean, 0.0)
 
 
 def _maxima(values: FloatArray) -> list[tuple[float, float]]:
@@ -338,7 +347,7 @@ def _windows(
     """Per window without lost samples: delay [s], weight, centre [samples], (Re ΣYX*, Σ|X|², Σ|Y|²)."""
     n_window = max(32, round(min(2.0, x.size * step_s / 16) / step_s))
     hann = np.hanning(n_window + 1)[:-1]
-    omega = 2 * np.pi * np.fft.rfftfreq(n_window, step_s)
+    omega = np.asarray(2 * np.pi * np.fft.rfftfreq(n_window, step_s), dtype=np.float64)
     in_band = (omega >= 2 * np.pi * _LOWEST_FREQUENCY_HZ) & (omega <= 2 * np.pi * _HIGHEST_FREQUENCY_HZ)
     found = []
     for first, last in runs(np.isfinite(x) & np.isfinite(y), True):
@@ -380,7 +389,7 @@ def _line_through(
         if np.array_equal(keep, used):
             break
         used = keep
-    n_free = max(1, np.count_nonzero(w) - 2)
+    n_free = max(1, int(np.count_nonzero(w)) - 2)
     unit_variance = _WINDOW_OVERLAP_VARIANCE * float((w * residual**2).sum()) / n_free
     rms = math.sqrt(float((w * residual**2).sum() / w.sum()))
     stds = math.sqrt(unit_variance / float(w.sum())), math.sqrt(unit_variance / moment)

@@ -1,4 +1,4 @@
-"""Speed and memory of the shaker analysis as ratios measured in one run.
+"""Speed and memory of the shaker analysis as ratios measured in one run, and of live recording at full load.
 
 Each measurement runs in a process of its own on one core. Times are processor times, the best of several
 repeats after a warm-up that compiles the kernels; the parent prints the table and says where a figure
@@ -14,12 +14,16 @@ import sys
 import tempfile
 from pathlib import Path
 
+TRANSPORTS = ("serial", "socketcand", "slcan")
 AIMS = {
     "netCDF to windows.nc and maps.nc [s]": 1.5,
     "… over reading and decoding the file": 5.0,
     "peak memory over decoded recording": 4.0,
     "10 × longer recording costs": 11.0,
+    **{f"{transport}: samples wrong or lost": 0.0 for transport in TRANSPORTS},
+    **{f"{transport}: recorder, share of one core": 0.6 for transport in TRANSPORTS},
 }
+RECORDING_S = 20.0
 ONE_CORE = {
     name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 }
@@ -32,6 +36,27 @@ def measured(what: str, *arguments: object) -> dict[str, float]:
     if done.returncode:
         sys.exit(done.stderr)
     return json.loads(done.stdout.splitlines()[-1])
+
+
+def recording_figures() -> dict[str, float]:
+    """Live recording in real time by each transport, device and recorder in two processes."""
+    from tests.benchmarks.sustained import LOADS, sustained
+
+    shown = (
+        "samples wrong or lost",
+        "recorder, share of one core",
+        "sample to disk, median [s]",
+        "sample to disk, 99 % [s]",
+    )
+    figures: dict[str, float] = {}
+    for transport, load in LOADS.items():
+        print(f"recording by {transport} for {RECORDING_S:g} s …", flush=True)
+        found = sustained(load, RECORDING_S)
+        figures[f"{transport}: counts [MB/s]"] = load.bytes_per_s / 1e6
+        if load.frames_per_s:
+            figures[f"{transport}: frames [1/s]"] = load.frames_per_s
+        figures |= {f"{transport}: {name}": float(found[name]) for name in shown}
+    return figures
 
 
 def main() -> None:
@@ -58,6 +83,7 @@ def main() -> None:
         "analysis over a 1000³ matrix product": standard["analysis_s"] / blas["product_s"],
     }  # fmt: skip
     missed = 0
+    figures |= recording_figures()
     for label, value in figures.items():
         aim = AIMS.get(label)
         verdict = "" if aim is None else f"   aim ≤ {aim:g}   {'met' if value <= aim else 'MISSED'}"

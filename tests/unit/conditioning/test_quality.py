@@ -42,6 +42,7 @@ def test_gaps_and_flags_are_remarks():
     flags[100:110] = 1
     flags[[5, 6]] = 4
     flags[7] = 8 | 2
+    flags[20:24] = 16
     run["quality"] = ("time", flags)
     quality = quality_of(run)
     assert quality.usable
@@ -52,6 +53,8 @@ def test_gaps_and_flags_are_remarks():
     assert "force_cell_1: 3 lost samples" in text
     assert "acceleration_control: 8 lost samples" in text
     assert "2 samples repaired after a CRC error" in text
+    assert quality.n_stuck == 4
+    assert "4 samples of a sensor that did not move" in text
 
 
 def test_a_little_clipping_is_remarked_on_and_much_makes_unusable():

@@ -44,9 +44,9 @@ def run_with(flags):
     )
 
 
-@pytest.mark.parametrize(("flag", "costs"), [(1, True), (2, True), (4, True), (8, False)])
+@pytest.mark.parametrize(("flag", "costs"), [(1, True), (2, True), (4, True), (8, False), (16, True)])
 def test_flags_of_the_recorder_cost_the_sample(flag, costs):
-    """Lost, clipped and repaired samples were not measured; one that came out of order was."""
+    """Lost, clipped, repaired and stuck samples were not measured; one that came out of order was."""
     flags = np.zeros(3000, np.uint8)
     flags[1500] = flag
     run = run_with(flags)

@@ -190,6 +190,14 @@ class TestTime:
         result = imported(tmp_path, columns, force(), source='time = "t"\nquality = "q"')
         np.testing.assert_array_equal(np.flatnonzero(result.recording["quality"].values == 4), [7])
 
+    def test_legend_of_quality_is_that_of_the_format(self, tmp_path: Path) -> None:
+        columns = {"t": np.arange(100) / 100, "F": np.arange(100.0), "q": 4.0 * (np.arange(100) == 7)}
+        legend = (
+            imported(tmp_path, columns, force(), source='time = "t"\nquality = "q"').recording["quality"].attrs
+        )
+        masks = dict(zip(legend["flag_meanings"].split(), legend["flag_masks"].tolist(), strict=True))
+        assert masks == {"lost": 1, "clipped": 2, "crc_repaired": 4, "out_of_order": 8, "stuck": 16}
+
 
 class TestDelay:
     def test_whole_steps_are_a_pure_shift(self, tmp_path: Path) -> None:

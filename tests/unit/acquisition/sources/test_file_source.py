@@ -1,5 +1,8 @@
 """Recordings as sources: the counts that are stored, floats to 30 bits of full scale, in real time or at once."""
 
+import subprocess
+import sys
+
 import netCDF4
 import numpy as np
 import pytest
@@ -59,7 +62,7 @@ def everything(source):
     """All counts that a started source delivers, and its End."""
     source.start()
     blocks, position = [], 0
-    while True:
+    for _ in range(100_000):
         for delivery in source.read(1.0):
             if isinstance(delivery, End):
                 return np.concatenate(blocks), delivery
@@ -68,6 +71,7 @@ def everything(source):
             assert delivery.counts.dtype == np.int32
             position += len(delivery.counts)
             blocks.append(delivery.counts)
+    raise AssertionError("no end")
 
 
 @pytest.mark.parametrize("dtype", ["i1", "u1", "i2", "u2", "i4"])
@@ -116,6 +120,18 @@ def test_the_fill_value_is_the_missing_count_and_attributes_are_kept(tmp_path):
     assert (channel.scale_factor, channel.missing_count) == (2.0, -32768)
     assert (channel.range_min, channel.range_max, channel.noise_std, channel.x_m) == (-5.0, 6.0, 0.1, 0.2)
     assert (channel.block_from, channel.block_to, channel.sensor_serial) == ("shaker", "tank", "A-7")
+
+
+@pytest.mark.parametrize(
+    ("fill", "expected"), [(-9.0, -9), (0.5, None), (70_000.0, None), (1e30, None), (np.nan, None), (np.inf, None)]
+)
+def test_a_missing_value_that_no_count_can_be_marks_none(tmp_path, fill, expected):
+    stored = np.array([0, -9, 1, 4464], np.int16)
+    path = write(tmp_path / "run.nc", {"force_a": (stored, force(missing_value=fill))})
+    with opened(path) as source:
+        assert source.info.channels[0].missing_count == expected
+        counts, _ = everything(source)
+    assert counts[:, 0].tolist() == stored.tolist()
 
 
 @pytest.mark.parametrize("full_scale", [1.0, 20.0, 1023.9, 1e-12, 3e30])
@@ -212,7 +228,9 @@ def test_in_real_time_no_sample_comes_before_its_time(tmp_path, query, speed):
         source.start()
         begun_ns = clock.now_ns
         received = []
-        while len(received) < 1000:
+        for _ in range(2000):
+            if len(received) == 1000:
+                break
             for block in source.read(0.5):
                 played_s = (clock.now_ns - begun_ns) * 1e-9 * speed
                 assert block.counter == len(received)
@@ -355,3 +373,29 @@ def test_damage_that_reading_meets_is_one_line(tmp_path):
     path.write_bytes(content)
     with opened(path) as source, pytest.raises(SourceError, match="cannot be read"):
         everything(source)
+
+
+READ_AT_ONCE = """
+import sys, threading
+from acquisition.sources.stored_counts import StoredCounts
+
+def read(path):
+    for _ in range(200):
+        with StoredCounts(path) as stored:
+            for start in range(0, stored.n_samples, 1000):
+                stored.counts(start, min(start + 1000, stored.n_samples))
+
+threads = [threading.Thread(target=read, args=(path,)) for path in sys.argv[1:]]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+print("read")
+"""
+
+
+def test_several_recordings_are_read_at_once_in_threads(tmp_path):
+    values = np.arange(20_000, dtype=np.int16)
+    paths = [write(tmp_path / f"{k}.nc", {"force_1": (values, force())}, chunk=1000) for k in range(4)]
+    done = subprocess.run([sys.executable, "-c", READ_AT_ONCE, *map(str, paths)], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "read\n"), done.stderr

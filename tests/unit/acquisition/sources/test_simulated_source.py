@@ -28,12 +28,13 @@ def simulated(rig, query, experiment="shaker_sweep", clock=None):
 def everything(source):
     source.start()
     blocks = []
-    while True:
+    for _ in range(100_000):
         for delivery in source.read(1.0):
             if isinstance(delivery, End):
                 return np.concatenate(blocks), delivery
             assert delivery.counter == sum(map(len, blocks))
             blocks.append(delivery.counts)
+    raise AssertionError("no end")
 
 
 RUNS = {
@@ -82,7 +83,9 @@ def test_it_runs_in_real_time_unless_told_otherwise(rig):
         source.start()
         begun_ns = clock.now_ns
         n_received = 0
-        while n_received < 2560:
+        for _ in range(5000):
+            if n_received == 2560:
+                break
             n_received += sum(len(block.counts) for block in source.read(1.0))
     # the last of 2560 samples is due 2559 steps after the start
     assert (clock.now_ns - begun_ns) * 1e-9 == pytest.approx(2559 / 512, abs=1e-6)

@@ -50,6 +50,11 @@ def test_what_is_not_stuffed_is_refused(wrong: str) -> None:
         cobs.decode(bytes.fromhex(wrong))
 
 
+def test_nothing_is_read_beyond_the_end() -> None:
+    with pytest.raises(ValueError, match="not stuffed bytes"):
+        cobs.decode(memoryview(b"\x05\x11\x22\x33\x44")[:4])  # type: ignore[arg-type]
+
+
 def test_a_full_last_block_may_be_followed_by_an_empty_one() -> None:
     # some encoders close a block of 254 bytes with an empty one; both mean the same
     assert cobs.decode(b"\xff" + UP[:254] + b"\x01") == UP[:254]

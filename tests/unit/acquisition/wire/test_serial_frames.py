@@ -202,7 +202,7 @@ def test_what_cannot_be_expressed_is_refused() -> None:
 
 
 def test_the_examples_of_the_documentation(repository: Path) -> None:
-    text = (repository / "docs" / "serial_protocol.md").read_text()
+    text = (repository / "docs" / "serial_protocol.md").read_text(encoding="utf-8")
     examples = [bytes.fromhex(found) for found in re.findall(r"^    ((?:[0-9a-f]{2}[ \n]+)+)", text, re.M)]
     start, two_samples, end = examples
     assert start == by_hand.frame(by_hand.START)

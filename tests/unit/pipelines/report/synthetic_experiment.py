@@ -145,7 +145,8 @@ def quality(run_id: str) -> RunQuality:
     pair = PairAgreement("acceleration_roof_2", "acceleration_roof_1", 1.004, 2e-6, -2.5e-4, 1, 0.01)
     agreed = SensorAgreement("acceleration_roof_1", (pair,), ())
     gap = Gap(17.0, 17.024, 12)
-    return RunQuality(run_id, 500.0, 240.0, 120000, channels, (gap,), 0, 0, 0, agreed, (), ("force_cell_1: cut",))
+    cut = ("force_cell_1: cut",)
+    return RunQuality(run_id, 500.0, 240.0, 120000, channels, (gap,), 0, 0, 0, 0, agreed, (), cut)
 
 
 def shaker_experiment(

@@ -1,0 +1,124 @@
+"""A simulated device, put together: signal, clock, wire and the place where it appears."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from acquisition.devices.appearance import Appearance, endpoint
+from acquisition.devices.can_wire import CanWire
+from acquisition.devices.device_clock import CLOCK_HZ, ClockedSignal, DeviceClock
+from acquisition.devices.faults import Faults
+from acquisition.devices.faulty_frames import FrameFaults
+from acquisition.devices.laboratory_time import LaboratoryTime
+from acquisition.devices.player import Player
+from acquisition.devices.sender import LossyLine, Sender
+from acquisition.devices.sensor_faults import SensorFaults
+from acquisition.devices.serial_wire import SerialWire
+from acquisition.devices.signal import Signal
+from acquisition.devices.truth import Truth
+from acquisition.devices.uart import TransmitQueue, Uart
+from acquisition.sources.interface import Channel
+from acquisition.wire.can_layout import device_database
+from sloshlab.errors import InputError
+
+
+def simulated_device(
+    signal: Signal,
+    found: Appearance,
+    laboratory: LaboratoryTime,
+    *,
+    faults: Faults | None = None,
+    seed: int = 0,
+    samples_per_frame: int | None = None,
+    n_hosts: int = 1,
+    runs_freely: bool = False,
+) -> Player:
+    """Make a device, not yet open.
+
+    Parameters
+    ----------
+    signal : Signal
+        What it measures.
+    found : Appearance
+        Where it appears.
+    laboratory : LaboratoryTime
+        Shared by all devices of one experiment.
+    faults : Faults, optional
+        None of them if not given.
+    seed : int
+        Of the numbers of its streams and everything else that is drawn.
+    samples_per_frame : int, optional
+        Of a serial device.
+    n_hosts, runs_freely : int, bool
+        When it begins, see `StreamEndpoint`.
+    """
+    faults = faults or Faults()
+    faults.require_channels(signal.channels, transport=found.transport)
+    clock = DeviceClock(signal.sampling_rate_hz, **faults.clock.model_dump())
+    clocked = ClockedSignal(signal, clock, seed=seed + faults.seed)
+    truth = Truth()
+    sensor_faults = SensorFaults(faults, signal.channels, clock, truth)
+    wire = _wire(found, sensor_faults.first_description(), clock, samples_per_frame)
+    made: list[Player] = []
+    place = endpoint(
+        found,
+        laboratory,
+        lambda: bytes(made[0].describe()["bytes"][0]),
+        n_hosts=n_hosts,
+        runs_freely=runs_freely,
+    )
+    sender = Sender(place, laboratory, truth, _line(faults, wire, truth), isinstance(wire, SerialWire))
+    made.append(
+        Player(
+            clocked,
+            wire,
+            sender,
+            clock,
+            stream_numbers(seed),
+            sensor_faults,
+            FrameFaults(faults, wire, seed=seed + faults.seed, truth=truth),
+            faults.disconnect,
+            sensor_faults.announcements(),
+        )
+    )
+    return made[0]
+
+
+def _line(faults: Faults, wire: SerialWire | CanWire, truth: Truth) -> LossyLine | None:
+    if faults.overrun is None:
+        return None
+    return (Uart if isinstance(wire, SerialWire) else TransmitQueue)(faults.overrun, wire, truth)
+
+
+def _wire(
+    found: Appearance, channels: tuple[Channel, ...], clock: DeviceClock, samples_per_frame: int | None
+) -> SerialWire | CanWire:
+    if found.transport == "serial":
+        return SerialWire(found.device, clock, channels, samples_per_frame=samples_per_frame)
+    if samples_per_frame is not None:
+        raise InputError("--samples-per-frame", got=found.url.text, allowed="serial devices")
+    layout = device_database(found.device, clock.sampling_rate_hz, CLOCK_HZ, channels, fd=found.fd)
+    if found.dbc is not None:
+        layout.write_dbc(found.dbc)
+    return CanWire(layout, clock)
+
+
+def stream_numbers(seed: int) -> Iterator[int]:
+    """Numbers of streams, each differing from the one before; 1 … 255, as CAN has 8 bits for them.
+
+    Examples
+    --------
+    >>> numbers = stream_numbers(0)
+    >>> first, second = next(numbers), next(numbers)
+    >>> first != second, 1 <= first <= 255
+    (True, True)
+    """
+    generator = np.random.default_rng([seed, 12])
+    last = 0
+    while True:
+        drawn = int(generator.integers(1, 256))
+        if drawn != last:
+            last = drawn
+            yield drawn

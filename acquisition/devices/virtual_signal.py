@@ -1,0 +1,176 @@
+"""The virtual rig as the signal of a device.
+
+At the nominal instants the counts are those of the run that `sloshlab virtual` writes for the same
+settings. A device whose clock is off samples the motion and the forces themselves, at its own instants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from acquisition.devices.signal import Piece, Signal
+from acquisition.sources.interface import Channel, SourceURL
+from acquisition.sources.urls import URLOptions
+from acquisition.virtual_laboratory.sensors import CHANNELS, FORCE_CELLS, LOST_COUNT, Laboratory, cell_forces
+from acquisition.virtual_laboratory.shaker import SweepPlan
+from acquisition.virtual_laboratory.shaker_run import VirtualShaker, virtual_shaker, virtual_shaker_run
+from sloshlab.errors import InputError
+from sloshlab.rig import Rig
+
+FloatArray = NDArray[np.float64]
+
+MOST_SAMPLES: Final = 4_000_000
+"""Because the amplifier ranges follow from the whole run, it is made as a whole."""
+
+_EXPERIMENTS = ("shaker_sweep", "shaker_vfa")
+
+
+def virtual_signal(url: SourceURL, names: Sequence[str] | None = None) -> VirtualSignal:
+    """The run that a URL describes.
+
+    Parameters
+    ----------
+    url : SourceURL
+        ``virtual:EXPERIMENT?rig=RIG.toml&…``; options as the settings of `sloshlab virtual`.
+    names : sequence of str, optional
+        Which channels.
+
+    Raises
+    ------
+    InputError
+        If there is no rig, or a setting is out of range.
+    """
+    options = URLOptions(url)
+    rig = options.text("rig")
+    settings: dict[str, Any] = {
+        "acceleration_g": options.number("acceleration_g", 3.0, lowest=0, highest=1e4),
+        "duration_s": options.number("duration_s", 240.0, lowest=0, highest=1e5),
+        "sampling_rate_hz": options.number("sampling_rate_hz", 512.0, lowest=1, highest=1e6),
+        "seed": options.integer("seed", 0, lowest=0, highest=2**31 - 1),
+        "direction": options.choice("direction", "up", ("up", "down")),
+        "law": options.choice("law", "octave", ("octave", "linear", "stepped")),
+        "configuration": options.choice("configuration", "sloshing", ("sloshing", "frozen", "empty")),
+        "imperfect": options.yes("imperfect", True),
+    }
+    options.refuse_others()
+    if url.target not in _EXPERIMENTS:
+        raise InputError(url.text, got=repr(url.target), allowed=", ".join(_EXPERIMENTS))
+    if rig is None:
+        raise InputError(f"{url.text}: rig", got="none", allowed="a rig description", remedy="add rig=RIG.toml")
+    n_samples = settings["duration_s"] * settings["sampling_rate_hz"]
+    if n_samples > MOST_SAMPLES:
+        raise InputError(f"{url.text}: length", got=f"{n_samples:g} samples", allowed=f"≤ {MOST_SAMPLES}")
+    return VirtualSignal(Rig.from_toml(Path(rig)), url.target, settings, names)
+
+
+class VirtualSignal(Signal):
+    """A run of the virtual shaker.
+
+    Parameters
+    ----------
+    rig : Rig
+    experiment : str
+    settings : dict
+        Arguments of `virtual_shaker_run`.
+    names : sequence of str, optional
+        Which channels.
+    """
+
+    def __init__(
+        self, rig: Rig, experiment: str, settings: dict[str, Any], names: Sequence[str] | None = None
+    ) -> None:
+        run = virtual_shaker_run(rig, experiment=experiment, **settings)  # type: ignore[arg-type]
+        self._names = tuple(names) if names is not None else CHANNELS
+        if not self._names or set(self._names) - set(CHANNELS) or len(set(self._names)) < len(self._names):
+            raise InputError("--channels", got=", ".join(self._names)[:200], allowed=", ".join(CHANNELS))
+        self._rate_hz = float(settings["sampling_rate_hz"])
+        self._channels = tuple(_channel(name, run[name]) for name in self._names)
+        self._counts = np.stack([_counts(run[name]) for name in self._names], axis=1)
+        ranges = {name: (run[name].attrs["range_max"], run[name].attrs["noise_std"]) for name in CHANNELS}
+        self._truth = _Truth(rig, experiment, settings, ranges)
+
+    @property
+    def sampling_rate_hz(self) -> float:
+        """As set."""
+        return self._rate_hz
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Force cells and accelerometers."""
+        return self._channels
+
+    @property
+    def n_samples(self) -> int:
+        """Length of the run."""
+        return len(self._counts)
+
+    def piece(self, start: int, stop: int) -> Piece:
+        """Samples start … stop − 1 of the nominal run."""
+        return Piece.of(self._counts[start:stop])
+
+    def piece_at(self, positions: FloatArray) -> Piece:
+        """The rig at any instants, read by its sensors."""
+        readings = self._truth.readings(positions / self._rate_hz)
+        columns = []
+        for channel in self._channels:
+            limit = round((channel.range_max or 0.0) / channel.scale_factor)
+            columns.append(np.clip(np.rint(readings[channel.name] / channel.scale_factor), -limit, limit))
+        return Piece.of(np.stack(columns, axis=1))
+
+
+class _Truth:
+    """Motion, forces and sensors of the run, at any time; its sensor noise is drawn anew."""
+
+    def __init__(
+        self, rig: Rig, experiment: str, settings: dict[str, Any], ranges: dict[str, tuple[float, float]]
+    ) -> None:
+        self._ranges = ranges  # half scale and noise of each channel, in units
+        known = {"start_hz": 5.0, "stop_hz": 20.0}
+        first, last = known.values() if settings["direction"] == "up" else reversed(known.values())
+        plan = SweepPlan(
+            acceleration_g=settings["acceleration_g"],
+            law="vfa" if experiment == "shaker_vfa" else settings["law"],
+            start_hz=first,
+            stop_hz=last,
+            duration_s=settings["duration_s"],
+        )
+        self._laboratory = Laboratory.drawn(0) if settings["imperfect"] else Laboratory.perfect()
+        self._shaker: VirtualShaker = virtual_shaker(
+            rig,
+            plan,
+            configuration=settings["configuration"],
+            seed=settings["seed"],
+            imperfect=settings["imperfect"],
+            laboratory=self._laboratory,
+        )
+        self._noise = np.random.default_rng([settings["seed"], 13])
+        self._is_noisy = bool(settings["imperfect"])
+
+    def readings(self, time_s: FloatArray) -> dict[str, FloatArray]:
+        """What each sensor reads, in units, before the converter rounds."""
+        moved = self._shaker.motion.at(time_s)
+        forces = cell_forces(self._shaker.external_force_n(time_s, moved), time_s, self._laboratory)
+        truths = dict.fromkeys(CHANNELS, moved.acceleration) | dict(zip(FORCE_CELLS, forces, strict=True))
+        return {name: self._read(name, truth) for name, truth in truths.items()}
+
+    def _read(self, name: str, truth: FloatArray) -> FloatArray:
+        half_scale, noise_std = self._ranges[name]
+        noise = noise_std * self._noise.standard_normal(truth.size) if self._is_noisy else 0.0
+        offset = self._laboratory.offset_share[name] * half_scale
+        return np.asarray(truth * self._laboratory.gain[name] + offset + noise)
+
+
+def _counts(channel: xr.DataArray) -> NDArray[np.int32]:
+    counts = np.rint(channel.values / channel.encoding["scale_factor"])
+    return np.where(np.isnan(counts), LOST_COUNT, counts).astype(np.int32)
+
+
+def _channel(name: str, channel: xr.DataArray) -> Channel:
+    scale = channel.encoding["scale_factor"]
+    return Channel(name, bits=16, scale_factor=scale, missing_count=LOST_COUNT, **channel.attrs)

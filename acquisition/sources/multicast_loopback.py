@@ -1,0 +1,90 @@
+"""Multicast that stays on this computer.
+
+python-can's ``udp_multicast`` joins its group on the default network interface and takes datagrams from
+anywhere on its port. Here such a bus is confined to the loopback interface, by which it neither sends to
+the network nor hears it, and gets a receive buffer that holds what arrives while nobody reads.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import socket
+from typing import Any, Final
+
+from sloshlab.errors import SourceError
+
+DEFAULT_GROUP: Final = "239.74.163.2"
+"""python-can's own group for IPv4."""
+
+RECEIVE_BUFFER_BYTES: Final = 8 << 20
+"""Asked for; the system may give less (on Linux net.core.rmem_max)."""
+
+_LOOPBACK_INTERFACE: Final = b"lo\0"
+_LOOPBACK_ADDRESS: Final = "127.0.0.1"
+
+
+def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool, name: str | None = None) -> Any:
+    """A bus of python-can over multicast.
+
+    Parameters
+    ----------
+    group : str
+        IPv4 multicast address; IPv6 only if `exposed`, since loopback interfaces have no route for it.
+    port : int
+    fd : bool
+        Whether CAN FD frames are taken.
+    exposed : bool
+        Speak and listen on the network, one hop far, instead of on this computer only.
+    name : str, optional
+        For error messages; ``can:udp_multicast?channel=GROUP&port=PORT`` by default.
+
+    Returns
+    -------
+    can.BusABC
+
+    Raises
+    ------
+    SourceError
+        If `group` is no such address, or the bus cannot be opened or confined.
+    """
+    import can
+
+    name = name or f"can:udp_multicast?channel={group}&port={port}"
+    _check_group(name, group, exposed)
+    try:
+        bus = can.Bus(
+            interface="udp_multicast", channel=group, port=port, hop_limit=int(exposed), fd=fd, ignore_config=True
+        )
+    except (can.CanError, OSError, ImportError) as error:
+        raise SourceError(name, got=str(error)) from error
+    try:
+        _prepare_socket(bus.fileno(), group, exposed)
+    except (OSError, AttributeError) as error:
+        bus.shutdown()
+        raise SourceError(
+            name,
+            got=f"a socket that cannot be confined to this computer ({error})",
+            remedy="use another interface, or expose=yes, by which all of the network can listen and send frames",
+        ) from error
+    return bus
+
+
+def _check_group(name: str, group: str, exposed: bool) -> None:
+    try:
+        address = ipaddress.ip_address(group)
+    except ValueError:
+        address = ipaddress.ip_address("0.0.0.0")
+    if not address.is_multicast or (address.version == 6 and not exposed):
+        raise SourceError(name, got=repr(group), allowed="a multicast address, for example " + DEFAULT_GROUP)
+
+
+def _prepare_socket(fileno: int, group: str, exposed: bool) -> None:
+    with socket.socket(fileno=os.dup(fileno)) as same:
+        same.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        if exposed:
+            return
+        interface = socket.inet_aton(_LOOPBACK_ADDRESS)
+        same.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
+        same.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + interface)
+        same.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, _LOOPBACK_INTERFACE)

@@ -1,0 +1,227 @@
+"""The command `replay`: a recording, the virtual rig or a test pattern played as devices."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import signal as signals
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquisition.devices.appearance import Appearance, appearance
+from acquisition.devices.faults import Faults
+from acquisition.devices.laboratory_time import LaboratoryTime
+from acquisition.devices.played_signal import played_signal
+from acquisition.devices.player import Player
+from acquisition.devices.signal import LoopedSignal
+from acquisition.devices.simulated_device import simulated_device
+from acquisition.sources.urls import parse_url
+from sloshlab import atomic_file
+from sloshlab.errors import InputError
+
+_STEP_S = 0.1
+_SLOWEST, _FASTEST = 1e-3, 1e4
+
+
+@dataclass(frozen=True)
+class ReplaySettings:
+    """What `sloshlab replay` is asked to do.
+
+    Attributes
+    ----------
+    source : str
+        ``RUN.nc``, ``virtual:shaker_sweep?rig=RIG.toml&…`` or ``pattern:channels=8&…``.
+    urls : sequence of str
+        Where each device appears.
+    channels : sequence of str
+        Names joined by commas, once per device; all channels on every device if empty.
+    speed : str
+        A factor of real time, or ``max``.
+    faults : sequence of Path or None
+        TOML files, once per device; None is a device without faults.
+    samples_per_frame : int or None
+        Of serial devices.
+    expose : str or None
+        Address to listen on instead of the loopback interface.
+    free_run : bool
+        Do not wait to be started.
+    wait_clients : int
+        Clients that a socketcand device waits for.
+    seed : int
+    loop_duration_s : float or None
+        Repeat the recording until it is so long.
+    truth : Path or None
+        JSON file for what each device did.
+    """
+
+    source: str
+    urls: Sequence[str]
+    channels: Sequence[str] = ()
+    speed: str = "1"
+    faults: Sequence[Path | None] = ()
+    samples_per_frame: int | None = None
+    expose: str | None = None
+    free_run: bool = False
+    wait_clients: int = 1
+    seed: int = 0
+    loop_duration_s: float | None = None
+    truth: Path | None = None
+
+
+def replay(settings: ReplaySettings, *, announce: Callable[[str], None] | None = None) -> dict[str, Any]:
+    """Play until every device has said everything and its hosts have read it.
+
+    Parameters
+    ----------
+    settings : ReplaySettings
+    announce : callable, optional
+        Called with ``ready URL`` for each device as soon as a host can open that URL, in the order of
+        `urls`, and with a line for each port that is exposed. Standard output if not given.
+
+    Returns
+    -------
+    dict
+        ``lines``, ``flags`` (none: what a device does to its samples on purpose is no failure), and per
+        device how many samples it took and sent and how often each fault struck.
+
+    Raises
+    ------
+    SloshlabError
+        If an argument is wrong or a device cannot appear.
+    """
+    say = announce or _said
+    places = _places(settings)
+    laboratory = LaboratoryTime(len(places), speed=_speed(settings.speed))
+    players = _players(settings, places, laboratory)
+    with contextlib.ExitStack() as cleaning:
+        for place, player in zip(places, players, strict=True):
+            cleaning.callback(player.endpoint.close)
+            if settings.expose and place.listens:
+                say(place.exposure())
+            say(f"ready {player.endpoint.open()}")
+        _run(players)
+    return _summary(settings, places, players)
+
+
+def _said(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def _speed(text: str) -> float:
+    if text == "max":
+        return math.inf
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = math.nan
+    if not _SLOWEST <= speed <= _FASTEST:
+        raise InputError("--speed", got=repr(text), allowed=f"{_SLOWEST:g} … {_FASTEST:g}, or max")
+    return speed
+
+
+def _places(settings: ReplaySettings) -> list[Appearance]:
+    if not settings.urls:
+        raise InputError("--as", got="nothing", allowed="at least one URL")
+    urls = enumerate(settings.urls, start=1)
+    places = [appearance(parse_url(url), number=number, expose=settings.expose) for number, url in urls]
+    names = [place.device for place in places]
+    if len(set(names)) < len(names):
+        raise InputError("--as", got=f"devices {', '.join(names)}", allowed="names that differ")
+    for option, values in (("--channels", settings.channels), ("--faults", settings.faults)):
+        if len(values) not in (0, len(places)):
+            raise InputError(option, got=f"{len(values)} times", allowed=f"once for each of {len(places)} devices")
+    return places
+
+
+def _players(settings: ReplaySettings, places: Sequence[Appearance], laboratory: LaboratoryTime) -> list[Player]:
+    players = []
+    for number, place in enumerate(places):
+        names = settings.channels[number].split(",") if settings.channels else None
+        played = played_signal(settings.source, names)
+        if settings.loop_duration_s is not None:
+            played = LoopedSignal(played, duration_s=settings.loop_duration_s)
+        players.append(
+            simulated_device(
+                played,
+                place,
+                laboratory,
+                faults=_faults(settings, number),
+                seed=settings.seed * 1000 + number,
+                samples_per_frame=settings.samples_per_frame if place.transport == "serial" else None,
+                n_hosts=settings.wait_clients if place.interface == "socketcand" else 1,
+                runs_freely=settings.free_run,
+            )
+        )
+    return players
+
+
+def _faults(settings: ReplaySettings, number: int) -> Faults | None:
+    path = settings.faults[number] if settings.faults else None
+    return None if path is None else Faults.from_toml(path)
+
+
+def _run(players: Sequence[Player]) -> None:
+    """Every device in a thread of its own; the first error of any ends all and is raised here."""
+    errors: list[BaseException] = []
+    threads = [threading.Thread(target=_play, args=(player, errors), daemon=True) for player in players]
+    with _stopped_by_signal(players):
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            for thread in threads:
+                thread.join(_STEP_S)
+            if errors:
+                _stop(players)
+    if errors:
+        raise errors[0]
+
+
+def _play(player: Player, errors: list[BaseException]) -> None:
+    try:
+        player.play()
+    except Exception as error:  # noqa: BLE001 - raised again in the main thread
+        errors.append(error)
+
+
+def _stop(players: Sequence[Player]) -> None:
+    for player in players:
+        player.stop()
+
+
+@contextlib.contextmanager
+def _stopped_by_signal(players: Sequence[Player]) -> Iterator[None]:
+    """Interrupt and termination end the devices in order, so that nothing is left behind."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    known = {number: signals.getsignal(number) for number in (signals.SIGINT, signals.SIGTERM)}
+    for number in known:
+        signals.signal(number, lambda *_: _stop(players))
+    try:
+        yield
+    finally:
+        for number, handler in known.items():
+            signals.signal(number, handler)
+
+
+def _summary(settings: ReplaySettings, places: Sequence[Appearance], players: Sequence[Player]) -> dict[str, Any]:
+    truths = {place.device: player.truth for place, player in zip(places, players, strict=True)}
+    if settings.truth is not None:
+        told = {device: truth.to_json() for device, truth in truths.items()}
+        atomic_file.write_bytes(settings.truth, (json.dumps(told, indent=1, sort_keys=True) + "\n").encode())
+    lines = []
+    for place, player in zip(places, players, strict=True):
+        numbers = ", ".join(f"{key.replace('_', ' ')} {n}" for key, n in player.truth.summary().items())
+        gone = "; the host went before the end" if player.has_lost_host else ""
+        lines.append(f"{place.device}: {numbers}{gone}")
+    devices = {
+        place.device: {**player.truth.summary(), "host_gone": player.has_lost_host}
+        for place, player in zip(places, players, strict=True)
+    }
+    return {"lines": lines, "flags": [], "devices": devices}

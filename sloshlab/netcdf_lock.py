@@ -1,0 +1,11 @@
+"""The one lock around the netCDF library, which lets go of the interpreter's lock but is not made for threads.
+
+Whoever reads or writes netCDF where another thread may do so too holds it; without it the process dies.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Final
+
+NETCDF_LOCK: Final = threading.RLock()

@@ -1,0 +1,118 @@
+"""Each fault on each transport in its intensities: every sample right or flagged, and the recording goes on."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import netCDF4
+import numpy as np
+import pytest
+from fault_matrix import played_and_recorded, problems
+from matrix_cases import FAULTS, TRANSPORTS, Case, cases
+from matrix_recordings import NAMES, Motion, Pattern
+from matrix_verdict import verdict
+
+QUICK = ("serial socket",)
+"""Transports on which all intensities are tried each time; on the others one of each fault is."""
+
+
+def is_slow(case: Case) -> bool:
+    if case.intensity.speed != "max":
+        return True
+    chosen = FAULTS[case.fault][0 if case.fault in ("none", "restart", "swapped sensors") else 1]
+    return case.intensity is not chosen and (
+        case.transport.name not in QUICK or case.fault in ("disconnect", "restart")
+    )
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.name, marks=[pytest.mark.slow] if is_slow(case) else [])
+        for case in cases()
+        if case.exists
+    ],
+)
+def test_every_sample_is_right_or_flagged(case, tmp_path):
+    assert problems(played_and_recorded(case, tmp_path)) == []
+
+
+def test_each_fault_is_tried_on_each_transport_every_time():
+    quick = {(case.fault, case.transport.name) for case in cases() if case.exists and not is_slow(case)}
+    assert quick == {(fault, transport) for fault in FAULTS for transport in TRANSPORTS}
+
+
+@pytest.mark.parametrize("n_samples", [1024, 2048])
+def test_the_truth_tells_every_place_of_a_sample(n_samples):
+    counts = Pattern(n_samples).counts(np.arange(n_samples))
+    for column, name in enumerate(NAMES):
+        assert len(np.unique(counts[:, column])) == n_samples, name
+    assert np.abs(counts[:, :4]).max() < 2**15
+    assert np.abs(counts[:, 4]).max() < 2**23
+
+
+def test_the_smallest_error_of_a_clock_shows_in_the_motion():
+    truth = Motion(2048)
+    places = np.arange(100, 1948)
+    for shifted in (places + 0.005 * 512, places * (1 + 1e-4)):
+        off = np.abs(truth.counts(shifted) - truth.counts(places)).max(axis=0)
+        assert (off > 20 * truth.tolerance()).all()
+
+
+def exchange(counts, quality, lost):
+    kept = np.flatnonzero(~lost)
+    counts[kept[5]], counts[kept[6]] = counts[kept[6]], counts[kept[5]]
+
+
+def off_by_one(counts, quality, lost):
+    counts[np.flatnonzero(~lost)[7]] += 1
+
+
+def lose(counts, quality, lost):
+    counts[np.flatnonzero(~lost)[7]] = counts[np.flatnonzero(lost)[0]]
+    quality[np.flatnonzero(~lost)[7]] = 1
+
+
+def lose_unflagged(counts, quality, lost):
+    quality[np.flatnonzero(lost)[3]] = 0
+
+
+def invent(counts, quality, lost):
+    counts[np.flatnonzero(lost)[3]] = 5
+
+
+def suspect(counts, quality, lost):
+    quality[np.flatnonzero(~lost)[9]] = 16
+
+
+@pytest.fixture(scope="module")
+def lossy(tmp_path_factory):
+    """A recording with a tenth of the frames dropped."""
+    return played_and_recorded(
+        Case("drop", FAULTS["drop"][1], TRANSPORTS["serial socket"]), tmp_path_factory.mktemp("lossy")
+    )
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (exchange, "some readings are silently wrong"),
+        (off_by_one, "some readings are silently wrong"),
+        (lose, "too many readings that were sent are lost"),
+        (lose_unflagged, "rows with lost readings are not flagged"),
+        (invent, "some readings are invented"),
+        (suspect, "flagged as stuck without cause"),
+    ],
+)
+def test_the_judge_sees_what_is_done_to_a_file(lossy, tmp_path, damage, said):
+    assert problems(lossy) == []
+    path = tmp_path / "run.nc"
+    path.write_bytes(lossy.recorded.path.read_bytes())
+    with netCDF4.Dataset(path, "a") as file:
+        file.set_auto_maskandscale(False)
+        counts, quality = file["force_cell_2"][:], file["quality"][:]
+        damage(counts, quality, counts == file["force_cell_2"].getncattr("_FillValue"))
+        file["force_cell_2"][:], file["quality"][:] = counts, quality
+    recorded = dataclasses.replace(lossy.recorded, path=path)
+    found = problems(dataclasses.replace(lossy, recorded=recorded, verdict=verdict(recorded)))
+    assert said in "; ".join(found)
