@@ -12,11 +12,13 @@ import io
 import json
 import os
 import zipfile
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import Box, Liquid, LiquidColumn, Numerics, TankSetup
@@ -26,19 +28,25 @@ from sloshlab.errors import InputError
 MAGIC: Final = b"sloshlab numerical tank checkpoint, version 1\n"
 LARGEST_FILE_BYTES: Final = 256 * 2**20
 _HASH_BYTES: Final = 32
+_EXTRA: Final = "extra_"
 
 
-def save(tank: NumericalTank, path: str | os.PathLike[str]) -> None:
+def save(
+    tank: NumericalTank, path: str | os.PathLike[str], extra: Mapping[str, NDArray[Any]] | None = None
+) -> None:
     """Write the whole state of a run, atomically.
 
     Parameters
     ----------
     tank : NumericalTank
     path : path-like
+    extra : mapping of str to ndarray, optional
+        What else must be there to go on: forces so far, the state of a structure.
     """
     setup = np.frombuffer(json.dumps(asdict(tank.setup)).encode(), np.uint8)
     content = io.BytesIO()
-    arrays: dict[str, Any] = {"setup": setup, **tank.checkpoint_arrays()}
+    more = {_EXTRA + name: values for name, values in (extra or {}).items()}
+    arrays: dict[str, Any] = {"setup": setup, **tank.checkpoint_arrays(), **more}
     np.savez(content, **arrays)
     body = content.getvalue()
     write_bytes(path, MAGIC + hashlib.sha256(body).digest() + body)
@@ -56,6 +64,21 @@ def load(path: str | os.PathLike[str]) -> NumericalTank:
     InputError
         If the file is no checkpoint, is damaged, or describes a tank that cannot be.
     """
+    return load_with_extra(path)[0]
+
+
+def load_with_extra(path: str | os.PathLike[str]) -> tuple[NumericalTank, dict[str, NDArray[Any]]]:
+    """Read a checkpoint and return the run and what was saved with it.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Raises
+    ------
+    InputError
+        As in `load`.
+    """
     arrays = _arrays(Path(path))
     try:
         tank = NumericalTank(_setup(bytes(arrays.pop("setup"))))
@@ -64,7 +87,7 @@ def load(path: str | os.PathLike[str]) -> NumericalTank:
         raise InputError(
             f"{path}", got=f"a checkpoint without valid {error}", remedy="start the run again"
         ) from error
-    return tank
+    return tank, {name.removeprefix(_EXTRA): arrays[name] for name in arrays if name.startswith(_EXTRA)}
 
 
 def _arrays(path: Path) -> dict[str, Any]:
