@@ -2,7 +2,7 @@
 
 Cell lists give all pairs closer than the support plus a skin. That list serves until some particle
 has moved half the skin; every step only measures the distances of the listed pairs and keeps those
-in reach. Each pair appears once, with the smaller index first; pairs of two images never.
+in reach. Each pair appears once; pairs of two images never.
 """
 
 from __future__ import annotations
@@ -15,60 +15,72 @@ from acquisition.numerical_tank.walls import list_images, place_images
 
 
 @njit(cache=True)
-def _sort_into_cells(particles, n_all, cell, origin, n_x, n_z):  # type: ignore[no-untyped-def]
-    """Return the first slot of every cell, the particles in the order of their cells, and the cell of each."""
-    cell_of = np.empty(n_all, np.int32)
+def _sort_into_cells(particles, first, last, cell, n_x, n_z):  # type: ignore[no-untyped-def]
+    """Return the first slot of every cell, the particles first … last − 1 in the order of their cells, and the cells.
+
+    The cells of a column follow one another from below upwards, so that some of them are one range of slots.
+    """
+    cell_of = np.empty(last - first, np.int32)
     start = np.zeros(n_x * n_z + 1, np.int32)
-    for i in range(n_all):
-        column = min(max(int((particles.x[i] - origin) / cell), 0), n_x - 1)
-        row = min(max(int((particles.z[i] - origin) / cell), 0), n_z - 1)
-        cell_of[i] = column * n_z + row
-        start[cell_of[i] + 1] += 1
+    for i in range(first, last):
+        column = min(max(int(particles.x[i] / cell) + 1, 0), n_x - 1) if particles.x[i] >= 0 else 0
+        row = min(max(int(particles.z[i] / cell) + 1, 0), n_z - 1) if particles.z[i] >= 0 else 0
+        cell_of[i - first] = column * n_z + row
+        start[cell_of[i - first] + 1] += 1
     for k in range(n_x * n_z):
         start[k + 1] += start[k]
     filled = start[:-1].copy()
-    order = np.empty(n_all, np.int32)
-    for i in range(n_all):
-        order[filled[cell_of[i]]] = i
+    order = np.empty(last - first, np.int32)
+    for i in range(last - first):
+        order[filled[cell_of[i]]] = first + i
         filled[cell_of[i]] += 1
     return start, order, cell_of
 
 
 @njit(cache=True)
+def _list_range(particles, pairs, order, first, last, i, square, count):  # type: ignore[no-untyped-def]
+    """List particle i with those in slots first … last − 1 that are close enough; return the new count."""
+    x, z = particles.x[i], particles.z[i]
+    for k in range(first, last):
+        j = order[k]
+        dx, dz = x - particles.x[j], z - particles.z[j]
+        if dx * dx + dz * dz < square:
+            pairs.j[count] = j
+            count += 1
+    return count
+
+
+@njit(cache=True)
 def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-def]
-    """List all pairs closer than support plus skin; False when there is no room."""
+    """List all pairs closer than support plus skin; False when there is no room.
+
+    Of two fluid particles, the one in the earlier slot lists the other, so each looks only at what follows
+    in its column and at the next column.
+    """
     n = constants.n
     reach = constants.support + constants.skin
-    n_x = int((constants.length + constants.two * reach) / reach) + 1
-    n_z = int((constants.height + constants.two * reach) / reach) + 1
-    start, order, cell_of = _sort_into_cells(particles, n_all, reach, -reach, n_x, n_z)
-    x_sorted, z_sorted = particles.x[order], particles.z[order]
-    images = np.empty(n_all, np.int32)
     square = reach * reach
+    n_x, n_z = int(constants.length / reach) + 3, int(constants.height / reach) + 3
+    start, order, cell_of = _sort_into_cells(particles, 0, n, reach, n_x, n_z)
+    image_start, image_order, _ = _sort_into_cells(particles, n, n_all, reach, n_x, n_z)
+    slot = np.empty(n, np.int32)
+    for k in range(n):
+        slot[order[k]] = k
     count = 0
     for i in range(n):
         pairs.start[i] = count
-        n_images = 0
         if count + n_all > pairs.j.size:
             return False
-        x, z = particles.x[i], particles.z[i]
-        column, row = cell_of[i] // n_z, cell_of[i] % n_z
-        low, high = max(row - 1, 0), min(row + 1, n_z - 1)
-        for beside in range(max(column - 1, 0), min(column + 2, n_x)):
-            for k in range(start[beside * n_z + low], start[beside * n_z + high + 1]):
-                j = order[k]
-                dx, dz = x - x_sorted[k], z - z_sorted[k]
-                if j > i and dx * dx + dz * dz < square:
-                    if j < n:
-                        pairs.j[count] = j
-                        count += 1
-                    else:
-                        images[n_images] = j
-                        n_images += 1
+        cell, row = cell_of[i], cell_of[i] % n_z
+        low, high = min(row, 1), min(n_z - row, 2)
+        count = _list_range(particles, pairs, order, slot[i] + 1, start[cell + high], i, square, count)
+        if cell + n_z < n_x * n_z:
+            first, last = start[cell + n_z - low], start[cell + n_z + high]
+            count = _list_range(particles, pairs, order, first, last, i, square, count)
         pairs.middle[i] = count
-        for k in range(n_images):
-            pairs.j[count] = images[k]
-            count += 1
+        for beside in range(max(cell - n_z, row), min(cell + n_z + 1, n_x * n_z), n_z):
+            first, last = image_start[beside - low], image_start[beside + high]
+            count = _list_range(particles, pairs, image_order, first, last, i, square, count)
     pairs.start[n] = count
     return True
 

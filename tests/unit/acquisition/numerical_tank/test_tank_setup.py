@@ -21,7 +21,7 @@ def test_mass_is_that_of_the_filled_box() -> None:
 def test_particles_at_rest_carry_hydrostatic_pressure() -> None:
     tank = filled_tank(BOX, 0.5, 16, numerics=Numerics(jitter=0.0))
     _, z, s = particles_at_rest(tank)
-    pressure = s * 998.2 * 15.0**2
+    pressure = s * 998.2 * tank.liquid.speed_of_sound_m_per_s**2
     assert z.min() == pytest.approx(0.0136 / 16, rel=1e-9)
     assert np.allclose(pressure, 998.2 * 9.81 * (0.0136 - z), rtol=1e-12)
 
