@@ -158,7 +158,8 @@ def check(runs: Recordings, as_json: Json = False) -> None:
 @app.command()
 def virtual(
     experiment: Annotated[
-        str, typer.Argument(help="shaker_sweep, shaker_vfa, or campaign for the whole of raw_data/shaker.")
+        str,
+        typer.Argument(help="shaker_sweep, shaker_vfa, sudden_start, or campaign for a whole folder of raw_data."),
     ],
     output: OutputFile,
     rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig to shake.")] = None,
@@ -166,9 +167,16 @@ def virtual(
     acceleration_g: Annotated[float, typer.Option(help="Level of the sweep in g.")] = 3.0,
     direction: Annotated[str, typer.Option(help="up or down.")] = "up",
     law: Annotated[str, typer.Option(help="octave, linear or stepped.")] = "octave",
+    frequency_hz: Annotated[float, typer.Option(help="Of a sudden start, in Hz.")] = 11.4,
     duration_s: Annotated[float, typer.Option(help="Duration in seconds.")] = 240.0,
     sampling_rate_hz: Annotated[float, typer.Option(help="Sampling rate in Hz.")] = 512.0,
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    liquid: Annotated[str, typer.Option(help="law, or numerical: computed, takes long.")] = "law",
+    layers: Annotated[int, typer.Option(help="Layers of particles over the height of the tank.")] = 16,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where a computation is saved; by default beside the recording."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """A run of the virtual laboratory."""
@@ -177,8 +185,17 @@ def virtual(
     if experiment == "campaign":
         _finish(make_campaign_folder(output, seed=seed), as_json)
         return
-    run = VirtualRun(experiment, configuration, acceleration_g, direction, law, duration_s, sampling_rate_hz, seed)
-    _finish(make_virtual_run(run, rig, output), as_json)
+    settings: dict[str, Any] = {
+        "acceleration_g": acceleration_g,
+        "direction": direction,
+        "law": law,
+        "duration_s": duration_s,
+        "sampling_rate_hz": sampling_rate_hz,
+    }
+    if experiment == "sudden_start":
+        settings["start_hz"] = frequency_hz
+    run = VirtualRun(experiment, configuration, seed, liquid, layers, settings)
+    _finish(make_virtual_run(run, rig, output, checkpoint), as_json)
 
 
 @app.command()

@@ -2,60 +2,79 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from acquisition.virtual_laboratory.campaign import make_campaign
-from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run, write_virtual_run
-from pipelines.progress import progress
+from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
+from acquisition.virtual_laboratory.shaker_run import EXPERIMENTS, virtual_shaker_run, write_virtual_run
+from pipelines.progress import amounts, progress
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
 
-_EXPERIMENTS = ("shaker_sweep", "shaker_vfa")
+LIQUIDS: Final = ("law", "numerical")
 
 
 @dataclass(frozen=True)
 class VirtualRun:
-    """What the virtual laboratory is asked to do."""
+    """What the virtual laboratory is asked to do; `settings` are arguments of the laboratory's own function."""
 
     experiment: str
     configuration: str
-    acceleration_g: float
-    direction: str
-    law: str
-    duration_s: float
-    sampling_rate_hz: float
     seed: int
+    liquid: str
+    layers: int
+    settings: Mapping[str, Any]
 
 
-def make_virtual_run(run: VirtualRun, rig: Path | None, output: Path) -> dict[str, Any]:
+def make_virtual_run(
+    run: VirtualRun, rig: Path | None, output: Path, checkpoint: Path | None = None
+) -> dict[str, Any]:
     """Make one run and write it.
+
+    Parameters
+    ----------
+    run : VirtualRun
+    rig : Path, optional
+        Rig description; needed.
+    output : Path
+        The recording.
+    checkpoint : Path, optional
+        Where a computed liquid is saved meanwhile; by default beside the recording. Removed at the end.
 
     Raises
     ------
     InputError
         If the experiment is unknown, no rig is given, or an argument is out of range.
     """
-    if run.experiment not in _EXPERIMENTS:
-        raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join((*_EXPERIMENTS, "campaign")))
+    if run.experiment not in EXPERIMENTS:
+        raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join((*EXPERIMENTS, "campaign")))
+    if run.liquid not in LIQUIDS:
+        raise InputError("--liquid", got=repr(run.liquid), allowed=", ".join(LIQUIDS))
     if rig is None:
         raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
-    recording = virtual_shaker_run(
-        Rig.from_toml(rig),
-        experiment=run.experiment,
-        configuration=run.configuration,
-        acceleration_g=run.acceleration_g,
-        direction=run.direction,
-        law=run.law,
-        duration_s=run.duration_s,
-        sampling_rate_hz=run.sampling_rate_hz,
-        seed=run.seed,
-        rig_name=rig.name,
-    )
+    saved = checkpoint or output.with_suffix(".checkpoint")
+    if output.is_dir() or not saved.parent.is_dir():
+        raise InputError("--output, --checkpoint", got=f"{output}, {saved}", allowed="files in folders that exist")
+    with amounts(run.experiment) as advance:
+        numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
+        recording = virtual_shaker_run(
+            Rig.from_toml(rig),
+            experiment=run.experiment,  # type: ignore[arg-type]
+            configuration=run.configuration,  # type: ignore[arg-type]
+            seed=run.seed,
+            rig_name=rig.name,
+            numerical=numerical if run.liquid == "numerical" else None,
+            **run.settings,
+        )
     write_virtual_run(recording, output)
-    lines = [f"recording: {output} ({recording.sizes['time']} samples at {run.sampling_rate_hz:g} Hz)"]
-    return {"lines": lines, "flags": [], "output": str(output)}
+    saved.unlink(missing_ok=True)
+    rate_hz = recording.attrs["sampling_rate_hz"]
+    lines = [f"recording: {output} ({recording.sizes['time']} samples at {rate_hz:g} Hz)"]
+    stopped = recording.attrs.get(STOPPED)
+    return {"lines": lines, "flags": [str(stopped)] if stopped else [], "output": str(output)}
 
 
 def make_campaign_folder(folder: Path, *, seed: int) -> dict[str, Any]:
