@@ -16,7 +16,7 @@ from acquisition.numerical_tank.walls import list_images, place_images
 
 @njit(cache=True)
 def _sort_into_cells(particles, first, last, cell, n_x, n_z):  # type: ignore[no-untyped-def]
-    """Return the first slot of every cell, the particles first … last − 1 in the order of their cells, and the cells.
+    """Return the first slot of every cell, particles first … last − 1 in the order of cells, and their cells.
 
     The cells of a column follow one another from below upwards, so that some of them are one range of slots.
     """

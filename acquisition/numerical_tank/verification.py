@@ -13,6 +13,7 @@ from acquisition.numerical_tank.verification_cases import (
     dam_break,
     hanging_surface,
     hydrostatic_rest,
+    numerical_damping,
     shaken_volume,
     standing_wave,
 )
@@ -30,6 +31,8 @@ LONG: Final[tuple[Case, ...]] = (
     lambda: hydrostatic_rest(8, 20.0),
     lambda: standing_wave(24),
     lambda: standing_wave(24, mode=2),
+    lambda: numerical_damping(12),
+    lambda: numerical_damping(24),
     lambda: dam_break(24),
     lambda: dam_break(32),
     lambda: hanging_surface(12),
