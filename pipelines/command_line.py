@@ -177,13 +177,23 @@ def virtual(
         Path | None,
         typer.Option(metavar="FILE", help="Where a computation is saved; by default beside the recording."),
     ] = None,
+    workers: Annotated[int, typer.Option(help="Processes of a computed campaign.")] = 2,
+    only: Annotated[
+        str, typer.Option(metavar="PATTERN", help="Runs of a computed campaign, as a pattern of file names.")
+    ] = "*",
+    checkpoints: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Where a computed campaign is saved; by default within the output."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """A run of the virtual laboratory."""
-    from pipelines.virtual import VirtualRun, make_campaign_folder, make_virtual_run
+    from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
+    from pipelines import virtual as laboratory
 
     if experiment == "campaign":
-        _finish(make_campaign_folder(output, seed=seed), as_json)
+        computed = CampaignSettings(seed, layers, workers, only, checkpoints)
+        _finish(laboratory.make_campaign_folder(output, liquid, computed, typer.echo), as_json)
         return
     settings: dict[str, Any] = {
         "acceleration_g": acceleration_g,
@@ -194,8 +204,8 @@ def virtual(
     }
     if experiment == "sudden_start":
         settings["start_hz"] = frequency_hz
-    run = VirtualRun(experiment, configuration, seed, liquid, layers, settings)
-    _finish(make_virtual_run(run, rig, output, checkpoint), as_json)
+    run = laboratory.VirtualRun(experiment, configuration, seed, liquid, layers, settings)
+    _finish(laboratory.make_virtual_run(run, rig, output, checkpoint), as_json)
 
 
 @app.command()

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from acquisition.virtual_laboratory.campaign import make_campaign
+from acquisition.virtual_laboratory.numerical_campaign import (
+    CampaignSettings,
+    FinishedRun,
+    make_numerical_campaign,
+)
 from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
 from acquisition.virtual_laboratory.shaker_run import EXPERIMENTS, virtual_shaker_run, write_virtual_run
 from pipelines.progress import amounts, progress
@@ -51,8 +57,7 @@ def make_virtual_run(
     """
     if run.experiment not in EXPERIMENTS:
         raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join((*EXPERIMENTS, "campaign")))
-    if run.liquid not in LIQUIDS:
-        raise InputError("--liquid", got=repr(run.liquid), allowed=", ".join(LIQUIDS))
+    _check_liquid(run.liquid)
     if rig is None:
         raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
     saved = checkpoint or output.with_suffix(".checkpoint")
@@ -77,8 +82,62 @@ def make_virtual_run(
     return {"lines": lines, "flags": [str(stopped)] if stopped else [], "output": str(output)}
 
 
-def make_campaign_folder(folder: Path, *, seed: int) -> dict[str, Any]:
-    """Make the whole campaign of the shaker experiment."""
+def make_campaign_folder(
+    folder: Path, liquid: str, settings: CampaignSettings, say: Callable[[str], None]
+) -> dict[str, Any]:
+    """Make the campaign whose liquid follows its law, of which only the seed can be chosen, or is computed.
+
+    Parameters
+    ----------
+    folder : Path
+    liquid : {'law', 'numerical'}
+    settings : CampaignSettings
+    say : callable
+        Takes a line for every computed run.
+    """
+    _check_liquid(liquid)
+    if liquid == "numerical":
+        return _make_numerical_campaign_folder(folder, settings, say)
     with progress("campaign", 40) as advance:
-        manifest = make_campaign(folder, seed=seed, progress=lambda done, of, name: advance(name))
+        manifest = make_campaign(folder, seed=settings.seed, progress=lambda done, of, name: advance(name))
     return {"lines": [f"manifest: {manifest}"], "flags": [], "output": str(folder)}
+
+
+def _check_liquid(liquid: str) -> None:
+    if liquid not in LIQUIDS:
+        raise InputError("--liquid", got=repr(liquid), allowed=", ".join(LIQUIDS))
+
+
+def _make_numerical_campaign_folder(
+    folder: Path, settings: CampaignSettings, say: Callable[[str], None]
+) -> dict[str, Any]:
+    share, start_s = [0.0], time.monotonic()
+
+    def told(run: FinishedRun) -> None:
+        left_s = (time.monotonic() - start_s) * (1 - share[0]) / max(share[0], 1e-6)
+        ending = f" ({run.flag})" if run.flag else ""
+        say(
+            f"{run.n_done} of {run.n_runs}: {run.name}{ending}, computed for {_duration(run.computing_s)}; "
+            f"{100 * share[0]:.0f} % of the work, {_duration(left_s)} left"
+        )
+
+    with amounts("campaign") as advance:
+
+        def progressed(now: float) -> None:
+            share[0] = now
+            advance(round(10_000 * now), 10_000)
+
+        summary = make_numerical_campaign(folder, settings, progressed=progressed, finished=told)
+    lines = [f"made: {summary.n_made}, kept: {summary.n_kept}", f"manifest: {summary.manifest}"]
+    return {
+        "lines": lines,
+        "flags": list(summary.flags),
+        "output": str(folder),
+        "made": summary.n_made,
+        "kept": summary.n_kept,
+    }
+
+
+def _duration(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    return f"{seconds:.0f} s" if seconds < 100 else f"{minutes // 60} h {minutes % 60:02d} min"

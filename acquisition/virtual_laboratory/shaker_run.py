@@ -15,7 +15,6 @@ from acquisition.virtual_laboratory.liquid_force import LiquidForce
 from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
 from acquisition.virtual_laboratory.sensors import (
     ACCELEROMETERS,
-    CHANNELS,
     FORCE_CELLS,
     LOST_COUNT,
     Laboratory,
@@ -239,16 +238,17 @@ def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     run : xarray.Dataset
-        From `virtual_shaker_run`.
+        From `virtual_shaker_run` or `virtual_structure_run`.
     path : path-like
         The recording to write.
     """
     squeeze = {"zlib": True, "complevel": 9, "shuffle": True, "chunksizes": (run.sizes["time"],)}
     encoding: dict[str, dict[str, Any]] = {str(name): dict(squeeze) for name in run.variables}
-    for name in CHANNELS:
-        encoding[name].update(
-            dtype="int16", scale_factor=run[name].encoding["scale_factor"], _FillValue=np.int16(LOST_COUNT)
-        )
+    for name, channel in run.data_vars.items():
+        if "scale_factor" in channel.encoding:
+            encoding[str(name)].update(
+                dtype="int16", scale_factor=channel.encoding["scale_factor"], _FillValue=np.int16(LOST_COUNT)
+            )
     encoding["time"]["_FillValue"] = None
     if "quality" in run:
         encoding["quality"]["_FillValue"] = None
