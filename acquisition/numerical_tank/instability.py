@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 from sloshlab.errors import SloshlabError
-
-if TYPE_CHECKING:
-    from acquisition.numerical_tank.simulation import WallForces
 
 
 class InstabilityError(SloshlabError, ArithmeticError):
@@ -21,8 +18,9 @@ class InstabilityError(SloshlabError, ArithmeticError):
         When.
     place_m : tuple of float
         Where, x and z in the tank.
-    valid : WallForces
-        Forces of the completed steps of the call that failed.
+    valid : object
+        What the call that failed would have returned, up to the last completed step: `WallForces` of a moved
+        tank, `StructureHistory` of one that a structure carries, a recording of a virtual experiment.
 
     Examples
     --------
@@ -30,7 +28,7 @@ class InstabilityError(SloshlabError, ArithmeticError):
     'numerical tank: a particle is too fast at 1.25 s, x = 0.1 m, z = 0.02 m; r'
     """
 
-    def __init__(self, reason: str, time_s: float, place_m: tuple[float, float], valid: WallForces | None) -> None:
+    def __init__(self, reason: str, time_s: float, place_m: tuple[float, float], valid: Any) -> None:
         self.reason, self.time_s, self.place_m, self.valid = reason, time_s, place_m, valid
         super().__init__(
             f"numerical tank: {reason} at {time_s:.6g} s, x = {place_m[0]:.4g} m, z = {place_m[1]:.4g} m; "

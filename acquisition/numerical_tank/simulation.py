@@ -19,7 +19,7 @@ from acquisition.numerical_tank.initial_state import constants_of, particles_at_
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.numerical_tank.kernel import coverage_table, surface_gradient
 from acquisition.numerical_tank.neighbours import list_neighbours
-from acquisition.numerical_tank.particles import Images, Pairs, Particles
+from acquisition.numerical_tank.particles import Constants, Images, Pairs, Particles
 from acquisition.numerical_tank.tank import TankSetup
 from sloshlab.errors import InputError
 
@@ -175,7 +175,7 @@ class NumericalTank:
         before = self.n_steps
         status = self._advance(motion, forces)
         if status != stepping.RUNNING:
-            raise self._unstable(status, self._as_forces(forces[: self.n_steps - before]))
+            raise self.instability(status, self._as_forces(forces[: self.n_steps - before]))
         return self._as_forces(forces)
 
     def step(self, vertical_m_per_s2: float, horizontal_m_per_s2: float = 0.0) -> tuple[float, float]:
@@ -194,28 +194,34 @@ class NumericalTank:
         forces = self.advance(np.array([[horizontal_m_per_s2, vertical_m_per_s2]]))
         return float(forces.vertical_n[0]), float(forces.horizontal_n[0])
 
+    @property
+    def compiled_state(self) -> tuple[Particles, Pairs, Images, Constants, NDArray[Any], Any, float]:
+        """What the compiled loops take first: the state itself, no copy, and the constants of the run."""
+        gravity = self.setup.gravity_m_per_s2
+        return self._particles, self._pairs, self._images, self._constants, self._table, self._scale, gravity
+
+    @property
+    def compiled_sums(self) -> tuple[FloatArray, NDArray[np.int64]]:
+        """What they take last and add to: sums of energies, and counters."""
+        return self._sums, self._counters
+
     def _advance(self, motion: FloatArray, forces: FloatArray) -> int:
-        return int(
-            stepping.advance(
-                self._particles,
-                self._pairs,
-                self._images,
-                self._constants,
-                self._table,
-                self._scale,
-                self.setup.gravity_m_per_s2,
-                motion,
-                forces,
-                self._sums,
-                self._counters,
-            )
-        )
+        return int(stepping.advance(*self.compiled_state, motion, forces, *self.compiled_sums))
 
     def _as_forces(self, forces: FloatArray) -> WallForces:
         scaled = forces * (self.setup.particle_mass_kg_per_m * self.setup.box.depth_m)
         return WallForces(*(np.ascontiguousarray(column) for column in scaled.T))
 
-    def _unstable(self, status: int, valid: WallForces) -> InstabilityError:
+    def instability(self, status: int, valid: Any) -> InstabilityError:
+        """Return the error that says why and where a number of steps ended.
+
+        Parameters
+        ----------
+        status : int
+            Of `stepping.advance`.
+        valid : object
+            What was computed before.
+        """
         crowded = int(np.argmax(self._particles.packing[: self.setup.n_particles]))
         which = crowded if status == stepping.NO_ROOM else int(self._counters[stepping.PARTICLE])
         place = float(self._particles.x[which]), float(self._particles.z[which])

@@ -10,7 +10,8 @@ as forwards has no direction into which the volume could drift.
     s′ = s½ + ½Δt ∇·(r⃗½, v⃗′) + Δt 𝒟      r⃗′ = r⃗½ + ½Δt v⃗′
 
 The force on the tank belongs to the middle of the step and needs the acceleration of the tank at no
-other instant, so a structure may be stepped in turn with the liquid.
+other instant: `begin_step` gives it before `end_step` needs that acceleration, so a structure may take
+the same step (`coupling`).
 """
 
 from __future__ import annotations
@@ -139,8 +140,11 @@ def correct(
 
 
 @njit(cache=True)
-def _step(particles, pairs, images, constants, body_x, body_z, force, sums):  # type: ignore[no-untyped-def]
-    """One symmetric step; returns Σ of the mean vertical velocity, the largest speed squared and whose it is."""
+def begin_step(particles, pairs, images, constants, force):  # type: ignore[no-untyped-def]
+    """Go to the middle of a step, where all forces are known; returns the rate of viscous losses.
+
+    `force` is written: the force of the liquid on the tank, divided by the mass of a particle [m/s²].
+    """
     n = constants.n
     n_all = n + images.number[0]
     half = constants.half * constants.step
@@ -153,15 +157,62 @@ def _step(particles, pairs, images, constants, body_x, body_z, force, sums):  # 
     mirror_density(particles, images, n)
     viscosity = accelerate(particles, pairs, constants, n_all)
     correct_gradient(particles, n)
+    _force_on_walls(particles, images, constants, force)
+    return viscosity
+
+
+@njit(cache=True)
+def _finish_motion(particles, pairs, images, constants, body_x, body_z, sums):  # type: ignore[no-untyped-def]
+    """From the kick on; returns Σ of the mean velocities, the largest speed squared and whose it is."""
+    n = constants.n
+    half = constants.half * constants.step
     sum_x, sum_z, largest, fastest = _kick(particles, constants, body_x, body_z)
     mirror_velocity(particles, images, n)
     rate_of_density(particles, pairs, constants)
     _compress(particles, n, half)
     sums[DENSITY_DIFFUSION] += _diffuse(particles, constants)
-    sums[VISCOSITY] += viscosity
-    _force_on_walls(particles, images, constants, force)
     _move(particles, n, half)
     return sum_x, sum_z, largest, fastest
+
+
+@njit(cache=True)
+def end_step(  # type: ignore[no-untyped-def]
+    particles,
+    pairs,
+    images,
+    constants,
+    table,
+    table_scale,
+    gravity,
+    tank_x,
+    tank_z,
+    viscosity,
+    force,
+    sums,
+    counters,
+):
+    """Kick the liquid and complete the step; returns RUNNING or TOO_FAST.
+
+    Parameters are those of `advance`; `tank_x` and `tank_z` are the acceleration of the tank in this step,
+    `viscosity` and `force` come from `begin_step`. To `force` the impulses of particles that cross a wall
+    at the end of the step are added.
+    """
+    sum_x, sum_z, largest, fastest = _finish_motion(
+        particles, pairs, images, constants, -tank_x, -tank_z - gravity, sums
+    )
+    sums[VISCOSITY] += viscosity
+    sums[TANK_WORK] -= tank_x * sum_x + tank_z * sum_z
+    impulse_x, impulse_z, crossings = exchange_with_images(particles, constants)
+    force[FORCE_X] -= impulse_x / constants.step
+    force[FORCE_Z] -= impulse_z / constants.step
+    counters[CROSSINGS] += crossings
+    if not largest <= constants.largest_speed * constants.largest_speed:
+        counters[PARTICLE] = fastest
+        return TOO_FAST
+    counters[STEPS_DONE] += 1
+    if counters[STEPS_DONE] % constants.n_slow == 0:
+        correct(particles, pairs, images, constants, table, table_scale, sums)
+    return RUNNING
 
 
 @njit(cache=True)
@@ -208,18 +259,22 @@ def advance(
         tank_x, tank_z = acceleration_m_per_s2[k, 0], acceleration_m_per_s2[k, 1]
         if list_is_stale(particles, constants) and not list_neighbours(particles, pairs, images, constants):
             return NO_ROOM
-        sum_x, sum_z, largest, fastest = _step(
-            particles, pairs, images, constants, -tank_x, -tank_z - gravity_m_per_s2, forces[k], sums
+        viscosity = begin_step(particles, pairs, images, constants, forces[k])
+        status = end_step(
+            particles,
+            pairs,
+            images,
+            constants,
+            table,
+            table_scale,
+            gravity_m_per_s2,
+            tank_x,
+            tank_z,
+            viscosity,
+            forces[k],
+            sums,
+            counters,
         )
-        sums[TANK_WORK] -= tank_x * sum_x + tank_z * sum_z
-        impulse_x, impulse_z, crossings = exchange_with_images(particles, constants)
-        forces[k, FORCE_X] -= impulse_x / constants.step
-        forces[k, FORCE_Z] -= impulse_z / constants.step
-        counters[CROSSINGS] += crossings
-        if not largest <= constants.largest_speed * constants.largest_speed:
-            counters[PARTICLE] = fastest
-            return TOO_FAST
-        counters[STEPS_DONE] += 1
-        if counters[STEPS_DONE] % constants.n_slow == 0:
-            correct(particles, pairs, images, constants, table, table_scale, sums)
+        if status != RUNNING:
+            return int(status)
     return RUNNING
