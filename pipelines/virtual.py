@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
+
+import xarray as xr
 
 from acquisition.virtual_laboratory.campaign import make_campaign
 from acquisition.virtual_laboratory.numerical_campaign import (
@@ -15,24 +17,52 @@ from acquisition.virtual_laboratory.numerical_campaign import (
     make_numerical_campaign,
 )
 from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
-from acquisition.virtual_laboratory.shaker_run import EXPERIMENTS, virtual_shaker_run, write_virtual_run
+from acquisition.virtual_laboratory.shaker_run import EXPERIMENTS as SHAKER_EXPERIMENTS
+from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run, write_virtual_run
+from acquisition.virtual_laboratory.structure_run import STRUCTURE_EXPERIMENTS, virtual_structure_run
 from pipelines.progress import amounts, progress
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
 
 LIQUIDS: Final = ("law", "numerical")
+EXPERIMENTS: Final = (*SHAKER_EXPERIMENTS, *STRUCTURE_EXPERIMENTS)
 
 
 @dataclass(frozen=True)
 class VirtualRun:
-    """What the virtual laboratory is asked to do; `settings` are arguments of the laboratory's own function."""
+    """What the virtual laboratory is asked to do; of the options it takes those that the experiment has."""
 
     experiment: str
     configuration: str
     seed: int
     liquid: str
     layers: int
-    settings: Mapping[str, Any]
+    acceleration_g: float
+    direction: str
+    law: str
+    frequency_hz: float
+    duration_s: float | None
+    sampling_rate_hz: float | None
+    initial_displacement_m: float | None
+    rms_g: float
+
+    def settings(self) -> dict[str, Any]:
+        """Arguments of the laboratory's own function."""
+        chosen: dict[str, Any] = {
+            "experiment": self.experiment,
+            "configuration": self.configuration,
+            "seed": self.seed,
+            "duration_s": self.duration_s,
+            "sampling_rate_hz": self.sampling_rate_hz,
+        }
+        if self.experiment in STRUCTURE_EXPERIMENTS:
+            chosen["initial_displacement_m"] = self.initial_displacement_m
+            chosen["rms_g"] = self.rms_g
+        else:
+            chosen |= {"acceleration_g": self.acceleration_g, "direction": self.direction, "law": self.law}
+        if self.experiment == "sudden_start":
+            chosen["start_hz"] = self.frequency_hz
+        return {name: value for name, value in chosen.items() if value is not None}
 
 
 def make_virtual_run(
@@ -61,25 +91,27 @@ def make_virtual_run(
     if rig is None:
         raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
     saved = checkpoint or output.with_suffix(".checkpoint")
-    if output.is_dir() or not saved.parent.is_dir():
-        raise InputError("--output, --checkpoint", got=f"{output}, {saved}", allowed="files in folders that exist")
+    for option, path in (("--output", output), ("--checkpoint", saved)):
+        if path.is_dir() or not path.parent.is_dir():
+            raise InputError(f"{option} {path}", got="no file", allowed="a file in a folder that exists")
     with amounts(run.experiment) as advance:
         numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
-        recording = virtual_shaker_run(
-            Rig.from_toml(rig),
-            experiment=run.experiment,  # type: ignore[arg-type]
-            configuration=run.configuration,  # type: ignore[arg-type]
-            seed=run.seed,
-            rig_name=rig.name,
-            numerical=numerical if run.liquid == "numerical" else None,
-            **run.settings,
-        )
+        recording = _recorded(run, rig, numerical)
     write_virtual_run(recording, output)
     saved.unlink(missing_ok=True)
     rate_hz = recording.attrs["sampling_rate_hz"]
     lines = [f"recording: {output} ({recording.sizes['time']} samples at {rate_hz:g} Hz)"]
     stopped = recording.attrs.get(STOPPED)
     return {"lines": lines, "flags": [str(stopped)] if stopped else [], "output": str(output)}
+
+
+def _recorded(run: VirtualRun, rig: Path, numerical: NumericalLiquid) -> xr.Dataset:
+    """The liquid follows its law where there is one and nothing else is asked for."""
+    described = Rig.from_toml(rig)
+    if run.experiment in STRUCTURE_EXPERIMENTS:
+        return virtual_structure_run(described, numerical=numerical, rig_name=rig.name, **run.settings())
+    computed = numerical if run.liquid == "numerical" else None
+    return virtual_shaker_run(described, numerical=computed, rig_name=rig.name, **run.settings())
 
 
 def make_campaign_folder(

@@ -26,6 +26,8 @@ from acquisition.virtual_laboratory.campaign import MANIFEST_NAME, campaign_labo
 from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid, numerical_setup
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
 from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC, virtual_shaker_run, write_virtual_run
+from acquisition.virtual_laboratory.structure_rig import StructureLaboratory
+from acquisition.virtual_laboratory.structure_run import virtual_structure_run
 from acquisition.virtual_laboratory.worker_processes import Outcome, work_through
 from sloshlab import atomic_file
 from sloshlab._version import __version__
@@ -207,10 +209,11 @@ def _recording(task: _Task, liquid: NumericalLiquid) -> xr.Dataset:
         "start_time_utc": start.strftime("%Y-%m-%dT%H:%M:%SZ"),
     }
     rig = Rig.from_toml_text(RIG_TEXTS[run.rig])
-    if not run.is_on_shaker:
-        raise InputError(run.name, got="a run on a structure", allowed="runs on the shaker")
-    laboratory = campaign_laboratory(task.laboratory_seed)
-    return virtual_shaker_run(rig, numerical=liquid, laboratory=laboratory, **run.settings, **common)
+    if run.is_on_shaker:
+        laboratory = campaign_laboratory(task.laboratory_seed)
+        return virtual_shaker_run(rig, numerical=liquid, laboratory=laboratory, **run.settings, **common)
+    rest = StructureLaboratory.drawn(task.laboratory_seed, rig)
+    return virtual_structure_run(rig, numerical=liquid, laboratory=rest, **run.settings, **common)
 
 
 class _Session:

@@ -173,7 +173,7 @@ def _sweep(fill_level: float, level_g: float, prefix: str = "sweep", suffix: str
 
 
 def _beam_runs() -> list[_Listed]:
-    decay = {"experiment": "beam_free", "initial_displacement_m": 0.0146, "duration_s": 20.0}
+    decay = {"experiment": "beam_free", "initial_displacement_m": -0.0146, "duration_s": 10.0}
     runs: list[_Listed] = [("beam/decay_frozen", BEAM_RIG, {**decay, "configuration": "frozen"})]
     for repeat in (1, 2, 3):
         settings = {**decay, "configuration": "sloshing", "repeat": repeat}
@@ -185,7 +185,7 @@ def _beam_runs() -> list[_Listed]:
 
 
 def _sdof_runs() -> list[_Listed]:
-    decay = {"experiment": "sdof_free", "initial_displacement_m": 0.064, "duration_s": 10.0}
+    decay = {"experiment": "sdof_free", "initial_displacement_m": 0.064, "duration_s": 6.0}
     return [
         (f"sdof/decay_{configuration}", SDOF_RIG, {**decay, "configuration": configuration})
         for configuration in ("frozen", "sloshing")
