@@ -10,6 +10,7 @@ import contextlib
 import fnmatch
 import hashlib
 import json
+import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -39,6 +40,7 @@ COMMAND: Final = "sloshlab virtual campaign --liquid numerical -o raw_data/numer
 _SAMPLING_RATE_HZ: Final = 512.0
 _FIRST_SEED: Final = 500
 """Other seeds than those of the campaign whose liquid follows a law."""
+_SHALLOWEST_FILL: Final = 0.375
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class CampaignSettings:
     seed : int
         Of everything random.
     layers_per_height : int
-        Resolution.
+        Resolution: height of the tank over the distance of the particles; half as fine again at α = 0.25.
     n_workers : int
         Processes.
     only : str
@@ -315,12 +317,18 @@ def _task(folder: Path, settings: CampaignSettings, run: NumericalRun) -> _Task:
         folder / f"{run.name}.nc",
         Path(),
         1000 * settings.seed + _FIRST_SEED + run.number,
-        settings.layers_per_height,
+        _layers_per_height(settings, run),
         settings.seed,
     )
     kept_in = Path(settings.checkpoints or folder / CHECKPOINTS_NAME)
     checkpoint = kept_in / f"{run.name.replace('/', '_')}_{_made_of(task)[:12]}.checkpoint"
     return replace(task, checkpoint=checkpoint)
+
+
+def _layers_per_height(settings: CampaignSettings, run: NumericalRun) -> int:
+    """A shallow liquid is computed more finely, so that it is as many particles deep as one that fills 3/8."""
+    fill_level = Rig.from_toml_text(RIG_TEXTS[run.rig]).liquid.fill_level
+    return max(settings.layers_per_height, math.ceil(_SHALLOWEST_FILL * settings.layers_per_height / fill_level))
 
 
 def _setup(task: _Task) -> TankSetup | None:

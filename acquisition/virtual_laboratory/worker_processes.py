@@ -9,12 +9,13 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Final, NoReturn
 
+from acquisition.numerical_tank.interruption import told_to_stop
 from sloshlab.errors import InputError, RecordingInterruptedError, SloshlabError
 
 MOST_WORKERS: Final = 256
@@ -76,7 +77,7 @@ def work_through(
         raise InputError("--workers", got=str(n_workers), allowed=f"1 … {MOST_WORKERS}")
     running: dict[Connection, _Running] = {}
     waiting = list(enumerate(tasks))[::-1]
-    with _told_to_stop() as stopping:
+    with told_to_stop() as stopping:
         while waiting or running:
             while waiting and len(running) < n_workers and not stopping:
                 number, task = waiting.pop()
@@ -147,26 +148,6 @@ def _stop(
             one.process.kill()
         for connection in ready:
             _listen(running, connection, progressed, finished)  # type: ignore[arg-type]
-
-
-@contextlib.contextmanager
-def _told_to_stop() -> Iterator[list[int]]:
-    """Yield a list that stays empty until Ctrl-C or SIGTERM; nothing is broken off by it."""
-    stopping: list[int] = []
-
-    def note(number: int, _: object) -> None:
-        stopping.append(number)
-
-    ours = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
-    try:
-        before = {number: signal.signal(number, note) for number in ours}
-    except ValueError:  # not in the main thread
-        before = {}
-    try:
-        yield stopping
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _interrupt(*_: object) -> NoReturn:

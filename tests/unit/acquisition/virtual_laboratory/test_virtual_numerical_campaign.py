@@ -231,3 +231,17 @@ def test_a_damaged_checkpoint_does_not_stop_a_campaign(tmp_path: Path) -> None:
 def test_impossible_campaigns_are_refused_at_once(tmp_path: Path, changed, match) -> None:
     with pytest.raises(InputError, match=match):
         make_numerical_campaign(tmp_path / "tank", settings(**changed), runs=SHORT)
+
+
+@pytest.mark.parametrize(("fill_level", "layers"), [("0.25", 24), ("0.50", 16), ("0.75", 16)])
+def test_a_shallow_liquid_is_computed_more_finely(fill_level: str, layers: int, tmp_path: Path) -> None:
+    """3/8 of 16 layers are 6; a quarter of the tank has them at h/24."""
+    made = []
+
+    def worker(work, tasks, n_workers, *, progressed, finished) -> None:
+        made.extend(task.layers_per_height for task in tasks)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(numerical_campaign, "work_through", worker)
+        make_numerical_campaign(tmp_path, CampaignSettings(only=f"shaker/fill_{fill_level}_sweep_3.00g"))
+    assert made == [layers]
