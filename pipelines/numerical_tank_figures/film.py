@@ -62,10 +62,10 @@ def film(snapshots: Sequence[Snapshot], tank: Tank) -> bytes:
         Of one motion, one frame apart.
     tank : Tank
     """
-    with drawing_style():
-        images = list(_images(snapshots, tank))
     from PIL import Image
 
+    with drawing_style():
+        images = list(_images(snapshots, tank))
     palette = _palette()
     reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     buffer = io.BytesIO()

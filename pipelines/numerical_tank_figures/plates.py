@@ -18,6 +18,7 @@ from pipelines.report.style import WIDTH_INCH, drawing_style, new_figure, png_by
 from sloshlab.rig import Tank
 
 if TYPE_CHECKING:
+    from matplotlib.collections import EllipseCollection
     from matplotlib.figure import Figure
 
 _N_COLUMNS: Final = 2
@@ -35,7 +36,7 @@ def conditions_plate(snapshots: Sequence[Snapshot], tank: Tank) -> bytes:
         At most 26, in the order of the letters.
     tank : Tank
     """
-    return _plate(snapshots, tank, [shaking_title(snapshot) for snapshot in snapshots])
+    return _plate(snapshots, tank, [shaking_title(snapshot) for snapshot in snapshots], SPEED_LABEL)
 
 
 def cycle_plate(snapshots: Sequence[Snapshot], tank: Tank) -> bytes:
@@ -47,7 +48,9 @@ def cycle_plate(snapshots: Sequence[Snapshot], tank: Tank) -> bytes:
         At most 26 of one motion.
     tank : Tank
     """
-    return _plate(snapshots, tank, [condition_text(snapshot) for snapshot in snapshots])
+    shaking = snapshots[0].shaking
+    label = f"{SPEED_LABEL}; {shaking.amplitude_g:g} g, {shaking.frequency_hz:g} Hz"
+    return _plate(snapshots, tank, [condition_text(snapshot) for snapshot in snapshots], label)
 
 
 def shaking_title(snapshot: Snapshot) -> str:
@@ -67,18 +70,23 @@ def shaking_title(snapshot: Snapshot) -> str:
     return f"{level}, {shaking.frequency_hz:g} Hz: {condition_text(snapshot)}"
 
 
-def _plate(snapshots: Sequence[Snapshot], tank: Tank, titles: Sequence[str]) -> bytes:
+def _plate(snapshots: Sequence[Snapshot], tank: Tank, titles: Sequence[str], label: str) -> bytes:
     n_rows = -(-len(snapshots) // _N_COLUMNS)
     panel_inch = WIDTH_INCH / _N_COLUMNS * tank.height_m / tank.length_m
     with drawing_style():
         figure = new_figure(n_rows * (panel_inch + _TEXT_INCH) + _BAR_INCH)
-        _draw_panels(figure, n_rows, snapshots, tank, titles)
+        discs = _draw_panels(figure, n_rows, snapshots, tank, titles)
+        bar = figure.colorbar(
+            discs, ax=figure.axes, location="bottom", fraction=0.03, aspect=45, pad=0.02, extend="max"
+        )
+        bar.set_label(label)
+        bar.outline.set_linewidth(0.6)
         return png_bytes(figure)
 
 
 def _draw_panels(
     figure: Figure, n_rows: int, snapshots: Sequence[Snapshot], tank: Tank, titles: Sequence[str]
-) -> None:
+) -> EllipseCollection:
     panels = figure.subplots(n_rows, _N_COLUMNS, squeeze=False).ravel()
     top = top_speed_m_per_s(snapshots)
     for axes, letter, title, snapshot in zip(panels, _LETTERS, titles, snapshots, strict=False):
@@ -88,8 +96,4 @@ def _draw_panels(
         axes.set_title(f"({letter})  {title}", fontsize=8.5, pad=3)
     for axes in panels[len(snapshots) :]:
         axes.set_axis_off()
-    bar = figure.colorbar(
-        discs, ax=list(panels), location="bottom", fraction=0.03, aspect=45, pad=0.02, extend="max"
-    )
-    bar.set_label(SPEED_LABEL)
-    bar.outline.set_linewidth(0.6)
+    return discs
