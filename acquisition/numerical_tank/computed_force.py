@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from acquisition.numerical_tank import checkpoint as checkpoints
 from acquisition.numerical_tank.forced_motion import averaged
 from acquisition.numerical_tank.instability import InstabilityError
+from acquisition.numerical_tank.interruption import told_to_stop
 from acquisition.numerical_tank.sampling import HALF_LENGTH_SAMPLES, oversampling, sampled
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import TankSetup
@@ -101,7 +102,7 @@ def computed_force(
     InputError
         If there is no sampling rate, a time is out of range, or the checkpoint is damaged or of another run.
     ComputationInterruptedError
-        At Ctrl-C, if there is a checkpoint.
+        At Ctrl-C or SIGTERM, if there is a checkpoint.
     """
     n_samples = _n_samples(setup, duration_s)
     run = _Computation(setup, acceleration_m_per_s2, n_samples)
@@ -110,17 +111,18 @@ def computed_force(
         run.restore(path)
     stopped, saved_s = "", monotonic_s()
     try:
-        while run.n_left:
-            start_s = monotonic_s()
-            stopped = run.advance()
-            run.computing_s += monotonic_s() - start_s
-            if stopped:
-                break
-            if progress is not None:
-                progress(run.share)
-            if path is not None and monotonic_s() - saved_s >= saved_every_s:
-                run.save(path)
-                saved_s = monotonic_s()
+        with told_to_stop() as stopping:
+            while run.n_left and not stopped:
+                start_s = monotonic_s()
+                stopped = run.advance()
+                run.computing_s += monotonic_s() - start_s
+                if stopping:
+                    raise KeyboardInterrupt
+                if progress is not None:
+                    progress(run.share)
+                if path is not None and not stopped and monotonic_s() - saved_s >= saved_every_s:
+                    run.save(path)
+                    saved_s = monotonic_s()
     except KeyboardInterrupt as interrupt:
         if path is None:
             raise
