@@ -26,6 +26,7 @@ from acquisition.numerical_tank.computed_force import SAVED_EVERY_S, Computation
 from acquisition.numerical_tank.coupling import CoupledTank
 from acquisition.numerical_tank.forced_motion import averaged
 from acquisition.numerical_tank.instability import InstabilityError
+from acquisition.numerical_tank.interruption import told_to_stop
 from acquisition.numerical_tank.sampling import HALF_LENGTH_SAMPLES, oversampling, sampled
 from acquisition.numerical_tank.structures import Structure
 from acquisition.numerical_tank.tank import TankSetup
@@ -164,15 +165,18 @@ def computed_structure(
         run.restore(path)
     stopped, saved_s = "", monotonic_s()
     try:
-        while run.n_left and not stopped:
-            start_s = monotonic_s()
-            stopped = run.advance()
-            run.computing_s += monotonic_s() - start_s
-            if progress is not None:
-                progress(run.share)
-            if path is not None and not stopped and monotonic_s() - saved_s >= saved_every_s:
-                run.save(path)
-                saved_s = monotonic_s()
+        with told_to_stop() as stopping:
+            while run.n_left and not stopped:
+                start_s = monotonic_s()
+                stopped = run.advance()
+                run.computing_s += monotonic_s() - start_s
+                if stopping:
+                    raise KeyboardInterrupt
+                if progress is not None:
+                    progress(run.share)
+                if path is not None and not stopped and monotonic_s() - saved_s >= saved_every_s:
+                    run.save(path)
+                    saved_s = monotonic_s()
     except KeyboardInterrupt as interrupt:
         if path is None:
             raise

@@ -5,11 +5,13 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from acquisition.numerical_tank import checkpoint as checkpoints
+from acquisition.numerical_tank import computed_force as computed_force_module
 from acquisition.numerical_tank.computed_force import ComputationInterruptedError, ComputedForce, computed_force
 from acquisition.numerical_tank.forced_motion import HarmonicMotion
 from acquisition.numerical_tank.tank import Box, TankSetup, filled_tank
@@ -93,6 +95,32 @@ def test_interrupted_it_says_how_to_go_on(tmp_path: Path, through: ComputedForce
     again = computed_force(tank(), MOTION, DURATION_S, checkpoint=saved, progress=resumed.append)
     assert resumed[0] > shares[-1]
     assert resumed[-1] == 1.0
+    assert again.vertical_n.tobytes() == through.vertical_n.tobytes()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_within_a_block_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, through: ComputedForce, number: signal.Signals
+) -> None:
+    """It arrives while the steps of the second block are computed; both blocks are in the checkpoint."""
+    saved, calls, before = tmp_path / "run.checkpoint", [], signal.getsignal(number)
+    unharmed = computed_force_module.averaged
+
+    def averaged(*arguments: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == 2:
+            signal.raise_signal(number)
+        return unharmed(*arguments)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(computed_force_module, "averaged", averaged)
+        with pytest.raises(ComputationInterruptedError, match=r"run\.checkpoint keeps"):
+            computed_force(tank(), MOTION, DURATION_S, checkpoint=saved)
+    assert len(calls) == 2
+    assert checkpoints.load(saved).time_s == pytest.approx(0.2, rel=0.05)
+    assert signal.getsignal(number) is before
+    again = computed_force(tank(), MOTION, DURATION_S, checkpoint=saved)
     assert again.vertical_n.tobytes() == through.vertical_n.tobytes()
 
 
