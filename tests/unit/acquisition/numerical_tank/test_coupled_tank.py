@@ -90,10 +90,9 @@ def test_sloshing_damps_more_than_frozen() -> None:
 
 
 def after_an_impulse_at_a_wall(tank: CoupledTank, base: np.ndarray) -> int:
-    """Advance at least 300 steps and until a particle has just crossed a wall; return how many."""
+    """Advance at least 300 steps and until a particle has just crossed floor or roof; return how many."""
     tank.advance(base[:300])
-    crossings = tank.tank.n_crossings
-    while tank.tank.n_crossings == crossings:
+    while tank.structure_arrays()["structure_carried"][0] == 0:
         tank.advance(base[tank.n_steps : tank.n_steps + 1])
     return tank.n_steps
 

@@ -1,6 +1,7 @@
 """Runs of the virtual beam and guided tank: recordings in the format, with the physics that they should show."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -244,13 +245,21 @@ def test_laboratory_differs_from_what_it_believes() -> None:
     assert true_hz / believed_hz == pytest.approx(drawn.frequency_factors, rel=1e-9)
 
 
-def test_noise_and_gain_of_imperfect_sensors() -> None:
+def test_gains_and_noise_of_the_sensors() -> None:
+    """The same structure read by perfect and by drawn sensors: slope is the gain, scatter the noise."""
+    perfect = StructureLaboratory.perfect(BEAM)
+    drawn = replace(perfect, sensors=replace(StructureLaboratory.drawn(2, BEAM).sensors, dry_mass_factor=1.0))
     settings = {"experiment": "beam_free", "configuration": "frozen", "duration_s": 0.5}
-    run = virtual_structure_run(BEAM, **settings)  # type: ignore[arg-type]
-    root = run["acceleration_root"]
-    assert 0 < float(root.values.std()) < 3 * root.attrs["noise_std"]
-    truth = StructureLaboratory.drawn(0, BEAM)
-    assert truth.sensors.gain["force_interface"] != 1
+    true = virtual_structure_run(BEAM, laboratory=perfect, imperfect=False, **settings)  # type: ignore[arg-type]
+    read = virtual_structure_run(BEAM, laboratory=drawn, **settings)  # type: ignore[arg-type]
+    for name in ("force_interface", "acceleration_tip", "displacement_tank"):
+        gain, offset = np.polyfit(true[name].values, read[name].values, 1)
+        noise = read[name].attrs["noise_std"]
+        assert gain == pytest.approx(drawn.sensors.gain[name], abs=2e-5)
+        assert offset == pytest.approx(drawn.sensors.offset_share[name] * read[name].attrs["range_max"], abs=noise)
+        # the converter rounds to counts of 1/0.6 noise
+        scatter = float(np.std(read[name].values - gain * true[name].values))
+        assert scatter == pytest.approx(noise * math.sqrt(1 + (1 / 0.6) ** 2 / 12), rel=0.15)
 
 
 class TestStopping:
