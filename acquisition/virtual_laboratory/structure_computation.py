@@ -157,7 +157,7 @@ def computed_structure(
     InputError
         If the structure is too fast for the step, or the checkpoint is damaged or of another run.
     ComputationInterruptedError
-        At Ctrl-C, if there is a checkpoint.
+        At Ctrl-C or SIGTERM, if there is a checkpoint.
     """
     run = _Computation(task)
     path = Path(checkpoint) if checkpoint is not None and task.configuration == "sloshing" else None

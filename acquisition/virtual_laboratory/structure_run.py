@@ -59,7 +59,8 @@ _COLUMN_OVER_STRUCTURE: Final = 2.0
 """Quarter-wave resonance c₀/4h of the liquid column over the highest natural frequency of the structure."""
 _LARGEST_SPEED_M_PER_S: Final = 10.0
 _LEAST_DAMPING_RATIO: Final = 0.02
-_LARGEST_SAMPLES: Final = 4_000_000
+_LARGEST_SAMPLES: Final = 500_000
+"""So that a checkpoint, which holds all that was computed, stays below 200 MB."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ def virtual_structure_run(
     InputError
         If an argument is out of range or does not fit the rig.
     ComputationInterruptedError
-        At Ctrl-C while the liquid is computed with a checkpoint.
+        At Ctrl-C or SIGTERM while the liquid is computed with a checkpoint.
 
     Notes
     -----

@@ -1,6 +1,7 @@
 """Runs of the virtual beam and guided tank: recordings in the format, with the physics that they should show."""
 
 import math
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -278,7 +279,7 @@ class TestStopping:
 
         def interrupt(share: float) -> None:
             if share > 0.4:
-                raise KeyboardInterrupt
+                signal.raise_signal(signal.SIGTERM)
 
         with pytest.raises(ComputationInterruptedError, match=r"run\.checkpoint keeps"):
             run(interrupt)
@@ -332,6 +333,7 @@ class TestStopping:
         (BEAM, {"experiment": "beam_free", "duration_s": 0.0}, "duration_s"),
         (BEAM, {"experiment": "beam_free", "duration_s": math.nan}, "duration_s"),
         (BEAM, {"experiment": "beam_free", "sampling_rate_hz": 10.0}, "sampling_rate_hz"),
+        (BEAM, {"experiment": "beam_free", "duration_s": 3000.0}, "length of the run"),
         (BEAM, {"experiment": "beam_free", "initial_displacement_m": 0.0}, "initial_displacement_m"),
         (BEAM, {"experiment": "beam_free", "initial_displacement_m": 0.3}, "speed of the tank"),
         (BEAM, {"experiment": "beam_random", "initial_displacement_m": 0.01}, "initial_displacement_m"),
