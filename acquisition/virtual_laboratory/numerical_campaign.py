@@ -277,6 +277,7 @@ class _Manifest:
             "seed": task.seed,
             "settings": dict(task.run.settings),
             "rig": task.run.rig,
+            **({"layers_per_height": task.layers_per_height} if task.run.is_computed else {}),
             "made_of": _made_of(task),
             "computing_s": round(result["computing_s"], 1),
             **({"flag": result["flag"]} if result["flag"] else {}),

@@ -160,7 +160,7 @@ def test_the_campaign_tells_each_run_and_keeps_what_it_has(tmp_path: Path, capsy
     [
         (["--only", "nothing"], "--only: got 'nothing'"),
         (["--seed", "-2"], "seed of the campaign: got -2"),
-        (["--layers", "8"], "layers of particles in the liquid: got 2"),
+        (["--layers", "8"], "layers of particles in the liquid: got 3; allowed: at least 4"),
         (["--liquid", "beer"], "--liquid: got 'beer'"),
     ],
 )

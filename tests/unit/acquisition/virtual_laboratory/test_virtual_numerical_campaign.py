@@ -114,6 +114,8 @@ def test_the_manifest_tells_what_each_file_is(campaign) -> None:
         assert manifest["runs"][run.name]["computing_s"] == round(run.computing_s, 1)
     assert len({one["seed"] for one in manifest["runs"].values()}) == 3
     assert manifest["runs"]["shaker/fast"]["settings"]["acceleration_g"] == 3.0
+    assert manifest["runs"]["shaker/fast"]["layers_per_height"] == 8
+    assert "layers_per_height" not in manifest["runs"]["shaker/frozen"]
 
 
 def test_the_longest_run_comes_first_and_progress_ends_with_all(campaign) -> None:
