@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from pipelines.command_line import DONE_BUT_FLAGGED, run
+from pipelines.command_line import DONE_BUT_FLAGGED, INPUT_IS_BAD, run
+from sloshlab.errors import SloshlabError
 
 
 def shaker_arguments(folder: Path, output: Path, rigs_folder: Path | None = None) -> list[str]:
@@ -23,7 +24,11 @@ def main() -> int:
     if experiment not in EXPERIMENTS:
         print(f"unknown experiment {experiment!r}; allowed: {', '.join(EXPERIMENTS)}", file=sys.stderr)  # noqa: T201
         return 2
-    return EXPERIMENTS[experiment](folder, output)
+    try:
+        return EXPERIMENTS[experiment](folder, output)
+    except SloshlabError as error:
+        print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
+        return INPUT_IS_BAD
 
 
 def _shaker(folder: Path, output: Path) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -22,6 +21,7 @@ from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus
 from acquisition.sources.interface import Source
 from acquisition.sources.urls import open_source
 from pipelines.alignment_choice import channel_pairs, checked_align
+from pipelines.free_place import require_free_place
 from pipelines.progress import amounts
 from pipelines.run_attributes import checked_run_attributes, require_rate
 from sloshlab.errors import (
@@ -109,7 +109,7 @@ def record(
         If nothing could be recorded, or not stored: the message says what is kept and how to get at it.
     """
     metadata = _checked_metadata(settings)
-    _require_free_place(settings)
+    _require_free_places(settings)
     with opened([open_source(url) for url in settings.sources]) as sources:
         infos = [source.info for source in sources]
         require_rate(metadata["attributes"], infos[0].sampling_rate_hz)
@@ -142,22 +142,16 @@ def _checked_metadata(settings: RecordSettings) -> dict[str, Any]:
     return {"attributes": attributes, **chosen}
 
 
-def _require_free_place(settings: RecordSettings) -> None:
+def _require_free_places(settings: RecordSettings) -> None:
     """Refuse places that are taken or cannot be written, before any device is touched."""
     output, journal = settings.output, settings.journal
     if output == journal:
         raise InputError(f"recording {output}", got="the suffix of journals", allowed="RUN.nc")
-    if output.is_dir() or journal.is_dir():
-        raise InputError(f"recording {output}", got="a folder in the way", remedy="choose another name")
-    if output.exists() and not settings.overwrite:
-        raise InputError(f"recording {output}", got="a file that is there already", remedy="--overwrite")
+    require_free_place(output, overwrite=settings.overwrite)
+    if journal.is_dir():
+        raise InputError(f"journal {journal}", got="a folder in the way", remedy="choose another name")
     if journal.exists() and not settings.overwrite:
         raise existing_journal(journal)
-    folder = next(folder for folder in output.absolute().parents if folder.exists())
-    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(
-            f"recording {output}", got=f"{folder}, which cannot be written", allowed="a writable folder"
-        )
 
 
 def _require_readable_duration(duration_s: float | None, longest_s: float) -> None:

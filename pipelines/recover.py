@@ -12,6 +12,7 @@ from acquisition.recorder.journal import Journal, read_journal
 from acquisition.recorder.source_alignment import require_alignable
 from acquisition.sources.interface import SourceInfo
 from pipelines.alignment_choice import channel_pairs, checked_align
+from pipelines.free_place import require_free_place
 from pipelines.progress import amounts
 from sloshlab.errors import InputError
 
@@ -53,12 +54,9 @@ def recover(
     JournalError
         If there is nothing to recover.
     """
-    if output.exists() and (not overwrite or output.samefile(journal_path)):
-        raise InputError(
-            f"recording {output}",
-            got="a file that is there already",
-            remedy="another name, or --overwrite" if not overwrite else "another name than the journal's",
-        )
+    require_free_place(output, overwrite=overwrite)
+    if output.exists() and journal_path.exists() and output.samefile(journal_path):
+        raise InputError(f"recording {output}", got="the journal itself", remedy="another name than the journal's")
     chosen_align = None if align is None else checked_align(align)
     pairs = channel_pairs(redundant)
     with read_journal(journal_path) as journal:

@@ -8,12 +8,15 @@ import math
 import signal as signals
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from acquisition.devices.appearance import Appearance, appearance
+from acquisition.devices.connection import MOST_CONNECTIONS
+from acquisition.devices.endpoint import Awaited
 from acquisition.devices.faults import Faults
 from acquisition.devices.laboratory_time import LaboratoryTime
 from acquisition.devices.played_signal import played_signal
@@ -25,6 +28,7 @@ from sloshlab import atomic_file
 from sloshlab.errors import InputError
 
 _STEP_S = 0.1
+_PATIENCE_S = 5.0
 _SLOWEST, _FASTEST = 1e-3, 1e4
 
 
@@ -73,7 +77,12 @@ class ReplaySettings:
     truth: Path | None = None
 
 
-def replay(settings: ReplaySettings, *, announce: Callable[[str], None] | None = None) -> dict[str, Any]:
+def replay(
+    settings: ReplaySettings,
+    *,
+    announce: Callable[[str], None] | None = None,
+    remind: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
     """Play until every device has said everything and its hosts have read it.
 
     Parameters
@@ -82,6 +91,9 @@ def replay(settings: ReplaySettings, *, announce: Callable[[str], None] | None =
     announce : callable, optional
         Called with ``ready URL`` for each device as soon as a host can open that URL, in the order of
         `urls`, and with a line for each port that is exposed. Standard output if not given.
+    remind : callable, optional
+        Called with a line for each device that still waits for hosts, if others have come and none has for 5 s.
+        Standard error if not given.
 
     Returns
     -------
@@ -98,19 +110,24 @@ def replay(settings: ReplaySettings, *, announce: Callable[[str], None] | None =
     places = _places(settings)
     laboratory = LaboratoryTime(len(places), speed=_speed(settings.speed))
     players = _players(settings, places, laboratory)
-    with contextlib.ExitStack() as cleaning:
+    with contextlib.ExitStack() as cleaning, _stopped_by_signal(players):
         for place, player in zip(places, players, strict=True):
             cleaning.callback(player.endpoint.close)
             if settings.expose and place.listens:
                 say(place.exposure())
             say(f"ready {player.endpoint.open()}")
-        _run(players)
+        _run(players, _Reminder([place.device for place in places], remind or _reminded))
     return _summary(settings, places, players)
 
 
 def _said(line: str) -> None:
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
+
+
+def _reminded(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
 
 
 def _speed(text: str) -> float:
@@ -133,10 +150,22 @@ def _places(settings: ReplaySettings) -> list[Appearance]:
     names = [place.device for place in places]
     if len(set(names)) < len(names):
         raise InputError("--as", got=f"devices {', '.join(names)}", allowed="names that differ")
+    _require_used(settings, places)
     for option, values in (("--channels", settings.channels), ("--faults", settings.faults)):
         if len(values) not in (0, len(places)):
             raise InputError(option, got=f"{len(values)} times", allowed=f"once for each of {len(places)} devices")
     return places
+
+
+def _require_used(settings: ReplaySettings, places: Sequence[Appearance]) -> None:
+    """Refuse options that no device would heed, and more clients than a device lets in."""
+    if not 1 <= settings.wait_clients <= MOST_CONNECTIONS:
+        allowed = f"1 … {MOST_CONNECTIONS}"
+        raise InputError("--wait-clients", got=str(settings.wait_clients), allowed=allowed)
+    if settings.wait_clients > 1 and not any(place.interface == "socketcand" for place in places):
+        raise InputError("--wait-clients", got="no socketcand device", allowed="--as can:socketcand?…")
+    if settings.samples_per_frame is not None and not any(place.transport == "serial" for place in places):
+        raise InputError("--samples-per-frame", got="no serial device", allowed="--as serial:…")
 
 
 def _players(settings: ReplaySettings, places: Sequence[Appearance], laboratory: LaboratoryTime) -> list[Player]:
@@ -166,18 +195,40 @@ def _faults(settings: ReplaySettings, number: int) -> Faults | None:
     return None if path is None else Faults.from_toml(path)
 
 
-def _run(players: Sequence[Player]) -> None:
+class _Reminder:
+    """Says who is missing when some hosts have asked their devices to begin and others have not for a while."""
+
+    def __init__(self, devices: Sequence[str], say: Callable[[str], None]) -> None:
+        self._devices, self._say = devices, say
+        self._seen: list[Awaited] = []
+        self._since_s, self._has_told = 0.0, True
+
+    def look(self, players: Sequence[Player]) -> None:
+        """Tell what has not changed for too long, once."""
+        awaited = [player.awaited for player in players]
+        if awaited != self._seen:
+            self._seen, self._since_s, self._has_told = awaited, time.monotonic(), False
+        has_begun = any(one.n_missing < one.n_hosts for one in awaited)
+        if self._has_told or not has_begun or time.monotonic() - self._since_s < _PATIENCE_S:
+            return
+        self._has_told = True
+        for device, one in zip(self._devices, awaited, strict=True):
+            if one.n_missing > 0:
+                self._say(f"waiting: {device} for {one.n_missing} of {one.n_hosts} hosts; Ctrl-C ends")
+
+
+def _run(players: Sequence[Player], reminder: _Reminder) -> None:
     """Every device in a thread of its own; the first error of any ends all and is raised here."""
     errors: list[BaseException] = []
     threads = [threading.Thread(target=_play, args=(player, errors), daemon=True) for player in players]
-    with _stopped_by_signal(players):
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
         for thread in threads:
-            thread.start()
-        while any(thread.is_alive() for thread in threads):
-            for thread in threads:
-                thread.join(_STEP_S)
-            if errors:
-                _stop(players)
+            thread.join(_STEP_S)
+        reminder.look(players)
+        if errors:
+            _stop(players)
     if errors:
         raise errors[0]
 

@@ -76,13 +76,7 @@ def replayed_campaign(folder: Path, output: Path, ways: Sequence[Way] = WAYS) ->
     runs = sorted(folder.glob("*.nc"))
     if not runs:
         raise RecordingError(f"folder {folder}", got="no recordings", allowed="*.nc with their rig*.toml")
-    flags: list[str] = []
-    played = [(way, run) for way in ways for run in runs[:: way.every]]
-    with progress("replaying", len(played)) as step, ThreadPoolExecutor(2) as pool:
-        jobs = [pool.submit(recorded, run, output / way.name, way) for way, run in played]
-        for (way, run), job in zip(played, jobs, strict=True):
-            flags += [f"{way.name}: {run.name}: {text}" for text in differences(run, job.result())]
-            step(f"{way.name} {run.stem}")
+    flags = _replayed_differences([(way, run) for way in ways for run in runs[:: way.every]], output)
     expected = _analysed(folder, folder, output / "file")
     n_windows = int(expected.sizes["window"])
     analysed = [way for way in ways if way.every == 1]
@@ -102,6 +96,20 @@ def replayed_campaign(folder: Path, output: Path, ways: Sequence[Way] = WAYS) ->
     }
 
 
+def _replayed_differences(played: Sequence[tuple[Way, Path]], output: Path) -> list[str]:
+    """Play and record, two at a time, and compare; the first failure of any ends all."""
+    flags: list[str] = []
+    with progress("replaying", len(played)) as step, ThreadPoolExecutor(2) as pool:
+        jobs = [pool.submit(recorded, run, output / way.name, way) for way, run in played]
+        try:
+            for (way, run), job in zip(played, jobs, strict=True):
+                flags += [f"{way.name}: {run.name}: {text}" for text in differences(run, job.result())]
+                step(f"{way.name} {run.stem}")
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+    return flags
+
+
 def recorded(run: Path, folder: Path, way: Way) -> Path:
     """Play one recording as devices and record them, in two processes; return the new recording."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -118,12 +126,19 @@ def recorded(run: Path, folder: Path, way: Way) -> Path:
 
 
 def differences(run: Path, recording: Path) -> list[str]:
-    """How the stored counts, flags, scaling and times of two recordings differ; nothing is decoded.
+    """How the stored counts, flags, scaling, times and attributes of two recordings differ; nothing is decoded.
 
-    The legend of the quality bits may: a recorder of today knows more of them.
+    The legend of the quality bits may: a recorder of today knows more of them. What the recorder says about
+    itself, `acquisition` and a `quality` without flags, may come on top.
     """
     with _stored(run) as expected, _stored(recording) as found:
-        texts = []
+        invented = sorted({*map(str, found.variables)} - {*map(str, expected.variables), "quality"})
+        texts = [f"{name} is invented" for name in invented]
+        texts += [
+            f"attribute {key} is {found.attrs.get(key)!r} instead of {value!r}"
+            for key, value in expected.attrs.items()
+            if not _equal(found.attrs.get(key), value)
+        ]
         for name, variable in expected.variables.items():
             if name not in found.variables:
                 texts.append(f"{name} is missing")
@@ -220,9 +235,22 @@ def _playing(arguments: Sequence[str], n_devices: int) -> Iterator[list[str]]:
         try:
             assert process.stdout is not None
             yield [_ready(process.stdout, messages) for _ in range(n_devices)]
-            process.wait(_LONGEST_RECORDING_S)
+            with _in_time("the simulated device"):
+                code = process.wait(_LONGEST_RECORDING_S)
+            if code != 0:
+                messages.seek(0)
+                got = f"exit code {code}: {_last_lines(messages.read())}"
+                raise SourceError("the simulated device", got=got, allowed="exit code 0")
         finally:
             process.kill()
+
+
+@contextlib.contextmanager
+def _in_time(what: str) -> Iterator[None]:
+    try:
+        yield
+    except subprocess.TimeoutExpired as error:
+        raise SourceError(what, got=f"no end within {error.timeout:g} s") from error
 
 
 def _ready(lines: IO[str], messages: IO[str]) -> str:
@@ -235,7 +263,8 @@ def _ready(lines: IO[str], messages: IO[str]) -> str:
 
 def _run(arguments: Sequence[str]) -> None:
     command = [sys.executable, "-m", "pipelines.command_line", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_RECORDING_S, check=False)
+    with _in_time(f"sloshlab {arguments[0]}"):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_RECORDING_S, check=False)
     if done.returncode not in (0, 3):
         raise SourceError(f"sloshlab {arguments[0]}", got=_last_lines(done.stderr), allowed="exit code 0 or 3")
 
@@ -251,5 +280,5 @@ def _analysed(recordings: Path, rigs: Path, output: Path) -> xr.Dataset:
     code = run([*shaker_arguments(recordings, output, rigs), "--no-report"])
     if code not in (0, DONE_BUT_FLAGGED):
         raise RecordingError(f"analysis of {recordings}", got=f"exit code {code}", allowed="0 or 3")
-    with xr.open_dataset(output / "windows.nc", engine="netcdf4", decode_times=False) as windows:
+    with NETCDF_LOCK, xr.open_dataset(output / "windows.nc", engine="netcdf4", decode_times=False) as windows:
         return windows.load()

@@ -247,7 +247,7 @@ def write_recording(
         if variable.dtype.kind not in "fiu":
             compressed = {}
         chosen[str(name)] = {**compressed, **(encoding or {}).get(str(name), {})}
-    with atomic_file.replaced(path) as temporary:
+    with atomic_file.replaced(path) as temporary, NETCDF_LOCK:
         recording.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=chosen)
 
 

@@ -120,11 +120,9 @@ class PseudoTerminal(Door, Connection):
         self._target = target
 
     def arrived(self) -> list[Connection]:
-        """The host, once it has opened its side."""
-        if self._host_was_there or not self._host_is_there():
-            return []
-        self._host_was_there = True
-        return [self]
+        """The host, once it has opened its side; one that was let go only after it has closed it."""
+        was_there, self._host_was_there = self._host_was_there, self._host_is_there()
+        return [self] if self._host_was_there and not was_there else []
 
     def _host_is_there(self) -> bool:
         if self._master < 0:
@@ -308,6 +306,7 @@ class ListeningSocket(Door):
             if connected is None:
                 break
             if self._is_full():
+                self._waits_since_s = None  # the next one has not waited yet
                 connected.close()
                 continue
             self._hosts.append(SocketConnection(connected))

@@ -8,7 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from acquisition.devices.connection import Connection, Door
 from acquisition.devices.conversation import Conversation, Host
@@ -17,8 +17,16 @@ from acquisition.devices.frames import FrameArray
 LONGEST_STALL_S: Final = 30.0
 """Where several hosts listen, one that takes nothing for so long is let go."""
 
+_LARGEST_ANSWERS_BYTES = 1 << 20
 _DOOR_STEP_S = 0.01
 _STEP_S = 0.05
+
+
+class Awaited(NamedTuple):
+    """How many hosts a device still waits for, of how many."""
+
+    n_missing: int
+    n_hosts: int
 
 
 class Endpoint(ABC):
@@ -36,6 +44,11 @@ class Endpoint(ABC):
     @abstractmethod
     def is_started(self) -> bool:
         """Whether enough hosts have asked the device to begin."""
+
+    @property
+    def awaited(self) -> Awaited:
+        """Hosts that have yet to ask the device to begin."""
+        return Awaited(0 if self.is_started else 1, 1)
 
     @property
     @abstractmethod
@@ -84,6 +97,7 @@ class _Line:
     connection: Connection
     host: Host = field(default_factory=Host)
     unsent: bytearray = field(default_factory=bytearray)
+    n_answer_bytes: int = 0  # of answers since everything had been sent for the last time
     stalled_since_s: float | None = None
 
 
@@ -129,9 +143,18 @@ class StreamEndpoint(Endpoint):
     @property
     def is_started(self) -> bool:
         """Once as many hosts as are waited for have asked at the same time."""
-        started = [line for line in self._lines if line.host.has_started and self._listens(line)]
-        self._is_started = self._is_started or self._runs_freely or len(started) >= self._n_hosts
+        self._is_started = self._is_started or self._runs_freely or self._n_missing <= 0
         return self._is_started
+
+    @property
+    def awaited(self) -> Awaited:
+        """Hosts that have yet to ask."""
+        return Awaited(0 if self.is_started else self._n_missing, self._n_hosts)
+
+    @property
+    def _n_missing(self) -> int:
+        started = [line for line in self._lines if line.host.has_started and self._listens(line)]
+        return self._n_hosts - len(started)
 
     @property
     def is_stopped(self) -> bool:
@@ -171,6 +194,8 @@ class StreamEndpoint(Endpoint):
 
     def _admit(self) -> None:
         for connection in self._door.arrived():
+            if any(line.connection is connection for line in self._lines):
+                continue  # a terminal that was closed and opened between two looks
             line = _Line(connection)
             line.unsent += self._conversation.greeting()
             self._lines.append(line)
@@ -181,11 +206,12 @@ class StreamEndpoint(Endpoint):
             received = line.connection.receive()
             if received:
                 answer = self._conversation.answer(line.host, received)
-                if len(line.unsent) + len(answer) > 1 << 20:  # asks and asks and never reads
+                line.n_answer_bytes += len(answer)
+                if line.n_answer_bytes > _LARGEST_ANSWERS_BYTES:  # asks and asks and never reads
                     line.host.refused = True
                 line.unsent += answer
                 self._is_stopped = self._is_stopped or (self._is_started and line.host.has_stopped)
-            if received is None or line.host.refused or not self._flush(line):
+            if received is None or not self._flush(line) or line.host.refused:
                 self._let_go(line)
 
     def _flush(self, line: _Line) -> bool:
@@ -197,6 +223,10 @@ class StreamEndpoint(Endpoint):
         if n_sent < 0:
             return False
         del line.unsent[:n_sent]
+        if n_sent:
+            line.stalled_since_s = None
+        if not line.unsent:
+            line.n_answer_bytes = 0
         return True
 
     def _let_go(self, line: _Line) -> None:
@@ -228,11 +258,10 @@ class StreamEndpoint(Endpoint):
             self._admit()
 
     def _push(self, line: _Line, *, n_lines: int) -> None:
-        before = len(line.unsent)
         if not self._flush(line):
             self._let_go(line)
-        elif len(line.unsent) < before or not line.unsent:
-            line.stalled_since_s = None
+        elif not line.unsent:
+            return
         elif line.stalled_since_s is None:
             line.stalled_since_s = self._now_s()
         elif n_lines > 1 and self._now_s() - line.stalled_since_s > LONGEST_STALL_S:

@@ -135,6 +135,7 @@ class Player:
     def __post_init__(self) -> None:
         self.progress = Progress(next(self.streams), self.clock.counter_start)
         self.has_lost_host = False
+        self.awaited = self.endpoint.awaited  # other threads may read it
         self._described_second = -1
         self._block_end = 0
         self._has_arrived = False
@@ -185,9 +186,10 @@ class Player:
             self.endpoint.close()
 
     def _await_start(self) -> None:
-        while not self.endpoint.is_started:
+        while (awaited := self.endpoint.awaited).n_missing > 0:
+            self.awaited = awaited
             self.sender.serve(STEP_S)
-        self._has_arrived = True
+        self._has_arrived, self.awaited = True, awaited
         self.laboratory.arrive()
         while not self.laboratory.has_begun:
             self.sender.serve(STEP_S)

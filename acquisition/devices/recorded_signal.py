@@ -19,6 +19,7 @@ from acquisition.devices.signal import Piece, Signal
 from acquisition.sources.interface import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
 from sloshlab.errors import InputError, RecordingError
 from sloshlab.file_structure import require_sound_structure
+from sloshlab.netcdf_lock import NETCDF_LOCK
 from sloshlab.recording import read_attributes
 from sloshlab.units import SI_UNITS, factor_to_si
 
@@ -114,7 +115,7 @@ def _read(
 ) -> tuple[tuple[Channel, ...], NDArray[np.int32], NDArray[np.bool_]]:
     import netCDF4
 
-    with netCDF4.Dataset(path, mode="r") as file:
+    with NETCDF_LOCK, netCDF4.Dataset(path, mode="r") as file:
         file.set_auto_maskandscale(False)
         there = [name for name, variable in file.variables.items() if _is_channel(name, variable)]
         chosen = list(names) if names is not None else there

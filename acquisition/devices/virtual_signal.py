@@ -8,27 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from acquisition.devices.signal import Piece, Signal
 from acquisition.sources.interface import Channel, SourceURL
+from acquisition.sources.simulated_source import EXPERIMENTS, MOST_SAMPLES, channel_of, counts_of, run_settings
 from acquisition.sources.urls import URLOptions
-from acquisition.virtual_laboratory.sensors import CHANNELS, FORCE_CELLS, LOST_COUNT, Laboratory, cell_forces
+from acquisition.virtual_laboratory.sensors import CHANNELS, FORCE_CELLS, Laboratory, cell_forces
 from acquisition.virtual_laboratory.shaker import SweepPlan
 from acquisition.virtual_laboratory.shaker_run import VirtualShaker, virtual_shaker, virtual_shaker_run
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
-
-MOST_SAMPLES: Final = 4_000_000
-"""Because the amplifier ranges follow from the whole run, it is made as a whole."""
-
-_EXPERIMENTS = ("shaker_sweep", "shaker_vfa")
 
 
 def virtual_signal(url: SourceURL, names: Sequence[str] | None = None) -> VirtualSignal:
@@ -48,19 +43,10 @@ def virtual_signal(url: SourceURL, names: Sequence[str] | None = None) -> Virtua
     """
     options = URLOptions(url)
     rig = options.text("rig")
-    settings: dict[str, Any] = {
-        "acceleration_g": options.number("acceleration_g", 3.0, lowest=0, highest=1e4),
-        "duration_s": options.number("duration_s", 240.0, lowest=0, highest=1e5),
-        "sampling_rate_hz": options.number("sampling_rate_hz", 512.0, lowest=1, highest=1e6),
-        "seed": options.integer("seed", 0, lowest=0, highest=2**31 - 1),
-        "direction": options.choice("direction", "up", ("up", "down")),
-        "law": options.choice("law", "octave", ("octave", "linear", "stepped")),
-        "configuration": options.choice("configuration", "sloshing", ("sloshing", "frozen", "empty")),
-        "imperfect": options.yes("imperfect", True),
-    }
+    settings = run_settings(options)
     options.refuse_others()
-    if url.target not in _EXPERIMENTS:
-        raise InputError(url.text, got=repr(url.target), allowed=", ".join(_EXPERIMENTS))
+    if url.target not in EXPERIMENTS:
+        raise InputError(url.text, got=repr(url.target), allowed=", ".join(EXPERIMENTS))
     if rig is None:
         raise InputError(f"{url.text}: rig", got="none", allowed="a rig description", remedy="add rig=RIG.toml")
     n_samples = settings["duration_s"] * settings["sampling_rate_hz"]
@@ -90,8 +76,8 @@ class VirtualSignal(Signal):
         if not self._names or set(self._names) - set(CHANNELS) or len(set(self._names)) < len(self._names):
             raise InputError("--channels", got=", ".join(self._names)[:200], allowed=", ".join(CHANNELS))
         self._rate_hz = float(settings["sampling_rate_hz"])
-        self._channels = tuple(_channel(name, run[name]) for name in self._names)
-        self._counts = np.stack([_counts(run[name]) for name in self._names], axis=1)
+        self._channels = tuple(channel_of(run[name]) for name in self._names)
+        self._counts = np.stack([counts_of(run[name]) for name in self._names], axis=1)
         ranges = {name: (run[name].attrs["range_max"], run[name].attrs["noise_std"]) for name in CHANNELS}
         self._truth = _Truth(rig, experiment, settings, ranges)
 
@@ -164,13 +150,3 @@ class _Truth:
         noise = noise_std * self._noise.standard_normal(truth.size) if self._is_noisy else 0.0
         offset = self._laboratory.offset_share[name] * half_scale
         return np.asarray(truth * self._laboratory.gain[name] + offset + noise)
-
-
-def _counts(channel: xr.DataArray) -> NDArray[np.int32]:
-    counts = np.rint(channel.values / channel.encoding["scale_factor"])
-    return np.where(np.isnan(counts), LOST_COUNT, counts).astype(np.int32)
-
-
-def _channel(name: str, channel: xr.DataArray) -> Channel:
-    scale = channel.encoding["scale_factor"]
-    return Channel(name, bits=16, scale_factor=scale, missing_count=LOST_COUNT, **channel.attrs)

@@ -51,7 +51,7 @@ class RecorderSettings:
     silence_limit_s : float
         With a duration: the recording ends when no source has brought anything for so long.
     longest_s : float or None
-        The recording ends when a device has sampled so much [s], see `longest_duration_s`.
+        The recording ends when a device has sampled for so long, silences included [s], see `longest_duration_s`.
     bytes_per_source : int
         Held in memory at most, per source, between reading and writing.
     """
@@ -275,7 +275,7 @@ class Recorder:
         settings = self._settings
         if settings.duration_s is not None and self._has_recorded(settings.duration_s, running):
             return StopReason.DURATION
-        if settings.longest_s is not None and max(record.recorded_s for record in running) >= settings.longest_s:
+        if settings.longest_s is not None and max(record.length_s for record in running) >= settings.longest_s:
             return StopReason.TOO_LONG
         quiet_s = min(record.quiet_s for record in running)
         is_over = settings.duration_s is not None and quiet_s > settings.silence_limit_s

@@ -16,8 +16,8 @@ from acquisition.recorder.placement import SourcePlacement
 from acquisition.recorder.survey import SourceSurvey
 from acquisition.sources.interface import SourceInfo
 from sloshlab.conditioning.device_clock import ClockStatus
+from sloshlab.conditioning.redundancy import PHASE_ERROR_AT_HZ
 from sloshlab.conditioning.time_alignment import (
-    PHASE_ERROR_AT_HZ,
     AlignmentStatus,
     ClockDelay,
     SampledSignal,

@@ -36,6 +36,7 @@ class SourceRecord:
         self.error: str | None = None
         self.is_finished = False
         self._last_block_ns = monotonic_ns()
+        self._first_block_ns: int | None = None
         self._has_ended = self._is_silent = False
         self._is_disconnected = False
         self._n_told: dict[TroubleKind, int] = {}
@@ -44,6 +45,8 @@ class SourceRecord:
         """Take one delivery into account; what a person must see at once is returned."""
         if isinstance(delivery, Block):
             self._last_block_ns = self._monotonic_ns()
+            if self._first_block_ns is None:
+                self._first_block_ns = self._last_block_ns
             self._has_ended = self._is_silent = self._is_disconnected = False
             self.meters.arrived(delivery)
             return None
@@ -71,6 +74,17 @@ class SourceRecord:
     def recorded_s(self) -> float:
         """What the device has sampled since its first sample, lost ones included [s]."""
         return self.meters.n_spanned / self.info.sampling_rate_hz
+
+    @property
+    def length_s(self) -> float:
+        """How much of a recording the device will fill [s].
+
+        Its samples, or the time since the first of them if that is longer: if it starts anew after a silence,
+        the silence will be a gap of that length.
+        """
+        if self._first_block_ns is None:
+            return 0.0
+        return max(self.recorded_s, (self._monotonic_ns() - self._first_block_ns) * 1e-9)
 
     @property
     def state(self) -> SourceState:

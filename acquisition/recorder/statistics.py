@@ -62,7 +62,7 @@ class ChannelMeters:
 
     def __init__(self, channels: Sequence[Channel]) -> None:
         self._channels = tuple(channels)
-        limits = [clipping_counts(channel) for channel in channels]
+        limits = [extreme_counts(channel) for channel in channels]
         self._lowest = np.array([low for low, _ in limits], np.int64)
         self._highest = np.array([high for _, high in limits], np.int64)
         self._scale = np.array([channel.scale_factor for channel in channels])
@@ -144,14 +144,15 @@ class ChannelMeters:
         self._begin_window(now_ns)
 
 
-def clipping_counts(channel: Channel) -> tuple[int, int]:
-    """Lowest and highest count of a channel; at or beyond them it is clipped.
+def extreme_counts(channel: Channel) -> tuple[int, int]:
+    """Lowest and highest count at or beyond which the live view says "clipped".
 
-    A range narrower than the counts is rounded to the nearest count, as a converter does.
+    The ends of the stated range, rounded to the nearest count as a converter does, or of the counts themselves:
+    a person at the rig should know of both. The recording flags stated ranges only, see `survey.clipping_counts`.
 
     Examples
     --------
-    >>> clipping_counts(Channel("force_cell_1", "force", "N", scale_factor=0.01, range_min=-20.0, range_max=20.0))
+    >>> extreme_counts(Channel("force_cell_1", "force", "N", scale_factor=0.01, range_min=-20.0, range_max=20.0))
     (-2000, 2000)
     """
     lowest, highest = -(1 << channel.bits - 1), (1 << channel.bits - 1) - 1

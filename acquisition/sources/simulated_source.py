@@ -15,6 +15,7 @@ import xarray as xr
 
 from acquisition.sources.interface import Channel, CountArray, SourceInfo, SourceURL
 from acquisition.sources.playback import PlayedSource
+from acquisition.sources.urls import URLOptions
 from acquisition.virtual_laboratory.sensors import CHANNELS, LOST_COUNT
 from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run
 from sloshlab.errors import InputError, SourceError
@@ -23,7 +24,8 @@ from sloshlab.rig import Rig
 MOST_SAMPLES: Final = 4_000_000
 """Two hours at 512 Hz."""
 
-_EXPERIMENTS = ("shaker_sweep", "shaker_vfa")
+EXPERIMENTS: Final = ("shaker_sweep", "shaker_vfa")
+"""What the virtual shaker can do."""
 
 
 class SimulatedSource(PlayedSource):
@@ -43,8 +45,8 @@ class SimulatedSource(PlayedSource):
 
     def __init__(self, url: SourceURL, **clocks: Any) -> None:
         super().__init__(url, device="virtual_shaker", real_time=True, **clocks)
-        if url.target not in _EXPERIMENTS:
-            raise SourceError(f"source {url.text}", got=repr(url.target), allowed=", ".join(_EXPERIMENTS))
+        if url.target not in EXPERIMENTS:
+            raise SourceError(f"source {url.text}", got=repr(url.target), allowed=", ".join(EXPERIMENTS))
         self._rig = self._options.text("rig")
         self._settings = {"experiment": url.target, **self._read_settings()}
         self._options.refuse_others()
@@ -67,8 +69,8 @@ class SimulatedSource(PlayedSource):
             raise SourceError(
                 f"source {self.url}: {error.what}", got=error.got, allowed=error.allowed, remedy=error.remedy
             ) from error
-        self._table = np.stack([_counts_of(run[name]) for name in CHANNELS], axis=1)
-        channels = tuple(_channel(name, run[name]) for name in CHANNELS)
+        self._table = np.stack([counts_of(run[name]) for name in CHANNELS], axis=1)
+        channels = tuple(channel_of(run[name]) for name in CHANNELS)
         rate_hz = self._settings["sampling_rate_hz"]
         self._info = SourceInfo(self._device, self.url, rate_hz, channels, (tuple(range(len(channels))),))
 
@@ -84,20 +86,11 @@ class SimulatedSource(PlayedSource):
         return self._table[start:stop].copy()
 
     def _read_settings(self) -> dict[str, Any]:
-        """Settings of the run; limits that the virtual laboratory knows better are left to it."""
         options = self._options
-        return {
-            "acceleration_g": options.number("acceleration_g", 3.0, lowest=0, highest=1e4),
-            "duration_s": options.number("duration_s", 240.0, lowest=0, highest=1e5),
-            "sampling_rate_hz": options.number("sampling_rate_hz", 512.0, lowest=1, highest=1e6),
+        return run_settings(options) | {
             "start_hz": options.number("start_hz", 5.0, lowest=0, highest=1e4),
             "stop_hz": options.number("stop_hz", 20.0, lowest=0, highest=1e4),
             "n_steps": options.integer("n_steps", 24, lowest=2, highest=1000),
-            "seed": options.integer("seed", 0, lowest=0, highest=2**31 - 1),
-            "direction": options.choice("direction", "up", ("up", "down")),
-            "law": options.choice("law", "octave", ("octave", "linear", "stepped")),
-            "configuration": options.choice("configuration", "sloshing", ("sloshing", "frozen", "empty")),
-            "imperfect": options.yes("imperfect", True),
         }
 
     def _check_length(self) -> None:
@@ -111,13 +104,27 @@ class SimulatedSource(PlayedSource):
             )
 
 
-def _counts_of(channel: xr.DataArray) -> CountArray:
-    """Counts behind the values; the division is exact to far less than half a count."""
+def run_settings(options: URLOptions) -> dict[str, Any]:
+    """Settings of a run by a URL; limits that the virtual laboratory knows better are left to it."""
+    return {
+        "acceleration_g": options.number("acceleration_g", 3.0, lowest=0, highest=1e4),
+        "duration_s": options.number("duration_s", 240.0, lowest=0, highest=1e5),
+        "sampling_rate_hz": options.number("sampling_rate_hz", 512.0, lowest=1, highest=1e6),
+        "seed": options.integer("seed", 0, lowest=0, highest=2**31 - 1),
+        "direction": options.choice("direction", "up", ("up", "down")),
+        "law": options.choice("law", "octave", ("octave", "linear", "stepped")),
+        "configuration": options.choice("configuration", "sloshing", ("sloshing", "frozen", "empty")),
+        "imperfect": options.yes("imperfect", True),
+    }
+
+
+def counts_of(channel: xr.DataArray) -> CountArray:
+    """Counts behind the values of a virtual sensor; the division is exact to far less than half a count."""
     counts = np.rint(channel.values / channel.encoding["scale_factor"])
     return np.where(np.isnan(counts), LOST_COUNT, counts).astype(np.int32)
 
 
-def _channel(name: str, channel: xr.DataArray) -> Channel:
-    return Channel(
-        name, bits=16, scale_factor=channel.encoding["scale_factor"], missing_count=LOST_COUNT, **channel.attrs
-    )
+def channel_of(channel: xr.DataArray) -> Channel:
+    """What the counts of a virtual sensor mean."""
+    scale = channel.encoding["scale_factor"]
+    return Channel(str(channel.name), bits=16, scale_factor=scale, missing_count=LOST_COUNT, **channel.attrs)

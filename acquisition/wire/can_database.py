@@ -242,6 +242,7 @@ class _DatabaseReader:
         return self._checked(layout)
 
     def _checked(self, layout: CanLayout) -> CanLayout:
+        self._check_identifiers(layout)
         try:
             _require_possible(layout)
         except SourceError as error:
@@ -250,6 +251,18 @@ class _DatabaseReader:
                 f"{self._name}: {what}", got=error.got, allowed=error.allowed, remedy=_REMEDY
             ) from error
         return layout
+
+    def _check_identifiers(self, layout: CanLayout) -> None:
+        """A frame must not be taken apart by two descriptions."""
+        messages: list[SampleMessage | ControlMessage] = list(layout.messages)
+        messages += [one for one in (layout.status, layout.command) if one is not None]
+        names: dict[tuple[int, bool], str] = {}
+        for message in messages:
+            key = message.arbitration_id, message.extended
+            if key in names:
+                got = f"{message.arbitration_id:#x} of {names[key]} and {message.name}"
+                self._refuse("identifiers", got, "each once")
+            names[key] = message.name
 
     def _refuse(self, what: str, got: str, allowed: str) -> NoReturn:
         raise SourceError(f"{self._name}: {what}", got=got, allowed=allowed, remedy=_REMEDY)

@@ -20,7 +20,6 @@ from sloshlab.recording import channels
 PHASE_ERROR_AT_HZ = 20.0
 """Delays are also stated as phase at this frequency, the upper end of the source's sweeps."""
 
-
 _SMALLEST_COMMON_SHARE = 0.3
 """Sensors that have less than this in common move apart, not against each other: one may be silent."""
 

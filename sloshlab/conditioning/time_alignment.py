@@ -11,19 +11,17 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sloshlab.conditioning.gaps import runs
+from sloshlab.conditioning.redundancy import PHASE_ERROR_AT_HZ
 from sloshlab.conditioning.resampling import resampled
 from sloshlab.errors import AnalysisError
 
 FloatArray = npt.NDArray[np.float64]
-
-PHASE_ERROR_AT_HZ: Final = 20.0
-"""Alignment errors are also stated as phase at this frequency, the upper end of the source's sweeps."""
 
 _HIGHEST_FREQUENCY_HZ = 150.0
 _LOWEST_FREQUENCY_HZ = 1.0

@@ -25,18 +25,20 @@ HEADER = struct.Struct("<BBHIQHHBBH")
 
 
 @contextlib.contextmanager
-def playing(source, *urls, speed="max", **settings):
+def playing(source, *urls, speed="max", remind=None, **settings):
     """Devices in a thread; yields their URLs and the summary, which fills when they have ended."""
     lines, summary, errors = Queue(), {}, []
 
     def run():
         try:
-            summary.update(replay(ReplaySettings(str(source), urls, speed=speed, **settings), announce=lines.put))
+            asked = ReplaySettings(str(source), urls, speed=speed, **settings)
+            summary.update(replay(asked, announce=lines.put, remind=remind))
         except BaseException as error:  # noqa: BLE001 - raised in the test
             errors.append(error)
             lines.put("failed")
 
-    thread = threading.Thread(target=run)
+    # a device that waits in vain fails its test; it must not keep the tests from ending
+    thread = threading.Thread(target=run, daemon=True)
     thread.start()
     ready = []
     try:

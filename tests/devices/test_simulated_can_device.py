@@ -1,6 +1,7 @@
 """The simulated CAN device, read by python-can's own clients and cantools."""
 
 import socket
+from queue import Queue
 
 import can
 import numpy as np
@@ -80,6 +81,20 @@ def test_the_device_waits_for_as_many_clients_as_told_and_serves_them_all(record
             first.shutdown()
     assert len(heard.counts_by_counter()) == 1460
     assert heard.counts_by_counter() == other.counts_by_counter()
+
+
+def test_what_a_device_waits_for_is_said_and_it_waits_on(recording, tmp_path, monkeypatch):
+    monkeypatch.setattr("pipelines.replay._PATIENCE_S", 0.0)
+    reminded = Queue()
+    url = f"{address('socketcand', tmp_path)}&device=adapter"
+    with playing(recording[0], url, wait_clients=2, remind=reminded.put) as (ready, _):
+        first = opened_bus(ready[0])
+        try:
+            assert reminded.get(timeout=30) == "waiting: adapter for 1 of 2 hosts; Ctrl-C ends"
+            assert listen_can(ready[0]).ends
+        finally:
+            first.shutdown()
+    assert reminded.empty()
 
 
 def test_a_hostile_client_of_the_socketcand_server_does_no_harm(recording, tmp_path):

@@ -3,6 +3,7 @@
 import os
 import socket
 import time
+from queue import Queue
 
 import numpy as np
 import pytest
@@ -146,6 +147,19 @@ def test_two_devices_begin_together(tmp_path):
     assert len(heard.counts_by_counter()) == 100
 
 
+def test_who_starts_one_of_two_devices_is_told_of_the_other(tmp_path, monkeypatch):
+    monkeypatch.setattr("pipelines.replay._PATIENCE_S", 0.0)
+    reminded = Queue()
+    urls = [f"serial:{tmp_path / 'one'}?device=one", "serial:socket://127.0.0.1:0?device=two"]
+    pattern = "pattern:channels=1&sampling_rate_hz=100&duration_s=1"
+    with playing(pattern, *urls, remind=reminded.put) as (ready, _), open_port(ready[0]) as port:
+        port.write(command(START))
+        assert reminded.get(timeout=30) == "waiting: two for 1 of 1 hosts; Ctrl-C ends"
+        assert listen_serial(ready[1]).ends
+        port.write(command(STOP))
+    assert reminded.empty()
+
+
 def test_the_terminal_is_raw_and_leaves_nothing_behind(recording, tmp_path):
     # far more than a terminal buffers, so that the device is not done when the first host goes
     pattern = "pattern:channels=3&sampling_rate_hz=500&bits=16&duration_s=400"
@@ -228,6 +242,9 @@ def test_many_connections_do_no_harm(recording):
         ({"channels": ["a", "b"]}, "--channels"),
         ({"channels": ["force_cell_9"]}, "force_cell_9"),
         ({"loop_duration_s": -1.0}, "--loop-duration"),
+        ({"wait_clients": 0}, "--wait-clients"),
+        ({"wait_clients": 2}, "--wait-clients.*socketcand"),
+        ({"wait_clients": 9}, "--wait-clients.* 1 … 8"),
     ],
 )
 def test_wrong_settings_are_refused_in_one_line(recording, tmp_path, settings, message):

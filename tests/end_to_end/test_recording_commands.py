@@ -411,8 +411,22 @@ def test_a_journal_cannot_be_aligned_by_anything(options: list[str], lab: Path, 
     refusal(capsys, ["recover", str(lab / "old.journal"), "-o", str(lab / "new.nc"), *options], lab, options[0])
 
 
-def test_no_journal_to_recover(lab: Path, capsys) -> None:
-    refusal(capsys, ["recover", str(lab / "none.journal"), "-o", str(lab / "new.nc")], lab, "none.journal")
+@pytest.mark.parametrize("options", [[], ["--overwrite"]], ids=" ".join)
+def test_no_journal_to_recover(options: list[str], bench: Path, lab: Path, capsys) -> None:
+    if options:
+        shutil.copy(bench / "run.nc", lab / "new.nc")
+    arguments = ["recover", str(lab / "none.journal"), "-o", str(lab / "new.nc"), *options]
+    refusal(capsys, arguments, lab, "none.journal", "no such file", "a journal of sloshlab record")
+
+
+@pytest.mark.parametrize(
+    ("name", "fragment"), [("folder", "a folder in the way"), ("file/new.nc", "cannot be written")]
+)
+def test_a_recovered_recording_needs_a_place(name: str, fragment: str, lab: Path, capsys) -> None:
+    (lab / "folder").mkdir()
+    (lab / "file").touch()
+    arguments = ["recover", str(lab / "old.journal"), "-o", str(lab / name), "--overwrite"]
+    refusal(capsys, arguments, lab, fragment)
 
 
 REFUSED_DEVICES = {

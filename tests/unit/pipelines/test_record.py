@@ -273,19 +273,20 @@ def test_a_duration_that_no_reader_takes_is_refused_before_a_device_starts(place
 
 
 def test_a_recording_ends_before_no_reader_takes_it(place: Path, monkeypatch) -> None:
-    """A device without an end, and room for 300 samples of time and quality and two channels."""
-    monkeypatch.setattr("acquisition.recorder.longest_recording.MAXIMUM_DECODED_BYTES", int(300 * 4 * 8 / 0.98))
+    """A device without an end, and room for 30 s: 30 000 samples of time and quality and two channels."""
+    room = int(30_000 * 4 * 8 / 0.98)
+    monkeypatch.setattr("acquisition.recorder.longest_recording.MAXIMUM_DECODED_BYTES", room)
 
     def endless() -> Iterator[list[Block]]:
         for k in range(10**9):
-            yield [block(10 * k)]
+            yield [block(1000 * k, 1000)]
             time.sleep(0.001)
 
     summary = record(settings_for(place), open_source=opening(FakeSource("fake:a", endless())))
     assert summary["reason"] == "too_long"
     assert any("could not be read" in flag for flag in summary["flags"])
     n_samples = summary["report"]["n_samples"]
-    assert n_samples >= 300
+    assert n_samples >= 30_000
     assert np.array_equal(stored_counts(place / "run.nc"), true_counts(0, n_samples))
 
 

@@ -206,6 +206,24 @@ def test_errors_at_start_and_close_are_told(tmp_path: Path) -> None:
     assert_continuous(path, 10, 1)
 
 
+def test_a_silence_counts_towards_the_longest_recording(tmp_path: Path) -> None:
+    """A device that came back would leave a gap of this length, in a recording that nothing could read."""
+    source = FakeSource([[block(0)]])
+    outcome = made(tmp_path / "run.journal", [source], RecorderSettings(longest_s=0.5)).run()
+    assert outcome.reason is StopReason.TOO_LONG
+    assert outcome.status.sources[0].n_samples == 10
+
+
+def test_waiting_for_the_first_sample_does_not_count(tmp_path: Path) -> None:
+    began = time.monotonic()
+
+    def late() -> list:
+        return [block(0), End(1, 10)] if time.monotonic() - began > 1.0 else []
+
+    source = FakeSource(itertools.repeat(late))
+    assert made(tmp_path / "run.journal", [source], RecorderSettings(longest_s=0.5)).run().reason is StopReason.END
+
+
 def test_nothing_left_to_read_ends_the_recording(tmp_path: Path) -> None:
     path = tmp_path / "run.journal"
     outcome = made(path, [FakeSource([[block(0)], SourceError("gone")])]).run()

@@ -12,7 +12,7 @@ from acquisition.recorder.statistics import (
     DriftMeter,
     LossMeter,
     SourceMeters,
-    clipping_counts,
+    extreme_counts,
 )
 from acquisition.sources.interface import Block, Channel, SourceInfo, Trouble, TroubleKind
 
@@ -75,7 +75,7 @@ def test_a_window_forgets_what_was_before() -> None:
     ],
 )
 def test_counts_at_which_a_channel_clips(channel: Channel, ends: tuple[int, int]) -> None:
-    assert clipping_counts(channel) == ends
+    assert extreme_counts(channel) == ends
 
 
 def test_clipped_and_missing_samples_are_counted_apart() -> None:

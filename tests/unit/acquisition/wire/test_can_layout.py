@@ -151,6 +151,10 @@ BREACHES = {
         replaced("n_samples : 32|32", "n_samples : 32|31"),
         "device_status.n_samples: got 31 bits; allowed: 32 … 62 bits, all of the sample counter",
     ),
+    "two messages of one identifier": (
+        replaced("BO_ 256 ", "BO_ 257 "),
+        "identifiers: got 0x101 of samples_0 and device_status; allowed: each once",
+    ),
     "clock too long": (LONG_CLOCK, "m.device_clock: got 64 bits; allowed: ≤ 62"),
 }
 

@@ -157,6 +157,16 @@ def test_troubles_are_counted_by_kind() -> None:
     assert int((counts == -1).sum()) == 2
 
 
+@pytest.mark.parametrize("n", [5, 300])
+def test_frames_that_come_twice_are_counted_to_the_last(n: int) -> None:
+    described = layout()
+    frames = [one for one in stream_of(described, 0, n) for _ in range(1 + (one[0] != STATUS_ID))]
+    receiver = CanReceiver(described)
+    found = receiver.take(batch_of(frames), 0, 0) + receiver.finish(1)
+    np.testing.assert_array_equal(samples(described, found, 0, n), counts_of(n))
+    assert receiver.n_repeated == 2 * n
+
+
 def test_device_that_lost_data_says_so() -> None:
     described = layout()
     lossy = encode_samples(described, 0, np.arange(16), counts_of(16), device_flags=1)
