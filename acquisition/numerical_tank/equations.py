@@ -31,34 +31,37 @@ FAST = {"contract", "arcp", "nsz"}
 
 
 @njit(cache=True, fastmath=FAST)
-def measure_pairs(particles: Particles, pairs: Pairs, constants: Constants) -> None:
-    """Find the pairs in reach and their kernel factors."""
-    x, z = particles.x, particles.z
-    one = constants.one
+def _measure_range(particles, pairs, constants, i, first, last, near):  # type: ignore[no-untyped-def]
+    """Keep those of candidates first … last − 1 of particle i that are in reach; return the new number."""
+    one, gradient, viscous = constants.one, constants.gradient, constants.viscous
     square = constants.support * constants.support
     per_support = one / constants.support
     soft = constants.smoothing * constants.smoothing * constants.softening
-    near = 0
+    x, z = particles.x[i], particles.z[i]
+    for k in range(first, last):
+        j = np.uintp(pairs.j[k])
+        rx, rz = x - particles.x[j], z - particles.z[j]
+        r2 = rx * rx + rz * rz
+        if r2 < square:
+            t = one - np.sqrt(r2) * per_support
+            factor = gradient * t * t * t
+            pairs.near_j[near] = pairs.j[k]
+            pairs.rx[near], pairs.rz[near], pairs.f[near] = rx, rz, factor
+            pairs.viscous[near] = viscous * factor / (r2 + soft)
+            near += np.uintp(1)
+    return near
+
+
+@njit(cache=True, fastmath=FAST)
+def measure_pairs(particles: Particles, pairs: Pairs, constants: Constants) -> None:
+    """Find the pairs in reach and their kernel factors."""
+    near = np.uintp(0)
     for i in range(constants.n):
+        first, middle, last = np.uintp(pairs.start[i]), np.uintp(pairs.middle[i]), np.uintp(pairs.start[i + 1])
         pairs.near_start[i] = near
+        near = _measure_range(particles, pairs, constants, i, first, middle, near)
         pairs.near_middle[i] = near
-        xi, zi = x[i], z[i]
-        middle = pairs.middle[i]
-        for k in range(pairs.start[i], pairs.start[i + 1]):
-            if k == middle:
-                pairs.near_middle[i] = near
-            j = pairs.j[k]
-            dx, dz = xi - x[j], zi - z[j]
-            r2 = dx * dx + dz * dz
-            if r2 < square:
-                t = one - np.sqrt(r2) * per_support
-                factor = constants.gradient * t * t * t
-                pairs.near_j[near] = j
-                pairs.rx[near], pairs.rz[near], pairs.f[near] = dx, dz, factor
-                pairs.viscous[near] = constants.viscous * factor / (r2 + soft)
-                near += 1
-        if middle == pairs.start[i + 1]:
-            pairs.near_middle[i] = near
+        near = _measure_range(particles, pairs, constants, i, middle, last, near)
     pairs.near_start[constants.n] = near
 
 
@@ -71,13 +74,13 @@ def rate_of_density(particles: Particles, pairs: Pairs, constants: Constants) ->
         ds[i] = zero
     for i in range(constants.n):
         vxi, vzi, own = vx[i], vz[i], zero
-        for k in range(pairs.near_start[i], pairs.near_middle[i]):
-            j = pairs.near_j[k]
+        for k in range(np.uintp(pairs.near_start[i]), np.uintp(pairs.near_middle[i])):
+            j = np.uintp(pairs.near_j[k])
             rate = pairs.f[k] * ((vxi - vx[j]) * pairs.rx[k] + (vzi - vz[j]) * pairs.rz[k])
             own += rate
             ds[j] += rate
-        for k in range(pairs.near_middle[i], pairs.near_start[i + 1]):
-            j = pairs.near_j[k]
+        for k in range(np.uintp(pairs.near_middle[i]), np.uintp(pairs.near_start[i + 1])):
+            j = np.uintp(pairs.near_j[k])
             own += pairs.f[k] * ((vxi - vx[j]) * pairs.rx[k] + (vzi - vz[j]) * pairs.rz[k])
         ds[i] += own
 
@@ -100,8 +103,8 @@ def _sum_over_partners(particles, pairs, constants, i, first, last):  # type: ig
     zero = constants.one - constants.one
     power, sum_ax, sum_az, sum_gx, sum_gz, sum_diffusion = zero, zero, zero, zero, zero, zero
     si, vxi, vzi, gxi, gzi = s[i], vx[i], vz[i], gx[i], gz[i]
-    for k in range(first, last):
-        j = pairs.near_j[k]
+    for k in range(np.uintp(first), np.uintp(last)):
+        j = np.uintp(pairs.near_j[k])
         rx, rz, f = pairs.rx[k], pairs.rz[k], pairs.f[k]
         closing = (vxi - vx[j]) * rx + (vzi - vz[j]) * rz
         drag = pairs.viscous[k] * closing

@@ -41,11 +41,11 @@ def _sort_into_cells(particles, first, last, cell, n_x, n_z):  # type: ignore[no
 def _list_range(particles, pairs, order, first, last, i, square, count):  # type: ignore[no-untyped-def]
     """List particle i with those in slots first … last − 1 that are close enough; return the new count."""
     x, z = particles.x[i], particles.z[i]
-    for k in range(first, last):
-        j = order[k]
+    for k in range(np.uintp(first), np.uintp(last)):
+        j = np.uintp(order[k])
         dx, dz = x - particles.x[j], z - particles.z[j]
         if dx * dx + dz * dz < square:
-            pairs.j[count] = j
+            pairs.j[count] = order[k]
             count += 1
     return count
 

@@ -67,8 +67,8 @@ def sum_arrangement(particles: Particles, pairs: Pairs, constants: Constants, n_
     bxx, bxz, bzz = particles.bxx, particles.bxz, particles.bzz
     one, two = constants.one, constants.two
     for i in range(constants.n):
-        for k in range(pairs.near_start[i], pairs.near_start[i + 1]):
-            j = pairs.near_j[k]
+        for k in range(np.uintp(pairs.near_start[i]), np.uintp(pairs.near_start[i + 1])):
+            j = np.uintp(pairs.near_j[k])
             rx, rz, f = pairs.rx[k], pairs.rz[k], pairs.f[k]
             q = np.sqrt(rx * rx + rz * rz) / constants.smoothing
             t = one - constants.half * q
@@ -177,8 +177,8 @@ def correct_density(particles: Particles, pairs: Pairs, constants: Constants, sp
     for i in range(error.size):
         error_sum[i] = constants.peak * error[i]
     for i in range(constants.n):
-        for k in range(pairs.near_start[i], pairs.near_start[i + 1]):
-            j = pairs.near_j[k]
+        for k in range(np.uintp(pairs.near_start[i]), np.uintp(pairs.near_start[i + 1])):
+            j = np.uintp(pairs.near_j[k])
             error_sum[i] += pairs.viscous[k] * error[j]
             error_sum[j] += pairs.viscous[k] * error[i]
     lost = 0.0
