@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 RESULTS := results
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker replay campaign test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -29,6 +29,12 @@ replay: setup  ## every recording of raw_data through simulated serial and CAN d
 
 campaign: setup  ## make the recordings of raw_data again
 	$(BIN)/sloshlab virtual campaign -o raw_data/shaker
+
+tank-campaign: setup  ## compute the recordings of raw_data/numerical_tank again (hours; goes on where it was stopped)
+	$(BIN)/sloshlab virtual campaign --liquid numerical -o raw_data/numerical_tank
+
+pictures: setup  ## the snapshots and the film of the numerical tank in docs/images again (minutes)
+	$(BIN)/python -m pipelines.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml
 
 test: setup  ## the tests, at most 10 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"

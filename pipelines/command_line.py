@@ -158,27 +158,70 @@ def check(runs: Recordings, as_json: Json = False) -> None:
 @app.command()
 def virtual(
     experiment: Annotated[
-        str, typer.Argument(help="shaker_sweep, shaker_vfa, or campaign for the whole of raw_data/shaker.")
+        str,
+        typer.Argument(
+            help="shaker_sweep, shaker_vfa, sudden_start, beam_free, beam_random, sdof_free, "
+            "or campaign for a whole folder of raw_data."
+        ),
     ],
     output: OutputFile,
-    rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig to shake.")] = None,
+    rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig of the experiment.")] = None,
     configuration: Annotated[str, typer.Option(help="sloshing, frozen or empty.")] = "sloshing",
     acceleration_g: Annotated[float, typer.Option(help="Level of the sweep in g.")] = 3.0,
     direction: Annotated[str, typer.Option(help="up or down.")] = "up",
     law: Annotated[str, typer.Option(help="octave, linear or stepped.")] = "octave",
-    duration_s: Annotated[float, typer.Option(help="Duration in seconds.")] = 240.0,
-    sampling_rate_hz: Annotated[float, typer.Option(help="Sampling rate in Hz.")] = 512.0,
+    frequency_hz: Annotated[float, typer.Option(help="Of a sudden start, in Hz.")] = 11.4,
+    initial_displacement_m: Annotated[
+        float | None, typer.Option(help="Deflection from which a free run starts, in m.", show_default=False)
+    ] = None,
+    rms_g: Annotated[float, typer.Option(help="Of the random motion of the root, in g.")] = 0.2,
+    duration_s: Annotated[
+        float | None, typer.Option(help="Duration in seconds; on the shaker 240.", show_default=False)
+    ] = None,
+    sampling_rate_hz: Annotated[
+        float | None, typer.Option(help="Sampling rate in Hz; on the shaker 512.", show_default=False)
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    liquid: Annotated[str, typer.Option(help="law, or numerical: computed, takes long.")] = "law",
+    layers: Annotated[int, typer.Option(help="Layers of particles over the height of the tank.")] = 16,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where a computation is saved; by default beside the recording."),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="Processes of a computed campaign.")] = 2,
+    only: Annotated[
+        str, typer.Option(metavar="PATTERN", help="Runs of a computed campaign, as a pattern of file names.")
+    ] = "*",
+    checkpoints: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Where a computed campaign is saved; by default within the output."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """A run of the virtual laboratory."""
-    from pipelines.virtual import VirtualRun, make_campaign_folder, make_virtual_run
+    from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
+    from pipelines import virtual as laboratory
 
     if experiment == "campaign":
-        _finish(make_campaign_folder(output, seed=seed), as_json)
+        computed = CampaignSettings(seed, layers, workers, only, checkpoints)
+        _finish(laboratory.make_campaign_folder(output, liquid, computed, typer.echo), as_json)
         return
-    run = VirtualRun(experiment, configuration, acceleration_g, direction, law, duration_s, sampling_rate_hz, seed)
-    _finish(make_virtual_run(run, rig, output), as_json)
+    run = laboratory.VirtualRun(
+        experiment=experiment,
+        configuration=configuration,
+        seed=seed,
+        liquid=liquid,
+        layers=layers,
+        acceleration_g=acceleration_g,
+        direction=direction,
+        law=law,
+        frequency_hz=frequency_hz,
+        duration_s=duration_s,
+        sampling_rate_hz=sampling_rate_hz,
+        initial_displacement_m=initial_displacement_m,
+        rms_g=rms_g,
+    )
+    _finish(laboratory.make_virtual_run(run, rig, output, checkpoint), as_json)
 
 
 @app.command()

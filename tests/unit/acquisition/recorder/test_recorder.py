@@ -14,24 +14,13 @@ import pytest
 from fake_source import FakeSource, block, counts_of, endless, info
 
 from acquisition.recorder import recorder as recorder_module
-from acquisition.recorder.block_joining import BlockJoiner
-from acquisition.recorder.delivery_queue import Delivered, DeliveryQueue, Finished
 from acquisition.recorder.journal import JournalWriter, read_journal
-from acquisition.recorder.reader_thread import ReaderThread
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
 from acquisition.recorder.status import Event, RecorderStatus, SourceState, StopReason
 from acquisition.sources.interface import Block, End, Trouble, TroubleKind
 from sloshlab.errors import SourceError
 
 PATIENCE_S = 60.0
-
-
-@pytest.fixture(autouse=True)
-def _no_thread_is_left() -> Iterator[None]:
-    before = set(threading.enumerate())
-    yield
-    left = [thread for thread in threading.enumerate() if thread not in before]
-    assert left == []
 
 
 class Watching:
@@ -487,130 +476,3 @@ def test_status_says_what_is_left(tmp_path: Path) -> None:
     assert seen[0].remaining_s == pytest.approx(0.75)
     assert seen[0].sources[0].state is SourceState.RUNNING
     assert seen[0].n_bytes_written > 0
-
-
-class Written:
-    """Stands for the journal."""
-
-    def __init__(self) -> None:
-        self.order: list[tuple] = []
-
-    def append_blocks(self, source: int, blocks: list[Block], /) -> None:
-        self.order.append((source, blocks[0].group, [one.counter for one in blocks]))
-
-    def append(self, source: int, delivery, /) -> None:
-        self.order.append((source, delivery))
-
-
-def test_blocks_are_joined_until_a_gap_or_a_quarter_of_a_second() -> None:
-    written, now = Written(), [0]
-    joiner = BlockJoiner(written, lambda: now[0], lambda source, blocks: None)
-    for counter in (0, 10, 20, 35):
-        joiner.add(0, block(counter))
-    assert written.order == [(0, 0, [0, 10, 20])]
-    joiner.add(0, block(45, stream=2))
-    assert written.order[1:] == [(0, 0, [35])]
-    now[0] = 249_999_999
-    joiner.write_due()
-    assert len(written.order) == 2
-    now[0] = 250_000_000
-    joiner.write_due()
-    assert written.order[2:] == [(0, 0, [45])]
-    joiner.add(0, block(55, stream=2))
-    joiner.add(1, block(7))
-    joiner.add(0, End(2, 65))
-    assert written.order[3:] == [(0, 0, [55]), (0, End(2, 65))]
-    joiner.write_all()
-    assert written.order[5:] == [(1, 0, [7])]
-
-
-def test_joining_is_bounded_by_bytes() -> None:
-    written = Written()
-    joiner = BlockJoiner(written, lambda: 0, lambda source, blocks: None)
-    for k in range(9):
-        joiner.add(0, block(k * 20_000, 20_000))
-    # 160 kB each: the seventh makes a MiB full
-    assert [len(counters) for _, _, counters in written.order] == [7]
-
-
-def test_a_flood_of_troubles_is_summed() -> None:
-    written, now = Written(), [0]
-    joiner = BlockJoiner(written, lambda: now[0], lambda source, blocks: None)
-    for number in range(1000):
-        joiner.add(0, Trouble(TroubleKind.GARBAGE, f"{number}", 3, number))
-    joiner.add(0, Trouble(TroubleKind.OVERRUN, "o", 1, 5))
-    now[0] = 250_000_000
-    joiner.write_due()
-    assert written.order == [
-        (0, Trouble(TroubleKind.GARBAGE, "0", 3000, 0)),
-        (0, Trouble(TroubleKind.OVERRUN, "o", 1, 5)),
-    ]
-
-
-def test_a_full_queue_makes_only_its_own_source_wait() -> None:
-    queue = DeliveryQueue(2, bytes_per_source=10_000)
-    assert queue.put(0, [block(0, 2000)])
-    assert queue.fill(0) == 1.0
-    passed = threading.Event()
-
-    def put_more() -> None:
-        assert queue.put(0, [block(2000, 2000)])
-        passed.set()
-
-    helper = threading.Thread(target=put_more)
-    helper.start()
-    assert queue.put(1, [block(0)])
-    assert not passed.wait(0.1)
-    first = queue.take(1.0)
-    assert [item.source for item in first] == [0, 1]
-    assert passed.wait(PATIENCE_S)
-    helper.join()
-    (item,) = queue.take(1.0)
-    assert isinstance(item, Delivered)
-    assert item.source == 0
-    queue.finish(1, "broken")
-    assert queue.take(1.0) == [Finished(1, "broken")]
-    assert queue.take(0.0) == []
-
-
-def test_a_closed_queue_lets_waiting_readers_go() -> None:
-    queue = DeliveryQueue(1, bytes_per_source=100)
-    queue.put(0, [block(0)])
-    answers = []
-    helper = threading.Thread(target=lambda: answers.append(queue.put(0, [block(10)])))
-    helper.start()
-    queue.close()
-    helper.join(PATIENCE_S)
-    assert answers == [False]
-
-
-def test_what_had_arrived_when_the_stop_came_is_read() -> None:
-    queue = DeliveryQueue(1)
-
-    def stop_in_the_middle() -> list[Block]:
-        reader.stop()
-        return [block(0)]
-
-    source = FakeSource([stop_in_the_middle, [block(10)], [block(20)]])
-    reader = ReaderThread(0, source, queue, threading.Barrier(1), lambda number, error: None)
-    reader.start()
-    assert reader.join(PATIENCE_S)
-    first, last, finished = queue.take(0.0)
-    assert [item.deliveries[0].counter for item in (first, last)] == [0, 10]
-    assert finished == Finished(0, None)
-
-
-def test_what_a_source_still_holds_is_asked_for_once_before_it_is_closed() -> None:
-    class Holding(FakeSource):
-        def finish(self) -> list[Block]:
-            assert not self.closed.is_set()
-            return [block(20)]
-
-    queue = DeliveryQueue(1)
-    source = Holding([[block(0)], lambda: reader.stop() or [block(10)]])
-    reader = ReaderThread(0, source, queue, threading.Barrier(1), lambda number, error: None)
-    reader.start()
-    assert reader.join(PATIENCE_S)
-    *delivered, finished = queue.take(0.0)
-    assert [one.counter for item in delivered for one in item.deliveries] == [0, 10, 20]
-    assert finished == Finished(0, None)
