@@ -120,6 +120,33 @@ def work(
     _finish(write_experiment(experiment, output, command=_command(), report=not no_report), as_json)
 
 
+@app.command()
+def beam(
+    runs: Recordings,
+    rig: Annotated[
+        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
+    ],
+    output: OutputFolder,
+    modes: Annotated[
+        int | None, typer.Option(help="Modes that are kept; all of the rig if not given.", show_default=False)
+    ] = None,
+    cycles: Annotated[int, typer.Option(help="Cycles per stretch of a decay.")] = 4,
+    segment_s: Annotated[
+        float | None,
+        typer.Option(help="Segments of random runs in s; a sixth of the run if not given.", show_default=False),
+    ] = None,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write modal.nc and spectra.nc only.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Beam or guided tank, frozen and sloshing: modal accelerations, damping, spectra and a report."""
+    from pipelines.beam import analyse_beam, checked_settings
+    from pipelines.beam_outputs import write_beam
+
+    settings = checked_settings(modes=modes, n_cycles=cycles, segment_s=segment_s)
+    experiment = analyse_beam(runs, rig, settings)
+    _finish(write_beam(experiment, output, command=_command(), report=not no_report), as_json)
+
+
 @app.command("import")
 def import_(
     sources: Annotated[list[Path], typer.Argument(metavar="SRC...", help="Files of one run.", show_default=False)],

@@ -61,6 +61,7 @@ def analyse_free_decay(
     frequency_range_hz: tuple[float, float] | None = None,
     n_cycles: int = 4,
     motion: Literal["acceleration", "displacement"] = "acceleration",
+    filter_edge_s: float = 0.0,
 ) -> FreeDecay:
     """Instantaneous damping and frequency of a free decay by three methods.
 
@@ -77,6 +78,9 @@ def analyse_free_decay(
         peak. Longer stretches have shorter intervals and blur what changes with amplitude.
     motion : {"acceleration", "displacement"}
         What the signal is; amplitudes of displacement are turned into acceleration with (2πf)².
+    filter_edge_s : float
+        How far from the ends of the record a filter that the signal went through is felt; what reaches there is
+        marked as edge.
 
     Returns
     -------
@@ -102,8 +106,10 @@ def analyse_free_decay(
     by_envelope = envelope(part, sampling_rate_hz, frequency_hz=frequency, noise=noise, n_cycles=n_cycles)
     by_peaks = log_decrement(part, sampling_rate_hz, frequency_hz=frequency, noise=noise)
     half_s = 0.5 * n_cycles / frequency
+    n_edge = round(filter_edge_s * sampling_rate_hz)
+    inner = n_edge / sampling_rate_hz, (np.size(signal) - 1 - n_edge) / sampling_rate_hz
     readings = [
-        _completed(reading, release, reach, motion)
+        _completed(reading, release, reach, motion, inner)
         for reading, reach in ((by_peaks, 0.5 / frequency), (by_envelope, half_s), (by_fit, half_s))
     ]
     shifted = dataclasses.replace(noise, time_s=noise.time_s + release.release_s)
@@ -111,7 +117,11 @@ def analyse_free_decay(
 
 
 def _completed(
-    reading: InstantaneousDamping, release: Release, reach_s: float, motion: str
+    reading: InstantaneousDamping,
+    release: Release,
+    reach_s: float,
+    motion: str,
+    inner_s: tuple[float, float],
 ) -> InstantaneousDamping:
     """Times from the record's first sample, amplitudes of acceleration, values in the transient marked."""
     time = reading.time_s + release.release_s
@@ -120,11 +130,15 @@ def _completed(
         amplitude = amplitude * (2 * np.pi * reading.frequency_hz) ** 2
     in_transient = time - reach_s < release.transient_end_s - 1e-9
     in_transient &= release.transient_end_s > release.release_s
+    trust = reading.trust
+    if inner_s[0] > 0:
+        at_edge = (time - reach_s < inner_s[0]) | (time + reach_s > inner_s[1])
+        trust = np.where(at_edge & reading.used, str(Trust.EDGE), trust)
     return dataclasses.replace(
         reading,
         time_s=time,
         acceleration_amplitude_m_per_s2=amplitude,
-        trust=np.where(in_transient, str(Trust.RELEASE), reading.trust),
+        trust=np.where(in_transient, str(Trust.RELEASE), trust),
     )
 
 

@@ -7,7 +7,6 @@ least-squares one, whose covariance gives the intervals.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,17 +16,13 @@ from scipy.stats import t as student_t
 
 from sloshlab.errors import AnalysisError
 from sloshlab.modal.instantaneous_damping import CONFIDENCE, damping_ratio_of
-from sloshlab.modal.spectra import Spectra
+from sloshlab.modal.spectra import HANN_LINE_CORRELATIONS, Spectra, hann_line_shape
 from sloshlab.modal.vector_fitting import RationalFit, vector_fit
 from sloshlab.quantities import described
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
-_KERNEL_LINES: Final = np.arange(-16, 17) / 4
-"""Quadrature points over the window's line shape, in lines: ± 4, where |W|² has fallen to 1e-8."""
-_HANN_LINE_CORRELATIONS: Final = ((2 / 3) ** 2, (1 / 6) ** 2)
-"""Correlation of the errors of H₁ one and two lines apart; the lines of a Hann window share noise and input."""
 _N_STEPS = 8
 
 
@@ -145,7 +140,8 @@ def modal_fit(
             allowed=f"the {n_modes} asked for",
             remedy="ask for fewer modes, widen the frequency range, or give extra pairs",
         )
-    poles, residues, covariance, n_free = _least_squares(f, h, weights, fit, _kernel(f, hann_lines))
+    kernel = hann_line_shape(float(np.median(np.diff(f)))) if hann_lines else (np.zeros(1), np.ones(1))
+    poles, residues, covariance, n_free = _least_squares(f, h, weights, fit, kernel)
     own = np.flatnonzero(poles.imag > 0)
     own = own[np.argsort(-poles.real[own] / np.abs(poles[own]), kind="stable")[:n_modes]]
     own = own[np.argsort(np.abs(poles[own]))]
@@ -233,22 +229,10 @@ def _scatter(blocks: FloatArray, hann_lines: bool) -> FloatArray:
     `blocks` has the shape (real and imaginary parts of all outputs, n_lines, n_parameters).
     """
     total = np.einsum("blp,blq->pq", blocks, blocks)
-    for apart, correlation in enumerate(_HANN_LINE_CORRELATIONS if hann_lines else (), start=1):
+    for apart, correlation in enumerate(HANN_LINE_CORRELATIONS if hann_lines else (), start=1):
         shifted = correlation * np.einsum("blp,blq->pq", blocks[:, apart:], blocks[:, :-apart])
         total = total + shifted + shifted.T
     return np.asarray(total, dtype=np.float64)
-
-
-def _kernel(f: FloatArray, hann_lines: bool) -> tuple[FloatArray, FloatArray]:
-    """Offsets [Hz] and shares of the line shape; a single point without a window.
-
-    The expectation of S_xy is H smoothed by |W|²; for a Hann window |W(u)|² ∝ (sinc u/(1 − u²))², u in lines.
-    """
-    if not hann_lines:
-        return np.zeros(1), np.ones(1)
-    u = np.where(np.abs(np.abs(_KERNEL_LINES) - 1) < 1e-9, _KERNEL_LINES + 1e-6, _KERNEL_LINES)
-    shape = (np.sinc(u) / (1 - u**2)) ** 2
-    return _KERNEL_LINES * float(np.median(np.diff(f))), shape / shape.sum()
 
 
 def _linearised(

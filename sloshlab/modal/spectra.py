@@ -6,8 +6,10 @@ densities: their sum times the line spacing is the mean square.
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +23,11 @@ from sloshlab.quantities import described
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
+
+HANN_LINE_CORRELATIONS: Final = ((2 / 3) ** 2, (1 / 6) ** 2)
+"""Correlation of the errors of densities and of H₁ one and two lines apart: lines of a Hann window share noise."""
+_LINE_SHAPE_POINTS: Final = np.arange(-16, 17) / 4
+"""Quadrature points over the window's line shape, in lines: ± 4, where |W|² has fallen to 1e-8."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +145,16 @@ class Spectra:
         noise = np.maximum(1 - self.coherence, 0.0) * self.output_psd / _positive(self.input_psd)
         return np.asarray(np.sqrt(noise / n_free))
 
+    def of_outputs(self, rows: Sequence[int]) -> Spectra:
+        """A copy with some of the outputs."""
+        chosen = list(rows)
+        return dataclasses.replace(
+            self,
+            output_names=tuple(self.output_names[row] for row in chosen),
+            output_psd=self.output_psd[chosen],
+            cross_psd=self.cross_psd[chosen],
+        )
+
     def to_dataset(self) -> xr.Dataset:
         """Densities, H₁ and H₂ in real and imaginary part, coherence and intervals over ``line_hz``."""
         both = ("output", "line_hz")
@@ -234,6 +251,33 @@ def random_spectra(
         cross_psd=density[n_outputs + 1 :, 1:],
         normalisation=_normalisation(window, hop, n_used, overlap, sampling_rate_hz),
     )
+
+
+def hann_line_shape(line_spacing_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Offsets [Hz] and shares of the line shape of a Hann window.
+
+    The expectation of a density is the true one smoothed by |W|²; for a Hann window |W(u)|² ∝ (sinc u/(1 − u²))²,
+    u in lines.
+
+    Parameters
+    ----------
+    line_spacing_hz : float
+        Distance of lines.
+
+    Returns
+    -------
+    tuple of ndarray
+
+    Examples
+    --------
+    >>> offsets, shares = hann_line_shape(0.1)
+    >>> round(float(shares.sum()), 12), round(float(offsets.max()), 12)
+    (1.0, 0.4)
+    """
+    points = _LINE_SHAPE_POINTS
+    u = np.where(np.abs(np.abs(points) - 1) < 1e-9, points + 1e-6, points)
+    shape = (np.sinc(u) / (1 - u**2)) ** 2
+    return points * line_spacing_hz, shape / shape.sum()
 
 
 def _segment_products(block: FloatArray, window: FloatArray) -> ComplexArray:
