@@ -118,41 +118,26 @@ def drawn_sections(plans: Sequence[SectionPlan], progress: Progress | None = Non
 
 
 def report_html(experiment: SweepExperiment, sections: Sequence[Section]) -> str:
+    """The page of a sweep experiment as text."""
+    return page_html(_page(experiment), sections)
+
+
+def page_html(page: Page, sections: Sequence[Section]) -> str:
     """The page as text: styles and images inside, nothing fetched from elsewhere."""
-    return page_html(
-        sections,
-        title=experiment.title,
-        subtitle=_subtitle(experiment),
-        flags=experiment.flags,
-        summary=sentences(experiment),
-        papers=citation(experiment.kind),
-    )
-
-
-def page_html(
-    sections: Sequence[Section],
-    *,
-    title: str,
-    subtitle: str,
-    flags: Sequence[str],
-    summary: Sequence[str],
-    papers: Sequence[Citation],
-) -> str:
-    """The page of any experiment: headline, flags, summary, sections, papers."""
     from jinja2 import Environment, StrictUndefined
 
     files = resources.files("pipelines.report")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(files.joinpath("page.html.j2").read_text(encoding="utf-8"))
     return template.render(
-        title=title,
-        subtitle=subtitle,
+        title=page.title,
+        subtitle=page.subtitle,
         css=_safe_css(files.joinpath("page.css").read_text(encoding="utf-8")),
-        flags=flags,
-        summary=summary,
+        flags=page.flags,
+        summary=page.summary,
         remark=gravity_remark(),
         sections=_numbered(sections),
-        papers=papers,
+        papers=page.papers,
     )
 
 
