@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 RESULTS := results
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -23,6 +23,12 @@ $(STAMP): pyproject.toml
 
 shaker: setup  ## the shaker experiment on raw_data: maps and report
 	$(BIN)/python -m pipelines.experiments shaker raw_data/shaker $(RESULTS)/shaker
+
+beam: setup  ## the beam of raw_data/numerical_tank: damping, modes, spectra and report
+	$(BIN)/python -m pipelines.experiments beam raw_data/numerical_tank/beam $(RESULTS)/beam
+
+sdof: setup  ## the guided tank of raw_data/numerical_tank: damping and report
+	$(BIN)/python -m pipelines.experiments sdof raw_data/numerical_tank/sdof $(RESULTS)/sdof
 
 replay: setup  ## every recording of raw_data through simulated serial and CAN devices
 	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay

@@ -160,7 +160,7 @@ class BeamRun:
             stated = (self.attributes.model_extra or {}).get("rms_g", self.attributes.acceleration_g)
             return f"{stated if isinstance(stated, float) else self.random.root_rms_g:.2g} g RMS"
         start = self.attributes.initial_displacement_m
-        return "release" if start is None else f"release from {1e3 * start:.3g} mm"
+        return "release" if start is None else f"release from {1e3 * start:.3g} mm".replace("-", "−")
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from pipelines.command_line import DONE_BUT_FLAGGED, INPUT_IS_BAD, run
-from sloshlab.errors import SloshlabError
+from sloshlab.errors import InputError, SloshlabError
 
 
 def shaker_arguments(folder: Path, output: Path, rigs_folder: Path | None = None) -> list[str]:
@@ -40,6 +40,34 @@ def _shaker(folder: Path, output: Path) -> int:
     return code
 
 
+def beam_arguments(folder: Path, output: Path) -> list[str]:
+    """Arguments of `sloshlab beam` for all runs of a folder and the rig beside them.
+
+    Raises
+    ------
+    InputError
+        If there is not one rig and at least one recording.
+    """
+    recordings, rigs = sorted(folder.glob("*.nc")), sorted(folder.glob("rig*.toml"))
+    if not recordings or len(rigs) != 1:
+        raise InputError(
+            f"{folder}",
+            got=f"{len(recordings)} recordings and {len(rigs)} rig files",
+            allowed="recordings and one rig*.toml",
+            remedy="make them with `make tank-campaign`, which computes for hours",
+        )
+    return ["beam", *map(str, recordings), "--rig", str(rigs[0]), "-o", str(output)]
+
+
+def _beam(folder: Path, output: Path) -> int:
+    """Damping, modes and report; a flagged result is a result."""
+    code = run(beam_arguments(folder, output))
+    if code in (0, DONE_BUT_FLAGGED):
+        print(f"The report is {(output / 'report.html').resolve()}")  # noqa: T201
+        return 0
+    return code
+
+
 def _replay(folder: Path, output: Path) -> int:
     """Every recording through simulated devices; any difference is a failure."""
     from pipelines.replayed_campaign import replayed_campaign
@@ -50,7 +78,7 @@ def _replay(folder: Path, output: Path) -> int:
     return 1 if summary["flags"] else 0
 
 
-EXPERIMENTS: Final = {"shaker": _shaker, "replay": _replay}
+EXPERIMENTS: Final = {"shaker": _shaker, "beam": _beam, "sdof": _beam, "replay": _replay}
 
 
 if __name__ == "__main__":

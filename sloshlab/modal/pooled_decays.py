@@ -19,7 +19,7 @@ from sloshlab.modal.instantaneous_damping import CONFIDENCE, InstantaneousDampin
 
 FloatArray = npt.NDArray[np.float64]
 
-BINS_PER_DECADE: Final = 12
+BINS_PER_DECADE: Final = 8
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,49 @@
+"""Colours, marks and words that all figures of the beam share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+from pipelines.report.axes import power_of_ten
+from pipelines.report.style import DISTINCT_COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+CONFIGURATION_COLOURS: Final = {"frozen": "#3b5b7a", "sloshing": "#d55e00", "empty": "#009e73"}
+METHOD_MARKS: Final = {
+    "log decrement": (DISTINCT_COLOURS[0], "o"),
+    "envelope": (DISTINCT_COLOURS[2], "s"),
+    "local sine fit": (DISTINCT_COLOURS[1], "D"),
+}
+RELEASE_COLOUR: Final = "#a3123a"
+CONFIGURATIONS: Final = ("frozen", "empty", "sloshing")
+
+
+def panel_letter(axes: Axes, number: int, text: str) -> None:
+    """Title of a panel with its letter."""
+    axes.set_title(f"({chr(ord('a') + number)}) {text}")
+
+
+def amplitude_axis(axes: Axes) -> None:
+    """Logarithmic abscissa with plain numbers at 1, 2 and 5 of every decade."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def legend_above(figure: Figure, axes: Axes | Sequence[Axes], *, columns: int = 4) -> None:
+    """One legend for all panels, each label once."""
+    entries: dict[str, object] = {}
+    for one in axes if isinstance(axes, Sequence) else [axes]:
+        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    if entries:
+        figure.legend(
+            list(entries.values()), list(entries), loc="outside upper center", ncols=min(columns, len(entries))
+        )
