@@ -48,13 +48,17 @@ def beam_arguments(folder: Path, output: Path) -> list[str]:
     InputError
         If there is not one rig and at least one recording.
     """
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}", got="no such folder", remedy="make it with `make tank-campaign`, which computes for hours"
+        )
     recordings, rigs = sorted(folder.glob("*.nc")), sorted(folder.glob("rig*.toml"))
     if not recordings or len(rigs) != 1:
         raise InputError(
             f"{folder}",
             got=f"{len(recordings)} recordings and {len(rigs)} rig files",
             allowed="recordings and one rig*.toml",
-            remedy="make them with `make tank-campaign`, which computes for hours",
+            remedy="make them with `make tank-campaign`, or name the files to `sloshlab beam`",
         )
     return ["beam", *map(str, recordings), "--rig", str(rigs[0]), "-o", str(output)]
 

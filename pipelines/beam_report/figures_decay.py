@@ -29,7 +29,7 @@ FloatArray = npt.NDArray[np.float64]
 Quantity = Literal["damping", "frequency"]
 
 _LABELS: Final = {"damping": "damping ratio ζ₁ [%]", "frequency": "frequency f₁ [Hz]"}
-_LEFT_OUT: Final = (str(Trust.NOISE), str(Trust.EDGE))
+_SOURCE_FIGURES: Final = {"beam": "Fig. 2.39", "sdof": "Fig. 2.8(b)"}
 
 
 def values_of(reading: InstantaneousDamping, quantity: Quantity) -> tuple[FloatArray, FloatArray]:
@@ -61,8 +61,8 @@ def over_amplitude(name: str, experiment: BeamExperiment, quantity: Quantity) ->
         "transient reaches into. Values at the edges of the record and too near the noise are left out here and "
         "marked in modal.nc. A decay is read from right to left."
     )
-    counterpart = {"damping": "Figs. 2.8(b) and 2.39", "frequency": "like Fig. 2.39"}[quantity]
-    return ReportFigure(name, caption, counterpart, png_bytes(figure))
+    like = "" if quantity == "damping" else "like "
+    return ReportFigure(name, caption, like + _SOURCE_FIGURES[experiment.kind], png_bytes(figure))
 
 
 def _draw_readings(axes: Axes, run: BeamRun, quantity: Quantity) -> None:
@@ -77,8 +77,9 @@ def _draw_readings(axes: Axes, run: BeamRun, quantity: Quantity) -> None:
         axes.errorbar(amplitude[used], values[used], half[used], color=colour, marker=marker, ms=3, lw=0,
                       elinewidth=0.7, alpha=0.85, label=reading.method)  # fmt: skip
         released = reading.trust == str(Trust.RELEASE)
-        axes.plot(amplitude[released], values[released], color=RELEASE_COLOUR, marker="x", ms=6, mew=1.4,
-                  ls="none", label="release transient", zorder=6)  # fmt: skip
+        if released.any():
+            axes.plot(amplitude[released], values[released], color=RELEASE_COLOUR, marker="x", ms=6, mew=1.4,
+                      ls="none", label="release transient", zorder=6)  # fmt: skip
         shown += [values[used], values[released]]
     _arrange(axes, np.concatenate(shown), quantity)
 
@@ -123,7 +124,7 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
         "amplitude; bands are 90 % intervals of the mean, from the scatter between repeats (Student), where there "
         "are two or more."
     )
-    return ReportFigure(name, caption, "Fig. 2.39, measured", png_bytes(figure))
+    return ReportFigure(name, caption, f"{_SOURCE_FIGURES[experiment.kind]}, measured", png_bytes(figure))
 
 
 def _draw_pooled(axes: Axes, experiment: BeamExperiment, configuration: str, quantity: Quantity) -> None:

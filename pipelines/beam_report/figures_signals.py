@@ -78,7 +78,9 @@ def modal_accelerations(name: str, experiment: BeamExperiment) -> ReportFigure:
         "shapes at "
         f"the sensors (2.25), {_words(runs)}. Panels of a row share their ordinate."
     )
-    return ReportFigure(name, caption, "Fig. 2.34", png_bytes(figure))
+    return ReportFigure(
+        name, caption, "Fig. 2.34" if experiment.kind == "beam" else "Fig. 2.8(a)", png_bytes(figure)
+    )
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,9 @@ def release_transient(name: str, experiment: BeamExperiment) -> ReportFigure:
         "release transient, in which one decaying sine leaves far more than it leaves later; it is kept and "
         "marked."
     )
-    return ReportFigure(name, caption, "Fig. 2.38, measured", png_bytes(figure))
+    return ReportFigure(
+        name, caption, "Fig. 2.38, measured" if experiment.kind == "beam" else "like Fig. 2.38", png_bytes(figure)
+    )
 
 
 def random_signals(name: str, experiment: BeamExperiment) -> ReportFigure:

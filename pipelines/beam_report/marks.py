@@ -19,6 +19,8 @@ METHOD_MARKS: Final = {
     "local sine fit": (DISTINCT_COLOURS[1], "D"),
 }
 RELEASE_COLOUR: Final = "#a3123a"
+_WIDE: Final = 500.0
+"""Largest over smallest value of an axis on which there is room for one number per decade only."""
 CONFIGURATIONS: Final = ("frozen", "empty", "sloshing")
 
 
@@ -28,11 +30,13 @@ def panel_letter(axes: Axes, number: int, text: str) -> None:
 
 
 def amplitude_axis(axes: Axes) -> None:
-    """Logarithmic abscissa with plain numbers at 1, 2 and 5 of every decade."""
+    """Logarithmic abscissa with plain numbers at 1, 2 and 5 of every decade, or at 1 if there are many."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+    low, high = axes.dataLim.intervalx
+    is_wide = low > 0 and high / low > _WIDE
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if is_wide else (1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
     axes.xaxis.set_minor_formatter(NullFormatter())
 

@@ -273,10 +273,11 @@ def reason_table(experiment: BeamExperiment) -> Table | None:
 def settings_table(experiment: BeamExperiment) -> Table:
     """What the analysis was told."""
     settings = experiment.settings
-    rows = (
+    rows = [
         ("modes kept", ", ".join(experiment.modes.names)),
         ("cycles per stretch of envelope and sine fit", str(settings.n_cycles)),
-        ("segments of random runs", f"{settings.segment_s:g} s, Hann window, half overlapping"),
         ("M_dry + m_l beyond the force sensor", f"{experiment.total_mass_kg:.4f} kg"),
-    )
-    return Table("Parameters", ("what", "value"), rows)
+    ]
+    if experiment.random_runs:
+        rows.append(("segments of random runs", f"{settings.segment_s:g} s, Hann window, half overlapping"))
+    return Table("Parameters", ("what", "value"), tuple(rows))
