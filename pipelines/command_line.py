@@ -252,6 +252,42 @@ def virtual(
 
 
 @app.command()
+def simulate(
+    rig: Annotated[
+        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig whose twin runs.", show_default=False)
+    ],
+    run_file: Annotated[
+        Path, typer.Option("--input", metavar="RUN.nc", help="Recording that drives it.", show_default=False)
+    ],
+    output: OutputFile,
+    block: Annotated[
+        str, typer.Option(help="'all' together, or 'tank' or 'structure' alone on its measured input.")
+    ] = "all",
+    configuration: Annotated[
+        str, typer.Option(help="Liquid: sloshing (as described), frozen, empty.")
+    ] = "sloshing",
+    twin: Annotated[
+        Path | None,
+        typer.Option(metavar="TWIN.toml", help="A saved twin instead of that of the rig.", show_default=False),
+    ] = None,
+    save_twin: Annotated[
+        Path | None, typer.Option(metavar="TWIN.toml", help="Save the twin that ran.", show_default=False)
+    ] = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(min=1, max=1000, help="Integration steps per sample.", show_default=False),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise of the twin's sensors.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """The twin of a rig file, driven by the motion, the base motion or the release of a recorded run."""
+    from pipelines.simulate import SimulationSettings, simulate_run
+
+    settings = SimulationSettings(rig, run_file, output, block, configuration, twin, save_twin, steps, seed)
+    _finish(simulate_run(settings), as_json)
+
+
+@app.command()
 def record(
     sources: Annotated[
         list[str],

@@ -12,10 +12,11 @@ from math import pi
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from sloshlab.conditioning.resampling import HALF_WIDTH, resampled
 from sloshlab.errors import InputError
-from sloshlab.twin.engine import INPUTS
+from sloshlab.twin.model import INPUTS
 
 FloatArray = npt.NDArray[np.float64]
 _DISPLACEMENT, _VELOCITY, _ACCELERATION, _PHASE, _FREQUENCY, _FORCE = range(len(INPUTS))
@@ -49,12 +50,20 @@ class Excitation:
         if not 2 <= self.n_samples <= 50_000_000:
             raise InputError("n_samples", got=str(self.n_samples), allowed="2 … 50000000")
 
-    def half_steps(self, n_substeps: int) -> FloatArray:
-        """Inputs at steps and half-way between, (2 (n − 1) n_substeps + 1, 6); empty where nothing drives."""
+    def half_steps(self, n_substeps: int, first: int = 0, stop: int | None = None) -> FloatArray:
+        """Inputs at steps and half-way between, rows `first` … `stop` of (2 (n − 1) n_substeps + 1, 6).
+
+        Empty where nothing drives.
+        """
         if self.inputs is None:
             return np.empty((0, len(INPUTS)))
-        n = 2 * (self.n_samples - 1) * n_substeps + 1
-        return np.ascontiguousarray(self.inputs(np.arange(n) / (2 * n_substeps * self.sampling_rate_hz)))
+        last = 2 * (self.n_samples - 1) * n_substeps + 1 if stop is None else stop
+        return np.ascontiguousarray(self.inputs(np.arange(first, last) / (2 * n_substeps * self.sampling_rate_hz)))
+
+    def at_start(self) -> FloatArray:
+        """Inputs at the first sample, shape (6,)."""
+        rows = self.half_steps(1, 0, 2)
+        return rows[0] if rows.size else np.zeros(len(INPUTS))
 
 
 def _n_samples(duration_s: float, sampling_rate_hz: float) -> int:
@@ -198,10 +207,14 @@ def recorded(
                 f"recorded {INPUTS[column]}", got=f"{lost} lost samples", remedy="simulate a stretch without gaps"
             )
 
+    between = {column: _Between(values) for column, values in given.items()}
+
     def inputs(time: FloatArray) -> FloatArray:
         table = np.zeros((time.size, len(INPUTS)))
-        for column, values in given.items():
-            table[:, column] = _between(values, (time.size - 1) // (values.size - 1))
+        per_sample = round(1.0 / ((time[1] - time[0]) * sampling_rate_hz))
+        first = round(time[0] * sampling_rate_hz * per_sample)
+        for column, series in between.items():
+            table[:, column] = series.at(first, time.size, per_sample)
         return table
 
     (shape,) = lengths
@@ -209,19 +222,49 @@ def recorded(
     return Excitation(sampling_rate_hz, shape[0], inputs, moves_base=moves)
 
 
-def _between(values: FloatArray, n_between: int) -> FloatArray:
-    """Band-limited values at `n_between` instants per sample; beyond the ends the series is reflected there.
+class _Between:
+    """Band-limited values of a series at instants between its samples; beyond the ends it is reflected there.
 
-    The kernel of `resampled` at these few offsets is taken from its answer to a unit impulse.
+    The kernel of `resampled` at the few offsets that are needed is taken from its answer to a unit impulse.
     """
-    pad = min(HALF_WIDTH, values.size - 1)
-    before, after = 2 * values[0] - values[pad:0:-1], 2 * values[-1] - values[-2 : -pad - 2 : -1]
-    padded = np.pad(np.concatenate([before, values, after]), HALF_WIDTH - pad, mode="edge")
+
+    def __init__(self, values: FloatArray) -> None:
+        pad = min(HALF_WIDTH, values.size - 1)
+        before, after = 2 * values[0] - values[pad:0:-1], 2 * values[-1] - values[-2 : -pad - 2 : -1]
+        self._padded = np.pad(np.concatenate([before, values, after]), HALF_WIDTH - pad, mode="edge")
+        self._n_samples = values.size
+        self._weights: dict[int, FloatArray] = {}
+
+    def at(self, first: int, n: int, per_sample: int) -> FloatArray:
+        """Values at instants `first` … `first + n` of `per_sample` per sample."""
+        if per_sample not in self._weights:
+            self._weights[per_sample] = _phases(per_sample)
+        first_sample = first // per_sample
+        last_sample = min((first + n - 1) // per_sample, self._n_samples - 1)
+        stretch = self._padded[first_sample : last_sample + 1 + 2 * HALF_WIDTH]
+        found = np.asarray(_weighted(stretch, self._weights[per_sample]))
+        return found[first - first_sample * per_sample :][:n]
+
+
+# no BLAS: its threads wait for each other where others use the cores
+@njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
+def _weighted(samples: FloatArray, weights: FloatArray) -> FloatArray:
+    """Sums of each window of samples with each row of weights, one window after the other."""
+    n_phases, width = weights.shape
+    n_windows = samples.size - width + 1
+    sums = np.empty(n_windows * n_phases)
+    for i in range(n_windows):
+        for phase in range(n_phases):
+            total = 0.0
+            for j in range(width):
+                total += samples[i + j] * weights[phase, j]
+            sums[i * n_phases + phase] = total
+    return sums
+
+
+def _phases(per_sample: int) -> FloatArray:
+    """Weights of the 2 · 24 + 1 samples around a sample, shape (per_sample, 2 · 24 + 1)."""
     centre, offsets = 3 * HALF_WIDTH, np.arange(-HALF_WIDTH, HALF_WIDTH + 1)
     impulse = np.zeros(2 * centre + 1)
     impulse[centre] = 1.0
-    between = np.empty((values.size, n_between))
-    for i in range(n_between):
-        weights = resampled(impulse, centre + i / n_between - offsets)
-        between[:, i] = np.correlate(padded, weights, mode="valid")
-    return between.ravel()[: (values.size - 1) * n_between + 1]
+    return np.stack([resampled(impulse, centre + i / per_sample - offsets) for i in range(per_sample)])

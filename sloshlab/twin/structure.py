@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from sloshlab.errors import RigError
 from sloshlab.rig import Rig
-from sloshlab.rig import Structure as RigStructure
-from sloshlab.twin.clamped_beam import ClampedBeam, beam_with_first_mode
+from sloshlab.twin.rig_beam import base_participation_kg
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -109,27 +108,12 @@ def structure_of_rig(rig: Rig) -> Structure:
         return single_degree_of_freedom(
             mass, described.stiffness_n_per_m or 0.0, described.damping_kg_per_s or 0.0
         )
-    beam = beam_of_rig(described)
-    participation = None if beam is None else beam.base_participation(described.tip_mode_shape)
     return modal_structure(
         described.frequencies_hz,
         described.damping_ratios,
         described.modal_masses_kg,
         mode_shape=described.tip_mode_shape,
-        base_participation_kg=participation,
-    )
-
-
-def beam_of_rig(described: RigStructure) -> ClampedBeam | None:
-    """Euler–Bernoulli beam with tip mass that has the first mode of the rig file; None without dimensions."""
-    if described.length_m is None or described.width_m is None or described.thickness_m is None:
-        return None
-    first_mass = described.modal_masses_kg[0] / described.tip_mode_shape[0] ** 2
-    return beam_with_first_mode(
-        described.length_m,
-        described.width_m * described.thickness_m,
-        first_modal_mass_kg=first_mass,
-        n_modes=len(described.frequencies_hz),
+        base_participation_kg=base_participation_kg(described),
     )
 
 
