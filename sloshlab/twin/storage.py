@@ -19,6 +19,7 @@ from scipy.io import netcdf_file
 
 from sloshlab.atomic_file import replaced, write_bytes
 from sloshlab.errors import InputError
+from sloshlab.twin import rate_independent_forces, structure_forces, tank_forces  # noqa: F401  they register forces
 from sloshlab.twin.sensors import Sensor
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import Term, kind_named
