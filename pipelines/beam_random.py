@@ -111,10 +111,13 @@ def _fitted(spectra: Spectra, modes: ModeNames, mode: int) -> ModeFit:
 
 
 def _checked(fit: ModalFit, low_hz: float, high_hz: float) -> tuple[ModalFit | None, str]:
-    """A pole outside the lines, or with an error as large as itself, is no mode found."""
+    """A pole outside the lines, without a peak, or with an error as large as itself is no mode found."""
     frequency, damping = float(fit.frequency_hz[0]), float(fit.damping_ratio[0])
     if not low_hz <= frequency <= high_hz or not 0 < damping < 0.5:
         return None, f"the pole found, {frequency:.4g} Hz with ζ = {damping:.3g}, is no mode in this range"
+    peak = abs(complex(fit.residues[0, 0])) / (damping * 2 * np.pi * frequency)
+    if peak < abs(float(fit.fit.constant[0])):
+        return None, f"no peak near {frequency:.4g} Hz stands out of what other modes leave there"
     if float(fit.damping_ratio_std[0]) > _LARGEST_RELATIVE_ERROR * damping:
         return None, f"ζ = {damping:.3g} with a standard error of {float(fit.damping_ratio_std[0]):.2g}: not told"
     return fit, ""
