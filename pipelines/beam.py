@@ -18,7 +18,7 @@ from sloshlab.conditioning.calibration import ApparentMass, apparent_mass
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping
 from sloshlab.modal.pooled_decays import PooledDamping, pooled_damping
-from sloshlab.modal.rig_modes import beam_of_rig, stated_modes, structure_of
+from sloshlab.modal.rig_modes import stated_modes, structure_of, uniform_beam
 from sloshlab.modal.structural_update import UpdatedBeam, update_beam
 from sloshlab.recording import channels, read_recording
 from sloshlab.rig import Rig
@@ -183,7 +183,7 @@ def _updated(rig: Rig, frozen: dict[int, FrozenMode]) -> tuple[UpdatedBeam | Non
     if n_modes < 2:
         return None, f"{n_modes} frequencies of the frozen liquid were measured; tip mass and stiffness need two"
     measured = np.array([frozen[mode].frequency_hz for mode in range(n_modes)])
-    return update_beam(beam_of_rig(rig), measured), ""
+    return update_beam(uniform_beam(rig), measured), ""
 
 
 def _pooled(runs: Sequence[BeamRun]) -> dict[tuple[str, str], PooledDamping]:

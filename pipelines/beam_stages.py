@@ -28,11 +28,11 @@ from sloshlab.modal.free_decay import FreeDecay, analyse_free_decay
 from sloshlab.modal.modal_filter import ModalFilter, ModalResponse, modal_filter
 from sloshlab.modal.rig_modes import (
     ModeNames,
-    beam_of_rig,
     rig_modal_filter,
     sensor_places_m,
     stated_modes,
     structure_of,
+    uniform_beam,
 )
 from sloshlab.recording import RunAttributes, channels, run_attributes
 from sloshlab.rig import Rig
@@ -157,7 +157,7 @@ def _motion(run: Loaded, rig: Rig, is_random: bool) -> _Motion:
 def _places_m(recording: xr.Dataset, names: list[str], rig: Rig) -> dict[str, float]:
     """Accelerometers beyond the root and where they are [m]."""
     stated = {name: recording[name].attrs.get("x_m") for name in names}
-    places = sensor_places_m(stated, beam_of_rig(rig).length_m)
+    places = sensor_places_m(stated, uniform_beam(rig).length_m)
     return {name: place for name, place in places.items() if place > 0}
 
 

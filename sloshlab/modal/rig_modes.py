@@ -1,30 +1,25 @@
 """Mode shapes of the rig's structure at the sensors of a recording.
 
-Shapes between root and tip are those of a uniform beam with the tip mass that gives the stated modal mass of the
-first mode, scaled to the stated tip values. Only the ratio of tip mass to beam mass enters the shapes.
+Shapes between root and tip are those of the uniform beam that the twin has too, scaled to the stated tip values.
+Only the ratio of tip mass to beam mass enters the shapes.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from sloshlab.errors import AnalysisError, RigError
 from sloshlab.modal.cantilever import Cantilever, cantilever_modes
 from sloshlab.modal.modal_filter import ModalFilter, modal_filter
 from sloshlab.rig import Rig, Structure
+from sloshlab.twin.rig_beam import beam_of_rig
 
 FloatArray = npt.NDArray[np.float64]
-
-ALUMINIUM_PA: Final = 70e9
-ALUMINIUM_KG_PER_M3: Final = 2700.0
-"""Book values of the material, where the rig states none; the frequencies are stated, not computed from them."""
 
 _AT_THE_TIP: Final = ("acceleration_tip", "acceleration_roof")
 
@@ -99,13 +94,13 @@ def stated_modes(rig: Rig, n_modes: int | None = None) -> ModeNames:
     return ModeNames(names, structure.frequencies_hz[:n_kept], structure.damping_ratios[:n_kept])
 
 
-def beam_of_rig(rig: Rig) -> Cantilever:
-    """The uniform aluminium beam of a rig with the tip mass that gives its first modal mass.
+def uniform_beam(rig: Rig) -> Cantilever:
+    """The uniform beam that a rig's structure stands for.
 
     Raises
     ------
     RigError
-        If the structure is no beam, dimensions are missing, or the bare beam already has more modal mass.
+        If the structure is no beam, dimensions are missing, or no tip mass suits its modes.
 
     Examples
     --------
@@ -122,32 +117,15 @@ def beam_of_rig(rig: Rig) -> Cantilever:
     ... modal_masses_kg = [0.8956]
     ... tip_mode_shape = [1.0]
     ... ''')
-    >>> round(beam_of_rig(rig).tip_mass_kg, 3)
-    0.41
+    >>> round(uniform_beam(rig).tip_mass_kg, 2)
+    0.45
     """
     structure = structure_of(rig)
-    missing = [name for name in ("length_m", "width_m", "thickness_m") if getattr(structure, name) is None]
-    if structure.kind != "beam" or missing:
-        got = f"kind {structure.kind!r}" if structure.kind != "beam" else f"no {', '.join(missing)}"
+    beam = beam_of_rig(structure) if structure.kind == "beam" else None
+    if beam is None:
+        got = f"kind {structure.kind!r}" if structure.kind != "beam" else "no length_m, width_m or thickness_m"
         raise RigError("rig: structure", got=got, allowed="a beam with its dimensions", remedy="measure the beam")
-    bare = Cantilever(
-        structure.length_m or 0.0, structure.width_m or 0.0, structure.thickness_m or 0.0,
-        ALUMINIUM_PA, ALUMINIUM_KG_PER_M3,
-    )  # fmt: skip
-    wanted = structure.modal_masses_kg[0] / structure.tip_mode_shape[0] ** 2
-
-    def excess(tip_mass_kg: float) -> float:
-        loaded = dataclasses.replace(bare, tip_mass_kg=tip_mass_kg)
-        return float(cantilever_modes(loaded, n_modes=1).modal_mass_kg[0]) - wanted
-
-    if excess(0.0) >= 0:
-        raise RigError(
-            "rig: structure.modal_masses_kg",
-            got=f"{structure.modal_masses_kg[0]:g} kg for mode 1",
-            allowed=f"> {excess(0.0) + wanted:.4g} kg, that of the bare aluminium beam",
-            remedy="correct dimensions or modal masses",
-        )
-    return dataclasses.replace(bare, tip_mass_kg=float(brentq(excess, 0.0, wanted, xtol=1e-12)))
+    return beam
 
 
 def sensor_places_m(places_m: Mapping[str, float | None], length_m: float) -> dict[str, float]:
@@ -217,7 +195,7 @@ def rig_modal_filter(rig: Rig, places_m: Mapping[str, float], *, n_modes: int | 
         If the sensors cannot see a mode; the message names it.
     """
     names = stated_modes(rig, n_modes).names
-    structure, beam = structure_of(rig), beam_of_rig(rig)
+    structure, beam = structure_of(rig), uniform_beam(rig)
     tip = np.asarray(structure.tip_mode_shape[: len(names)])
     along = cantilever_modes(beam, n_modes=len(names)).mode_shape * tip
     at_sensors = _shapes_at(beam, list(places_m.values()), len(names)) * tip
