@@ -44,6 +44,11 @@ class Structure:
         """Undamped natural frequencies."""
         return np.asarray(np.sqrt(self.stiffnesses_n_per_m / self.masses_kg) / (2 * pi))
 
+    @property
+    def static_stiffness_n_per_m(self) -> float:
+        """Static force at the tank over its deflection."""
+        return float(1.0 / (self.mode_shape**2 / self.stiffnesses_n_per_m).sum())
+
     def static_deflection(self, deflection_m: float) -> FloatArray:
         """Modal coordinates under a static force at the tank that deflects it by `deflection_m`."""
         flexible = self.mode_shape / self.stiffnesses_n_per_m

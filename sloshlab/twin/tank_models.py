@@ -17,6 +17,7 @@ from typing import Any
 
 from sloshlab.errors import InputError, RigError
 from sloshlab.rig import Rig
+from sloshlab.twin.measured_maps import terms_from_maps
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING
 from sloshlab.twin.tank_forces import BOUNCING_BALL
 from sloshlab.twin.terms import Term
@@ -71,13 +72,13 @@ def _frozen(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term
 
 @tank_model("viscous")
 def _viscous(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
-    known = dict(parameters)
-    damping = known.pop("damping_kg_per_s", None)
-    if known:
-        raise InputError("viscous", got=", ".join(sorted(known)), allowed="damping_kg_per_s")
-    if damping is None:
-        raise InputError("viscous: damping_kg_per_s", got="nothing", allowed="a number [kg/s]")
-    return (VISCOUS_DAMPING(place="tank", damping_n_s_per_m=damping),)
+    if "maps" in parameters:
+        return terms_from_maps(rig, parameters, folder)
+    unknown = sorted(set(parameters) - {"damping_kg_per_s"})
+    if unknown or "damping_kg_per_s" not in parameters:
+        got = ", ".join(unknown) or "nothing"
+        raise InputError("viscous", got=got, allowed="damping_kg_per_s, or maps and metric")
+    return (VISCOUS_DAMPING(place="tank", damping_n_s_per_m=parameters["damping_kg_per_s"]),)
 
 
 @tank_model("bouncing_ball")
