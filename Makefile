@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 RESULTS := results
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker beam sdof replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof bouncing-ball replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -29,6 +29,9 @@ beam: setup  ## the beam of raw_data/numerical_tank: damping, modes, spectra and
 
 sdof: setup  ## the guided tank of raw_data/numerical_tank: damping and report
 	$(BIN)/python -m pipelines.experiments sdof raw_data/numerical_tank/sdof $(RESULTS)/sdof
+
+bouncing-ball: setup  ## bouncing balls in place of the liquid of raw_data: parameters, maps, errors, reports (minutes)
+	$(BIN)/python -m pipelines.experiments ball raw_data $(RESULTS)/bouncing_ball
 
 replay: setup  ## every recording of raw_data through simulated serial and CAN devices
 	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay

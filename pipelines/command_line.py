@@ -147,6 +147,36 @@ def beam(
     _finish(write_beam(experiment, output, command=_command(), report=not no_report), as_json)
 
 
+@app.command()
+def ball(
+    runs: Recordings,
+    rig: Annotated[
+        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
+    ],
+    output: OutputFolder,
+    omega_bar: Annotated[float, typer.Option(help="On the shaker: ω̄ at which W̄ is matched.")] = 4.0,
+    damper: Annotated[str, typer.Option(help="The ball's damper acts in 'contact' or 'always'.")] = "contact",
+    lowest_acceleration_g: Annotated[
+        float, typer.Option(help="Of a decay: smallest amplitude that is matched, in g.")
+    ] = 0.3,
+    generations: Annotated[int, typer.Option(help="Of the global search.")] = 40,
+    seed: Annotated[int, typer.Option(help="Seed of the global search.")] = 0,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write ball.toml and ball.nc only.")] = False,
+    as_json: Json = False,
+) -> None:
+    """A bouncing ball in place of the liquid, from free decays or from runs on the shaker."""
+    from pipelines.bouncing_ball.outputs import write_ball
+    from pipelines.bouncing_ball.stages import BallSettings, analyse_ball
+    from sloshlab.bouncing_ball.identification import SearchSettings
+
+    if damper not in ("contact", "always"):
+        raise typer.BadParameter(f"{damper!r} is neither 'contact' nor 'always'", param_hint="--damper")
+    search = SearchSettings(n_generations=generations, seed=seed)
+    settings = BallSettings(omega_bar, 1.0 if damper == "always" else 0.0, lowest_acceleration_g, search)
+    experiment = analyse_ball(runs, rig, settings)
+    _finish(write_ball(experiment, output, command=_command(), report=not no_report), as_json)
+
+
 @app.command("import")
 def import_(
     sources: Annotated[list[Path], typer.Argument(metavar="SRC...", help="Files of one run.", show_default=False)],

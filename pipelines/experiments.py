@@ -72,6 +72,30 @@ def _beam(folder: Path, output: Path) -> int:
     return code
 
 
+def _ball(folder: Path, output: Path) -> int:
+    """Balls from every experiment of the folder that is there: decays, and both shakers filled half."""
+    whole = folder / "numerical_tank"
+    found = {
+        "decay": (sorted((whole / "sdof").glob("*.nc")), whole / "sdof" / "rig_sdof.toml"),
+        "shaker": (sorted((folder / "shaker").glob("fill_0.50_*.nc")), folder / "shaker" / "rig_fill_0.50.toml"),
+        "numerical_tank": (
+            sorted((whole / "shaker").glob("fill_0.50_*.nc")),
+            whole / "shaker" / "rig_fill_0.50.toml",
+        ),
+    }
+    if not any(runs for runs, _ in found.values()):
+        raise InputError(f"{folder}", got="no recordings", remedy="make them with `make campaign`")
+    for name, (runs, rig) in found.items():
+        if not runs:
+            print(f"{name}: no recordings; make them with `make tank-campaign`")  # noqa: T201
+            continue
+        code = run(["ball", *map(str, runs), "--rig", str(rig), "--damper", "always", "-o", str(output / name)])
+        if code not in (0, DONE_BUT_FLAGGED):
+            return code
+        print(f"The report is {(output / name / 'report.html').resolve()}")  # noqa: T201
+    return 0
+
+
 def _replay(folder: Path, output: Path) -> int:
     """Every recording through simulated devices; any difference is a failure."""
     from pipelines.replayed_campaign import replayed_campaign
@@ -82,7 +106,7 @@ def _replay(folder: Path, output: Path) -> int:
     return 1 if summary["flags"] else 0
 
 
-EXPERIMENTS: Final = {"shaker": _shaker, "beam": _beam, "sdof": _beam, "replay": _replay}
+EXPERIMENTS: Final = {"shaker": _shaker, "beam": _beam, "sdof": _beam, "ball": _ball, "replay": _replay}
 
 
 if __name__ == "__main__":

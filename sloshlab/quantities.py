@@ -128,6 +128,13 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "x_m": Quantity("m", "distance from the root of the beam", "x"),
     "tip_mass_kg": Quantity("kg", "mass at the tip of the beam, liquid frozen"),
     "youngs_modulus_pa": Quantity("Pa", "Young's modulus of the beam", "E"),
+    "ball_parameter": Quantity("1", "name of a parameter of a bouncing ball"),
+    "ball_value": Quantity("1", "value of a parameter of a bouncing ball, in the unit of its name"),
+    "ball_value_low": Quantity("1", "lower end of the 90 % interval of a parameter of a ball, −∞ if it has none"),
+    "ball_value_high": Quantity("1", "upper end of the 90 % interval of a parameter of a ball, ∞ if it has none"),
+    "ball_profile_ratio": Quantity("1", "growth of the sum of squares at the ends over the predicted one"),
+    "ball_damping_ratio": Quantity("1", "share of critical damping with the ball, at the measured amplitudes"),
+    "ball_w_bar": Quantity("1", "W̄ of the ball at the frequency and amplitude of each window"),
 }
 
 

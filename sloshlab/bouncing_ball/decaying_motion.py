@@ -34,8 +34,8 @@ class DecayingRun:
         A value is the mean over so many cycles, because a ball may repeat every second one only.
     """
 
-    n_cycles: int = 100
-    samples_per_cycle: int = 200
+    n_cycles: int = 60
+    samples_per_cycle: int = 60
     n_averaged_cycles: int = 2
 
     def __post_init__(self) -> None:

@@ -23,6 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 _DIED_OUT_SHARE = 2e-3
 """A decay is read down to this share of its largest value."""
 _FEWEST_VALUES = 8
+_LONGEST_COULOMB_DECAY_S = 200.0
 _NO_NOISE = DecayNoise(np.zeros(1), np.full(1, 1e-12), 1e6)
 
 
@@ -155,7 +156,7 @@ def damping_shares(
     ball: BouncingBall, rig: Rig, initial_displacement_m: float, duration_s: float
 ) -> dict[str, DampingCurve]:
     """ζ(a) with all dampings, and with each alone: ``all``, ``ball``, ``coulomb``, ``viscous`` (Fig. 2.14)."""
-    frequency = natural_frequency_hz(rig)
+    frequency, longest = natural_frequency_hz(rig), _coulomb_duration_s(rig, initial_displacement_m)
     runs = {
         "all": (ball, ()),
         "ball": (ball, ("coulomb", "viscous")),
@@ -164,10 +165,26 @@ def damping_shares(
     }
     return {
         name: simulated_curve(
-            simulated_decay(who, rig, initial_displacement_m, duration_s, without=without), frequency
+            simulated_decay(
+                who,
+                rig,
+                initial_displacement_m,
+                max(duration_s, longest if name == "coulomb" else 0.0),
+                without=without,
+            ),
+            frequency,
         )
         for name, (who, without) in runs.items()
     }
+
+
+def _coulomb_duration_s(rig: Rig, initial_displacement_m: float) -> float:
+    """How long dry friction alone needs to stop the structure: it takes 4F/K of the amplitude per cycle."""
+    structure = rig.structure
+    if structure is None or not structure.coulomb_force_n or structure.stiffness_n_per_m is None:
+        return 0.0
+    n_cycles = abs(initial_displacement_m) * structure.stiffness_n_per_m / (4 * structure.coulomb_force_n)
+    return min(n_cycles / natural_frequency_hz(rig), _LONGEST_COULOMB_DECAY_S)
 
 
 def natural_frequency_hz(rig: Rig) -> float:

@@ -40,9 +40,9 @@ class Bound:
 
 BOUNDS: Final = (
     Bound("radius_m", 0.05, 0.495, logarithmic=False),
-    Bound("stiffness_n_per_m", 0.7, 20.0),
-    Bound("damping_kg_per_s", 0.01, 3.0),
-    Bound("hardening_per_m", 0.1, 300.0),
+    Bound("stiffness_n_per_m", 0.7, 15.0),
+    Bound("damping_kg_per_s", 0.01, 2.0),
+    Bound("hardening_per_m", 0.1, 1000.0),
     Bound("beta", 1e-4, 0.5),
 )
 """r₀/h; √(k̂/m_b)/Ω; c/(2√(k̂ m_b)); αh; β. The first mention of a parameter's name is that of the ball's."""
