@@ -1,4 +1,4 @@
-"""Speed and memory: the shaker analysis as ratios measured in one run, the numerical tank, live recording.
+"""Speed and memory: shaker analysis as ratios measured in one run, the twin, the numerical tank, live recording.
 
 Each measurement runs in a process of its own on one core. Times are processor times, the best of several
 repeats after a warm-up that compiles the kernels; the parent prints the table and says where a figure
@@ -15,6 +15,7 @@ import tempfile
 from pathlib import Path
 
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
+from tests.benchmarks.twin import FREE_LABEL, RANDOM_LABEL, RIVAL_LABEL
 
 TRANSPORTS = ("serial", "socketcand", "slcan")
 AIMS = {
@@ -22,11 +23,13 @@ AIMS = {
     "… over reading and decoding the file": 5.0,
     "peak memory over decoded recording": 4.0,
     "10 × longer recording costs": 11.0,
+    FREE_LABEL: 0.1,
+    RANDOM_LABEL: 1.0,
     **{label(layers): aim for layers, aim in RESOLUTIONS.items()},
     **{f"{transport}: samples wrong or lost": 0.0 for transport in TRANSPORTS},
     **{f"{transport}: recorder, share of one core": 0.6 for transport in TRANSPORTS},
 }
-AT_LEAST = {SIDE_BY_SIDE: 1.8}
+AT_LEAST = {SIDE_BY_SIDE: 1.8, RIVAL_LABEL: 50.0}
 RECORDING_S = 20.0
 ONE_CORE = {
     name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -86,6 +89,8 @@ def main() -> None:
         "plain SciPy: work per cycle, over ours with phasors": peer["plain_s"] / peer["ours_s"],
         "analysis over a 1000³ matrix product": standard["analysis_s"] / blas["product_s"],
     }  # fmt: skip
+    print("the twin, and the same by solve_ivp …", flush=True)
+    figures |= measured("twin")
     figures |= tank_figures(ONE_CORE)
     figures |= recording_figures()
     sys.exit(1 if printed(figures) else 0)

@@ -13,11 +13,11 @@ import xarray as xr
 
 from sloshlab.errors import RigError
 from sloshlab.rig import Rig
-from sloshlab.twin import tank_models
+from sloshlab.twin import rate_independent_forces, tank_models
 from sloshlab.twin.excitation import free, harmonic
 from sloshlab.twin.law import VELOCITY, law
 from sloshlab.twin.tank_models import tank_model, tank_terms
-from sloshlab.twin.terms import ForceKind, Parameter, Term, register
+from sloshlab.twin.terms import _KINDS, ForceKind, Parameter, Term, register
 from sloshlab.twin.twin import Twin
 
 RIG = """
@@ -40,6 +40,7 @@ tank_model = "{model}"
 [twin.parameters]
 {parameters}
 """
+assert rate_independent_forces.HYSTERESIS.name == "hysteresis"  # registers the last of the built-in forces
 LIQUID_KG, HEIGHT_M = 0.12433, 0.0272
 SCALE = math.sqrt(9.81 / HEIGHT_M)
 
@@ -131,6 +132,19 @@ def test_impossible_parameters_are_refused_in_one_line(folder: Path, parameters:
     assert message in str(error.value)
     assert "twin.parameters" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_every_force_is_documented_with_all_its_parameters() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "twin.md").read_text(encoding="utf-8")
+    rows = {row.split("|")[1].strip(" `"): row for row in page.splitlines() if row.startswith("| `")}
+    built_in = [kind for kind in _KINDS.values() if kind.law.function.__module__.startswith("sloshlab.")]
+    assert len(built_in) >= 19
+    for kind in built_in:
+        assert kind.name in rows, kind.name
+        if kind.name == "effective_mass_map":
+            continue  # "the same" as the row before
+        assert all(f"`{parameter.name}`" in rows[kind.name] for parameter in kind.parameters), kind.name
+        assert all(place in rows[kind.name] for place in kind.places)
 
 
 @law
