@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from pipelines.beam_results import METHODS, BeamExperiment, BeamRun, BeamSettings, FrozenMode
+from pipelines.beam_results import METHODS, BeamExperiment, BeamRun, BeamSettings, FrozenMode, group_of
 from pipelines.beam_stages import RANDOM, Loaded, analysed, loaded
 from pipelines.progress import progress
 from pipelines.sweep_stages import naming
@@ -100,9 +100,10 @@ def _loaded(paths: Sequence[Path], kind: str) -> list[Loaded]:
     runs: list[Loaded] = []
     for path in paths:
         run = loaded(path, read_recording(path), kind)
-        twin = next((one for one in runs if one.attributes.run_id == run.attributes.run_id), None)
-        if twin is not None:
-            raise AnalysisError(f"{path}: run_id", got=f"{run.attributes.run_id!r}, as in {twin.path}",
+        own = run.attributes.run_id, group_of(run.attributes)
+        same = next((one for one in runs if (one.attributes.run_id, group_of(one.attributes)) == own), None)
+        if same is not None:
+            raise AnalysisError(f"{path}: run_id", got=f"{own[0]!r}, as in {same.path}",
                                 allowed="one run_id per run", remedy="give every run once")  # fmt: skip
         runs.append(run)
     rates = {run.attributes.sampling_rate_hz for run in runs if run.attributes.experiment in RANDOM}
@@ -131,7 +132,7 @@ def _carried_mass(runs: Sequence[Loaded]) -> ApparentMass | None:
     frozen = [
         apparent_mass(run.recording)
         for run in runs
-        if run.attributes.configuration == "frozen" and channels(run.recording, "force")
+        if group_of(run.attributes) == "frozen" and channels(run.recording, "force")
     ]
     return min(
         frozen, key=lambda one: one.mass_std_kg if math.isfinite(one.mass_std_kg) else math.inf, default=None
@@ -142,13 +143,13 @@ def _frozen_modes(runs: Sequence[BeamRun]) -> dict[int, FrozenMode]:
     """Frequencies with the liquid frozen: from decays where there are any, else from random runs."""
     found: dict[int, FrozenMode] = {}
     for run in runs:
-        if run.attributes.configuration != "frozen":
+        if run.group != "frozen":
             continue
         for one in run.decays:
             if one.decay is not None and one.decay.local_sine_fit.used.any() and one.mode not in found:
                 found[one.mode] = _of_decay(one.decay.local_sine_fit)
     for run in runs:
-        if run.attributes.configuration != "frozen" or run.random is None:
+        if run.group != "frozen" or run.random is None:
             continue
         for fit in run.random.fits:
             if fit.fit is not None:
@@ -188,16 +189,12 @@ def _updated(rig: Rig, frozen: dict[int, FrozenMode]) -> tuple[UpdatedBeam | Non
 
 def _pooled(runs: Sequence[BeamRun]) -> dict[tuple[str, str], PooledDamping]:
     pooled = {}
-    for configuration in sorted({run.attributes.configuration for run in runs if run.decays}):
-        decays = [
-            run.first_decay
-            for run in runs
-            if run.first_decay is not None and run.attributes.configuration == configuration
-        ]
+    for group in sorted({run.group for run in runs if run.decays}):
+        decays = [run.first_decay for run in runs if run.first_decay is not None and run.group == group]
         for index, method in enumerate(METHODS):
             readings = [decay.readings[index] for decay in decays]
             if any(reading.used.any() for reading in readings):
-                pooled[configuration, method] = pooled_damping(readings)
+                pooled[group, method] = pooled_damping(readings)
     return pooled
 
 

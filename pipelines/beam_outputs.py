@@ -47,7 +47,7 @@ def modal_dataset(experiment: BeamExperiment) -> xr.Dataset:
     for index, point in enumerate(_POINTS):
         variables.update(_readings(experiment.runs, index, point))
     coordinates = {
-        "run": ("run", np.array([run.attributes.run_id for run in experiment.runs], dtype=object)),
+        "run": ("run", np.array([run.name for run in experiment.runs], dtype=object)),
         "configuration": (
             "run",
             np.array([run.attributes.configuration for run in experiment.runs], dtype=object),
@@ -167,7 +167,7 @@ def spectra_dataset(experiment: BeamExperiment) -> xr.Dataset:
             }
         )
         spectra = random.spectra.to_dataset()
-        parts.append(spectra.merge(modal).assign_coords(run=run.attributes.run_id).assign_attrs(spectra.attrs))
+        parts.append(spectra.merge(modal).assign_coords(run=run.name).assign_attrs(spectra.attrs))
     if not parts:
         return xr.Dataset()
     joined = xr.concat(parts, dim="run", combine_attrs="drop_conflicts", join="outer")
@@ -225,9 +225,7 @@ def _summary(experiment: BeamExperiment, folder: Path, report: bool) -> dict[str
         f"spectra: {folder / 'spectra.nc'} ({n_random} random runs)",
     ]
     first = {
-        run.attributes.run_id: float(
-            run.first_decay.local_sine_fit.damping_ratio[run.first_decay.local_sine_fit.used].mean()
-        )
+        run.name: float(run.first_decay.local_sine_fit.damping_ratio[run.first_decay.local_sine_fit.used].mean())
         for run in experiment.free_runs
         if run.first_decay is not None and run.first_decay.local_sine_fit.used.any()
     }
@@ -239,7 +237,7 @@ def _summary(experiment: BeamExperiment, folder: Path, report: bool) -> dict[str
         "random_runs": n_random,
         "mean_damping_ratio": first,
         "random_damping_ratio": {
-            run.attributes.run_id: run.random.density_fit.damping_ratio
+            run.name: run.random.density_fit.damping_ratio
             for run in experiment.random_runs
             if run.random is not None and run.random.density_fit is not None
         },

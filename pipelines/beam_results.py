@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +25,7 @@ from sloshlab.rig import Rig
 
 FloatArray = npt.NDArray[np.float64]
 
+CONFIGURATIONS: Final = ("frozen", "empty", "sloshing")
 METHODS: Final = ("log decrement", "envelope", "local sine fit")
 """Of reading a decay, in the order of `FreeDecay.readings`."""
 
@@ -149,6 +150,26 @@ class BeamRun:
     flags: tuple[str, ...] = ()
 
     @property
+    def is_simulated(self) -> bool:
+        """Whether a twin made it (`sloshlab simulate`)."""
+        return bool((self.attributes.model_extra or {}).get("simulated_from"))
+
+    @property
+    def simulated_from(self) -> str:
+        """File name of the recording that drove the twin; empty for a measured run."""
+        return str((self.attributes.model_extra or {}).get("simulated_from", ""))
+
+    @property
+    def group(self) -> str:
+        """What the run is a repeat of: its configuration, or the twin that made it."""
+        return group_of(self.attributes)
+
+    @property
+    def name(self) -> str:
+        """`run_id`, with its twin where one made it."""
+        return f"{self.attributes.run_id} ({self.group})" if self.is_simulated else self.attributes.run_id
+
+    @property
     def first_decay(self) -> FreeDecay | None:
         """Decay of the first mode."""
         return self.decays[0].decay if self.decays else None
@@ -205,7 +226,7 @@ class BeamExperiment:
         The beam model fitted to the frozen frequencies.
     update_reason : str
         Why there is none.
-    pooled : dict of (configuration, method) to PooledDamping
+    pooled : dict of (group, method) to PooledDamping
         First mode over repeats of the free runs.
     inputs : tuple of Path
         Recordings and rig.
@@ -242,9 +263,20 @@ class BeamExperiment:
         found = [run for run in self.runs if run.random is not None]
         return tuple(sorted(found, key=lambda run: run.random.root_rms_g if run.random else 0.0))
 
-    def first_of(self, configuration: str) -> BeamRun | None:
-        """The first free run of a configuration."""
-        return next((run for run in self.free_runs if run.attributes.configuration == configuration), None)
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups of all runs: measured configurations first, frozen before sloshing, then twins in their order."""
+        measured = {run.group for run in self.runs if not run.is_simulated}
+        twins = dict.fromkeys(run.group for run in self.runs if run.is_simulated)
+        return (*(one for one in CONFIGURATIONS if one in measured), *twins)
+
+    def first_of(self, group: str) -> BeamRun | None:
+        """The first free run of a group."""
+        return next((run for run in self.free_runs if run.group == group), None)
+
+    def measured_of(self, simulated: BeamRun) -> BeamRun | None:
+        """The recording that drove a simulated run, if it is among the runs."""
+        return next((run for run in self.runs if run.path.name == simulated.simulated_from), None)
 
     @property
     def total_mass_kg(self) -> float:
@@ -252,6 +284,19 @@ class BeamExperiment:
         if self.carried_mass is not None:
             return self.carried_mass.mass_kg
         return self.rig.tank.dry_mass_kg + self.rig.liquid_mass_kg
+
+
+def group_of(attributes: RunAttributes) -> str:
+    """Configuration of a measured run; of a simulated one the forces on its tank and its rig.
+
+    Forces of the structure are left out: they are there with every liquid.
+    """
+    more = attributes.model_extra or {}
+    if not more.get("simulated_from"):
+        return attributes.configuration
+    forces = [one.strip() for one in str(more.get("simulated_forces", "")).split(",")]
+    liquid = [one.removesuffix("(tank)").strip().replace("_", " ") for one in forces if one.endswith("(tank)")]
+    return f"twin {PurePath(attributes.rig).stem}: {', '.join(liquid) or 'frozen'}"
 
 
 def in_g(values: FloatArray) -> FloatArray:

@@ -22,7 +22,7 @@ from sloshlab.conditioning.combined_channels import (
     mean_acceleration,
     total_force,
 )
-from sloshlab.conditioning.quality import RunQuality
+from sloshlab.conditioning.quality import RunQuality, quality_of
 from sloshlab.errors import AnalysisError
 from sloshlab.modal.free_decay import FreeDecay, analyse_free_decay
 from sloshlab.modal.modal_filter import ModalFilter, ModalResponse, modal_filter
@@ -92,7 +92,10 @@ def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
             allowed=f"{' or '.join(allowed)} with this rig, whose structure is of kind {kind!r}",
             remedy="use `sloshlab shaker` for sweeps, or give the rig that the run belongs to",
         )
-    return Loaded(path, recording, attributes, require_usable(recording, path))
+    # a simulated root does not move and a frozen liquid has no force: constant channels are no dead sensors there
+    simulated = "simulated_from" in recording.attrs
+    quality = quality_of(recording) if simulated else require_usable(recording, path)
+    return Loaded(path, recording, attributes, quality)
 
 
 def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:

@@ -64,8 +64,13 @@ def beam_arguments(folder: Path, output: Path) -> list[str]:
 
 
 def _beam(folder: Path, output: Path) -> int:
-    """Damping, modes and report; a flagged result is a result."""
-    code = run(beam_arguments(folder, output))
+    """Damping, modes, twins of the sloshing runs, and report; a flagged result is a result."""
+    from pipelines.beam_twins import simulated_twins
+
+    arguments = beam_arguments(folder, output)
+    rig = Path(arguments[arguments.index("--rig") + 1])
+    twins = simulated_twins(folder, rig, output / "twins")
+    code = run([arguments[0], *map(str, twins), *arguments[1:]])
     if code in (0, DONE_BUT_FLAGGED):
         print(f"The report is {(output / 'report.html').resolve()}")  # noqa: T201
         return 0

@@ -9,15 +9,14 @@ import numpy.typing as npt
 
 from pipelines.beam_report.figures_signals import shown_runs
 from pipelines.beam_report.marks import (
-    CONFIGURATION_COLOURS,
-    CONFIGURATIONS,
     METHOD_MARKS,
     RELEASE_COLOUR,
     amplitude_axis,
+    group_colour,
     legend_above,
     panel_letter,
 )
-from pipelines.beam_results import BeamExperiment, BeamRun, in_g
+from pipelines.beam_results import CONFIGURATIONS, BeamExperiment, BeamRun, in_g
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import DISTINCT_MARKERS, new_figure, png_bytes
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping, Trust
@@ -46,7 +45,7 @@ def over_amplitude(name: str, experiment: BeamExperiment, quantity: Quantity) ->
     grid = figure.subplots(1, len(runs), sharey=quantity == "frequency", squeeze=False)[0]
     for number, (axes, run) in enumerate(zip(grid, runs, strict=True)):
         _draw_readings(axes, run, quantity)
-        panel_letter(axes, number, f"{run.attributes.configuration}, {run.level_text}")
+        panel_letter(axes, number, f"{run.group}, {run.level_text}")
         axes.set_xlabel("amplitude of acceleration a [g]")
     grid[0].set_ylabel(_LABELS[quantity])
     legend_above(figure, list(grid))
@@ -101,9 +100,9 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
     figure = new_figure(3.8)
     axes = figure.subplots()
     shown = []
-    for configuration in CONFIGURATIONS:
-        runs = [run for run in experiment.free_runs if run.attributes.configuration == configuration]
-        colour = CONFIGURATION_COLOURS[configuration]
+    for group in experiment.groups:
+        runs = [run for run in experiment.free_runs if run.group == group]
+        colour = group_colour(experiment, group)
         for number, run in enumerate(runs):
             reading = run.first_decay.local_sine_fit if run.first_decay is not None else None
             if reading is None:
@@ -112,29 +111,31 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
             amplitude = in_g(reading.acceleration_amplitude_m_per_s2)
             axes.plot(amplitude[reading.used], values[reading.used], color=colour,
                       marker=DISTINCT_MARKERS[number % len(DISTINCT_MARKERS)], ms=3.5, ls="none", alpha=0.7,
-                      label=f"{configuration}, run {number + 1}")  # fmt: skip
+                      label=f"{group}, run {number + 1}" if len(runs) > 1 else group)  # fmt: skip
             shown.append(values[reading.used])
-        _draw_pooled(axes, experiment, configuration, quantity)
+        _draw_pooled(axes, experiment, group, quantity)
     axes.set_xlabel("amplitude of acceleration a [g]")
     axes.set_ylabel(_LABELS[quantity])
     _arrange(axes, np.concatenate(shown) if shown else np.array([]), quantity)
     legend_above(figure, axes, columns=4)
     caption = (
-        "The first mode in every free run, by the local sine fit. Lines are means over the repeats within bins of "
+        "The first mode in every free run, by the local sine fit; dashed lines are simulations. Lines are means "
+        "over the repeats within bins of "
         "amplitude; bands are 90 % intervals of the mean, from the scatter between repeats (Student), where there "
         "are two or more."
     )
     return ReportFigure(name, caption, f"{_SOURCE_FIGURES[experiment.kind]}, measured", png_bytes(figure))
 
 
-def _draw_pooled(axes: Axes, experiment: BeamExperiment, configuration: str, quantity: Quantity) -> None:
-    pooled = experiment.pooled.get((configuration, "local sine fit"))
+def _draw_pooled(axes: Axes, experiment: BeamExperiment, group: str, quantity: Quantity) -> None:
+    pooled = experiment.pooled.get((group, "local sine fit"))
     if pooled is None:
         return
-    amplitude, colour = in_g(pooled.acceleration_amplitude_m_per_s2), CONFIGURATION_COLOURS[configuration]
+    amplitude, colour = in_g(pooled.acceleration_amplitude_m_per_s2), group_colour(experiment, group)
     mean = 100 * pooled.damping_ratio if quantity == "damping" else pooled.frequency_hz
     low, high = 100 * pooled.damping_ratio_interval if quantity == "damping" else pooled.frequency_interval_hz
-    axes.plot(amplitude, mean, color=colour, lw=1.4, label=f"{configuration}, mean")
+    axes.plot(amplitude, mean, color=colour, lw=1.4, ls="-" if group in CONFIGURATIONS else "--",
+              label=f"{group}, mean" if pooled.n_repeats.max() > 1 else None)  # fmt: skip
     axes.fill_between(amplitude, low, high, where=np.isfinite(low), color=colour, alpha=0.18, lw=0)
 
 
@@ -145,7 +146,7 @@ def higher_modes(name: str, experiment: BeamExperiment) -> ReportFigure:
         (mode, run, run.decays[mode].decay)
         for mode in numbers
         for run in experiment.free_runs
-        if run.decays[mode].decay is not None
+        if run.decays[mode].decay is not None and not run.is_simulated
     ]
     if not found:
         raise NothingToDrawError("no higher mode could be read")
@@ -160,10 +161,10 @@ def higher_modes(name: str, experiment: BeamExperiment) -> ReportFigure:
             reading = decay.local_sine_fit
             values, half = values_of(reading, "damping")
             clear = reading.used & (half < 0.5 * np.abs(values) + 0.2)
-            colour = CONFIGURATION_COLOURS[run.attributes.configuration]
+            colour = group_colour(experiment, run.group)
             amplitude = in_g(reading.acceleration_amplitude_m_per_s2)
             axes.errorbar(amplitude[clear], values[clear], half[clear], color=colour, marker="o", ms=3, lw=0,
-                          elinewidth=0.7, label=run.attributes.configuration)  # fmt: skip
+                          elinewidth=0.7, label=run.group)  # fmt: skip
             shown.append(values[clear])
         _arrange(axes, np.concatenate(shown), "damping")
         panel_letter(axes, number, experiment.modes.names[mode])

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.beam_report.marks import (
-    CONFIGURATION_COLOURS,
-    CONFIGURATIONS,
     RELEASE_COLOUR,
+    group_colour,
     legend_above,
     panel_letter,
 )
@@ -28,12 +27,14 @@ _MOST_POINTS: Final = 12_000
 """Of a line: beyond that, minimum and maximum of groups of samples are drawn."""
 _CYCLES_SHOWN: Final = 14
 _MOST_SECONDS: Final = 8.0
+_MOST_COLUMNS: Final = 3
 
 
 def shown_runs(experiment: BeamExperiment) -> list[BeamRun]:
-    """The first free run of each configuration, frozen first."""
-    found = [experiment.first_of(configuration) for configuration in CONFIGURATIONS]
+    """The first free run of each measured configuration, frozen first; twins only where nothing was measured."""
+    found = [experiment.first_of(group) for group in experiment.groups]
     runs = [run for run in found if run is not None]
+    runs = [run for run in runs if not run.is_simulated] or runs[:_MOST_COLUMNS]
     if not runs:
         raise NothingToDrawError("there is no free run")
     return runs
@@ -67,9 +68,9 @@ def modal_accelerations(name: str, experiment: BeamExperiment) -> ReportFigure:
     grid = figure.subplots(len(modes.names), len(runs), sharex="col", sharey="row", squeeze=False)
     for column, run in enumerate(runs):
         for row, mode in enumerate(modes.names):
-            colour = CONFIGURATION_COLOURS[run.attributes.configuration]
+            colour = group_colour(experiment, run.group)
             draw_line(grid[row, column], run.time_s, in_g(run.response.acceleration_m_per_s2[row]), colour, "")
-            panel_letter(grid[row, column], row * len(runs) + column, f"{run.attributes.configuration}, {mode}")
+            panel_letter(grid[row, column], row * len(runs) + column, f"{run.group}, {mode}")
             grid[row, column].set_xlim(run.time_s[0], run.time_s[0] + _shown_s(run))
         grid[-1, column].set_xlabel("time [s]")
     figure.supylabel("modal acceleration at the tip [g]", fontsize=9)
@@ -133,7 +134,7 @@ def release_transient(name: str, experiment: BeamExperiment) -> ReportFigure:
     figure = new_figure(0.7 + 1.6 * rows)
     grid = figure.subplots(rows, len(runs), sharex="col", sharey="row", squeeze=False)
     for column, (run, cut) in enumerate(zip(runs, cuts, strict=True)):
-        colour = CONFIGURATION_COLOURS[run.attributes.configuration]
+        colour = group_colour(experiment, run.group)
         for row, values in enumerate((cut.acceleration_g, cut.force_n, cut.sloshing_force_n)[:rows]):
             axes = grid[row, column]
             if values is not None:
@@ -142,7 +143,7 @@ def release_transient(name: str, experiment: BeamExperiment) -> ReportFigure:
                 axes.axvspan(cut.release_s, cut.transient_end_s, color=RELEASE_COLOUR, alpha=0.15, lw=0,
                              label="release transient")  # fmt: skip
             axes.set_xlim(cut.time_s[0], cut.time_s[-1])
-        panel_letter(grid[0, column], column, run.attributes.configuration)
+        panel_letter(grid[0, column], column, run.group)
         grid[-1, column].set_xlabel("time [s]")
     labels = ("acceleration\nof the tank [g]", "force of the\nstructure [N]", "Δf of the\nliquid [N]")
     for axes, label in zip(grid[:, 0], labels, strict=False):
@@ -164,8 +165,8 @@ def release_transient(name: str, experiment: BeamExperiment) -> ReportFigure:
 
 def random_signals(name: str, experiment: BeamExperiment) -> ReportFigure:
     """Acceleration of the tank in the random runs (Fig. 2.36) with that of the root (Fig. 2.35)."""
-    runs = [run for run in experiment.random_runs if run.attributes.configuration == "sloshing"]
-    runs = runs or list(experiment.random_runs)
+    measured = [run for run in experiment.random_runs if not run.is_simulated]
+    runs = [run for run in measured if run.group == "sloshing"] or measured or list(experiment.random_runs)
     if not runs:
         raise NothingToDrawError("there is no random run")
     figure = new_figure(0.6 + 1.4 * len(runs))
@@ -174,7 +175,7 @@ def random_signals(name: str, experiment: BeamExperiment) -> ReportFigure:
         draw_line(axes, run.time_s, in_g(run.tank_acceleration), NEUTRAL_COLOUR, "tank")
         if run.root_acceleration is not None:
             draw_line(axes, run.time_s, in_g(run.root_acceleration), "#e69f00", "root")
-        panel_letter(axes, number, f"{run.attributes.configuration}, {run.level_text}")
+        panel_letter(axes, number, f"{run.group}, {run.level_text}")
         axes.set_xlim(run.time_s[0], run.time_s[-1])
     grid[-1].set_xlabel("time [s]")
     figure.supylabel("acceleration [g]", fontsize=9)
@@ -185,7 +186,7 @@ def random_signals(name: str, experiment: BeamExperiment) -> ReportFigure:
 
 def arrange_time(axes: Axes, number: int, run: BeamRun) -> None:
     """Title and abscissa of a time history."""
-    panel_letter(axes, number, f"{run.attributes.configuration}, {run.level_text}")
+    panel_letter(axes, number, f"{run.group}, {run.level_text}")
     axes.set_xlabel("time [s]")
     axes.set_xlim(run.time_s[0], run.time_s[0] + _shown_s(run))
 
@@ -206,4 +207,4 @@ def _shown_s(run: BeamRun) -> float:
 
 
 def _words(runs: list[BeamRun]) -> str:
-    return " and ".join(run.attributes.configuration for run in runs)
+    return " and ".join(run.group for run in runs)

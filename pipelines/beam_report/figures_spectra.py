@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.beam_random import FIT_RANGE
-from pipelines.beam_report.marks import CONFIGURATION_COLOURS, RELEASE_COLOUR, legend_above, panel_letter
+from pipelines.beam_report.marks import RELEASE_COLOUR, group_colour, legend_above, panel_letter
 from pipelines.beam_results import BeamExperiment, BeamRun, RandomResponse
 from pipelines.report.axes import plain_log_ticks
 from pipelines.report.figure import NothingToDrawError, ReportFigure
@@ -68,10 +68,10 @@ def densities(name: str, experiment: BeamExperiment) -> ReportFigure:
                 continue
             lines = (random.spectra.frequency_hz >= low) & (random.spectra.frequency_hz <= high)
             density = random.spectra.output_psd[0, lines] / GRAVITY_M_PER_S2**2
-            colour = CONFIGURATION_COLOURS[run.attributes.configuration]
+            colour = group_colour(experiment, run.group)
             frequency = random.spectra.frequency_hz[lines]
             axes.semilogy(frequency, density, color=colour, lw=1.2,
-                          label=run.attributes.configuration)  # fmt: skip
+                          label=run.group)  # fmt: skip
             if random.density_fit is not None:
                 fit = random.density_fit
                 fitted = fit.density / GRAVITY_M_PER_S2**2
@@ -141,7 +141,7 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
     axes = figure.subplots()
     drawn = False
     for run, random in runs:
-        colour = CONFIGURATION_COLOURS[run.attributes.configuration]
+        colour = group_colour(experiment, run.group)
         points: list[tuple[float, float, float, str, str]] = []
         if random.density_fit is not None:
             fit = random.density_fit
@@ -154,7 +154,7 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
             points.append((1.03, float(modal.damping_ratio[0]), half, "s", "H₁"))
         for shift, value, half, marker, how in points:
             axes.errorbar(shift * random.root_rms_g, 100 * value, 100 * half, color=colour, marker=marker, ms=5,
-                          lw=0, elinewidth=1.0, label=f"{run.attributes.configuration}, {how}")  # fmt: skip
+                          lw=0, elinewidth=1.0, label=f"{run.group}, {how}")  # fmt: skip
             drawn = True
     if not drawn:
         raise NothingToDrawError("no fit of the first mode")
@@ -181,7 +181,7 @@ def _level(run: BeamRun) -> str:
 
 
 def _label(run: BeamRun) -> str:
-    return f"{run.attributes.configuration}, {run.level_text}"
+    return f"{run.group}, {run.level_text}"
 
 
 def _welch(random: RandomResponse) -> str:

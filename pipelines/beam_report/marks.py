@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CONFIGURATION_COLOURS: Final = {"frozen": "#3b5b7a", "sloshing": "#d55e00", "empty": "#009e73"}
+    from pipelines.beam_results import BeamExperiment
+
+_CONFIGURATION_COLOURS: Final = {"frozen": "#3b5b7a", "sloshing": "#d55e00", "empty": "#009e73"}
+_TWIN_COLOURS: Final = ("#000000", "#0072b2", "#cc79a7", "#8a6d00", "#56b4e9", "#7a3b5b")
 METHOD_MARKS: Final = {
     "log decrement": (DISTINCT_COLOURS[0], "o"),
     "envelope": (DISTINCT_COLOURS[2], "s"),
@@ -21,7 +24,14 @@ METHOD_MARKS: Final = {
 RELEASE_COLOUR: Final = "#a3123a"
 _WIDE: Final = 500.0
 """Largest over smallest value of an axis on which there is room for one number per decade only."""
-CONFIGURATIONS: Final = ("frozen", "empty", "sloshing")
+
+
+def group_colour(experiment: BeamExperiment, group: str) -> str:
+    """Colour of measured configurations, the same in every report, and of twins in their order."""
+    if group in _CONFIGURATION_COLOURS:
+        return _CONFIGURATION_COLOURS[group]
+    twins = [one for one in experiment.groups if one not in _CONFIGURATION_COLOURS]
+    return _TWIN_COLOURS[twins.index(group) % len(_TWIN_COLOURS)]
 
 
 def panel_letter(axes: Axes, number: int, text: str) -> None:

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from pipelines.beam_report import figures_decay, figures_signals, figures_spectra, tables
+from pipelines.beam_report import figures_decay, figures_signals, figures_spectra, figures_twin, tables
 from pipelines.beam_report.summary import sentences
 from pipelines.beam_results import BeamExperiment
 from pipelines.progress import progress
@@ -66,6 +66,8 @@ def planned_sections(experiment: BeamExperiment) -> tuple[SectionPlan, ...]:
         sections.append(_decay_section(experiment))
     if experiment.random_runs:
         sections.append(_random_section(experiment))
+    if any(run.is_simulated for run in experiment.runs):
+        sections.append(_twin_section(experiment))
     quality = _present(
         tables.filter_table(experiment),
         channel_table(experiment.runs),  # type: ignore[arg-type]
@@ -98,6 +100,15 @@ def _decay_section(experiment: BeamExperiment) -> SectionPlan:
         plans["damping_of_higher_modes"] = partial(figures_decay.higher_modes, experiment=experiment)
     shown = _present(tables.decay_table(experiment), tables.pooled_table(experiment))
     return SectionPlan("Free decays", tuple(FigurePlan(name, draw) for name, draw in plans.items()), shown)
+
+
+def _twin_section(experiment: BeamExperiment) -> SectionPlan:
+    plans = {
+        "decay_against_twins": figures_twin.decay_against_twins,
+        "random_against_twins": figures_twin.random_against_twins,
+    }
+    drawn = tuple(FigurePlan(name, partial(draw, experiment=experiment)) for name, draw in plans.items())
+    return SectionPlan("Twins", drawn, _present(tables.twin_table(experiment)))
 
 
 def _random_section(experiment: BeamExperiment) -> SectionPlan:

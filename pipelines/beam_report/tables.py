@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from pipelines.beam_report.figures_spectra import TABLE_2_5
+from pipelines.beam_report.figures_twin import pairs_of, relative_error
 from pipelines.beam_results import METHODS, BeamExperiment, BeamRun, in_g
 from pipelines.report.numbers import MISSING, interval, signed, text
 from pipelines.report.tables import Table
@@ -79,7 +80,7 @@ def filter_table(experiment: BeamExperiment) -> Table | None:
             )
         )
         visible = ", ".join(text(value, 3) for value in run.modal_filter.visibility)
-        rows.append((run.attributes.run_id, visible, text(run.modal_filter.condition_number, 3), residuals))
+        rows.append((run.name, visible, text(run.modal_filter.condition_number, 3), residuals))
     if not rows:
         return None
     return Table(
@@ -108,8 +109,8 @@ def decay_table(experiment: BeamExperiment) -> Table | None:
         amplitude = decay.log_decrement.acceleration_amplitude_m_per_s2
         rows.append(
             (
-                run.attributes.run_id,
-                run.attributes.configuration,
+                run.name,
+                run.group,
                 text(decay.release.release_s + float(run.time_s[0])),
                 f"{transient:.0f} ms" if transient > 0 else "none",
                 text(float(amplitude.max()) / GRAVITY_M_PER_S2),
@@ -145,12 +146,12 @@ def _at_ends(reading: InstantaneousDamping) -> str:
 def pooled_table(experiment: BeamExperiment) -> Table | None:
     """Mean over repeats at round amplitudes, by all methods."""
     rows = []
-    for configuration in sorted({key[0] for key in experiment.pooled}):
+    for group in experiment.groups:
         for amplitude in _AMPLITUDES_G:
-            cells = [_pooled_at(experiment, configuration, method, amplitude) for method in METHODS]
+            cells = [_pooled_at(experiment, group, method, amplitude) for method in METHODS]
             if any(cell != MISSING for cell, _ in cells):
                 n = max(number for _, number in cells)
-                rows.append((configuration, f"{amplitude:g}", str(n), *(cell for cell, _ in cells)))
+                rows.append((group, f"{amplitude:g}", str(n), *(cell for cell, _ in cells)))
     if not rows:
         return None
     return Table(
@@ -163,8 +164,8 @@ def pooled_table(experiment: BeamExperiment) -> Table | None:
     )
 
 
-def _pooled_at(experiment: BeamExperiment, configuration: str, method: str, amplitude_g: float) -> tuple[str, int]:
-    pooled = experiment.pooled.get((configuration, method))
+def _pooled_at(experiment: BeamExperiment, group: str, method: str, amplitude_g: float) -> tuple[str, int]:
+    pooled = experiment.pooled.get((group, method))
     if pooled is None:
         return MISSING, 0
     distance = np.abs(np.log10(in_g(pooled.acceleration_amplitude_m_per_s2) / amplitude_g))
@@ -188,8 +189,8 @@ def random_table(experiment: BeamExperiment) -> Table | None:
         alone = random.density_fit
         rows.append(
             (
-                run.attributes.run_id,
-                run.attributes.configuration,
+                run.name,
+                run.group,
                 text(random.root_rms_g, 3),
                 f"{text(random.tank_rms_g, 3)} ({text(random.tank_peak_g, 3)})",
                 MISSING
@@ -203,7 +204,7 @@ def random_table(experiment: BeamExperiment) -> Table | None:
     if not rows:
         return None
     reasons = [
-        f"{run.attributes.run_id}, {experiment.modes.names[fit.mode]}: {fit.reason}"
+        f"{run.name}, {experiment.modes.names[fit.mode]}: {fit.reason}"
         for run in experiment.random_runs
         if run.random is not None
         for fit in run.random.fits
@@ -233,11 +234,48 @@ def _modal_cell(run: BeamRun) -> str:
 
 
 def _published(run: BeamRun) -> str:
-    column = {"sloshing": "experiment", "frozen": "frozen"}.get(run.attributes.configuration)
+    column = {"sloshing": "experiment", "frozen": "frozen"}.get(run.group)
     if column is None or run.random is None:
         return MISSING
     near = [damping for rms, damping in TABLE_2_5[column] if abs(run.random.root_rms_g / rms - 1) < 0.1]
     return f"{near[0]:.2f}" if near else MISSING
+
+
+def twin_table(experiment: BeamExperiment) -> Table | None:
+    """How far the twins are from the recordings that drove them."""
+    rows = []
+    for measured, simulated in pairs_of(experiment, experiment.runs):
+        for run in simulated:
+            acceleration, force = relative_error(measured, run)
+            rows.append(
+                (
+                    measured.name,
+                    run.group,
+                    text(100 * acceleration, 3),
+                    text(100 * force, 3),
+                    _mean_damping(measured),
+                    _mean_damping(run),
+                )
+            )
+    if not rows:
+        return None
+    header = ("recording", "twin", "error of ü [%]", "error of F [%]", "ζ₁ measured [%]", "ζ₁ of the twin [%]")
+    note = (
+        "Error: RMS of the difference over RMS of the recording, over the whole run. ζ₁: mean over the "
+        "amplitudes of a "
+        "decay (local sine fit), or from the density of the tank in random motion. A small difference of "
+        "frequency "
+        "makes a large error of a long decay."
+    )
+    return Table("Twins against recordings", header, tuple(rows), note)
+
+
+def _mean_damping(run: BeamRun) -> str:
+    if run.first_decay is not None and run.first_decay.local_sine_fit.used.any():
+        reading = run.first_decay.local_sine_fit
+        return text(100 * float(reading.damping_ratio[reading.used].mean()))
+    fit = run.random.density_fit if run.random is not None else None
+    return MISSING if fit is None else text(100 * fit.damping_ratio)
 
 
 def run_table(runs: Sequence[BeamRun]) -> Table:
@@ -245,9 +283,9 @@ def run_table(runs: Sequence[BeamRun]) -> Table:
     rows = [
         (
             str(number),
-            run.attributes.run_id,
+            run.name,
             run.attributes.experiment,
-            run.attributes.configuration,
+            run.group,
             run.level_text,
             text(run.attributes.sampling_rate_hz, 4),
             interval([float(run.time_s[0]), float(run.time_s[-1])]),
@@ -262,7 +300,7 @@ def run_table(runs: Sequence[BeamRun]) -> Table:
 def reason_table(experiment: BeamExperiment) -> Table | None:
     """Modes whose decay could not be read, and why."""
     rows = [
-        (run.attributes.run_id, experiment.modes.names[one.mode], one.reason)
+        (run.name, experiment.modes.names[one.mode], one.reason)
         for run in experiment.free_runs
         for one in run.decays
         if one.reason
