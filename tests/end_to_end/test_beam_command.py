@@ -13,6 +13,8 @@ import xarray as xr
 from short_runs import DONE_BUT_FLAGGED, refusal
 
 from pipelines import experiments
+from pipelines.beam import analyse_beam, checked_settings
+from pipelines.beam_outputs import write_beam
 from pipelines.command_line import run
 from sloshlab.recording import LOST, write_recording
 
@@ -166,6 +168,31 @@ def test_dry_friction_on_the_guide(tmp_path: Path, capsys: pytest.CaptureFixture
     displacement = amplitude / (2 * np.pi * 6.56) ** 2
     assert damping == pytest.approx(2 * 0.37 / 3808.8 / (np.pi * displacement), rel=0.02)
     assert "report" in capsys.readouterr().out
+
+
+def test_a_simulated_run_is_a_group_of_its_own(folder: Path, tmp_path: Path) -> None:
+    """A twin with twice the damping neither joins the repeats nor counts as the frozen liquid."""
+    twin = beam_runs.beam_decay("sloshing_1_simulated", configuration="frozen", coefficient=8.0e-4)
+    twin = twin.drop_vars("acceleration_root").assign_attrs(
+        simulated_from="decay_sloshing_1.nc",
+        simulated_forces="viscous_damping (tank), coulomb (structure)",
+        rig="c1.toml",
+    )
+    write_recording(twin, tmp_path / "twin.nc")
+    runs = [folder / "decay_frozen.nc", folder / "decay_sloshing_1.nc", tmp_path / "twin.nc"]
+    settings = checked_settings(modes=1, n_cycles=4, segment_s=None)
+    experiment = analyse_beam(runs, folder / "rig_beam.toml", settings)
+    assert experiment.groups == ("frozen", "sloshing", "twin c1: viscous damping")
+    assert experiment.frozen_modes[0].damping_ratio == pytest.approx(0.0032, rel=0.01)
+    assert experiment.pooled["sloshing", "local sine fit"].n_repeats.max() == 1
+    simulated = experiment.runs[2]
+    assert experiment.measured_of(simulated) is experiment.runs[1]
+    ours = experiment.pooled["twin c1: viscous damping", "local sine fit"]
+    ratio = ours.damping_ratio / ours.acceleration_amplitude_m_per_s2
+    assert np.median(ratio) == pytest.approx(8.0e-4, rel=0.1)
+    page = write_beam(experiment, tmp_path / "out", command="")["output"]
+    assert (Path(page) / "figures" / "decay_against_twins.png").is_file()
+    assert "Twins against recordings" in (Path(page) / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_gap_is_never_crossed_and_flagged(
