@@ -69,11 +69,13 @@ class Law:
 
     @functools.cached_property
     def _compiled(self) -> Any:
+        compiled = functools.partial(cfunc, _SIGNATURE, nopython=True, error_model="numpy")
+        has_module = self.function.__code__.co_filename.endswith(".py")  # else nothing to keep it beside
         with _COMPILING:
             try:
-                return cfunc(_SIGNATURE, nopython=True, cache=True, error_model="numpy")(self.function)
-            except (RuntimeError, OSError):  # no file behind the function, so nothing to keep it beside
-                return cfunc(_SIGNATURE, nopython=True, error_model="numpy")(self.function)
+                return compiled(cache=has_module)(self.function)
+            except (RuntimeError, OSError):  # a module in a place that cannot be written
+                return compiled()(self.function)
 
     @property
     def address(self) -> int:

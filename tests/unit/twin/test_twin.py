@@ -13,7 +13,8 @@ from sloshlab.errors import AnalysisError, InputError, RigError
 from sloshlab.modal.cantilever import cantilever_modes
 from sloshlab.rig import Rig
 from sloshlab.rig import Structure as RigStructure
-from sloshlab.twin.excitation import Excitation, free, harmonic, recorded, stepped_sine
+from sloshlab.twin import preparation
+from sloshlab.twin.excitation import Excitation, free, harmonic, harmonic_force, recorded, stepped_sine
 from sloshlab.twin.law import VELOCITY, law
 from sloshlab.twin.rig_beam import base_participation_kg, beam_of_rig, scale_remarks, shapes_at
 from sloshlab.twin.sensors import Sensor
@@ -345,3 +346,28 @@ def test_channels_have_the_names_of_recordings_and_the_interface_force_balances(
     mass = 0.3 + 1000 * 0.5 * 0.0272 * 0.1172 * 0.0780
     expected = mass * result.acceleration_m_per_s2 + 3.4 * result.velocity_m_per_s
     np.testing.assert_allclose(channels["force_interface"], expected, atol=1e-10)
+
+
+def test_one_stretch_or_many_give_the_same_bytes_and_tell_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(2)
+    a = np.convolve(rng.standard_normal(400), np.ones(8) / 8, mode="same")
+    motion = recorded(500.0, acceleration=30 * a, velocity=0.1 * a, displacement=0.001 * a)
+    twin = sdof().with_term(BOUNCING_BALL(**BALL)).with_term(COULOMB_FRICTION(force_n=0.37))
+    whole = twin.simulate(motion, n_substeps=10, initial_displacement_m=0.01)
+    monkeypatch.setattr(preparation, "_HALF_STEPS_AT_ONCE", 20 * 37)
+    told: list[tuple[int, int]] = []
+    cut = twin.simulate(
+        motion, n_substeps=10, initial_displacement_m=0.01, watch=lambda done, n: told.append((done, n))
+    )
+    assert whole.n_events > 3
+    for name in ("modes", "places", "base_motion", "forces_n", "memory", "works_j", "events"):
+        assert getattr(cut, name).tobytes() == getattr(whole, name).tobytes(), name
+    assert told == [(min(1 + 37 * k, 400), 400) for k in range(1, 12)]
+
+
+def test_an_external_force_is_part_of_the_balance_of_the_tank() -> None:
+    """Push and structure together move the tank: F_interface = M a − f_ext."""
+    twin = Twin(single_degree_of_freedom(2.0, 3000.0), carried_mass_kg=2.0)
+    result = twin.simulate(harmonic_force(5.0, 3.0, 0.5, 2000.0))
+    np.testing.assert_allclose(result.interface_force_n, -3000.0 * result.displacement_m, atol=1e-9)
+    assert np.abs(result.external_force_n).max() == pytest.approx(5.0, rel=1e-4)
