@@ -15,6 +15,7 @@ from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.model import (
     DRY_FRICTION,
     INPUTS,
+    N_OTHER_WORKS,
     USES_ACCELERATION,
     Excited,
     Model,
@@ -36,6 +37,7 @@ Watch = Callable[[int, int], None]
 
 _LARGEST_EVENT_LOG: Final = 100_000
 _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S, _LARGEST_MEMORY = 100.0, 1e6, 1e15
+_LARGEST_OUTPUTS_BYTES: Final = 4 * 2**30
 _HALF_STEPS_AT_ONCE = 1 << 17
 """So that the excitation of a long run is never held whole, and progress can be told."""
 _MARGIN = 6
@@ -173,6 +175,7 @@ def run(
     model, n_rows = ready.model, excitation.n_samples
     s = scratch(model, start_state(twin, ready, excitation.at_start(), *start), _n_event_functions(twin.terms))
     largest = _largest(s, ready)
+    _check_size(n_rows, model, ready.memory.size)
     out = empty_outputs(n_rows, model.stiffness.size, model.law.size, ready.memory.size, _LARGEST_EVENT_LOG)
     external, base_motion = np.zeros(n_rows), np.zeros((n_rows, 3))
     step = 1.0 / (excitation.sampling_rate_hz * n_substeps)
@@ -194,6 +197,18 @@ def run(
             break
     ending = Ending(Status(status), filled / excitation.sampling_rate_hz, _place_of(twin, model, status, where))
     return _simulation(twin, excitation, ending, out, external, base_motion, filled, n_events)
+
+
+def _check_size(n_rows: int, model: Model, n_memory: int) -> None:
+    n_columns = 3 * model.stiffness.size + 6 + 3 * model.law.size + n_memory + N_OTHER_WORKS + 4
+    needed = 8 * n_rows * n_columns
+    if needed > _LARGEST_OUTPUTS_BYTES:
+        raise InputError(
+            "simulation",
+            got=f"{n_rows} samples of {n_columns} numbers, {needed / 2**30:.1f} GiB",
+            allowed=f"≤ {_LARGEST_OUTPUTS_BYTES / 2**30:g} GiB",
+            remedy="simulate a shorter run, or fewer samples with more steps each",
+        )
 
 
 def _stretches(n_rows: int, n_substeps: int) -> Iterator[tuple[int, int]]:

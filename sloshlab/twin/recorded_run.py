@@ -38,6 +38,7 @@ LONGEST_BRIDGE: Final = 5
 """Lost samples in a row that are bridged."""
 
 _FEWEST_SAMPLES = 12
+_DEFLECTIONS_AGREE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +135,7 @@ def _driven_structure(recording: xr.Dataset, twin: Twin, block: Block) -> Drive:
     start = _initial_displacement_m(recording)
     if start:
         parts.append(f"released from {1000 * start:g} mm")
+        flags = (*flags, *_start_remarks(recording, start))
     if block == "structure":
         forces, motions = force_channels(recording), acceleration_channels(recording)
         acting = twin.carried_mass_kg * mean_acceleration(recording).values - total_force(recording).values
@@ -168,6 +170,17 @@ def _initial_displacement_m(recording: xr.Dataset) -> float:
         return float(stated or 0.0)
     first = float(recording["displacement_tank"].values[0])
     return first if np.isfinite(first) else 0.0
+
+
+def _start_remarks(recording: xr.Dataset, stated_m: float) -> tuple[str, ...]:
+    """A nominal deflection that the measured one contradicts, for example by its sign."""
+    if "displacement_tank" not in recording.data_vars:
+        return ()
+    measured = float(recording["displacement_tank"].values[0])
+    if not np.isfinite(measured) or abs(measured - stated_m) <= _DEFLECTIONS_AGREE * abs(stated_m):
+        return ()
+    stated = f"released from the stated {1000 * stated_m:g} mm"
+    return (f"{stated}, but displacement_tank starts at {1000 * measured:.3g} mm",)
 
 
 def _integrated_twice(acceleration: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:

@@ -215,6 +215,17 @@ def test_a_simulation_ends_at_a_long_gap_and_says_so(folder: Path, tmp_path: Pat
     assert (found["quality"].values[3000:] & LOST).all()
 
 
+def test_a_stated_deflection_that_the_measured_one_contradicts_is_flagged(
+    folder: Path, tmp_path: Path, capsys: Any
+) -> None:
+    recorded = read_recording(folder / "sdof_free.nc")
+    recorded.attrs["initial_displacement_m"] = -recorded.attrs["initial_displacement_m"]
+    write_recording(recorded, tmp_path / "run.nc")
+    command = ["simulate", "--rig", str(folder / "sdof.toml"), "--input", str(tmp_path / "run.nc")]
+    assert run([*command, "-o", str(tmp_path / "sim.nc")]) == DONE_BUT_FLAGGED
+    assert "stated -64 mm, but displacement_tank starts at 6" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("model", "parameters", "fragments"),
     [

@@ -296,6 +296,7 @@ def test_a_ball_that_leaves_its_tank_is_reported() -> None:
         (lambda: Sensor("x", noise_std=-1.0), "noise_std"),
         (lambda: sdof().simulate(free(1.0, 100.0), initial_displacement_m=np.nan), "initial_displacement_m"),
         (lambda: run(sdof().with_term(BOUNCING_BALL(**{**BALL, "liquid_mass_kg": 3.0}))), "negative"),
+        (lambda: sdof().simulate(free(2000.0, 20000.0)), "40000001 samples of 16 numbers, 4.8 GiB"),
         (lambda: run(Twin(modal_structure([1.0], [0.0], [1.0], mode_shape=[1.0]))), "base participation"),
     ],
 )  # fmt: skip
