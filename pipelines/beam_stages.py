@@ -92,10 +92,18 @@ def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
             allowed=f"{' or '.join(allowed)} with this rig, whose structure is of kind {kind!r}",
             remedy="use `sloshlab shaker` for sweeps, or give the rig that the run belongs to",
         )
-    # a simulated root does not move and a frozen liquid has no force: constant channels are no dead sensors there
+    if attributes.experiment in FREE:
+        recording = _without_still_root(recording)
+    # a frozen liquid has no force: constant channels are no dead sensors in a simulation
     simulated = "simulated_from" in recording.attrs
     quality = quality_of(recording) if simulated else require_usable(recording, path)
     return Loaded(path, recording, attributes, quality)
+
+
+def _without_still_root(recording: xr.Dataset) -> xr.Dataset:
+    """A root that does not move at all is what a free run wants; whether its sensor is dead does not matter."""
+    roots = [name for name in channels(recording, "acceleration") if name.startswith("acceleration_root")]
+    return recording.drop_vars([name for name in roots if np.ptp(recording[name].values) == 0])
 
 
 def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
