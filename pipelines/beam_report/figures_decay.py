@@ -117,6 +117,7 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
     axes.set_xlabel("amplitude of acceleration a [g]")
     axes.set_ylabel(_LABELS[quantity])
     _arrange(axes, np.concatenate(shown) if shown else np.array([]), quantity)
+    _limit_to_measured(axes, experiment)
     legend_above(figure, axes, columns=4)
     caption = (
         "The first mode in every free run, by the local sine fit; dashed lines are simulations. Lines are means "
@@ -125,6 +126,18 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
         "are two or more."
     )
     return ReportFigure(name, caption, f"{_SOURCE_FIGURES[experiment.kind]}, measured", png_bytes(figure))
+
+
+def _limit_to_measured(axes: Axes, experiment: BeamExperiment) -> None:
+    """A simulation without noise goes on decaying where no recording can follow."""
+    amplitudes = [
+        pooled.acceleration_amplitude_m_per_s2
+        for (group, _), pooled in experiment.pooled.items()
+        if group in CONFIGURATIONS
+    ]
+    if amplitudes:
+        shown = in_g(np.concatenate(amplitudes))
+        axes.set_xlim(0.8 * shown.min(), 1.25 * shown.max())
 
 
 def _draw_pooled(axes: Axes, experiment: BeamExperiment, group: str, quantity: Quantity) -> None:

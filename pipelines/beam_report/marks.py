@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from pipelines.report.axes import power_of_ten
-from pipelines.report.style import DISTINCT_COLOURS
+from pipelines.report.style import DISTINCT_COLOURS, legend_columns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,5 +59,8 @@ def legend_above(figure: Figure, axes: Axes | Sequence[Axes], *, columns: int = 
             entries.setdefault(label, handle)
     if entries:
         figure.legend(
-            list(entries.values()), list(entries), loc="outside upper center", ncols=min(columns, len(entries))
+            list(entries.values()),
+            list(entries),
+            loc="outside upper center",
+            ncols=legend_columns(list(entries), columns),
         )
