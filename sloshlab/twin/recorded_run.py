@@ -90,8 +90,8 @@ def drive_of(recording: xr.Dataset, twin: Twin, *, block: Block = "all") -> Driv
     -----
     Free runs are released from `initial_displacement_m` (the first sample of `displacement_tank` where that
     attribute is absent) with the base at rest; the base of every other run moves as `acceleration_root` says.
-    Static means of accelerations are removed, but for free runs. Velocity and displacement are integrated without
-    drift.
+    The static mean of Δf is removed, and that of accelerations but for free runs. Velocity and displacement are
+    integrated without drift.
     """
     if block not in BLOCKS:
         raise InputError("block", got=repr(block), allowed=", ".join(BLOCKS))
@@ -140,6 +140,7 @@ def _driven_structure(recording: xr.Dataset, twin: Twin, block: Block) -> Drive:
         forces, motions = force_channels(recording), acceleration_channels(recording)
         acting = twin.carried_mass_kg * mean_acceleration(recording).values - total_force(recording).values
         force, n_force, more = _usable(recording, [*forces, *motions], acting)
+        force -= force.mean()
         n, flags = min(n, n_force), (*flags, *more)
         driven["force_n"] = force
         names += [*forces, *motions]

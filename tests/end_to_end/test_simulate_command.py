@@ -80,6 +80,11 @@ def test_a_block_alone_on_its_measured_input_repeats_the_loop(folder: Path, tmp_
     rig, recorded = folder / "sdof.toml", read_recording(folder / "sdof_free.nc")
     alone = simulated(rig, folder / "sdof_free.nc", tmp_path / "s.nc", "--block", "structure")
     assert relative_difference(recorded, alone, "acceleration_tip") < 0.005
+    recorded["force_interface"].values += 22.0  # the weight may be in the forces or not
+    write_recording(recorded, tmp_path / "weight.nc")
+    weighed = simulated(rig, tmp_path / "weight.nc", tmp_path / "w.nc", "--block", "structure")
+    np.testing.assert_allclose(weighed["acceleration_tip"], alone["acceleration_tip"], atol=1e-6)
+    recorded["force_interface"].values -= 22.0
     tank = simulated(rig, folder / "sdof_free.nc", tmp_path / "t.nc", "--block", "tank")
     assert relative_difference(recorded, tank, "force_interface") < 0.005
     np.testing.assert_allclose(tank["acceleration_tip"], recorded["acceleration_tip"], atol=1e-6)
