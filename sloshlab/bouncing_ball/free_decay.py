@@ -140,8 +140,12 @@ def simulated_curve(decay: Simulation, frequency_hz: float) -> DampingCurve:
     n_cycles = signal.size / decay.sampling_rate_hz * frequency_hz
     if n_cycles < 5:
         raise AnalysisError("simulated decay", got=f"{n_cycles:.1f} cycles", allowed="at least 5")
-    reading = log_decrement(signal, decay.sampling_rate_hz, frequency_hz=frequency_hz, noise=_NO_NOISE)
-    used = reading.used
+    # friction may hold the tank still for a while: extrema without curvature, which have no errors
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reading = log_decrement(signal, decay.sampling_rate_hz, frequency_hz=frequency_hz, noise=_NO_NOISE)
+    used = reading.used & np.isfinite(reading.damping_ratio)
+    if not used.any():
+        raise AnalysisError("simulated decay", got="no value of ζ", allowed="a decay that can be read")
     return DampingCurve(reading.acceleration_amplitude_m_per_s2[used], reading.damping_ratio[used], frequency_hz)
 
 

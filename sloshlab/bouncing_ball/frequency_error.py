@@ -72,7 +72,7 @@ def error_by_frequency(
     tuned_omega_bar : float
         Where the ball was identified.
     n_bands : int
-        Bands, equal in ln ω̄, beside the one around the tuned frequency.
+        Bands, about equal in ln ω̄, beside the one around the tuned frequency.
     tuned_half_width : float
         Of that band, relative to its centre.
     run : HarmonicRun, optional
@@ -98,11 +98,21 @@ def error_by_frequency(
             got=f"none within ω̄ = {low:.3g} … {high:.3g}",
             allowed=f"ω̄ = {omega_bar.min():.3g} … {omega_bar.max():.3g}",
         )
-    edges = np.geomspace(omega_bar.min(), omega_bar.max() * (1 + 1e-9), n_bands + 1)
-    parts = [(a, b, ~tuned & (omega_bar >= a) & (omega_bar < b)) for a, b in itertools.pairwise(edges)]
-    bands = [_band(float(a), float(b), False, w_bar[at], simulated[at]) for a, b, at in parts if at.any()]
+    parts = [
+        (a, b, ~tuned & (omega_bar >= a) & (omega_bar < b)) for a, b in _limits(omega_bar, low, high, n_bands)
+    ]
+    bands = [_band(a, b, False, w_bar[at], simulated[at]) for a, b, at in parts if at.any()]
     bands.append(_band(low, high, True, w_bar[tuned], simulated[tuned]))
     return tuple(sorted(bands, key=lambda band: band.low + band.high)), simulated
+
+
+def _limits(omega_bar: FloatArray, low: float, high: float, n_bands: int) -> list[tuple[float, float]]:
+    """Bands below and above the tuned one, of about equal width in ln ω̄."""
+    first, last = min(float(omega_bar.min()), low), max(float(omega_bar.max()), high) * (1 + 1e-9)
+    below = float(np.log(low / first) / np.log(low / first * last / high)) if first < low or last > high else 0.5
+    n_below = min(max(1, round(below * n_bands)), max(1, n_bands - 1))
+    edges = [np.geomspace(first, low, n_below + 1), np.geomspace(high, last, max(1, n_bands - n_below) + 1)]
+    return [(float(a), float(b)) for part in edges for a, b in itertools.pairwise(part)]
 
 
 def _band(low: float, high: float, is_tuned: bool, measured: FloatArray, ball: FloatArray) -> FrequencyBand:
