@@ -23,8 +23,7 @@ from sloshlab.twin.twin import Twin
 RATE_HZ, DEFLECTION_M = 20_000.0, -0.0146
 FREE_LABEL = "twin: 10 s of beam and ball at 20 kHz [s]"
 RANDOM_LABEL = "twin: 90 s of random base motion at 20 kHz [s]"
-RIVAL_LABEL = "twin: solve_ivp (RK45) at equal error over ours"
-BEST_RIVAL_LABEL = "twin: solve_ivp (DOP853) at equal error over ours"
+RIVAL_LABEL = "twin: solve_ivp (RK45) at equal error over ours, 10 s"
 BALL = {
     "radius_m": 0.009, "stiffness_n_per_m": 3000.0, "damping_kg_per_s": 9.0, "hardening_per_m": 500.0,
     "beta": 0.002, "liquid_mass_kg": 0.12433, "height_m": 0.0272,
@@ -142,11 +141,14 @@ def twin_figures() -> dict[str, float]:
     random = best_of(lambda: twin.simulate(base, n_substeps=20).require_done(), 3)
     error, rivals = errors()
     figures = {FREE_LABEL: ours, RANDOM_LABEL: random, "twin: its error over 1 s [m]": error}
-    for method, label in (("RK45", RIVAL_LABEL), ("DOP853", BEST_RIVAL_LABEL)):
-        tolerance, theirs = rivals[method]
-        figures[label] = best_of(lambda m=method, t=tolerance: rival(m, 10.0, t), 1) / ours  # type: ignore[misc]
+    first_second = best_of(lambda: twin.simulate(free(1.0, RATE_HZ), initial_displacement_m=DEFLECTION_M), 7)
+    for method, (tolerance, theirs) in rivals.items():
+        taken = best_of(lambda m=method, t=tolerance: rival(m, 1.0, t), 1)  # type: ignore[misc]
+        figures[f"twin: solve_ivp ({method}) at equal error over ours, first second"] = taken / first_second
         figures[f"twin: error of {method} over 1 s [m]"] = theirs
         figures[f"twin: relative tolerance of {method}"] = tolerance
+        taken = best_of(lambda m=method, t=tolerance: rival(m, 10.0, t), 1)  # type: ignore[misc]
+        figures[f"twin: solve_ivp ({method}) at equal error over ours, 10 s"] = taken / ours
     return figures
 
 
