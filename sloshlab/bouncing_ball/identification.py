@@ -29,7 +29,7 @@ _NO_BALL = 10.0
 _STEPS = (2e-3, 2e-4)
 """Finite differences in the unit box, first across the roughness of impacts, then within it."""
 _AT_BOUND = 0.005
-_EXTRA_LOCAL_STARTS = 1
+_EXTRA_LOCAL_STARTS = 2
 
 
 @dataclass(frozen=True)
@@ -39,16 +39,16 @@ class SearchSettings:
     Attributes
     ----------
     population : int
-        Candidates per parameter of the global search.
+        Candidates per parameter of the global search; their number is rounded up to a power of two.
     n_generations : int
     n_local_evaluations : int
         Of the least squares, Jacobians included.
     seed : int
     """
 
-    population: int = 7
+    population: int = 10
     n_generations: int = 40
-    n_local_evaluations: int = 120
+    n_local_evaluations: int = 150
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -212,7 +212,7 @@ def _global(search: _Search, settings: SearchSettings, progress: Progress | None
         maxiter=settings.n_generations,
         popsize=settings.population,
         seed=settings.seed,
-        init="latinhypercube",
+        init="sobol",
         mutation=(0.4, 0.9),
         recombination=0.8,
         tol=1e-6,
@@ -309,5 +309,5 @@ def _moved(point: FloatArray, i: int, share: float) -> FloatArray:
 def _profile(search: _Search, best: OptimizeResult, i: int, share: float, settings: SearchSettings) -> float:
     """Growth of the sum of squares with one parameter held elsewhere and the others fitted again."""
     free = np.arange(best.x.size) != i
-    again = _local(search, _moved(best.x, i, share), settings.n_local_evaluations // 3, free)
+    again = _local(search, _moved(best.x, i, share), settings.n_local_evaluations // 2, free)
     return float(2 * again.cost - 2 * best.cost)
