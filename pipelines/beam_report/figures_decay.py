@@ -137,7 +137,9 @@ def _limit_to_measured(axes: Axes, experiment: BeamExperiment) -> None:
     ]
     if amplitudes:
         shown = in_g(np.concatenate(amplitudes))
-        axes.set_xlim(0.8 * shown.min(), 1.25 * shown.max())
+        limits = 0.8 * float(shown.min()), 1.25 * float(shown.max())
+        amplitude_axis(axes, limits)
+        axes.set_xlim(*limits)
 
 
 def _draw_pooled(axes: Axes, experiment: BeamExperiment, group: str, quantity: Quantity) -> None:

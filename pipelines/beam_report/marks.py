@@ -39,11 +39,14 @@ def panel_letter(axes: Axes, number: int, text: str) -> None:
     axes.set_title(f"({chr(ord('a') + number)}) {text}")
 
 
-def amplitude_axis(axes: Axes) -> None:
-    """Logarithmic abscissa with plain numbers at 1, 2 and 5 of every decade, or at 1 if there are many."""
+def amplitude_axis(axes: Axes, shown: tuple[float, float] | None = None) -> None:
+    """Logarithmic abscissa with plain numbers at 1, 2 and 5 of every decade, or at 1 if there are many of them.
+
+    `shown` are the limits that the axis will have, if not those of the data.
+    """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    low, high = axes.dataLim.intervalx
+    low, high = axes.dataLim.intervalx if shown is None else shown
     is_wide = low > 0 and high / low > _WIDE
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if is_wide else (1.0, 2.0, 5.0)))
