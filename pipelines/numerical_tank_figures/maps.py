@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import xarray as xr
 
-from pipelines.numerical_tank_figures.measured_facts import (
+from pipelines.measured_facts.map_readings import FactsOfMap, facts_of, half_filled
+from pipelines.measured_facts.published import (
     BEAM,
     BETA_AT_WEAKEST,
     ISOLINE_U_BAR,
     LARGEST,
     SHARE_OF_LARGEST,
     WEAKEST_G,
-    FactsOfMap,
-    facts_of,
-    half_filled,
-)  # fmt: skip
+)
 from pipelines.report.axes import arrange_plane, draw_iso_acceleration
 from pipelines.report.figures_maps import MapField, draw_map, scaled_field, shades
 from pipelines.report.style import REFERENCE_COLOUR, drawing_style, new_figure, png_bytes
