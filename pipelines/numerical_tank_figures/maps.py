@@ -122,7 +122,7 @@ def _beta_entries(facts: FactsOfMap) -> list[tuple[str, dict[str, Any]]]:
         sign = ("negative everywhere, measured and numerical", _NOTHING)
     return [
         (f"mean at {WEAKEST_G:g} g, measured: {number(BETA_AT_WEAKEST, 3)}", _LINE),
-        (f"mean at {WEAKEST_G:g} g, numerical: {number(facts.beta_at_weakest, 3)}", _NOTHING),
+        (f"mean along it on the map, numerical: {number(facts.beta_at_weakest, 3)}", _NOTHING),
         sign,
     ]
 
