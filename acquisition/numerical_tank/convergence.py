@@ -46,6 +46,11 @@ class ConvergenceCase:
     speed_of_sound_m_per_s : float
     numerics : dict
         Settings that differ from the defaults of `Numerics`.
+    frequency_hz : float
+    viscosity_m2_per_s : float
+        ν of the liquid.
+    n_cycles : int
+        The first half is left out.
     """
 
     name: str
@@ -53,6 +58,9 @@ class ConvergenceCase:
     layers_per_height: int = 16
     speed_of_sound_m_per_s: float = Liquid().speed_of_sound_m_per_s
     numerics: dict[str, Any] = field(default_factory=dict)
+    frequency_hz: float = FREQUENCY_HZ
+    viscosity_m2_per_s: float = Liquid().viscosity_m2_per_s
+    n_cycles: int = N_CYCLES
 
 
 CASES: Final = (
@@ -91,32 +99,45 @@ class HarmonicResult:
     residual_share: float
 
 
-def harmonic_result(case: ConvergenceCase, seed: int, *, n_cycles: int = N_CYCLES) -> HarmonicResult:
+def harmonic_result(case: ConvergenceCase, seed: int) -> HarmonicResult:
     """Shake the half-filled tank with constant frequency and amplitude.
 
     Parameters
     ----------
     case : ConvergenceCase
     seed : int
-    n_cycles : int
-        The first half is left out.
     """
-    liquid = Liquid(speed_of_sound_m_per_s=case.speed_of_sound_m_per_s)
+    liquid = Liquid(viscosity_m2_per_s=case.viscosity_m2_per_s, speed_of_sound_m_per_s=case.speed_of_sound_m_per_s)
     setup = filled_tank(
         TANK, 0.5, case.layers_per_height, liquid=liquid, numerics=Numerics(**case.numerics), seed=seed
     )
-    tank, period = NumericalTank(setup), 1 / FREQUENCY_HZ
-    omega = 2 * math.pi * FREQUENCY_HZ
+    tank, period = NumericalTank(setup), 1 / case.frequency_hz
     motion = HarmonicMotion(
-        case.acceleration_g * STANDARD_GRAVITY_M_PER_S2, FREQUENCY_HZ, rise_s=RISE_CYCLES * period
+        case.acceleration_g * STANDARD_GRAVITY_M_PER_S2, case.frequency_hz, rise_s=RISE_CYCLES * period
     )
-    for _ in moved(tank, motion, n_cycles // 2 * period):
+    for _ in moved(tank, motion, case.n_cycles // 2 * period):
         pass
+    return measured_cycles(tank, motion, case.n_cycles - case.n_cycles // 2)
+
+
+def measured_cycles(tank: NumericalTank, motion: HarmonicMotion, n_cycles: int) -> HarmonicResult:
+    """Shake a tank on for some cycles, and say what they gave.
+
+    Parameters
+    ----------
+    tank : NumericalTank
+        Goes on from where it is.
+    motion : HarmonicMotion
+        Its rise is over.
+    n_cycles : int
+    """
+    setup, period = tank.setup, 1 / motion.frequency_hz
+    omega = 2 * math.pi * motion.frequency_hz
     before = tank.account()
-    blocks = list(moved(tank, motion, (n_cycles - n_cycles // 2) * period))
+    blocks = list(moved(tank, motion, n_cycles * period))
     time = np.concatenate([block.time_s for block in blocks])
     force = np.concatenate([block.forces.vertical_n for block in blocks])
-    force += setup.liquid_mass_kg * STANDARD_GRAVITY_M_PER_S2
+    force += setup.liquid_mass_kg * setup.gravity_m_per_s2
     amplitude = motion.amplitude_m_per_s2
     velocity = amplitude / omega * np.sin(omega * time)
     work = -float(np.mean(force * velocity)) * period
@@ -127,7 +148,7 @@ def harmonic_result(case: ConvergenceCase, seed: int, *, n_cycles: int = N_CYCLE
     return HarmonicResult(
         work / unit,
         -in_phase / (setup.liquid_mass_kg * amplitude),
-        spent.tank_work_j_per_m * setup.box.depth_m / (n_cycles - n_cycles // 2) / unit,
+        spent.tank_work_j_per_m * setup.box.depth_m / n_cycles / unit,
         spent.packing_j_per_m / spent.tank_work_j_per_m,
         spent.residual_j_per_m / spent.tank_work_j_per_m,
     )

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import xarray as xr
 
-from pipelines.numerical_tank_figures.measured_facts import (
+from pipelines.measured_facts.map_readings import FactsOfMap, facts_of, half_filled
+from pipelines.measured_facts.published import (
     BEAM,
     BETA_AT_WEAKEST,
     ISOLINE_U_BAR,
     LARGEST,
     SHARE_OF_LARGEST,
     WEAKEST_G,
-    FactsOfMap,
-    facts_of,
-    half_filled,
-)  # fmt: skip
+)
 from pipelines.report.axes import arrange_plane, draw_iso_acceleration
 from pipelines.report.figures_maps import MapField, draw_map, scaled_field, shades
 from pipelines.report.style import REFERENCE_COLOUR, drawing_style, new_figure, png_bytes
@@ -124,7 +122,7 @@ def _beta_entries(facts: FactsOfMap) -> list[tuple[str, dict[str, Any]]]:
         sign = ("negative everywhere, measured and numerical", _NOTHING)
     return [
         (f"mean at {WEAKEST_G:g} g, measured: {number(BETA_AT_WEAKEST, 3)}", _LINE),
-        (f"mean at {WEAKEST_G:g} g, numerical: {number(facts.beta_at_weakest, 3)}", _NOTHING),
+        (f"mean along it on the map, numerical: {number(facts.beta_at_weakest, 3)}", _NOTHING),
         sign,
     ]
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipelines.measured_facts import Results, facts, main
+from pipelines.measured_facts.__main__ import main
+from pipelines.measured_facts.table import Results, facts
 
 OMEGA_BAR = np.linspace(2.0, 6.0, 81)
 U_BAR = np.linspace(0.02, 0.46, 89)
@@ -18,7 +19,8 @@ def maps(top=1.65, omega_at=3.8, u_at=0.25):
     w_bar = hill(OMEGA_BAR[:, None], U_BAR[None, :], top, omega_at, u_at)
     coords = {"omega_bar": OMEGA_BAR, "u_bar": U_BAR}
     dims = ("omega_bar", "u_bar")
-    return xr.Dataset({"w_bar": (dims, w_bar), "measured": (dims, np.ones(w_bar.shape, np.int8))}, coords)
+    values = {"w_bar": w_bar, "beta": np.full(w_bar.shape, -0.1), "measured": np.ones(w_bar.shape, np.int8)}
+    return xr.Dataset({name: (dims, one) for name, one in values.items()}, coords)
 
 
 def windows(levels, beta=-0.154, runs=("sweep",)):

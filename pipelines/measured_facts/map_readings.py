@@ -1,9 +1,4 @@
-"""What was measured of the half-filled tank on the shaker, and the same numbers read from a map.
-
-The facts are those of the source: the largest W̄ is 1.65 at ω̄ = 3.78 near 4 g, W̄ is 1.38 at
-ω̄ = 3.55 and ū = 0.162, the lines at 85 % of the largest W̄ lie within ū = 0.2 … 0.3, β is negative
-everywhere with a mean of −0.154 at 0.25 g.
-"""
+"""Numbers of a map that were measured too: the largest W̄ and its place, W̄ where the beam works, β."""
 
 from __future__ import annotations
 
@@ -13,29 +8,16 @@ from typing import Final
 import numpy as np
 import xarray as xr
 
+from pipelines.measured_facts.published import (
+    BEAM,
+    FILLING_LEVEL,
+    SHARE_OF_LARGEST,
+    WEAKEST_G,
+    MeasuredWork,
+)
 from sloshlab.errors import InputError
 
-FILLING_LEVEL: Final = 0.5
 NEEDED: Final = ("w_bar", "beta")
-
-
-@dataclass(frozen=True)
-class MeasuredWork:
-    """W̄ at a place of the plane."""
-
-    omega_bar: float
-    u_bar: float
-    w_bar: float
-
-
-LARGEST: Final = MeasuredWork(3.78, 4.0 / 3.78**2, 1.65)
-"""ū follows from a₀/g = ū ω̄² = 4."""
-BEAM: Final = MeasuredWork(3.55, 0.162, 1.38)
-"""Where the sloshing beam works."""
-SHARE_OF_LARGEST: Final = 0.85
-ISOLINE_U_BAR: Final = (0.2, 0.3)
-WEAKEST_G: Final = 0.25
-BETA_AT_WEAKEST: Final = -0.154
 
 
 @dataclass(frozen=True)
@@ -88,7 +70,8 @@ def half_filled(maps: xr.Dataset) -> xr.Dataset:
     for name in NEEDED:
         if set(maps[name].dims) != {"omega_bar", "u_bar"} or not np.isfinite(maps[name].values).any():
             raise InputError(f"maps, {name}", got="no map with finite values over ω̄ and ū")
-    return maps[list(NEEDED)].transpose("omega_bar", "u_bar").load()
+    kept = maps.where(maps["measured"].astype(bool)) if "measured" in maps else maps
+    return kept[list(NEEDED)].transpose("omega_bar", "u_bar").load()
 
 
 def facts_of(maps: xr.Dataset) -> FactsOfMap:

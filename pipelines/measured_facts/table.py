@@ -1,16 +1,11 @@
 """What the thesis measured on its shaker, beside what an analysis of other recordings gives, as one table.
 
-The published figures are those of the half-filled tank unless said otherwise (chapter 1 of the source). The
-other column is computed from `windows.nc` and `maps.nc` of `sloshlab shaker`; the spread between repeats of
-one sweep is given with it.
-
-Run as ``python -m pipelines.measured_facts RESULTS [--output FILE]``.
+The found column is computed from `windows.nc` and `maps.nc` of `sloshlab shaker`; the spread between repeats
+of one sweep is given with it.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,20 +15,30 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from sloshlab import atomic_file
-from sloshlab.errors import InputError, SloshlabError
+from pipelines.measured_facts.map_readings import facts_of, half_filled
+from pipelines.measured_facts.published import (
+    BEAM,
+    BETA_AT_WEAKEST,
+    FILLING_LEVEL,
+    ISOLINE_U_BAR,
+    LARGEST,
+    MEAN_AT_BEAM_FREQUENCY,
+    PLACE_OF_LARGEST,
+    SHARE_OF_LARGEST,
+    THRESHOLD_G,
+    WEAKEST_G,
+)
+from sloshlab.errors import InputError
 
 FloatArray = npt.NDArray[np.float64]
 
-HALF: Final = 0.5
 FULL_BAND: Final = (3.0, 5.0)
 """Frequencies ω̄ between which levels of acceleration are compared."""
 ONSET_W_BAR: Final = 0.2
 """W̄ from which the liquid counts as dissipating."""
-ISOLINE: Final = 0.85
-"""Share of the maximum on the isolines of the source."""
 _LEVEL_TOLERANCE = 0.1
-_REFERENCE_OMEGA_BAR, _REFERENCE_U_BAR = 3.55, 0.162
+NEAR: Final = 0.1
+"""Two values of W̄ agree if they differ by no more than this share."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +102,13 @@ class Results:
         there = np.flatnonzero(np.isclose(self.maps.fill_level, fill_level))
         return self.maps.isel(fill_level=int(there[0])) if there.size else None
 
-    def level(self, acceleration_g: float, fill_level: float = HALF) -> xr.Dataset:
-        """Windows near one acceleration, between the frequencies of `FULL_BAND`."""
+    def level(
+        self, acceleration_g: float, fill_level: float = FILLING_LEVEL, band: tuple[float, float] = FULL_BAND
+    ) -> xr.Dataset:
+        """Windows near one acceleration, between two frequencies ω̄."""
         one = self.at(fill_level)
         near = np.abs(one.acceleration_g / acceleration_g - 1) < _LEVEL_TOLERANCE
-        inside = (one.omega_bar > FULL_BAND[0]) & (one.omega_bar < FULL_BAND[1])
+        inside = (one.omega_bar > band[0]) & (one.omega_bar < band[1])
         return one.isel(window=np.flatnonzero(near & inside))
 
 
@@ -141,9 +148,9 @@ def _levels(results: Results) -> Iterator[Fact]:
         onset = float(np.interp(ONSET_W_BAR, means[k - 1 : k + 1], levels[k - 1 : k + 1]))
     yield Fact(
         f"threshold: mean W̄ over ω̄ = {FULL_BAND[0]:g} … {FULL_BAND[1]:g} passes {ONSET_W_BAR:g} at",
-        "about 1 g",
+        f"about {THRESHOLD_G:g} g",
         f"{onset:.2f} g",
-        bool(0.8 <= onset <= 1.5) if np.isfinite(onset) else None,
+        bool(0.8 * THRESHOLD_G <= onset <= 1.5 * THRESHOLD_G) if np.isfinite(onset) else None,
     )
     listed = ", ".join(
         f"{level:g} g {round(mean, 2) + 0.0:.2f}".replace("-", "−")
@@ -170,44 +177,56 @@ def _map_arrays(one: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _maximum(results: Results) -> Iterator[Fact]:
-    one = results.map_of(HALF)
+    one = results.map_of(FILLING_LEVEL)
     if one is None:
         return
-    omega_bar, u_bar, w_bar = _map_arrays(one)
-    i, k = np.unravel_index(np.nanargmax(w_bar), w_bar.shape)
-    largest, omega, u = float(w_bar[i, k]), float(omega_bar[i]), float(u_bar[k])
-    found = f"{largest:.2f} at ω̄ = {omega:.2f}, ū = {u:.2f} ({u * omega**2:.1f} g)"
-    yield Fact("maximum of W̄", "1.65 at ω̄ = 3.78, near 4 g", found, abs(largest / 1.65 - 1) < 0.1)
-    inside = bool(3 <= omega <= 5 and 0.2 <= u <= 0.4)
-    yield Fact("its place", "ω̄ = 3 … 5, ū = 0.2 … 0.4", "inside" if inside else "outside", inside)
+    found = facts_of(half_filled(one)).largest
+    omega_bar, u_bar = found.omega_bar, found.u_bar
+    yield Fact(
+        "maximum of W̄",
+        f"{LARGEST.w_bar:g} at ω̄ = {LARGEST.omega_bar:g}, near {LARGEST.u_bar * LARGEST.omega_bar**2:.0f} g",
+        f"{found.w_bar:.2f} at ω̄ = {omega_bar:.2f}, ū = {u_bar:.2f} ({u_bar * omega_bar**2:.1f} g)",
+        abs(found.w_bar / LARGEST.w_bar - 1) < NEAR,
+    )
+    (slow, fast), (small, large) = PLACE_OF_LARGEST
+    inside = bool(slow <= omega_bar <= fast and small <= u_bar <= large)
+    place = f"ω̄ = {slow:g} … {fast:g}, ū = {small:g} … {large:g}"
+    yield Fact("its place", place, "inside" if inside else "outside", inside)
 
 
 def _reference_points(results: Results) -> Iterator[Fact]:
-    one = results.map_of(HALF)
+    one = results.map_of(FILLING_LEVEL)
     if one is None:
         return
+    value = facts_of(half_filled(one)).w_bar_of_beam
+    yield Fact(
+        f"W̄ at ω̄ = {BEAM.omega_bar:g} (10.7 Hz), ū = {BEAM.u_bar:g}",
+        f"{BEAM.w_bar:g}",
+        f"{value:.2f}",
+        bool(abs(value / BEAM.w_bar - 1) < NEAR) if np.isfinite(value) else None,
+    )
     omega_bar, u_bar, w_bar = _map_arrays(one)
-    row = w_bar[np.abs(omega_bar - _REFERENCE_OMEGA_BAR).argmin()]
-    known = np.isfinite(row)
-    if not known.any():
-        return
-    value = float(np.interp(_REFERENCE_U_BAR, u_bar[known], row[known]))
-    yield Fact("W̄ at ω̄ = 3.55 (10.7 Hz), ū = 0.162", "1.38", f"{value:.2f}", abs(value / 1.38 - 1) < 0.1)
-    from_1_g = known & (u_bar * _REFERENCE_OMEGA_BAR**2 >= 1.0)
+    row = w_bar[np.abs(omega_bar - BEAM.omega_bar).argmin()]
+    from_1_g = np.isfinite(row) & (u_bar * BEAM.omega_bar**2 >= THRESHOLD_G)
     mean = float(row[from_1_g].mean()) if from_1_g.any() else np.nan
-    yield Fact("mean over ū at ω̄ = 3.55, from 1 g up", "1.274", f"{mean:.2f}", abs(mean / 1.274 - 1) < 0.1)
+    yield Fact(
+        f"mean over ū at ω̄ = {BEAM.omega_bar:g}, from {THRESHOLD_G:g} g up",
+        f"{MEAN_AT_BEAM_FREQUENCY:g}",
+        f"{mean:.2f}",
+        bool(abs(mean / MEAN_AT_BEAM_FREQUENCY - 1) < NEAR) if np.isfinite(mean) else None,
+    )
 
 
 def _effective_mass(results: Results) -> Iterator[Fact]:
-    one = results.at(HALF)
+    one = results.at(FILLING_LEVEL)
     negative = float((one.beta < 0).mean()) if one.sizes["window"] else np.nan
     yield Fact("β < 0", "everywhere", f"in {100 * negative:.0f} % of the windows", negative > 0.95)
-    quiet = _mean(results.level(0.25).beta)
+    quiet = _mean(results.level(WEAKEST_G, band=(0.0, np.inf)).beta)
     yield Fact(
-        "mean β at 0.25 g",
-        "−0.154",
+        f"mean β at {WEAKEST_G:g} g, all frequencies",
+        f"{BETA_AT_WEAKEST:.3f}".replace("-", "−"),
         f"{quiet:.3f}".replace("-", "−"),
-        bool(abs(quiet + 0.154) < 0.05) if np.isfinite(quiet) else None,
+        bool(abs(quiet - BETA_AT_WEAKEST) < 0.05) if np.isfinite(quiet) else None,
     )
 
 
@@ -217,7 +236,7 @@ def _isoline(results: Results, fill_level: float) -> tuple[float, float, float, 
     if one is None:
         return None
     _, u_bar, w_bar = _map_arrays(one)
-    above = w_bar >= ISOLINE * np.nanmax(w_bar)
+    above = w_bar >= SHARE_OF_LARGEST * np.nanmax(w_bar)
     places = np.broadcast_to(u_bar, w_bar.shape)[above]
     return float(places.min()), float(places.mean()), float(places.max()), above.sum() / np.isfinite(w_bar).sum()
 
@@ -225,12 +244,13 @@ def _isoline(results: Results, fill_level: float) -> tuple[float, float, float, 
 def _fill_levels(results: Results) -> Iterator[Fact]:
     lines = {fill: _isoline(results, fill) for fill in (0.25, 0.5, 0.75)}
     known = {fill: line for fill, line in lines.items() if line is not None}
+    lowest, highest = ISOLINE_U_BAR
     for fill, (low, mean, high, share) in known.items():
         yield Fact(
-            f"region above 85 % of the maximum, α = {fill:g}",
-            "ū = 0.2 … 0.3",
+            f"region above {100 * SHARE_OF_LARGEST:.0f} % of the maximum, α = {fill:g}",
+            f"ū = {lowest:g} … {highest:g}",
             f"ū = {low:.2f} … {high:.2f}, mean {mean:.2f}, {100 * share:.0f} % of the measured region",
-            bool(0.2 <= mean <= 0.3),
+            bool(lowest <= mean <= highest),
         )
     if len(known) == 3:
         means, shares = ([known[fill][k] for fill in (0.25, 0.5, 0.75)] for k in (1, 3))
@@ -254,7 +274,7 @@ def _work(results: Results) -> Iterator[Fact]:
                 f"α with the most work at {level:g} g, {frequency_hz:g} Hz",
                 "0.5" if half_is_largest else "not 0.5",
                 f"{largest:g} ({listed} mJ)",
-                (largest == HALF) == half_is_largest,
+                (largest == FILLING_LEVEL) == half_is_largest,
             )
 
 
@@ -301,30 +321,3 @@ def table(all_facts: Sequence[Fact]) -> str:
     verdict = {True: "yes", False: "**no**", None: "–"}
     rows += [f"| {one.what} | {one.published} | {one.found} | {verdict[one.agrees]} |" for one in all_facts]
     return "\n".join(rows)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, and write it if asked to.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        As on the command line.
-    """
-    parser = argparse.ArgumentParser(description="What was measured beside what an analysis gives.")
-    parser.add_argument("results", type=Path, help="folder with windows.nc and maps.nc")
-    parser.add_argument("--output", type=Path, help="write the table to this file")
-    chosen = parser.parse_args(arguments)
-    try:
-        text = table(list(facts(Results.of_folder(chosen.results))))
-    except SloshlabError as error:
-        sys.stderr.write(f"{error}\n")
-        return 1
-    sys.stdout.write(f"{text}\n")
-    if chosen.output:
-        atomic_file.write_bytes(chosen.output, f"{text}\n".encode())
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
