@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing import get_context
@@ -195,6 +195,23 @@ def table(workers: int, cases: Sequence[ConvergenceCase] = CASES) -> Iterator[st
             yield row(case, [job.result() for job in jobs])
 
 
+def show(lines: Iterable[str], output: Path | None) -> None:
+    """Print lines as they come, and write them to a file at the end if one is given.
+
+    Parameters
+    ----------
+    lines : iterable of str
+    output : Path, optional
+    """
+    shown = []
+    for line in lines:
+        shown.append(line)
+        sys.stdout.write(line + "\n")
+        sys.stdout.flush()
+    if output:
+        write_bytes(output, ("\n".join(shown) + "\n").encode())
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table, and write it if asked to.
 
@@ -207,13 +224,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--output", type=Path, help="write the table to this file")
     chosen = parser.parse_args(arguments)
-    lines = []
-    for line in table(max(chosen.workers, 1)):
-        lines.append(line)
-        sys.stdout.write(line + "\n")
-        sys.stdout.flush()
-    if chosen.output:
-        write_bytes(chosen.output, ("\n".join(lines) + "\n").encode())
+    show(table(max(chosen.workers, 1)), chosen.output)
     return 0
 
 

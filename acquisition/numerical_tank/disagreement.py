@@ -17,6 +17,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import chain
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
@@ -27,12 +28,12 @@ from acquisition.numerical_tank.convergence import (
     TANK,
     ConvergenceCase,
     measured_cycles,
+    show,
     table,
 )
 from acquisition.numerical_tank.forced_motion import HarmonicMotion, moved
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, filled_tank
-from sloshlab.atomic_file import write_bytes
 
 _WEAK_CYCLES = 200
 """A subharmonic wave needs twenty to sixty cycles to grow."""
@@ -143,14 +144,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, help="write the tables to this file")
     chosen = parser.parse_args(arguments)
     workers = max(chosen.workers, 1)
-    lines = []
-    for lines_of_one in (history_table(workers), iter([""]), table(workers, CASES)):
-        for line in lines_of_one:
-            lines.append(line)
-            sys.stdout.write(line + "\n")
-            sys.stdout.flush()
-    if chosen.output:
-        write_bytes(chosen.output, ("\n".join(lines) + "\n").encode())
+    show(chain(history_table(workers), [""], table(workers, CASES)), chosen.output)
     return 0
 
 
