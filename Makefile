@@ -4,9 +4,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 RESULTS := results
+RECORDINGS := raw_data/numerical_tank/shaker
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker replay campaign test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof bouncing-ball replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -21,14 +22,29 @@ $(STAMP): pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[formats,dev,docs]'
 	@touch $@
 
-shaker: setup  ## the shaker experiment on raw_data: maps and report
-	$(BIN)/python -m pipelines.experiments shaker raw_data/shaker $(RESULTS)/shaker
+shaker: setup  ## the shaker experiment on the numerical tank (or RECORDINGS=folder): maps and report
+	$(BIN)/python -m pipelines.experiments shaker $(RECORDINGS) $(RESULTS)/shaker
 
-replay: setup  ## every recording of raw_data through simulated serial and CAN devices
+beam: setup  ## the beam of raw_data/numerical_tank: damping, modes, spectra and report
+	$(BIN)/python -m pipelines.experiments beam raw_data/numerical_tank/beam $(RESULTS)/beam
+
+sdof: setup  ## the guided tank of raw_data/numerical_tank: damping and report
+	$(BIN)/python -m pipelines.experiments sdof raw_data/numerical_tank/sdof $(RESULTS)/sdof
+
+bouncing-ball: setup  ## bouncing balls in place of the liquid of raw_data: parameters, maps, errors, reports (minutes)
+	$(BIN)/python -m pipelines.experiments ball raw_data $(RESULTS)/bouncing_ball
+
+replay: setup  ## every recording of raw_data/shaker through simulated serial and CAN devices
 	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay
 
-campaign: setup  ## make the recordings of raw_data again
+campaign: setup  ## make the recordings of raw_data/shaker again
 	$(BIN)/sloshlab virtual campaign -o raw_data/shaker
+
+tank-campaign: setup  ## compute the recordings of raw_data/numerical_tank again (hours; goes on where it was stopped)
+	$(BIN)/sloshlab virtual campaign --liquid numerical -o raw_data/numerical_tank
+
+pictures: setup  ## the snapshots and the film of the numerical tank in docs/images again (minutes)
+	$(BIN)/python -m pipelines.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml
 
 test: setup  ## the tests, at most 10 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"

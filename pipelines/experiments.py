@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from pipelines.command_line import DONE_BUT_FLAGGED, INPUT_IS_BAD, run
-from sloshlab.errors import SloshlabError
+from sloshlab.errors import InputError, SloshlabError
 
 
 def shaker_arguments(folder: Path, output: Path, rigs_folder: Path | None = None) -> list[str]:
@@ -40,6 +40,67 @@ def _shaker(folder: Path, output: Path) -> int:
     return code
 
 
+def beam_arguments(folder: Path, output: Path) -> list[str]:
+    """Arguments of `sloshlab beam` for all runs of a folder and the rig beside them.
+
+    Raises
+    ------
+    InputError
+        If there is not one rig and at least one recording.
+    """
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}", got="no such folder", remedy="make it with `make tank-campaign`, which computes for hours"
+        )
+    recordings, rigs = sorted(folder.glob("*.nc")), sorted(folder.glob("rig*.toml"))
+    if not recordings or len(rigs) != 1:
+        raise InputError(
+            f"{folder}",
+            got=f"{len(recordings)} recordings and {len(rigs)} rig files",
+            allowed="recordings and one rig*.toml",
+            remedy="make them with `make tank-campaign`, or name the files to `sloshlab beam`",
+        )
+    return ["beam", *map(str, recordings), "--rig", str(rigs[0]), "-o", str(output)]
+
+
+def _beam(folder: Path, output: Path) -> int:
+    """Damping, modes, twins of the sloshing runs, and report; a flagged result is a result."""
+    from pipelines.beam_twins import simulated_twins
+
+    arguments = beam_arguments(folder, output)
+    rig = Path(arguments[arguments.index("--rig") + 1])
+    twins = simulated_twins(folder, rig, output / "twins")
+    code = run([arguments[0], *map(str, twins), *arguments[1:]])
+    if code in (0, DONE_BUT_FLAGGED):
+        print(f"The report is {(output / 'report.html').resolve()}")  # noqa: T201
+        return 0
+    return code
+
+
+def _ball(folder: Path, output: Path) -> int:
+    """Balls from every experiment of the folder that is there: decays, and both shakers filled half."""
+    whole = folder / "numerical_tank"
+    found = {
+        "decay": (sorted((whole / "sdof").glob("*.nc")), whole / "sdof" / "rig_sdof.toml"),
+        "shaker": (sorted((folder / "shaker").glob("fill_0.50_*.nc")), folder / "shaker" / "rig_fill_0.50.toml"),
+        "numerical_tank": (
+            sorted((whole / "shaker").glob("fill_0.50_*.nc")),
+            whole / "shaker" / "rig_fill_0.50.toml",
+        ),
+    }
+    if not any(runs for runs, _ in found.values()):
+        raise InputError(f"{folder}", got="no recordings", remedy="make them with `make campaign`")
+    for name, (runs, rig) in found.items():
+        if not runs:
+            print(f"{name}: no recordings; make them with `make tank-campaign`")  # noqa: T201
+            continue
+        code = run(["ball", *map(str, runs), "--rig", str(rig), "--damper", "always", "-o", str(output / name)])
+        if code not in (0, DONE_BUT_FLAGGED):
+            return code
+        print(f"The report is {(output / name / 'report.html').resolve()}")  # noqa: T201
+    return 0
+
+
 def _replay(folder: Path, output: Path) -> int:
     """Every recording through simulated devices; any difference is a failure."""
     from pipelines.replayed_campaign import replayed_campaign
@@ -50,7 +111,7 @@ def _replay(folder: Path, output: Path) -> int:
     return 1 if summary["flags"] else 0
 
 
-EXPERIMENTS: Final = {"shaker": _shaker, "replay": _replay}
+EXPERIMENTS: Final = {"shaker": _shaker, "beam": _beam, "sdof": _beam, "ball": _ball, "replay": _replay}
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ has its gain error, noise and offset. What is unknown to the analysis is drawn o
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -50,8 +51,8 @@ class Laboratory:
     offset_share: dict[str, float]
 
     @classmethod
-    def drawn(cls, seed: int) -> Laboratory:
-        """Draw a laboratory: gains and dry mass within ±1 %, most within ±0.5 %."""
+    def drawn(cls, seed: int, channels: Sequence[str] = CHANNELS) -> Laboratory:
+        """Draw a laboratory with these channels: gains and dry mass within ±1 %, most within ±0.5 %."""
         generator = np.random.default_rng([seed, 7301])
 
         def one() -> float:
@@ -59,16 +60,16 @@ class Laboratory:
 
         return cls(
             dry_mass_factor=one(),
-            gain={channel: one() for channel in CHANNELS},
+            gain={channel: one() for channel in channels},
             cell_1_share=float(generator.uniform(0.47, 0.53)),
             rocking=0.01,
-            offset_share={channel: float(generator.uniform(-0.004, 0.004)) for channel in CHANNELS},
+            offset_share={channel: float(generator.uniform(-0.004, 0.004)) for channel in channels},
         )
 
     @classmethod
-    def perfect(cls) -> Laboratory:
+    def perfect(cls, channels: Sequence[str] = CHANNELS) -> Laboratory:
         """No errors at all: believed mass, unit gains, equal shares."""
-        return cls(1.0, dict.fromkeys(CHANNELS, 1.0), 0.5, 0.0, dict.fromkeys(CHANNELS, 0.0))
+        return cls(1.0, dict.fromkeys(channels, 1.0), 0.5, 0.0, dict.fromkeys(channels, 0.0))
 
     def to_json(self) -> str:
         """The truth as JSON text, for tests; never written beside recordings."""
@@ -125,6 +126,7 @@ def reading(
     generator: np.random.Generator,
     noisy: bool = True,
     n_clipped: int = 0,
+    noisy_half_scale_counts: int | None = None,
 ) -> Reading:
     """Read one channel.
 
@@ -133,7 +135,7 @@ def reading(
     truth : ndarray
         True values in SI units.
     quantity : str
-        ``force`` or ``acceleration``; sets the resolution.
+        ``force`` or ``acceleration``; sets the resolution where `noisy_half_scale_counts` does not.
     gain, offset_share : float
         Of the sensor.
     generator : numpy.random.Generator
@@ -142,6 +144,8 @@ def reading(
         If false there is no noise, and the converter has 15 bits on each side instead of 9 or 10.
     n_clipped : int
         The range is chosen so small that about this many samples are clipped; 0 for none.
+    noisy_half_scale_counts : int, optional
+        Counts on each side of a noisy reading.
 
     Returns
     -------
@@ -152,7 +156,7 @@ def reading(
     half_scale = _amplifier_range(largest * _HEADROOM)
     if n_clipped:
         half_scale = float(np.sort(np.abs(truth * gain))[-n_clipped])
-    n_counts = _HALF_SCALE_COUNTS[quantity] if noisy else 32000
+    n_counts = (noisy_half_scale_counts or _HALF_SCALE_COUNTS[quantity]) if noisy else 32000
     step = half_scale / n_counts
     noise = _NOISE_COUNTS * step if noisy else 0.0
     measured = truth * gain + offset_share * half_scale + noise * generator.standard_normal(truth.size)

@@ -19,7 +19,7 @@ from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError
 
 FloatArray = NDArray[np.float64]
-Law = Literal["octave", "linear", "stepped", "vfa"]
+Law = Literal["octave", "linear", "stepped", "vfa", "constant"]
 
 STROKE_LIMIT_M: Final = 0.0125
 IMPACT_PHASE_RAD: Final = 1.35 * np.pi
@@ -41,8 +41,9 @@ class SweepPlan:
     acceleration_g
         Amplitude a₀/g where the stroke allows it; for a VFA run the highest one.
     law
-        ``octave``, ``linear`` in frequency, ``stepped`` sine, or ``vfa``: frequency and amplitude
-        both go to and fro, at rates that fill the plane.
+        ``octave``, ``linear`` in frequency, ``stepped`` sine, ``vfa``: frequency and amplitude
+        both go to and fro, at rates that fill the plane; or ``constant``: from rest at once to one
+        frequency and amplitude.
     start_hz, stop_hz
         Frequencies at the beginning and the end; a downward sweep starts high. A VFA run starts at
         the lower one whatever the order.
@@ -67,8 +68,10 @@ class SweepPlan:
             raise InputError("sweep: duration_s", got=f"{self.duration_s:g}", allowed="5 … 7200 s")
         if not 2 <= self.n_steps <= 1000:
             raise InputError("sweep: n_steps", got=str(self.n_steps), allowed="2 … 1000")
-        if self.law not in ("octave", "linear", "stepped", "vfa"):
-            raise InputError("sweep: law", got=repr(self.law), allowed="octave, linear, stepped, vfa")
+        if self.law not in ("octave", "linear", "stepped", "vfa", "constant"):
+            raise InputError("sweep: law", got=repr(self.law), allowed="octave, linear, stepped, vfa, constant")
+        if self.law == "constant":
+            _check_sudden_start(self)
 
     @property
     def rate_octave_per_s(self) -> float:
@@ -116,8 +119,14 @@ class Imperfections:
     slow_seed: int = 0
 
     @classmethod
-    def drawn(cls, generator: np.random.Generator) -> Imperfections:
-        """One run's imperfections."""
+    def drawn(
+        cls, generator: np.random.Generator, impact_phase_rad: float | None = IMPACT_PHASE_RAD
+    ) -> Imperfections:
+        """One run's imperfections.
+
+        The blows of the liquid leave their phase in the harmonics of the shaker; where that phase is not
+        known beforehand, `impact_phase_rad` is None and the harmonics have any phase.
+        """
         orders = ((2, 0.015), (3, 0.008))
         return cls(
             start_phase_rad=float(generator.uniform(-np.pi, np.pi)),
@@ -128,7 +137,7 @@ class Imperfections:
                 (
                     order,
                     float(largest * generator.uniform(0.5, 1.0)),
-                    float(-order * IMPACT_PHASE_RAD + generator.uniform(-0.6, 0.6)),
+                    _harmonic_phase(order, impact_phase_rad, generator),
                 )
                 for order, largest in orders
             ),
@@ -217,7 +226,8 @@ def shaken(plan: SweepPlan, imperfections: Imperfections | None = None) -> Motio
     Returns
     -------
     Motion
-        Its fundamental never exceeds the stroke limit.
+        Its fundamental never exceeds the stroke limit. A sudden start is exact whatever the imperfections:
+        it begins at the upper end of its acceleration, where the velocity is zero, and has no ramps.
 
     Examples
     --------
@@ -225,6 +235,8 @@ def shaken(plan: SweepPlan, imperfections: Imperfections | None = None) -> Motio
     >>> round(float(motion.at(np.array([0.0])).amplitude_m[0]), 4)
     0.0125
     """
+    if plan.law == "constant":
+        return _sudden_start(plan)
     faults = imperfections or Imperfections()
     slow = np.random.default_rng(faults.slow_seed)
     n_knots = max(int(np.ceil(plan.duration_s / _KNOT_STEP_S)) + 1, 12)
@@ -241,6 +253,39 @@ def shaken(plan: SweepPlan, imperfections: Imperfections | None = None) -> Motio
         acceleration = acceleration * _ramps(time_s, plan.duration_s)
     amplitude = make_interp_spline(time_s, acceleration / omega_true**2, k=5)
     return Motion(phi, amplitude, plan.duration_s, faults.harmonics)
+
+
+def _sudden_start(plan: SweepPlan) -> Motion:
+    """u = −A cos Ωt from t = 0 on: velocity and displacement are continuous, the acceleration jumps."""
+    omega = 2 * np.pi * plan.start_hz
+    time_s = np.linspace(0.0, plan.duration_s, 12)
+    amplitude = plan.acceleration_g * GRAVITY_M_PER_S2 / omega**2
+    return Motion(
+        make_interp_spline(time_s, omega * time_s, k=5),
+        make_interp_spline(time_s, np.full(time_s.size, amplitude), k=5),
+        plan.duration_s,
+    )
+
+
+def _check_sudden_start(plan: SweepPlan) -> None:
+    if plan.start_hz != plan.stop_hz:
+        got = f"{plan.start_hz:g} and {plan.stop_hz:g} Hz"
+        raise InputError("sudden start: start_hz and stop_hz", got=got, allowed="one frequency")
+    stroke_m = plan.acceleration_g * GRAVITY_M_PER_S2 / (2 * np.pi * plan.start_hz) ** 2
+    if stroke_m > STROKE_LIMIT_M:
+        highest_g = STROKE_LIMIT_M * (2 * np.pi * plan.start_hz) ** 2 / GRAVITY_M_PER_S2
+        raise InputError(
+            "sudden start: stroke",
+            got=f"{1e3 * stroke_m:.4g} mm for {plan.acceleration_g:g} g at {plan.start_hz:g} Hz",
+            allowed=f"at most {1e3 * STROKE_LIMIT_M:g} mm, that is {highest_g:.3g} g",
+            remedy="less acceleration or a higher frequency",
+        )
+
+
+def _harmonic_phase(order: int, impact_phase_rad: float | None, generator: np.random.Generator) -> float:
+    if impact_phase_rad is None:
+        return float(generator.uniform(-np.pi, np.pi))
+    return float(-order * impact_phase_rad + generator.uniform(-0.6, 0.6))
 
 
 def _slow_noise(time_s: FloatArray, generator: np.random.Generator) -> FloatArray:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from acquisition.virtual_laboratory.liquid_force import LiquidForce
+from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
 from acquisition.virtual_laboratory.sensors import (
     ACCELEROMETERS,
-    CHANNELS,
     FORCE_CELLS,
     LOST_COUNT,
     Laboratory,
@@ -22,15 +22,26 @@ from acquisition.virtual_laboratory.sensors import (
     cell_forces,
     reading,
 )
-from acquisition.virtual_laboratory.shaker import Imperfections, Kinematics, Law, Motion, SweepPlan, shaken
+from acquisition.virtual_laboratory.shaker import (
+    Imperfections,
+    Kinematics,
+    Law,
+    Motion,
+    SweepPlan,
+    shaken,
+)
 from sloshlab.errors import InputError
 from sloshlab.recording import CLIPPED, LOST, write_recording
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
-Experiment = Literal["shaker_sweep", "shaker_vfa"]
+Experiment = Literal["shaker_sweep", "shaker_vfa", "sudden_start"]
 Configuration = Literal["sloshing", "frozen", "empty"]
 
+EXPERIMENTS: Final = ("shaker_sweep", "shaker_vfa", "sudden_start")
+CONFIGURATIONS: Final = ("sloshing", "frozen", "empty")
+SWEEP_LAWS: Final = ("octave", "linear", "stepped")
+_LAW_OF_EXPERIMENT: Final[dict[str, Law]] = {"shaker_vfa": "vfa", "sudden_start": "constant"}
 START_TIME_UTC = "2026-01-12T09:00:00Z"
 _LARGEST_SAMPLES = 50_000_000
 
@@ -73,8 +84,6 @@ def virtual_shaker(
     laboratory: Laboratory | None = None,
 ) -> VirtualShaker:
     """The truth of the run that `virtual_shaker_run` records for the same arguments."""
-    if configuration not in ("sloshing", "frozen", "empty"):
-        raise InputError("configuration", got=repr(configuration), allowed="sloshing, frozen, empty")
     truth = laboratory or (Laboratory.drawn(0) if imperfect else Laboratory.perfect())
     generator = np.random.default_rng([seed, 1])
     motion = shaken(plan, Imperfections.drawn(generator) if imperfect else None)
@@ -106,6 +115,7 @@ def virtual_shaker_run(
     rig_name: str = "rig.toml",
     repeat: int = 1,
     start_time_utc: str = START_TIME_UTC,
+    numerical: NumericalLiquid | None = None,
 ) -> xr.Dataset:
     """Record one run of the virtual shaker.
 
@@ -113,8 +123,9 @@ def virtual_shaker_run(
     ----------
     rig : Rig
         Tank and liquid as believed; the fill level chooses the liquid's law.
-    experiment : {'shaker_sweep', 'shaker_vfa'}
-        A VFA run (frequency and amplitude both vary) ignores `law` and `direction`.
+    experiment : {'shaker_sweep', 'shaker_vfa', 'sudden_start'}
+        A VFA run (frequency and amplitude both vary) ignores `law` and `direction`; a sudden start, from
+        rest to `acceleration_g` at `start_hz` at once, also ignores `stop_hz`.
     configuration : {'sloshing', 'frozen', 'empty'}
         What the tank holds.
     acceleration_g : float
@@ -137,16 +148,21 @@ def virtual_shaker_run(
         About so many samples of ``force_cell_1`` clipped.
     run_id, rig_name, repeat, start_time_utc
         Global attributes.
+    numerical : NumericalLiquid, optional
+        The liquid is computed instead of following its law.
 
     Returns
     -------
     xarray.Dataset
-        In the recording format, values as the converter gives them, upward positive.
+        In the recording format, values as the converter gives them, upward positive. It is shorter than
+        asked for, and its attribute `numerical_tank_stopped` says why, if the computation became unstable.
 
     Raises
     ------
     InputError
         If an argument is out of range.
+    ComputationInterruptedError
+        At Ctrl-C while the liquid is computed with a checkpoint.
 
     Examples
     --------
@@ -156,52 +172,62 @@ def virtual_shaker_run(
     >>> run.sizes["time"], run.attrs["experiment"]
     (2560, 'shaker_sweep')
     """
-    if experiment not in ("shaker_sweep", "shaker_vfa"):
-        raise InputError("experiment", got=repr(experiment), allowed="shaker_sweep, shaker_vfa")
-    if direction not in ("up", "down"):
-        raise InputError("direction", got=repr(direction), allowed="up, down")
+    _check_choice("experiment", experiment, EXPERIMENTS)
+    _check_choice("configuration", configuration, CONFIGURATIONS)
+    _check_choice("direction", direction, ("up", "down"))
+    _check_choice("law", law, SWEEP_LAWS)
     if seed < 0:
         raise InputError("seed", got=str(seed), allowed="≥ 0")
     if not 0 <= n_clipped <= 1000:
         raise InputError("n_clipped", got=str(n_clipped), allowed="0 … 1000")
+    if experiment == "sudden_start":
+        stop_hz = start_hz
     first, last = (start_hz, stop_hz) if direction == "up" else (stop_hz, start_hz)
     plan = SweepPlan(
         acceleration_g=acceleration_g,
-        law="vfa" if experiment == "shaker_vfa" else law,
+        law=_LAW_OF_EXPERIMENT.get(experiment, law),
         start_hz=first,
         stop_hz=last,
         duration_s=duration_s,
         n_steps=n_steps,
     )
     time_s = _sample_times(duration_s, sampling_rate_hz, max(start_hz, stop_hz))
+    flags = _lost_samples(time_s, lost)
     laboratory = laboratory or (Laboratory.drawn(0) if imperfect else Laboratory.perfect())
-    shaker = virtual_shaker(
-        rig, plan, configuration=configuration, seed=seed, imperfect=imperfect, laboratory=laboratory
+    if numerical is None:
+        shaker = virtual_shaker(
+            rig, plan, configuration=configuration, seed=seed, imperfect=imperfect, laboratory=laboratory
+        )
+        moved, method = shaker.motion.at(time_s), dict[str, Any]()
+        external_force_n = shaker.external_force_n(time_s, moved)
+    else:
+        generator = np.random.default_rng([seed, 1])
+        motion = shaken(plan, Imperfections.drawn(generator, impact_phase_rad=None) if imperfect else None)
+        liquid_force_n, method = numerical.force_n(
+            rig, motion, configuration, sampling_rate_hz=sampling_rate_hz, seed=seed
+        )
+        time_s, flags = time_s[: liquid_force_n.size], flags[: liquid_force_n.size]
+        moved = motion.at(time_s)
+        external_force_n = rig.tank.dry_mass_kg * laboratory.dry_mass_factor * moved.acceleration - liquid_force_n
+    readings = _readings(
+        external_force_n, moved, time_s, laboratory, seed=seed, noisy=imperfect, n_clipped=n_clipped
     )
-    readings = _readings(shaker, time_s, laboratory, seed=seed, noisy=imperfect, n_clipped=n_clipped)
-    lost_samples = _lost_samples(time_s, lost)
     for its_reading in readings.values():
-        its_reading.counts[lost_samples] = LOST_COUNT
+        its_reading.counts[flags] = LOST_COUNT
     attributes = {
         "sloshlab_format": "1",
         "run_id": run_id or f"virtual_{experiment}_{configuration}_{acceleration_g:.2f}g_seed{seed}",
-        "experiment": experiment,
+        "experiment": "other" if experiment == "sudden_start" else experiment,
         "configuration": configuration,
         "rig": rig_name,
         "sampling_rate_hz": float(sampling_rate_hz),
         "start_time_utc": start_time_utc,
         "acceleration_g": float(acceleration_g),
         "repeat": int(repeat),
-        "sweep_start_hz": float(first),
-        "sweep_stop_hz": float(last),
-        "sweep_law": plan.law,
-        "sweep_duration_s": float(duration_s),
+        **_plan_attributes(plan),
+        **method,
     }
-    if plan.law == "octave":
-        attributes["sweep_rate_octave_per_s"] = plan.rate_octave_per_s
-    if plan.law == "linear":
-        attributes["sweep_rate_hz_per_s"] = (float(last) - float(first)) / float(duration_s)
-    return _dataset(time_s, readings, lost_samples, attributes)
+    return _dataset(time_s, readings, flags, attributes)
 
 
 def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -212,20 +238,40 @@ def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     run : xarray.Dataset
-        From `virtual_shaker_run`.
+        From `virtual_shaker_run` or `virtual_structure_run`.
     path : path-like
         The recording to write.
     """
     squeeze = {"zlib": True, "complevel": 9, "shuffle": True, "chunksizes": (run.sizes["time"],)}
     encoding: dict[str, dict[str, Any]] = {str(name): dict(squeeze) for name in run.variables}
-    for name in CHANNELS:
-        encoding[name].update(
-            dtype="int16", scale_factor=run[name].encoding["scale_factor"], _FillValue=np.int16(LOST_COUNT)
-        )
+    for name, channel in run.data_vars.items():
+        if "scale_factor" in channel.encoding:
+            encoding[str(name)].update(
+                dtype="int16", scale_factor=channel.encoding["scale_factor"], _FillValue=np.int16(LOST_COUNT)
+            )
     encoding["time"]["_FillValue"] = None
     if "quality" in run:
         encoding["quality"]["_FillValue"] = None
     write_recording(run, path, encoding=encoding)
+
+
+def _check_choice(what: str, got: str, allowed: tuple[str, ...]) -> None:
+    if got not in allowed:
+        raise InputError(what, got=repr(got), allowed=", ".join(allowed))
+
+
+def _plan_attributes(plan: SweepPlan) -> dict[str, Any]:
+    attributes: dict[str, Any] = {
+        "sweep_start_hz": float(plan.start_hz),
+        "sweep_stop_hz": float(plan.stop_hz),
+        "sweep_law": plan.law,
+        "sweep_duration_s": float(plan.duration_s),
+    }
+    if plan.law == "octave":
+        attributes["sweep_rate_octave_per_s"] = plan.rate_octave_per_s
+    if plan.law == "linear":
+        attributes["sweep_rate_hz_per_s"] = (float(plan.stop_hz) - float(plan.start_hz)) / float(plan.duration_s)
+    return attributes
 
 
 def _sample_times(duration_s: float, sampling_rate_hz: float, highest_hz: float) -> FloatArray:
@@ -243,7 +289,8 @@ def _sample_times(duration_s: float, sampling_rate_hz: float, highest_hz: float)
 
 
 def _readings(
-    shaker: VirtualShaker,
+    external_force_n: FloatArray,
+    moved: Kinematics,
     time_s: FloatArray,
     laboratory: Laboratory,
     *,
@@ -251,8 +298,7 @@ def _readings(
     noisy: bool,
     n_clipped: int,
 ) -> dict[str, Reading]:
-    moved = shaker.motion.at(time_s)
-    forces = cell_forces(shaker.external_force_n(time_s, moved), time_s, laboratory)
+    forces = cell_forces(external_force_n, time_s, laboratory)
     truths = dict(zip(FORCE_CELLS, forces, strict=True))
     truths.update(dict.fromkeys(ACCELEROMETERS, moved.acceleration))
     generator = np.random.default_rng([seed, 2])

@@ -15,7 +15,7 @@ class Citation:
     doi: str = ""
 
 
-_SOURCE: Final = Citation(
+SOURCE: Final = Citation(
     "experiment, work per cycle, maps, effective mass (1.7–1.30)",
     "F. Saltari, M. Pizzoli, G. Coppotelli, F. Gambioli, J. E. Cooper, F. Mastroddi: Experimental "
     "characterisation of sloshing tank dissipative behaviour in vertical harmonic excitation. Journal of "
@@ -57,20 +57,20 @@ _ALPHA_SHAPE: Final = Citation(
     "Transactions on Information Theory 29, 551–559 (1983).",
     "10.1109/TIT.1983.1056714",
 )
-_SCIPY: Final = Citation(
+SCIPY: Final = Citation(
     "numerical routines",
     "P. Virtanen et al.: SciPy 1.0: fundamental algorithms for scientific computing in Python. Nature "
     "Methods 17, 261–272 (2020).",
     "10.1038/s41592-019-0686-2",
 )
-_XARRAY: Final = Citation(
+XARRAY: Final = Citation(
     "labelled arrays",
     "S. Hoyer, J. Hamman: xarray: N-D labeled arrays and datasets in Python. Journal of Open Research "
     "Software 5, 10 (2017).",
     "10.5334/jors.148",
 )
 
-_ALWAYS: Final = (_SOURCE, _SPLINES, _CROSS_VALIDATION, _ALPHA_SHAPE, _SCIPY, _XARRAY)
+_ALWAYS: Final = (SOURCE, _SPLINES, _CROSS_VALIDATION, _ALPHA_SHAPE, SCIPY, XARRAY)
 
 
 def citation(kind: str = "shaker") -> tuple[Citation, ...]:
@@ -88,4 +88,4 @@ def citation(kind: str = "shaker") -> tuple[Citation, ...]:
     """
     if kind == "work":
         return _ALWAYS
-    return (_SOURCE, _FREE_SURFACE, _FARADAY, _SLOSHING, *_ALWAYS[1:])
+    return (SOURCE, _FREE_SURFACE, _FARADAY, _SLOSHING, *_ALWAYS[1:])

@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.report.citations import citation
+from pipelines.report.citations import Citation, citation
 from pipelines.report.figure import NothingToDrawError, ReportFigure, SkippedFigure
 from pipelines.report.sections import SectionPlan, planned_sections
 from pipelines.report.style import drawing_style, file_stem
@@ -21,6 +21,30 @@ if TYPE_CHECKING:
     from pipelines.results import SweepExperiment
 
 Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a report says beside its figures; `plans` are drawn in their order.
+
+    Attributes
+    ----------
+    title, subtitle : str
+        Head of the page.
+    flags, summary : tuple of str
+        What must be read first; the result in sentences.
+    plans : tuple of SectionPlan
+        Sections with their figures and tables.
+    papers : tuple of Citation
+        What the methods rest on.
+    """
+
+    title: str
+    subtitle: str
+    flags: tuple[str, ...]
+    summary: tuple[str, ...]
+    plans: tuple[SectionPlan, ...]
+    papers: tuple[Citation, ...]
 
 
 @dataclass(frozen=True)
@@ -50,13 +74,29 @@ def write_report(experiment: SweepExperiment, folder: Path, *, progress: Progres
     Path
         The report. The same experiment gives the same bytes.
     """
-    sections = drawn_sections(planned_sections(experiment), progress)
-    page = report_html(experiment, sections).encode("utf-8", errors="replace")
+    return write_page(_page(experiment), folder, progress=progress)
+
+
+def write_page(page: Page, folder: Path, *, progress: Progress | None = None) -> Path:
+    """Write `figures/*.png` and `report.html`; nothing is written before every figure is drawn."""
+    sections = drawn_sections(page.plans, progress)
+    html = page_html(page, sections).encode("utf-8", errors="replace")
     for figure in _figures(sections):
         atomic_file.write_bytes(folder / "figures" / f"{figure.name}.png", figure.png)
     report = folder / "report.html"
-    atomic_file.write_bytes(report, page)
+    atomic_file.write_bytes(report, html)
     return report
+
+
+def _page(experiment: SweepExperiment) -> Page:
+    return Page(
+        title=experiment.title,
+        subtitle=_subtitle(experiment),
+        flags=experiment.flags,
+        summary=sentences(experiment),
+        plans=planned_sections(experiment),
+        papers=citation(experiment.kind),
+    )
 
 
 def drawn_sections(plans: Sequence[SectionPlan], progress: Progress | None = None) -> tuple[Section, ...]:
@@ -78,6 +118,11 @@ def drawn_sections(plans: Sequence[SectionPlan], progress: Progress | None = Non
 
 
 def report_html(experiment: SweepExperiment, sections: Sequence[Section]) -> str:
+    """The page of a sweep experiment as text."""
+    return page_html(_page(experiment), sections)
+
+
+def page_html(page: Page, sections: Sequence[Section]) -> str:
     """The page as text: styles and images inside, nothing fetched from elsewhere."""
     from jinja2 import Environment, StrictUndefined
 
@@ -85,14 +130,14 @@ def report_html(experiment: SweepExperiment, sections: Sequence[Section]) -> str
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(files.joinpath("page.html.j2").read_text(encoding="utf-8"))
     return template.render(
-        title=experiment.title,
-        subtitle=_subtitle(experiment),
+        title=page.title,
+        subtitle=page.subtitle,
         css=_safe_css(files.joinpath("page.css").read_text(encoding="utf-8")),
-        flags=experiment.flags,
-        summary=sentences(experiment),
+        flags=page.flags,
+        summary=page.summary,
         remark=gravity_remark(),
         sections=_numbered(sections),
-        papers=citation(experiment.kind),
+        papers=page.papers,
     )
 
 

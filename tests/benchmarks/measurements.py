@@ -157,6 +157,14 @@ def blas() -> dict[str, float]:
     return {"product_s": best_of(lambda: matrix @ matrix, 5)}
 
 
+def twin() -> dict[str, float]:
+    """Speed of the twin, alone and against `solve_ivp`."""
+    from tests.benchmarks.twin import twin_figures
+
+    return twin_figures()
+
+
 if __name__ == "__main__":
-    chosen = {"make": make, "analyse": analyse, "memory": memory, "peer": peer, "blas": blas}[sys.argv[1]]
+    measurements = {"make": make, "analyse": analyse, "memory": memory, "peer": peer, "blas": blas, "twin": twin}
+    chosen = measurements[sys.argv[1]]
     print(json.dumps(chosen(*sys.argv[2:])))

@@ -1,0 +1,225 @@
+"""The force of the computed liquid along a whole motion: hours of computing that may be stopped at any time.
+
+The force is kept as means over a few steps (`sampling`). Now and then they are saved together with the state
+of the tank; started again with the same checkpoint the computation goes on and ends with the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.numerical_tank import checkpoint as checkpoints
+from acquisition.numerical_tank.forced_motion import averaged
+from acquisition.numerical_tank.instability import InstabilityError
+from acquisition.numerical_tank.interruption import told_to_stop
+from acquisition.numerical_tank.sampling import HALF_LENGTH_SAMPLES, oversampling, sampled
+from acquisition.numerical_tank.simulation import NumericalTank
+from acquisition.numerical_tank.tank import TankSetup
+from sloshlab.errors import InputError, RecordingInterruptedError
+
+FloatArray = NDArray[np.float64]
+VerticalMotion = Callable[[FloatArray], FloatArray]
+"""Vertical acceleration of the tank [m/s²] at given times [s], 0 being the start of the run."""
+Progress = Callable[[float], None]
+"""Takes the share of the work that is done, 0 … 1."""
+
+SAVED_EVERY_S: Final = 20.0
+_BLOCK_S: Final = 0.1
+
+
+class ComputationInterruptedError(RecordingInterruptedError):
+    """A person stopped a computation; its checkpoint is safe, and the message says how to go on."""
+
+
+@dataclass(frozen=True)
+class ComputedForce:
+    """What the computation gave.
+
+    Attributes
+    ----------
+    vertical_n : ndarray, shape (n,)
+        Force of the liquid on the tank [N], upward positive, without the static weight −m g; sample k at
+        k over the sampling rate. Shorter than asked for where the computation became unstable.
+    computing_s : float
+        Time that it took, without interruptions.
+    stopped : str
+        Why, when and where it became unstable; empty if it did not.
+    """
+
+    vertical_n: FloatArray
+    computing_s: float
+    stopped: str = ""
+
+
+def computed_force(
+    setup: TankSetup,
+    acceleration_m_per_s2: VerticalMotion,
+    duration_s: float,
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    saved_every_s: float = SAVED_EVERY_S,
+    monotonic_s: Callable[[], float] = time.monotonic,
+) -> ComputedForce:
+    """Move the tank from rest and return the force of the liquid on it.
+
+    Parameters
+    ----------
+    setup : TankSetup
+        With a sampling rate.
+    acceleration_m_per_s2 : callable
+        Vertical acceleration of the tank [m/s²] at times [s]; also asked for up to 12 samples beyond the end,
+        which the filter of the last samples needs. Before the start the tank is at rest.
+    duration_s : float
+        Duration of the run.
+    checkpoint : path-like, optional
+        Where the state is saved from time to time. If the file is there, the computation goes on from it.
+    progress : callable, optional
+        Called with the share of the work done, every few tenths of a second.
+    saved_every_s : float
+        Time of computing between two checkpoints.
+    monotonic_s : callable
+        The clock.
+
+    Returns
+    -------
+    ComputedForce
+        With the same setup and motion the same bytes, however often it was stopped and continued.
+
+    Raises
+    ------
+    InputError
+        If there is no sampling rate, a time is out of range, or the checkpoint is damaged or of another run.
+    ComputationInterruptedError
+        At Ctrl-C or SIGTERM, if there is a checkpoint.
+    """
+    n_samples = _n_samples(setup, duration_s)
+    run = _Computation(setup, acceleration_m_per_s2, n_samples)
+    path = None if checkpoint is None else Path(checkpoint)
+    if path is not None and path.exists():
+        run.restore(path)
+    stopped, saved_s = "", monotonic_s()
+    try:
+        with told_to_stop() as stopping:
+            while run.n_left and not stopped:
+                start_s = monotonic_s()
+                stopped = run.advance()
+                run.computing_s += monotonic_s() - start_s
+                if stopping:
+                    raise KeyboardInterrupt
+                if progress is not None:
+                    progress(run.share)
+                if path is not None and not stopped and monotonic_s() - saved_s >= saved_every_s:
+                    run.save(path)
+                    saved_s = monotonic_s()
+    except KeyboardInterrupt as interrupt:
+        if path is None:
+            raise
+        if run.is_consistent:
+            run.save(path)
+        raise _interrupted(run, path, duration_s) from interrupt
+    return ComputedForce(run.samples(n_samples), run.computing_s, stopped)
+
+
+class _Computation:
+    """A tank, its motion and the mean forces so far."""
+
+    def __init__(self, setup: TankSetup, motion: VerticalMotion, n_samples: int) -> None:
+        self._n_means = oversampling(setup.steps_per_sample)
+        self._steps_per_mean = setup.steps_per_sample // self._n_means
+        self._means = np.zeros((n_samples - 1 + HALF_LENGTH_SAMPLES) * self._n_means)
+        self._at_once = max(round(_BLOCK_S / (self._steps_per_mean * setup.step_s)), 1)
+        self._n_done = 0
+        self._motion = motion
+        self._weight_n = setup.gravity_m_per_s2 * setup.liquid_mass_kg
+        self._run = _identity(setup, motion, n_samples)
+        self.tank = NumericalTank(setup)
+        self.computing_s = 0.0
+
+    @property
+    def n_left(self) -> int:
+        return self._means.size - self._n_done
+
+    @property
+    def share(self) -> float:
+        return self._n_done / self._means.size
+
+    @property
+    def is_consistent(self) -> bool:
+        """False if an interrupt fell between a block of steps and the storing of its forces."""
+        return self.tank.n_steps == self._n_done * self._steps_per_mean
+
+    def advance(self) -> str:
+        """Compute a block; return why it became unstable, or nothing."""
+        n_steps = min(self._at_once, self.n_left) * self._steps_per_mean
+        motion = self._motion(self.tank.times_s(n_steps))
+        try:
+            forces, trouble = self.tank.advance(motion), ""
+        except InstabilityError as error:
+            if error.valid is None:
+                raise
+            forces, trouble = error.valid, str(error)
+        means = averaged(forces.vertical_n, self._steps_per_mean) + self._weight_n
+        self._means[self._n_done : self._n_done + means.size] = means
+        self._n_done += means.size
+        return trouble
+
+    def samples(self, n_samples: int) -> FloatArray:
+        return sampled(self._means[: self._n_done], self._n_means, n_samples)
+
+    def save(self, path: Path) -> None:
+        extra: dict[str, NDArray[Any]] = {
+            "run": self._run,
+            "means": self._means[: self._n_done],
+            "computing_s": np.array([self.computing_s]),
+        }
+        checkpoints.save(self.tank, path, extra)
+
+    def restore(self, path: Path) -> None:
+        tank, extra = checkpoints.load_with_extra(path)
+        if extra.get("run", np.zeros(0)).tobytes() != self._run.tobytes():
+            remedy = "remove it, or give another name"
+            raise InputError(f"{path}", got="the checkpoint of another run", remedy=remedy)
+        means, computing_s = extra.get("means", np.zeros(0)), extra.get("computing_s", np.zeros(0))
+        if means.size * self._steps_per_mean != tank.n_steps or means.size > self._means.size:
+            raise InputError(f"{path}", got="a checkpoint without all forces", remedy="remove it")
+        self.tank, self._n_done, self.computing_s = tank, means.size, float(computing_s.sum())
+        self._means[: means.size] = means
+
+
+def _n_samples(setup: TankSetup, duration_s: float) -> int:
+    if setup.sampling_rate_hz is None:
+        raise InputError("sampling_rate_hz of the tank", got="none", allowed="1 … 1e6")
+    if not (math.isfinite(duration_s) and duration_s * setup.sampling_rate_hz >= 1):
+        raise InputError("duration_s", got=f"{duration_s}", allowed="at least one sample, finite")
+    return round(duration_s * setup.sampling_rate_hz)
+
+
+def _identity(setup: TankSetup, motion: VerticalMotion, n_samples: int) -> NDArray[np.uint8]:
+    """Hash of all that determines the run: setup, and motion at the times of the samples."""
+    digest = hashlib.sha256(json.dumps(asdict(setup), sort_keys=True).encode())
+    digest.update(np.ascontiguousarray(motion(np.arange(n_samples) / (setup.sampling_rate_hz or 1.0))).tobytes())
+    return np.frombuffer(digest.digest(), np.uint8)
+
+
+def _interrupted(run: _Computation, path: Path, duration_s: float) -> ComputationInterruptedError:
+    done_s = min(run.tank.time_s, duration_s)
+    if not path.exists():
+        return ComputationInterruptedError(
+            f"interrupted at {done_s:.4g} of {duration_s:g} s; nothing was saved yet"
+        )
+    return ComputationInterruptedError(
+        f"interrupted at {done_s:.4g} of {duration_s:g} s; {path.name} keeps what was computed; "
+        "give the same command again to go on"
+    )

@@ -1,0 +1,220 @@
+"""A structure and its tank, each moved by the other.
+
+The liquid's step tells the force on the walls in its middle, before it needs the acceleration of the
+tank. There the structure takes its own step with that force, and the liquid is kicked with minus the
+acceleration that came out. Force times mean velocity is then one number, given by one side and taken by
+the other, and no iteration is needed: the liquid is compressible, so its force does not depend on the
+acceleration of the same instant.
+
+A particle that reaches a wall at the end of a step gives its impulse to the structure in the next one;
+what the liquid handed over and what the structure took differ by that, and both are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from acquisition.numerical_tank import stepping
+from acquisition.numerical_tank.carried_tank import CarriedTank, StructureHistory, as_base
+from acquisition.numerical_tank.neighbours import list_is_stale, list_neighbours
+from acquisition.numerical_tank.simulation import NumericalTank
+from acquisition.numerical_tank.stepping import FORCE_Z, NO_ROOM, RUNNING, begin_step, end_step
+from acquisition.numerical_tank.structure_motion import HANDED_OVER, step_structure
+from acquisition.numerical_tank.structures import Structure
+from acquisition.numerical_tank.tank import TankSetup
+from sloshlab.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+class CoupledTank(CarriedTank):
+    """A numerical tank on a structure.
+
+    Parameters
+    ----------
+    setup : TankSetup
+        Box, liquid, resolution, seed; its time step is that of both.
+    structure : Structure
+        Without the liquid.
+
+    Examples
+    --------
+    >>> from acquisition.numerical_tank.structures import Mode
+    >>> from acquisition.numerical_tank.tank import Box, filled_tank
+    >>> on_spring = Structure((Mode(2.0, 3800.0, 0.0, 1.0, 2.0),))
+    >>> tank = CoupledTank(filled_tank(Box(0.06, 0.03, 0.05), 0.5, 12), on_spring)
+    >>> tank.deflect(-0.005)
+    >>> history = tank.advance(np.zeros(100))
+    >>> bool(history.tank_acceleration_m_per_s2[0] > 9.0)
+    True
+    """
+
+    def __init__(self, setup: TankSetup, structure: Structure) -> None:
+        super().__init__(structure, setup.step_s)
+        self.tank = NumericalTank(setup)
+        self._carried = np.zeros(1)
+
+    @property
+    def n_steps(self) -> int:
+        """Steps done since the start."""
+        return self.tank.n_steps
+
+    def advance(self, base_acceleration_m_per_s2: ArrayLike) -> StructureHistory:
+        """Take one step for each acceleration of the base.
+
+        Parameters
+        ----------
+        base_acceleration_m_per_s2 : array_like, shape (n_steps,)
+            Upward, in the middle of every step.
+
+        Raises
+        ------
+        InputError
+            If an acceleration is not finite.
+        InstabilityError
+            If the computation cannot go on; its `valid` is the history of the steps before.
+        """
+        base = as_base(base_acceleration_m_per_s2)
+        rows, forces = np.zeros((base.size, 3 * self.structure.n_modes)), np.zeros(base.size)
+        first = self.n_steps
+        status = self._advance(base, rows, forces)
+        done = self.n_steps - first
+        history = self._history(base[:done], rows[:done], forces[:done], first)
+        if status != stepping.RUNNING:
+            raise self.tank.instability(status, history)
+        return history
+
+    def _advance(self, base: FloatArray, rows: FloatArray, forces: FloatArray) -> int:
+        setup = self.tank.setup
+        per_particle = setup.particle_mass_kg_per_m * setup.box.depth_m
+        weight = setup.liquid_mass_kg * setup.gravity_m_per_s2
+        return int(
+            _advance_coupled(
+                *self.tank.compiled_state,
+                self._system,
+                self._motion,
+                per_particle,
+                weight,
+                base,
+                rows,
+                forces,
+                self._carried,
+                self._energies,
+                *self.tank.compiled_sums,
+            )
+        )
+
+    def structure_arrays(self) -> dict[str, NDArray[Any]]:
+        """Return copies of what a later step depends on beside the tank, for `coupled_checkpoint.save`."""
+        own = {f"structure_{name}": value.copy() for name, value in self._kept().items()}
+        return {**own, "structure_start": np.array([self._start_j])}
+
+    def restore_structure(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take up the state that `structure_arrays` returned.
+
+        Parameters
+        ----------
+        arrays : mapping of str to ndarray
+
+        Raises
+        ------
+        KeyError
+            If one is missing.
+        InputError
+            If one does not belong to this structure or is not finite.
+        """
+        start = np.zeros(1)
+        for name, target in {**self._kept(), "start": start}.items():
+            given = arrays[f"structure_{name}"]
+            if given.shape != target.shape or given.dtype != target.dtype or not np.isfinite(given).all():
+                raise InputError(
+                    f"checkpoint, structure_{name}",
+                    got=f"{given.dtype} {given.shape}",
+                    allowed=f"finite {target.dtype} {target.shape}",
+                )
+            target[...] = given
+        self._start_j = float(start[0])
+
+    def _kept(self) -> dict[str, FloatArray]:
+        q, p = self._motion
+        return {"q": q, "p": p, "energies": self._energies, "carried": self._carried}
+
+
+@njit(cache=True)
+def _mean_velocity(system, row):  # type: ignore[no-untyped-def]
+    """Mean velocity of the tank during the step of a row."""
+    n, velocity = system.shape.size, 0.0
+    for i in range(n):
+        velocity += system.shape[i] * row[n + i]
+    return velocity
+
+
+@njit(cache=True)
+def _velocity(system, motion):  # type: ignore[no-untyped-def]
+    """Velocity of the tank at the end of a step."""
+    velocity = 0.0
+    for i in range(system.shape.size):
+        velocity += system.shape[i] * motion.p[i]
+    return velocity
+
+
+@njit(cache=True)
+def _advance_coupled(  # type: ignore[no-untyped-def]
+    particles,
+    pairs,
+    images,
+    constants,
+    table,
+    table_scale,
+    gravity,
+    system,
+    motion,
+    per_particle,
+    weight,
+    base,
+    rows,
+    forces,
+    carried,
+    energies,
+    sums,
+    counters,
+):
+    """Steps of liquid and structure; see `CoupledTank.advance` and `stepping.advance`.
+
+    `per_particle` turns the sums of the walls into forces [N], `weight` is that of the liquid, `carried` the
+    force of impulses at the end of the last step.
+    """
+    walls = np.zeros(4)
+    for k in range(base.size):
+        if list_is_stale(particles, constants) and not list_neighbours(particles, pairs, images, constants):
+            return NO_ROOM
+        viscosity = begin_step(particles, pairs, images, constants, walls)
+        in_middle = per_particle * walls[FORCE_Z] + weight
+        forces[k] = in_middle + carried[0]
+        tank_z = step_structure(system, motion, forces[k], base[k], rows[k], energies)
+        status = end_step(
+            particles,
+            pairs,
+            images,
+            constants,
+            table,
+            table_scale,
+            gravity,
+            0.0,
+            tank_z,
+            viscosity,
+            walls,
+            sums,
+            counters,
+        )
+        carried[0] = per_particle * walls[FORCE_Z] + weight - in_middle
+        energies[HANDED_OVER] += system.step * in_middle * _mean_velocity(system, rows[k])
+        energies[HANDED_OVER] += system.step * carried[0] * _velocity(system, motion)
+        if status != RUNNING:
+            return status
+    return RUNNING

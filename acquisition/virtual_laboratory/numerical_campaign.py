@@ -1,0 +1,390 @@
+"""The campaign of the numerical tank: hours of computing, in processes, that may be stopped at any time.
+
+Started again it keeps the recordings that the manifest vouches for and goes on with the others from their
+checkpoints. The bytes of a recording depend on its run, the seed and the resolution only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fnmatch
+import hashlib
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any, Final
+
+import xarray as xr
+
+from acquisition.numerical_tank import checkpoint as checkpoints
+from acquisition.numerical_tank.tank import TankSetup
+from acquisition.virtual_laboratory.campaign import MANIFEST_NAME, campaign_laboratory, file_record
+from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid, numerical_setup
+from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
+from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC, virtual_shaker_run, write_virtual_run
+from acquisition.virtual_laboratory.structure_rig import StructureLaboratory
+from acquisition.virtual_laboratory.structure_run import virtual_structure_run
+from acquisition.virtual_laboratory.worker_processes import Outcome, work_through
+from sloshlab import atomic_file
+from sloshlab._version import __version__
+from sloshlab.errors import InputError, RecordingInterruptedError
+from sloshlab.rig import Rig
+
+CHECKPOINTS_NAME: Final = ".checkpoints"
+COMMAND: Final = "sloshlab virtual campaign --liquid numerical -o raw_data/numerical_tank --layers {} --seed {}"
+_SAMPLING_RATE_HZ: Final = 512.0
+_FIRST_SEED: Final = 500
+"""Other seeds than those of the campaign whose liquid follows a law."""
+_SHALLOWEST_FILL: Final = 0.375
+
+
+@dataclass(frozen=True)
+class CampaignSettings:
+    """How a campaign is made.
+
+    Attributes
+    ----------
+    seed : int
+        Of everything random.
+    layers_per_height : int
+        Resolution: height of the tank over the distance of the particles; half as fine again at α = 0.25.
+    n_workers : int
+        Processes.
+    only : str
+        Pattern of the names of the runs to be made, as of files.
+    checkpoints : path-like, optional
+        Folder of the checkpoints; by default one within the campaign's.
+    """
+
+    seed: int = 0
+    layers_per_height: int = 16
+    n_workers: int = 2
+    only: str = "*"
+    checkpoints: str | os.PathLike[str] | None = None
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """What a person is told when a run has ended.
+
+    Attributes
+    ----------
+    name : str
+    computing_s : float
+        Time that it took, over all sessions.
+    n_done, n_runs : int
+        Runs of this session.
+    flag : str
+        What is wrong with it; empty if nothing.
+    """
+
+    name: str
+    computing_s: float
+    n_done: int
+    n_runs: int
+    flag: str
+
+
+@dataclass(frozen=True)
+class CampaignSummary:
+    """What there is in the end.
+
+    Attributes
+    ----------
+    manifest : Path
+    n_kept, n_made : int
+        Recordings found good, and made.
+    flags : tuple of str
+        Runs that failed or became unstable.
+    """
+
+    manifest: Path
+    n_kept: int
+    n_made: int
+    flags: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Task:
+    run: NumericalRun
+    recording: Path
+    checkpoint: Path
+    seed: int
+    layers_per_height: int
+    laboratory_seed: int
+
+
+def make_numerical_campaign(
+    folder: str | os.PathLike[str],
+    settings: CampaignSettings | None = None,
+    *,
+    runs: Sequence[NumericalRun] | None = None,
+    progressed: Callable[[float], None] | None = None,
+    finished: Callable[[FinishedRun], None] | None = None,
+) -> CampaignSummary:
+    """Make the recordings that are not there yet.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made if missing. Rig descriptions are written to it, recordings below it, and the manifest.
+    settings : CampaignSettings, optional
+    runs : sequence of NumericalRun, optional
+        Others than those of `numerical_runs`.
+    progressed : callable, optional
+        Called with the share of the work of this session that is done.
+    finished : callable, optional
+        Called after every run.
+
+    Raises
+    ------
+    InputError
+        If a setting is out of range, no run has such a name, or another campaign works in the folder.
+    RecordingInterruptedError
+        At Ctrl-C or SIGTERM; checkpoints are safe.
+    """
+    settings = settings or CampaignSettings()
+    target = Path(folder)
+    tasks = _tasks(target, settings, numerical_runs() if runs is None else runs)
+    with _alone(tasks[0].checkpoint.parent):
+        for name, text in RIG_TEXTS.items():
+            atomic_file.write_bytes(target / name, text.encode())
+        manifest = _Manifest(target, settings)
+        missing = [task for task in tasks if not manifest.vouches_for(task)]
+        missing.sort(key=_cost, reverse=True)
+        session = _Session(manifest, missing, progressed or (lambda share: None), finished or (lambda run: None))
+        try:
+            work_through(
+                record, missing, settings.n_workers, progressed=session.progressed, finished=session.finished
+            )
+        except KeyboardInterrupt as interrupt:
+            raise RecordingInterruptedError(
+                f"campaign interrupted: {session.n_done} of {len(missing)} runs done; checkpoints keep what was "
+                "computed of the others; give the same command again to go on"
+            ) from interrupt
+        finally:
+            manifest.write()
+    return CampaignSummary(manifest.path, len(tasks) - len(missing), session.n_made, tuple(session.flags))
+
+
+def record(task: _Task, progress: Callable[[float], None]) -> dict[str, Any]:
+    """Make one recording; this is what a worker does.
+
+    Returns
+    -------
+    dict
+        ``computing_s`` and ``flag``.
+    """
+    _discard_if_damaged(task.checkpoint)
+    start_s, computed = time.monotonic(), list[float]()
+    liquid = NumericalLiquid(
+        task.layers_per_height, task.checkpoint, progress, lambda force: computed.append(force.computing_s)
+    )
+    recording = _recording(task, liquid)
+    write_virtual_run(recording, task.recording)
+    task.checkpoint.unlink(missing_ok=True)
+    computing_s = computed[0] if computed else time.monotonic() - start_s
+    return {"computing_s": computing_s, "flag": str(recording.attrs.get(STOPPED, ""))}
+
+
+def _discard_if_damaged(checkpoint: Path) -> None:
+    """A run whose checkpoint cannot be read starts again; the campaign goes on."""
+    if checkpoint.exists():
+        try:
+            checkpoints.load(checkpoint)
+        except InputError:
+            checkpoint.unlink()
+
+
+def _recording(task: _Task, liquid: NumericalLiquid) -> xr.Dataset:
+    run = task.run
+    start = datetime.fromisoformat(START_TIME_UTC) + timedelta(minutes=10 * run.number)
+    common: dict[str, Any] = {
+        "seed": task.seed,
+        "run_id": Path(run.name).name,
+        "rig_name": Path(run.rig).name,
+        "start_time_utc": start.strftime("%Y-%m-%dT%H:%M:%SZ"),
+    }
+    rig = Rig.from_toml_text(RIG_TEXTS[run.rig])
+    if run.is_on_shaker:
+        laboratory = campaign_laboratory(task.laboratory_seed)
+        return virtual_shaker_run(rig, numerical=liquid, laboratory=laboratory, **run.settings, **common)
+    rest = StructureLaboratory.drawn(task.laboratory_seed, rig)
+    return virtual_structure_run(rig, numerical=liquid, laboratory=rest, **run.settings, **common)
+
+
+class _Session:
+    """What is done and what is left while processes work."""
+
+    def __init__(
+        self,
+        manifest: _Manifest,
+        tasks: Sequence[_Task],
+        progressed: Callable[[float], None],
+        finished: Callable[[FinishedRun], None],
+    ) -> None:
+        self._manifest, self._tasks, self._progressed, self._finished = manifest, tasks, progressed, finished
+        self._costs = [_cost(task) for task in tasks]
+        self._shares = [0.0] * len(tasks)
+        self.n_done, self.n_made, self.flags = 0, 0, list[str]()
+
+    def progressed(self, number: int, share: float) -> None:
+        self._shares[number] = share
+        done = sum(cost * share for cost, share in zip(self._costs, self._shares, strict=True))
+        self._progressed(done / sum(self._costs))
+
+    def finished(self, number: int, outcome: Outcome) -> None:
+        task = self._tasks[number]
+        result = outcome.result or {"computing_s": 0.0, "flag": f"not made: {outcome.error}"}
+        self.n_done += 1
+        if not outcome.error:
+            self.n_made += 1
+            self._manifest.add(task, result)
+        if result["flag"]:
+            self.flags.append(f"{task.run.name}: {result['flag']}")
+        self.progressed(number, 1.0)
+        self._finished(
+            FinishedRun(task.run.name, result["computing_s"], self.n_done, len(self._tasks), result["flag"])
+        )
+
+
+class _Manifest:
+    """`manifest.json`: what each file is, and what it was made of."""
+
+    def __init__(self, folder: Path, settings: CampaignSettings) -> None:
+        self.path, self._folder, self._settings = folder / MANIFEST_NAME, folder, settings
+        self._runs: dict[str, Any] = {}
+        self._files: dict[str, Any] = {}
+        with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
+            known = json.loads(self.path.read_text(encoding="utf-8"))
+            self._runs, self._files = dict(known["runs"]), dict(known["files"])
+
+    def vouches_for(self, task: _Task) -> bool:
+        """Whether the recording is there, unchanged, and made as it would be made now."""
+        run = self._runs.get(task.run.name)
+        if not isinstance(run, dict) or run.get("made_of") != _made_of(task) or not task.recording.is_file():
+            return False
+        return bool(self._files.get(self._relative(task.recording)) == file_record(task.recording))
+
+    def add(self, task: _Task, result: Mapping[str, Any]) -> None:
+        self._files[self._relative(task.recording)] = file_record(task.recording)
+        self._runs[task.run.name] = {
+            "seed": task.seed,
+            "settings": dict(task.run.settings),
+            "rig": task.run.rig,
+            **({"layers_per_height": task.layers_per_height} if task.run.is_computed else {}),
+            "made_of": _made_of(task),
+            "computing_s": round(result["computing_s"], 1),
+            **({"flag": result["flag"]} if result["flag"] else {}),
+        }
+        self.write()
+
+    def write(self) -> None:
+        self._files.update({name: file_record(self._folder / name) for name in RIG_TEXTS})
+        content = {
+            "format": 1,
+            "command": COMMAND.format(self._settings.layers_per_height, self._settings.seed),
+            "seed": self._settings.seed,
+            "layers_per_height": self._settings.layers_per_height,
+            "sloshlab_version": __version__,
+            "runs": self._runs,
+            "files": self._files,
+        }
+        atomic_file.write_bytes(self.path, (json.dumps(content, indent=1, sort_keys=True) + "\n").encode())
+
+    def _relative(self, path: Path) -> str:
+        return path.relative_to(self._folder).as_posix()
+
+
+def _tasks(folder: Path, settings: CampaignSettings, runs: Sequence[NumericalRun]) -> list[_Task]:
+    if settings.seed < 0:
+        raise InputError("seed of the campaign", got=str(settings.seed), allowed="≥ 0")
+    chosen = [run for run in runs if fnmatch.fnmatchcase(run.name, settings.only)]
+    if not chosen:
+        names = ", ".join(run.name for run in runs[:2])
+        raise InputError("--only", got=repr(settings.only), allowed=f"a pattern of names such as {names}")
+    return [_task(folder, settings, run) for run in chosen]
+
+
+def _task(folder: Path, settings: CampaignSettings, run: NumericalRun) -> _Task:
+    """What a worker is told; what cannot be computed is refused here, before hours are spent on others."""
+    task = _Task(
+        run,
+        folder / f"{run.name}.nc",
+        Path(),
+        1000 * settings.seed + _FIRST_SEED + run.number,
+        _layers_per_height(settings, run),
+        settings.seed,
+    )
+    kept_in = Path(settings.checkpoints or folder / CHECKPOINTS_NAME)
+    checkpoint = kept_in / f"{run.name.replace('/', '_')}_{_made_of(task)[:12]}.checkpoint"
+    return replace(task, checkpoint=checkpoint)
+
+
+def _layers_per_height(settings: CampaignSettings, run: NumericalRun) -> int:
+    """A shallow liquid is computed more finely, so that it is as many particles deep as one that fills 3/8."""
+    fill_level = Rig.from_toml_text(RIG_TEXTS[run.rig]).liquid.fill_level
+    return max(settings.layers_per_height, math.ceil(_SHALLOWEST_FILL * settings.layers_per_height / fill_level))
+
+
+def _setup(task: _Task) -> TankSetup | None:
+    """The numerical tank of a run; None where no liquid moves."""
+    if not task.run.is_computed:
+        return None
+    return numerical_setup(
+        Rig.from_toml_text(RIG_TEXTS[task.run.rig]),
+        layers_per_height=task.layers_per_height,
+        seed=task.seed,
+        sampling_rate_hz=_SAMPLING_RATE_HZ,
+    )
+
+
+def _cost(task: _Task) -> float:
+    """Steps of particles, about proportional to the time of computing."""
+    setup, duration_s = _setup(task), float(task.run.settings["duration_s"])
+    return duration_s * (1e4 if setup is None else setup.n_particles / setup.step_s)
+
+
+def _made_of(task: _Task) -> str:
+    """Hash of all that a recording follows from."""
+    setup = _setup(task)
+    content = {
+        "rig": RIG_TEXTS[task.run.rig],
+        "run": asdict(task.run),
+        "seeds": [task.seed, task.laboratory_seed],
+        "tank": None if setup is None else asdict(setup),
+        "version": __version__,
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Make the folder of the checkpoints, keep a second campaign out of it, remove it when it is empty."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        if not _locked(lock.fileno()):
+            raise InputError(
+                f"{folder}", got="another campaign at work", remedy="wait for it, or name other --checkpoints"
+            )
+        yield
+        if len(list(folder.iterdir())) == 1:
+            (folder / "lock").unlink()
+            folder.rmdir()
+
+
+def _locked(file: int) -> bool:
+    try:
+        import fcntl
+    except ImportError:  # there are no such locks on this system
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,142 @@
+"""The liquid of the numerical tank in the rigs of the virtual laboratory.
+
+Everything that the tank needs comes from the rig description. No law tells it what to do.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.numerical_tank.computed_force import ComputedForce, computed_force
+from acquisition.numerical_tank.tank import Box, Liquid, TankSetup, filled_tank
+from acquisition.virtual_laboratory.shaker import Motion
+from sloshlab._version import __version__
+from sloshlab.errors import InputError
+from sloshlab.rig import Rig
+
+FloatArray = NDArray[np.float64]
+
+STOPPED: Final = "numerical_tank_stopped"
+"""Global attribute of a recording whose computation became unstable: why, when and where."""
+
+
+def numerical_setup(rig: Rig, *, layers_per_height: int, seed: int, sampling_rate_hz: float) -> TankSetup:
+    """The numerical tank of a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        Inside of the tank, density, fill level and, where it tells one, viscosity.
+    layers_per_height : int
+        Height of the tank over the distance of the particles.
+    seed : int
+        Of the disturbance at the start.
+    sampling_rate_hz : float
+        A whole number of steps makes a sample.
+
+    Raises
+    ------
+    InputError
+        If such a tank cannot be computed.
+    """
+    water = Liquid()
+    viscosity = rig.liquid.kinematic_viscosity_m2_per_s
+    return filled_tank(
+        Box(rig.tank.length_m, rig.tank.height_m, rig.tank.width_m),
+        rig.liquid.fill_level,
+        layers_per_height,
+        liquid=Liquid(
+            rig.liquid.density_kg_per_m3,
+            water.viscosity_m2_per_s if viscosity is None else viscosity,
+            water.speed_of_sound_m_per_s,
+        ),
+        seed=seed,
+        sampling_rate_hz=sampling_rate_hz,
+    )
+
+
+def method_attributes(setup: TankSetup) -> dict[str, Any]:
+    """Global attributes of a recording that tell how its liquid was computed."""
+    return {
+        "liquid": "numerical_tank",
+        "layers_per_height": round(setup.box.height_m / setup.spacing_m),
+        "n_particles": setup.n_particles,
+        "step_s": setup.step_s,
+        "speed_of_sound_m_per_s": setup.liquid.speed_of_sound_m_per_s,
+        "viscosity_m2_per_s": setup.effective_viscosity_m2_per_s,
+        "seed": setup.seed,
+        "sloshlab_version": __version__,
+    }
+
+
+@dataclass(frozen=True)
+class NumericalLiquid:
+    """How the liquid of a run is computed.
+
+    Attributes
+    ----------
+    layers_per_height : int
+        Height of the tank over the distance of the particles.
+    checkpoint : path-like, optional
+        Where the state is saved from time to time, and taken up if it is there.
+    progress : callable, optional
+        Called with the share of the work done.
+    finished : callable, optional
+        Called with what was computed, the time that it took included.
+    """
+
+    layers_per_height: int = 16
+    checkpoint: str | os.PathLike[str] | None = None
+    progress: Callable[[float], None] | None = None
+    finished: Callable[[ComputedForce], None] | None = None
+
+    def force_n(
+        self, rig: Rig, motion: Motion, configuration: str, *, sampling_rate_hz: float, seed: int
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Force of the liquid on the shaken tank, and what the recording says about it.
+
+        Parameters
+        ----------
+        rig : Rig
+        motion : Motion
+            Of the tank.
+        configuration : {'sloshing', 'frozen', 'empty'}
+            Only a sloshing liquid is computed; a frozen one moves with the tank, F_S = −m_l ü.
+        sampling_rate_hz : float
+            Sample k is at k over it.
+        seed : int
+            Of the disturbance at the start.
+
+        Returns
+        -------
+        ndarray, dict
+            F_S [N], upward positive, without the weight, shorter than the motion if the computation became
+            unstable; and global attributes, then with `numerical_tank_stopped`.
+        """
+        if configuration != "sloshing":
+            mass_kg = rig.liquid_mass_kg if configuration == "frozen" else 0.0
+            time_s = np.arange(round(motion.duration_s * sampling_rate_hz)) / sampling_rate_hz
+            force_n = -mass_kg * motion.at(time_s).acceleration
+            return force_n, {"liquid": configuration, "seed": seed, "sloshlab_version": __version__}
+        setup = numerical_setup(
+            rig, layers_per_height=self.layers_per_height, seed=seed, sampling_rate_hz=sampling_rate_hz
+        )
+        computed = computed_force(
+            setup,
+            lambda time_s: motion.at(time_s).acceleration,
+            motion.duration_s,
+            checkpoint=self.checkpoint,
+            progress=self.progress,
+        )
+        if self.finished is not None:
+            self.finished(computed)
+        if not computed.vertical_n.size:
+            raise InputError("numerical tank: not one sample", got=computed.stopped)
+        stopped = {STOPPED: computed.stopped} if computed.stopped else {}
+        return computed.vertical_n, {**method_attributes(setup), **stopped}

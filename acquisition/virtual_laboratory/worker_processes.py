@@ -1,0 +1,177 @@
+"""Tasks shared out to processes, each of which tells how far it is and may be stopped at any time.
+
+One process per task: what one does or leaves behind cannot touch another, and the result of a task does not
+depend on how many there are. Processes are started anew (spawn), so they inherit nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import signal
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any, Final, NoReturn
+
+from acquisition.numerical_tank.interruption import told_to_stop
+from sloshlab.errors import InputError, RecordingInterruptedError, SloshlabError
+
+MOST_WORKERS: Final = 256
+Work = Callable[[Any, Callable[[float], None]], Any]
+"""Takes a task and a function to be called with the share of it that is done; returns its result."""
+
+_DONE, _FAILED, _SHARE, _STOPPED = "done", "failed", "share", "stopped"
+_PATIENCE_S: Final = 60.0
+_LOOK_UP_S: Final = 0.5
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a task ended.
+
+    Attributes
+    ----------
+    result : object
+        What the work returned.
+    error : str
+        Why there is no result, in one line; empty if there is one.
+    """
+
+    result: Any = None
+    error: str = ""
+
+
+def work_through(
+    work: Work,
+    tasks: Sequence[Any],
+    n_workers: int,
+    *,
+    progressed: Callable[[int, float], None],
+    finished: Callable[[int, Outcome], None],
+) -> None:
+    """Work through tasks, in their order, in several processes.
+
+    Parameters
+    ----------
+    work : callable
+        A function of a module, so that another process finds it.
+    tasks : sequence
+        Arguments that can be sent to another process.
+    n_workers : int
+        How many processes at once.
+    progressed : callable
+        Called with the number of a task and the share of it that is done.
+    finished : callable
+        Called with the number of a task and its outcome. A failed task does not stop the others.
+
+    Raises
+    ------
+    InputError
+        If there are no workers, or too many.
+    KeyboardInterrupt
+        At Ctrl-C or SIGTERM, after every process has been stopped and has saved what it can.
+    """
+    if not 1 <= n_workers <= MOST_WORKERS:
+        raise InputError("--workers", got=str(n_workers), allowed=f"1 … {MOST_WORKERS}")
+    running: dict[Connection, _Running] = {}
+    waiting = list(enumerate(tasks))[::-1]
+    with told_to_stop() as stopping:
+        while waiting or running:
+            while waiting and len(running) < n_workers and not stopping:
+                number, task = waiting.pop()
+                started = _start(work, number, task)
+                running[started.connection] = started
+            for connection in wait(list(running), timeout=_LOOK_UP_S):
+                _listen(running, connection, progressed, finished)  # type: ignore[arg-type]
+            if stopping:
+                _stop(running, progressed, finished)
+                raise KeyboardInterrupt
+
+
+@dataclass
+class _Running:
+    number: int
+    process: BaseProcess
+    connection: Connection
+    outcome: Outcome | None = None
+
+
+def _start(work: Work, number: int, task: Any) -> _Running:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_child, args=(theirs, work, task), name=f"task {number}")
+    process.start()
+    theirs.close()
+    return _Running(number, process, ours)
+
+
+def _listen(
+    running: dict[Connection, _Running],
+    connection: Connection,
+    progressed: Callable[[int, float], None],
+    finished: Callable[[int, Outcome], None],
+) -> None:
+    """Take one message; at the end of the pipe the process is over."""
+    one = running[connection]
+    try:
+        kind, content = connection.recv()
+    except (EOFError, OSError):
+        del running[connection]
+        connection.close()
+        one.process.join()
+        if one.outcome is None:
+            one.outcome = Outcome(error=f"its process ended with code {one.process.exitcode}")
+        if one.outcome.error != _STOPPED:
+            finished(one.number, one.outcome)
+        one.process.close()
+        return
+    if kind == _SHARE:
+        progressed(one.number, content)
+    else:
+        one.outcome = Outcome(result=content) if kind == _DONE else Outcome(error=content or _STOPPED)
+
+
+def _stop(
+    running: dict[Connection, _Running],
+    progressed: Callable[[int, float], None],
+    finished: Callable[[int, Outcome], None],
+) -> None:
+    """Ask all to stop, hear what they still have to say, and leave none behind."""
+    for one in running.values():
+        one.outcome = one.outcome or Outcome(error=_STOPPED)
+        one.process.terminate()
+    while running:
+        ready = wait(list(running), timeout=_PATIENCE_S)
+        for one in [] if ready else list(running.values()):
+            one.process.kill()
+        for connection in ready:
+            _listen(running, connection, progressed, finished)  # type: ignore[arg-type]
+
+
+def _interrupt(*_: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _child(connection: Connection, work: Work, task: Any) -> None:
+    """What runs in a process of its own. Ctrl-C is for the parent, which then terminates this one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _interrupt)
+
+    def say_share(share: float) -> None:
+        try:
+            connection.send((_SHARE, share))
+        except OSError:
+            raise KeyboardInterrupt from None  # the parent is gone: save and stop
+
+    try:
+        answer = _DONE, work(task, say_share)
+    except (KeyboardInterrupt, RecordingInterruptedError):
+        answer = _STOPPED, ""
+    except (SloshlabError, OSError, MemoryError) as error:
+        answer = _FAILED, " ".join(str(error).split()) or type(error).__name__
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    with contextlib.suppress(OSError):
+        connection.send(answer)
+    connection.close()

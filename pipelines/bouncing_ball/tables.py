@@ -1,0 +1,96 @@
+"""Tables of the report on a ball."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pipelines.bouncing_ball.results import BallExperiment, LineResult
+from pipelines.report.numbers import MISSING, signed, text
+from pipelines.report.tables import Table
+
+_PARAMETERS = {
+    "radius_m": ("radius r₀", "m", "r₀/h", "radius"),
+    "stiffness_n_per_m": ("stiffness k̂", "N/m", "k̂/(ρ g S ω̄²)", "stiffness"),
+    "damping_kg_per_s": ("damping c", "kg/s", "c/(ρ S √(gh) ω̄)", "damping"),
+    "hardening_per_m": ("hardening α", "1/m", "α h", "hardening"),
+    "beta": ("frozen share β", "1", "β", "beta"),
+}
+
+
+def parameter_table(experiment: BallExperiment) -> Table:
+    """Values, intervals and non-dimensional form."""
+    plain = experiment.identified.ball.non_dimensional(experiment.rig, experiment.omega_bar)
+    rows = []
+    for one in experiment.identified.intervals:
+        label, unit, scaled, field = _PARAMETERS[one.name]
+        ends = [text(end, 4) if np.isfinite(end) else "bound" for end in (one.low, one.high)]
+        rows.append(
+            (
+                f"{label} [{unit}]",
+                text(one.value, 4),
+                f"{ends[0]} … {ends[1]}",
+                text(one.profile_ratio, 2),
+                f"at its {one.at_bound} bound" if one.at_bound else MISSING,
+                f"{scaled} = {text(getattr(plain, field), 4)}",
+            )
+        )
+    law = "always" if experiment.identified.ball.damping_in_flight else "in contact only"
+    caption = (
+        f"90 % intervals from the Jacobian; “bound” where they leave the range of the search. Profile: "
+        f"growth of the "
+        "sum of squares at the ends of the interval with all other parameters fitted again, over the growth "
+        "that the "
+        "Jacobian predicts; 1 where the interval is right, less where it is too short. Non-dimensional by "
+        "(2.19) at ω̄ "
+        f"= {text(experiment.omega_bar)}. The damper acts {law}."
+    )
+    header = ("parameter", "value", "90 % interval", "profile", "bound", "non-dimensional")
+    return Table("Parameters of the ball", header, tuple(rows), caption)
+
+
+def band_table(result: LineResult) -> Table:
+    """Errors at and away from the tuned frequency."""
+    rows = tuple(
+        (
+            f"{band.low:.2f} … {band.high:.2f}" + (" (tuned)" if band.is_tuned else ""),
+            str(band.n_windows),
+            text(band.measured_rms, 3),
+            text(band.ball_rms, 3),
+            text(band.error_rms, 2),
+            signed(band.error_mean, 2),
+            f"{100 * band.relative_error:.0f} %",
+        )
+        for band in result.bands
+    )
+    header = ("ω̄", "windows", "W̄ measured, RMS", "W̄ of the ball, RMS", "error, RMS", "error, mean", "relative")
+    caption = (
+        "W̄ of the ball in steady harmonic motion at frequency and amplitude of each window, minus the "
+        "measured one. "
+        "The windows of the tuned band are in no other. Relative: RMS error over RMS of the measured W̄."
+    )
+    return Table("Error at and away from the tuning frequency", header, rows, caption)
+
+
+def search_table(experiment: BallExperiment) -> Table:
+    """What the search did."""
+    found = experiment.identified
+    unit = "W̄" if isinstance(experiment.result, LineResult) else "% of critical damping"
+    rows = (
+        ("values matched", str(found.residuals.size)),
+        (f"RMS after the global search [{unit}]", text(found.global_rms, 3)),
+        (f"RMS after least squares [{unit}]", text(found.rms, 3)),
+        ("simulations", str(found.n_evaluations)),
+    )
+    return Table("The search", ("quantity", "value"), rows, "Differential evolution, then bounded least squares.")
+
+
+def provenance_table(experiment: BallExperiment) -> Table:
+    """Command, inputs and versions."""
+    provenance: Mapping[str, Any] = experiment.provenance
+    rows = [("command", str(provenance.get("command", MISSING)))]
+    rows += [(name, digest) for name, digest in dict(provenance.get("inputs", {})).items()]
+    rows += [(name, version) for name, version in dict(provenance.get("versions", {})).items()]
+    return Table("Provenance", ("what", "value"), tuple(rows), "SHA-256 of the inputs.")

@@ -1,0 +1,133 @@
+"""Commands that analyse recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.commands.application import (
+    HalfWidth,
+    Json,
+    NoReport,
+    OutputFolder,
+    Recordings,
+    RigOption,
+    Spacing,
+    app,
+    command_as_given,
+    finish,
+)
+
+
+@app.command()
+def shaker(
+    runs: Recordings,
+    rig: RigOption,
+    output: OutputFolder,
+    p: HalfWidth = 6,
+    m: Spacing = 24,
+    boundaries: Annotated[
+        str, typer.Option(help="Cycle boundaries from the 'measured' phase or from the sweep 'law'.")
+    ] = "measured",
+    allow_incomplete: Annotated[
+        bool, typer.Option("--allow-incomplete", help="Analyse a sweep that stops early up to where it stops.")
+    ] = False,
+    no_report: NoReport = False,
+    as_json: Json = False,
+) -> None:
+    """Sweeps or VFA runs of a tank on the shaker: windows, maps and a report."""
+    from pipelines.outputs import write_experiment
+    from pipelines.shaker import ShakerSettings, analyse_shaker
+
+    if boundaries not in ("measured", "law"):
+        raise typer.BadParameter(f"{boundaries!r} is neither 'measured' nor 'law'", param_hint="--boundaries")
+    settings = ShakerSettings.checked(p=p, m=m, boundaries=boundaries, allow_incomplete=allow_incomplete)
+    experiment = analyse_shaker(runs, rig, settings)
+    finish(write_experiment(experiment, output, command=command_as_given(), report=not no_report), as_json)
+
+
+@app.command()
+def work(
+    runs: Recordings,
+    output: OutputFolder,
+    force: Annotated[str, typer.Option(help="Channel of the force on the structure.", show_default=False)],
+    acceleration: Annotated[str, typer.Option(help="Channel of the motion, as acceleration.")] = "",
+    velocity: Annotated[str, typer.Option(help="Channel of the motion, as velocity.")] = "",
+    displacement: Annotated[str, typer.Option(help="Channel of the motion, as displacement.")] = "",
+    phase_reference: Annotated[
+        str, typer.Option(help="Channel whose phase counts the cycles; the motion if not given.")
+    ] = "",
+    p: HalfWidth = 6,
+    m: Spacing = 24,
+    no_report: NoReport = False,
+    as_json: Json = False,
+) -> None:
+    """Any sweep with one force and one motion channel, no tank needed."""
+    from pipelines.outputs import write_experiment
+    from pipelines.work import WorkSettings, analyse_work
+
+    motions = {"acceleration": acceleration, "velocity": velocity, "displacement": displacement}
+    if sum(map(bool, motions.values())) != 1:
+        raise typer.BadParameter("name exactly one of --acceleration, --velocity, --displacement")
+    settings = WorkSettings.checked(p=p, m=m, force=force, motions=motions, phase_reference=phase_reference)
+    experiment = analyse_work(runs, settings)
+    finish(write_experiment(experiment, output, command=command_as_given(), report=not no_report), as_json)
+
+
+@app.command()
+def beam(
+    runs: Recordings,
+    rig: Annotated[
+        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
+    ],
+    output: OutputFolder,
+    modes: Annotated[
+        int | None, typer.Option(help="Modes that are kept; all of the rig if not given.", show_default=False)
+    ] = None,
+    cycles: Annotated[int, typer.Option(help="Cycles per stretch of a decay.")] = 4,
+    segment_s: Annotated[
+        float | None,
+        typer.Option(help="Segments of random runs in s; a sixth of the run if not given.", show_default=False),
+    ] = None,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write modal.nc and spectra.nc only.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Beam or guided tank, frozen and sloshing: modal accelerations, damping, spectra and a report."""
+    from pipelines.beam import analyse_beam, checked_settings
+    from pipelines.beam_outputs import write_beam
+
+    settings = checked_settings(modes=modes, n_cycles=cycles, segment_s=segment_s)
+    experiment = analyse_beam(runs, rig, settings)
+    finish(write_beam(experiment, output, command=command_as_given(), report=not no_report), as_json)
+
+
+@app.command()
+def ball(
+    runs: Recordings,
+    rig: Annotated[
+        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
+    ],
+    output: OutputFolder,
+    omega_bar: Annotated[float, typer.Option(help="On the shaker: ω̄ at which W̄ is matched.")] = 4.0,
+    damper: Annotated[str, typer.Option(help="The ball's damper acts in 'contact' or 'always'.")] = "contact",
+    lowest_acceleration_g: Annotated[
+        float, typer.Option(help="Of a decay: smallest amplitude that is matched, in g.")
+    ] = 0.3,
+    generations: Annotated[int, typer.Option(help="Of the global search.")] = 40,
+    seed: Annotated[int, typer.Option(help="Seed of the global search.")] = 0,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write ball.toml and ball.nc only.")] = False,
+    as_json: Json = False,
+) -> None:
+    """A bouncing ball in place of the liquid, from free decays or from runs on the shaker."""
+    from pipelines.bouncing_ball.outputs import write_ball
+    from pipelines.bouncing_ball.stages import BallSettings, analyse_ball
+    from sloshlab.bouncing_ball.identification import SearchSettings
+
+    if damper not in ("contact", "always"):
+        raise typer.BadParameter(f"{damper!r} is neither 'contact' nor 'always'", param_hint="--damper")
+    search = SearchSettings(n_generations=generations, seed=seed)
+    settings = BallSettings(omega_bar, 1.0 if damper == "always" else 0.0, lowest_acceleration_g, search)
+    experiment = analyse_ball(runs, rig, settings)
+    finish(write_ball(experiment, output, command=command_as_given(), report=not no_report), as_json)

@@ -1,0 +1,215 @@
+"""Commands of the laboratory: virtual runs, live recording, recovery, simulated devices."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.commands.application import (
+    Json,
+    OutputFile,
+    Redundant,
+    app,
+    finish,
+)
+
+
+@app.command()
+def virtual(
+    experiment: Annotated[
+        str,
+        typer.Argument(
+            help="shaker_sweep, shaker_vfa, sudden_start, beam_free, beam_random, sdof_free, "
+            "or campaign for a whole folder of raw_data."
+        ),
+    ],
+    output: OutputFile,
+    rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig of the experiment.")] = None,
+    configuration: Annotated[str, typer.Option(help="sloshing, frozen or empty.")] = "sloshing",
+    acceleration_g: Annotated[float, typer.Option(help="Level of the sweep in g.")] = 3.0,
+    direction: Annotated[str, typer.Option(help="up or down.")] = "up",
+    law: Annotated[str, typer.Option(help="octave, linear or stepped.")] = "octave",
+    frequency_hz: Annotated[float, typer.Option(help="Of a sudden start, in Hz.")] = 11.4,
+    initial_displacement_m: Annotated[
+        float | None, typer.Option(help="Deflection from which a free run starts, in m.", show_default=False)
+    ] = None,
+    rms_g: Annotated[float, typer.Option(help="Of the random motion of the root, in g.")] = 0.2,
+    duration_s: Annotated[
+        float | None, typer.Option(help="Duration in seconds; on the shaker 240.", show_default=False)
+    ] = None,
+    sampling_rate_hz: Annotated[
+        float | None, typer.Option(help="Sampling rate in Hz; on the shaker 512.", show_default=False)
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    liquid: Annotated[str, typer.Option(help="law, or numerical: computed, takes long.")] = "law",
+    layers: Annotated[int, typer.Option(help="Layers of particles over the height of the tank.")] = 16,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where a computation is saved; by default beside the recording."),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="Processes of a computed campaign.")] = 2,
+    only: Annotated[
+        str, typer.Option(metavar="PATTERN", help="Runs of a computed campaign, as a pattern of file names.")
+    ] = "*",
+    checkpoints: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Where a computed campaign is saved; by default within the output."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """A run of the virtual laboratory."""
+    from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
+    from pipelines import virtual as laboratory
+
+    if experiment == "campaign":
+        computed = CampaignSettings(seed, layers, workers, only, checkpoints)
+        finish(laboratory.make_campaign_folder(output, liquid, computed, typer.echo), as_json)
+        return
+    run = laboratory.VirtualRun(
+        experiment=experiment,
+        configuration=configuration,
+        seed=seed,
+        liquid=liquid,
+        layers=layers,
+        acceleration_g=acceleration_g,
+        direction=direction,
+        law=law,
+        frequency_hz=frequency_hz,
+        duration_s=duration_s,
+        sampling_rate_hz=sampling_rate_hz,
+        initial_displacement_m=initial_displacement_m,
+        rms_g=rms_g,
+    )
+    finish(laboratory.make_virtual_run(run, rig, output, checkpoint), as_json)
+
+
+@app.command()
+def record(
+    sources: Annotated[
+        list[str],
+        typer.Option("--source", metavar="URL", help="A device; the first is the time base.", show_default=False),
+    ],
+    rig: Annotated[
+        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig the run belongs to.", show_default=False)
+    ],
+    output: OutputFile,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Seconds of samples; until the end if not given.", show_default=False),
+    ] = None,
+    run_table: Annotated[
+        Path | None, typer.Option("--run", metavar="RUN.toml", help="Attributes of the run.", show_default=False)
+    ] = None,
+    attribute: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="An attribute of the run.", show_default=False)
+    ] = None,
+    align: Annotated[str, typer.Option(help="Clocks of several devices: host, device or counter.")] = "host",
+    redundant: Redundant = None,
+    keep_journal: Annotated[bool, typer.Option("--keep-journal", help="Keep RUN.journal.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Live devices – serial, CAN, simulated – to one recording, through a crash-safe journal."""
+    from pipelines.live_view import LiveView
+    from pipelines.record import RecordSettings
+    from pipelines.record import record as record_run
+
+    settings = RecordSettings(
+        sources=tuple(sources),
+        rig=rig,
+        output=output,
+        duration_s=duration,
+        run=run_table,
+        attributes=tuple(attribute or ()),
+        align=align,
+        redundant=tuple(redundant or ()),
+        keep_journal=keep_journal,
+        overwrite=overwrite,
+    )
+    with LiveView(output.absolute().parent, len(sources)) as view:
+        summary = record_run(settings, view)
+    finish(summary, as_json)
+
+
+@app.command()
+def recover(
+    journal: Annotated[
+        Path, typer.Argument(metavar="RUN.journal", help="Journal of a recorder.", show_default=False)
+    ],
+    output: OutputFile,
+    align: Annotated[
+        str | None,
+        typer.Option(help="host, device or counter; as it was recorded if not given.", show_default=False),
+    ] = None,
+    redundant: Redundant = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
+    as_json: Json = False,
+) -> None:
+    """A journal left by a crash to a recording: everything up to the last complete block."""
+    from pipelines.recover import recover as recover_journal
+
+    summary = recover_journal(journal, output, overwrite, align=align, redundant=redundant or ())
+    finish(summary, as_json)
+
+
+@app.command()
+def replay(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN.nc",
+            help="A recording, virtual:EXPERIMENT?rig=RIG.toml or pattern:channels=8.",
+            show_default=False,
+        ),
+    ],
+    urls: Annotated[
+        list[str], typer.Option("--as", metavar="URL", help="Where a device appears.", show_default=False)
+    ],
+    channels: Annotated[
+        list[str] | None, typer.Option(metavar="A,B", help="Channels; once per --as.", show_default=False)
+    ] = None,
+    speed: Annotated[str, typer.Option(help="Factor of real time, or 'max'.")] = "1",
+    faults: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FAULTS.toml", help="Faults or 'none'; once per --as.", show_default=False),
+    ] = None,
+    samples_per_frame: Annotated[int | None, typer.Option(help="Of a serial device.", show_default=False)] = None,
+    expose: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Listen here, for more than this computer: whoever reaches it reads every sample.",
+        ),
+    ] = "",
+    free_run: Annotated[bool, typer.Option("--free-run", help="Begin without being started by a host.")] = False,
+    wait_clients: Annotated[int, typer.Option(min=1, help="Clients a socketcand device waits for.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    loop_duration: Annotated[
+        float | None, typer.Option(help="Repeat the recording up to so many seconds.", show_default=False)
+    ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Write what each fault touched.", show_default=False)
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """A recording, the virtual rig or a test pattern, played as serial or CAN devices."""
+    from pipelines.replay import ReplaySettings
+    from pipelines.replay import replay as play
+
+    settings = ReplaySettings(
+        source=source,
+        urls=urls,
+        channels=channels or (),
+        speed=speed,
+        faults=[None if str(path) == "none" else path for path in faults or ()],
+        samples_per_frame=samples_per_frame,
+        expose=expose or None,
+        free_run=free_run,
+        wait_clients=wait_clients,
+        seed=seed,
+        loop_duration_s=loop_duration,
+        truth=truth,
+    )
+    finish(play(settings), as_json)

@@ -1,0 +1,1 @@
+"""What was measured on the shaker of the source, beside what recordings give: numbers, readings, table."""

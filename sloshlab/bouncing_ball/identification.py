@@ -1,0 +1,313 @@
+"""A ball from measured values: differential evolution over the unit box, then least squares, then intervals.
+
+The residuals are differences between a curve of the ball and the measured one. Impacts make them rough, so the
+global search does the work and least squares only polishes, with steps wide enough to look across the roughness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import OptimizeResult, differential_evolution, least_squares
+from scipy.stats import t as student_t
+
+from sloshlab.bouncing_ball.ball import BouncingBall
+from sloshlab.bouncing_ball.search_space import BOUNDS, SearchSpace
+from sloshlab.errors import InputError, SloshlabError
+
+FloatArray = npt.NDArray[np.float64]
+Residuals = Callable[[BouncingBall], FloatArray]
+Progress = Callable[[int, int], None]
+
+CONFIDENCE: Final = 0.90
+_NO_BALL = 10.0
+"""Residual, in units of the measured curve, of a ball that cannot be simulated."""
+_STEPS = (2e-3, 2e-4)
+"""Finite differences in the unit box, first across the roughness of impacts, then within it."""
+_AT_BOUND = 0.005
+_EXTRA_LOCAL_STARTS = 2
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """How long to search.
+
+    Attributes
+    ----------
+    population : int
+        Candidates per parameter of the global search; their number is rounded up to a power of two.
+    n_generations : int
+    n_local_evaluations : int
+        Of the least squares, Jacobians included.
+    seed : int
+    """
+
+    population: int = 10
+    n_generations: int = 40
+    n_local_evaluations: int = 150
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.population < 2 or self.n_generations < 1 or self.n_local_evaluations < 1:
+            raise InputError("search of a ball", got=str(self), allowed="population ≥ 2, the others ≥ 1")
+
+
+@dataclass(frozen=True)
+class ParameterInterval:
+    """One parameter with its interval.
+
+    Attributes
+    ----------
+    name : str
+        Field of `BouncingBall`.
+    value, low, high : float
+        Value and ends of its 90 % interval, from the Jacobian, cut at the bounds of the search.
+    profile_ratio : float
+        Growth of the sum of squares at the ends with all others fitted again, over the growth that the
+        Jacobian predicts: 1 where the interval is right, less where it is too short.
+    at_bound : str
+        ``"lower"`` or ``"upper"`` if the value sits at the end of its search, else empty.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    profile_ratio: float
+    at_bound: str = ""
+
+    @property
+    def is_determined(self) -> bool:
+        """The interval ends before the bounds of the search do."""
+        return bool(np.isfinite(self.low) and np.isfinite(self.high))
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedBall:
+    """A ball, how well it meets the measurement, and how well it is known.
+
+    Attributes
+    ----------
+    ball : BouncingBall
+    space : SearchSpace
+    residuals : ndarray, shape (n_values,)
+        Ball minus measured.
+    global_rms, rms : float
+        Of the residuals after the global and after the local search.
+    intervals : tuple of ParameterInterval
+    n_evaluations : int
+    """
+
+    ball: BouncingBall
+    space: SearchSpace
+    residuals: FloatArray
+    global_rms: float
+    rms: float
+    intervals: tuple[ParameterInterval, ...]
+    n_evaluations: int
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What a reader must know: parameters at the bounds of the search."""
+        return tuple(
+            f"bouncing ball: {one.name} sits at the {one.at_bound} bound {one.value:.4g} of its search; the data "
+            "may not hold it, or no ball of this kind suits them"
+            for one in self.intervals
+            if one.at_bound
+        )
+
+
+def identified(
+    residuals: Residuals,
+    space: SearchSpace,
+    settings: SearchSettings | None = None,
+    *,
+    progress: Progress | None = None,
+) -> IdentifiedBall:
+    """Search the ball whose residuals are smallest.
+
+    Parameters
+    ----------
+    residuals : callable
+        Ball → ball minus measured, shape (n_values,); may raise SloshlabError where a ball is impossible.
+    space : SearchSpace
+    settings : SearchSettings, optional
+    progress : callable, optional
+        Called with (generations done, generations in all).
+
+    Returns
+    -------
+    IdentifiedBall
+
+    Raises
+    ------
+    InputError
+        If there are not more values than parameters.
+    """
+    settings = settings or SearchSettings()
+    search = _Search(residuals, space)
+    n_values = search.require_values()
+    if n_values <= space.n_parameters:
+        raise InputError(
+            "identification of a ball", got=f"{n_values} values", allowed=f"more than {space.n_parameters}"
+        )
+    found = _global(search, settings, progress)
+    best = _polished(search, found, settings)
+    rough = float(np.sqrt(found.fun / n_values))
+    if best.cost * 2 > found.fun:
+        best = OptimizeResult(x=found.x, cost=found.fun / 2, fun=search(found.x), jac=_jacobian(search, found.x))
+    return IdentifiedBall(
+        ball=space.ball(best.x),
+        space=space,
+        residuals=best.fun,
+        global_rms=rough,
+        rms=float(np.sqrt(2 * best.cost / n_values)),
+        intervals=_intervals(search, best, settings),
+        n_evaluations=search.n_evaluations,
+    )
+
+
+class _Search:
+    """Residuals over the unit box; impossible balls have large ones."""
+
+    def __init__(self, residuals: Residuals, space: SearchSpace) -> None:
+        self._residuals, self.space = residuals, space
+        self.n_values, self.n_evaluations = 0, 0
+
+    def require_values(self) -> int:
+        """Number of residuals, from a ball that is possible in every tank."""
+        middle = np.array([0.6, 0.5, 0.6, 0.5, 0.2])
+        self.n_values = self._residuals(self.space.ball(middle)).size
+        return self.n_values
+
+    def __call__(self, point: FloatArray) -> FloatArray:
+        self.n_evaluations += 1
+        try:
+            values = self._residuals(self.space.ball(point))
+        except SloshlabError:
+            return np.full(self.n_values, _NO_BALL)
+        return np.clip(np.nan_to_num(values, nan=_NO_BALL), -_NO_BALL, _NO_BALL)
+
+    def sum_of_squares(self, point: FloatArray) -> float:
+        values = self(point)
+        return float(values @ values)
+
+
+def _global(search: _Search, settings: SearchSettings, progress: Progress | None) -> OptimizeResult:
+    done = 0
+
+    def report(*_: object, **__: object) -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done, settings.n_generations)
+
+    return differential_evolution(
+        search.sum_of_squares,
+        [(0.0, 1.0)] * search.space.n_parameters,
+        maxiter=settings.n_generations,
+        popsize=settings.population,
+        seed=settings.seed,
+        init="sobol",
+        mutation=(0.4, 0.9),
+        recombination=0.8,
+        tol=1e-6,
+        polish=False,
+        callback=report,
+    )
+
+
+def _local(search: _Search, start: FloatArray, n_evaluations: int, free: npt.NDArray[np.bool_]) -> OptimizeResult:
+    """Least squares over the free parameters."""
+    fixed = start.copy()
+
+    def of_free(values: FloatArray) -> FloatArray:
+        point = fixed.copy()
+        point[free] = values
+        return search(point)
+
+    inside = np.clip(start[free], 1e-9, 1 - 1e-9)
+    n_steps = max(2, n_evaluations // (len(_STEPS) * (int(free.sum()) + 1)))
+    results = []
+    for step in _STEPS:
+        results.append(
+            least_squares(of_free, inside, bounds=(0.0, 1.0), diff_step=step, x_scale=0.1, max_nfev=n_steps)
+        )
+        inside = results[-1].x
+    result = min(results, key=lambda one: one.cost)
+    fixed[free] = result.x
+    result.x = fixed
+    return result
+
+
+def _polished(search: _Search, found: OptimizeResult, settings: SearchSettings) -> OptimizeResult:
+    """Least squares from the best candidates, because the nearest valley may be a rough one."""
+    free = np.ones(search.space.n_parameters, dtype=bool)
+    order = np.argsort(found.population_energies)[: 1 + _EXTRA_LOCAL_STARTS]
+    results = [_local(search, found.population[i], settings.n_local_evaluations, free) for i in order]
+    return min(results, key=lambda result: result.cost)
+
+
+def _jacobian(search: _Search, point: FloatArray) -> FloatArray:
+    columns = []
+    for i in range(point.size):
+        step = _STEPS[0] if point[i] < 0.5 else -_STEPS[0]
+        moved = point.copy()
+        moved[i] += step
+        columns.append((search(moved) - search(point)) / step)
+    return np.array(columns).T
+
+
+def _intervals(search: _Search, best: OptimizeResult, settings: SearchSettings) -> tuple[ParameterInterval, ...]:
+    n, p = best.fun.size, best.x.size
+    variance = 2 * best.cost / (n - p)
+    factor = float(student_t.ppf(0.5 + CONFIDENCE / 2, n - p))
+    half = factor * np.sqrt(variance * np.diag(_inverse(best.jac.T @ best.jac)))
+    predicted = variance * factor**2
+    return tuple(_interval(search, best, i, float(half[i]), predicted, settings) for i in range(p))
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Inverse with what the data do not hold left at a large variance."""
+    values, vectors = np.linalg.eigh(matrix)
+    floor = max(float(values[-1]), 1e-300) * 1e-14
+    return np.asarray((vectors / np.maximum(values, floor)) @ vectors.T)
+
+
+def _interval(
+    search: _Search, best: OptimizeResult, i: int, half: float, predicted: float, settings: SearchSettings
+) -> ParameterInterval:
+    centre = float(best.x[i])
+    ends = [centre - half, centre + half]
+    inside = [end for end in ends if 0 < end < 1]
+    ratios = [_profile(search, best, i, end, settings) / max(predicted, 1e-300) for end in inside]
+    values = [
+        search.space.parameter(i, _moved(best.x, i, end)) if 0 < end < 1 else open_end
+        for end, open_end in zip(ends, (-np.inf, np.inf), strict=True)
+    ]
+    side = "lower" if centre < _AT_BOUND else "upper" if centre > 1 - _AT_BOUND else ""
+    return ParameterInterval(
+        name=BOUNDS[i].name,
+        value=search.space.parameter(i, best.x),
+        low=values[0],
+        high=values[1],
+        profile_ratio=float(np.mean(ratios)) if ratios else float("nan"),
+        at_bound=side,
+    )
+
+
+def _moved(point: FloatArray, i: int, share: float) -> FloatArray:
+    moved = point.copy()
+    moved[i] = share
+    return moved
+
+
+def _profile(search: _Search, best: OptimizeResult, i: int, share: float, settings: SearchSettings) -> float:
+    """Growth of the sum of squares with one parameter held elsewhere and the others fitted again."""
+    free = np.arange(best.x.size) != i
+    again = _local(search, _moved(best.x, i, share), settings.n_local_evaluations // 2, free)
+    return float(2 * again.cost - 2 * best.cost)

@@ -1,0 +1,247 @@
+"""One compiled integrator for every twin: modes, internal states of the terms, events, work of every term.
+
+Classical Runge–Kutta of order 4 on the smooth pieces between events. Within a step every switch is held, so
+that no stage looks across a discontinuity; at the end of a step the signs of the event functions are compared with
+the switches, and where they differ the step is repeated shorter until its end is the event (regula falsi,
+Illinois). The order therefore survives contacts and friction. Two events that undo each
+other within one step pass unseen.
+
+Dry friction slides (the laws are asked with DIRECTION = ±1) or sticks: then the acceleration is that of the
+structure held, and the holding force must lie between the sliding forces of both directions.
+Constant masses of terms are part of the mass; a law that depends on the acceleration otherwise is solved for by
+Newton's method at every stage.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sloshlab.twin.law import DISPLACEMENT, N_MOTION, VELOCITY
+from sloshlab.twin.law_call import call_law
+from sloshlab.twin.model import NO_FRICTION, STICKS, Excited, FloatArray, Model, Outputs, Scratch
+from sloshlab.twin.rates import advance, let_go, rates_once, set_friction
+from sloshlab.twin.status import Status
+
+DONE, UNSTABLE, FAULT, CHATTER, NO_ACCELERATION = (int(status) for status in Status)
+
+_SWITCH_TOLERANCE = 1e-13
+_EVENT_TIME_TOLERANCE_S = 1e-12
+_MOST_EVENTS_PER_STEP = 50
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _copy(source: FloatArray, target: FloatArray) -> None:
+    for j in range(source.size):
+        target[j] = source[j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _events(m: Model, i: int, y: FloatArray, s: Scratch) -> None:
+    motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
+    call_law(m.events[i], s.motion, motion, m.parameters, m.parameters_at[i], y, at, s.values, 0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _margin(m: Model, y: FloatArray, s: Scratch) -> float:
+    """Smallest of all event functions, each positive while its switch holds."""
+    smallest = np.inf
+    for i in range(m.law.size):
+        if m.events[i] == 0:
+            continue
+        _events(m, i, y, s)
+        at = m.memory_at[i] + m.n_states[i]
+        for k in range(m.n_switches[i]):
+            smallest = min(smallest, y[at + k] * s.values[k])
+        for k in range(m.n_switches[i], m.n_switches[i] + m.n_limits[i]):
+            smallest = min(smallest, s.values[k])
+    if s.friction[0] == STICKS:
+        smallest = min(smallest, s.friction[1] - s.friction[2], s.friction[3] - s.friction[1])
+    elif s.friction[0] != NO_FRICTION:
+        smallest = min(smallest, s.friction[0] * s.motion[m.friction_frame * N_MOTION + VELOCITY])
+    return smallest
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _to_event(
+    m: Model, excited: Excited, time: float, position: float, step: float, share: float, gap: float, s: Scratch
+) -> float:
+    """Share of the whole step after which the first event has just come; `trial` is the state there."""
+    low, high, above, below = 0.0, share, -1.0, gap
+    kept = 0
+    for _ in range(100):
+        if (high - low) * step <= _EVENT_TIME_TOLERANCE_S:
+            break
+        middle = 0.5 * (low + high)
+        if above > 0.0:
+            middle = low + (high - low) * above / (above - below)
+            middle = min(max(middle, low + 0.01 * (high - low)), high - 0.01 * (high - low))
+        advance(m, excited, time, position, middle * step, 2.0 * middle, s)
+        value = _margin(m, s.trial, s)
+        if value < -_SWITCH_TOLERANCE or not np.isfinite(value):
+            high, below = middle, value
+            above *= 0.5 if kept == 1 else 1.0
+            kept = 1
+        else:
+            low, above = middle, max(value, 0.0)
+            below *= 0.5 if kept == -1 else 1.0
+            kept = -1
+    advance(m, excited, time, position, high * step, 2.0 * high, s)
+    return high
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _switch(
+    m: Model, excited: Excited, time: float, position: float, s: Scratch, log: FloatArray, n_logged: int
+) -> tuple[int, int]:
+    """Turn every switch whose event has come; returns events logged and the term that met its limit, or −1."""
+    for i in range(m.law.size):
+        if m.events[i] == 0:
+            continue
+        _events(m, i, s.state, s)
+        at = m.memory_at[i] + m.n_states[i]
+        for k in range(m.n_switches[i] + m.n_limits[i]):
+            if k >= m.n_switches[i]:
+                if s.values[k] < 0.0:
+                    return n_logged, i
+            elif s.state[at + k] * s.values[k] < 0.0:
+                s.state[at + k] = -s.state[at + k]
+                n_logged = _logged(log, n_logged, time, i, k, s.state[at + k])
+    before = s.friction[0]
+    if before == STICKS:
+        let_go(s)
+    elif before != NO_FRICTION and before * s.motion[m.friction_frame * N_MOTION + VELOCITY] < 0.0:
+        set_friction(m, excited, time, position, s)
+    if s.friction[0] != before:
+        n_logged = _logged(log, n_logged, time, -1, 0, s.friction[0])
+    return n_logged, -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _logged(log: FloatArray, n: int, time: float, term: int, event: int, value: float) -> int:
+    if n < log.shape[0]:
+        log[n, 0], log[n, 1], log[n, 2], log[n, 3] = time, term, event, value
+    return n + 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _record(m: Model, row: int, s: Scratch, out: Outputs) -> None:
+    """The present state as a row of the outputs; the rates there are in the first slopes."""
+    n, y = m.stiffness.size, s.state
+    for j in range(n):
+        out.modes[row, 0, j], out.modes[row, 1, j], out.modes[row, 2, j] = y[j], y[n + j], s.slopes[0, n + j]
+    for frame in range(2):
+        for c in range(3):
+            out.places[row, frame, c] = s.motion[frame * N_MOTION + DISPLACEMENT + c]
+    for i in range(m.law.size):
+        out.forces[row, i] = s.force[i]
+    for j in range(out.memory.shape[1]):
+        out.memory[row, j] = y[2 * n + j]
+    for j in range(s.works.size):
+        out.works[row, j] = s.works[j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _fault_of(y: FloatArray, largest: FloatArray) -> int:
+    """Index of the first state that is no number or beyond its bound, or −1."""
+    for j in range(y.size):
+        if not abs(y[j]) <= largest[j]:
+            return j
+    return -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
+    """Set the switches and the friction of the start and record it; the term that is beyond its limit, or −1."""
+    rates_once(m, excited, 0.0, 0.0, s.state, s.slopes[0], s.powers[0], s)
+    for i in range(m.law.size):
+        if m.events[i]:
+            _events(m, i, s.state, s)
+            at = m.memory_at[i] + m.n_states[i]
+            for j in range(m.n_switches[i]):
+                s.state[at + j] = -1.0 if s.values[j] < 0.0 else 1.0
+            for j in range(m.n_switches[i], m.n_switches[i] + m.n_limits[i]):
+                if s.values[j] < 0.0:
+                    return i
+    if m.friction_frame >= 0:
+        velocity = s.motion[m.friction_frame * N_MOTION + VELOCITY]
+        s.friction[0] = -1.0 if velocity < 0.0 else 1.0
+        if velocity == 0.0:
+            set_friction(m, excited, 0.0, 0.0, s)
+    rates_once(m, excited, 0.0, 0.0, s.state, s.slopes[0], s.powers[0], s)
+    _record(m, 0, s, out)
+    return -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _update(m: Model, excited: Excited, time: float, position: float, s: Scratch) -> None:
+    """Let models in discrete time take their step."""
+    updated = False
+    for i in range(m.law.size):
+        if m.update[i]:
+            motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
+            call_law(m.update[i], s.motion, motion, m.parameters, m.parameters_at[i], s.state, at, s.slopes[4], at)
+            updated = True
+    if updated:
+        rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def integrate(
+    m: Model,
+    excited: Excited,
+    s: Scratch,
+    largest: FloatArray,
+    step: float,
+    n_substeps: int,
+    first_row: int,
+    last_row: int,
+    out: Outputs,
+    n_logged: int,
+) -> tuple[int, int, int, int]:
+    """Integrate on and fill the rows from `first_row` (not 0) up to and without `last_row`.
+
+    Returns
+    -------
+    tuple of int
+        Status, rows filled, term or state that ended the simulation, number of events so far.
+    """
+    for row in range(first_row, last_row):
+        for substep in range(n_substeps):
+            index = (row - 1) * n_substeps + substep
+            done, n_switched = 0.0, 0
+            while done < 1.0:
+                time, position, share = (index + done) * step, 2.0 * (index + done), 1.0 - done
+                good = advance(m, excited, time, position, share * step, 2.0 * share, s)
+                gap = _margin(m, s.trial, s)
+                if not good:
+                    where = _fault_of(s.trial, largest)
+                    return (NO_ACCELERATION if where < 0 else UNSTABLE), row, where, n_logged
+                if not gap < -_SWITCH_TOLERANCE:
+                    _accept(s)
+                    break
+                done += _to_event(m, excited, time, position, step, share, gap, s)
+                _accept(s)
+                time, position = (index + done) * step, 2.0 * (index + done)
+                n_logged, where = _switch(m, excited, time, position, s, out.log, n_logged)
+                if where >= 0:
+                    return FAULT, row, where, n_logged
+                rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+                n_switched += 1
+                if n_switched > _MOST_EVENTS_PER_STEP:
+                    return CHATTER, row, -1, n_logged
+        _update(m, excited, row * n_substeps * step, 2.0 * row * n_substeps, s)
+        where = _fault_of(s.state, largest)
+        if where >= 0:
+            return UNSTABLE, row, where, n_logged
+        _record(m, row, s, out)
+    return DONE, last_row, -1, n_logged
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _accept(s: Scratch) -> None:
+    """The trial step becomes the state, its last rates the first ones of the next step."""
+    _copy(s.trial, s.state)
+    _copy(s.trial_works, s.works)
+    _copy(s.slopes[4], s.slopes[0])
+    _copy(s.powers[4], s.powers[0])

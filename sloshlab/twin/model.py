@@ -1,0 +1,121 @@
+"""What the compiled engine works on: the twin as arrays, and its working memory.
+
+    m_j q̈_j = −k_j q_j − c_j q̇_j − Γ_j a_base + ψ_j (F − m_a (a + a_base)),   a = Σ ψ_j q̈_j
+
+All forces act at the tank's place on the modes, which is also that of the guide. F is the sum of the terms' forces
+and the external force, m_a the mass that terms add. With s = Σ ψ_j²/m_j and r_j the part without F and m_a,
+a (1 + m_a s) = Σ ψ_j r_j/m_j + s (F − m_a a_base), so that no system of equations has to be solved.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sloshlab.twin.law import N_MOTION
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+USES_ACCELERATION, DRY_FRICTION = 1, 2
+"""Bits of `Model.kind`."""
+
+RELATIVE, ABSOLUTE = 0, 1
+"""Frames: motion relative to the base for terms of the structure, absolute for those of the tank."""
+
+INPUTS: Final = ("displacement", "velocity", "acceleration", "phase", "frequency", "force")
+"""Columns of the excitation: motion of the base, phase and frequency of the excitation, force on the tank."""
+
+N_OTHER_WORKS: Final = 3
+"""Works after two per term: modal damping, inertia of the base motion, external force."""
+
+STICKS, NO_FRICTION = 0.0, 2.0
+"""Values of `Scratch.friction[0]` beside the directions ±1 of sliding."""
+
+
+class Model(NamedTuple):
+    """Everything the engine needs to know of a twin; terms are rows."""
+
+    shape: FloatArray  # (n_modes,) at the tank
+    inverse_mass: FloatArray  # (n_modes,)
+    stiffness: FloatArray  # (n_modes,)
+    damping: FloatArray  # (n_modes,)
+    base_participation: FloatArray  # (n_modes,)
+    mobility: float  # s
+    added_mass: float  # m_a
+    law: IntArray  # (n_terms,) addresses
+    events: IntArray  # (n_terms,) addresses, 0 without events
+    update: IntArray  # (n_terms,) addresses, 0 without an update after each output step
+    kind: IntArray  # (n_terms,)
+    frame: IntArray  # (n_terms,)
+    mass: FloatArray  # (n_terms,)
+    parameters: FloatArray  # flat
+    parameters_at: IntArray  # (n_terms,)
+    memory_at: IntArray  # (n_terms + 1,) in the state
+    n_states: IntArray  # (n_terms,) continuous states; switches follow
+    n_switches: IntArray  # (n_terms,)
+    n_limits: IntArray  # (n_terms,) events that end the simulation, after the switches
+    friction_frame: int  # −1 without dry friction
+    uses_acceleration: bool  # any of the laws
+
+
+class Scratch(NamedTuple):
+    """Working memory of one simulation; `state`, `works` and `friction` go on from call to call."""
+
+    state: FloatArray  # (n_states,) q, q̇, memory of the terms
+    works: FloatArray  # (2 n_terms + N_OTHER_WORKS,)
+    friction: FloatArray  # (4,) direction, holding force, smallest, largest it can be
+    motion: FloatArray  # (2 N_MOTION,) one row per frame
+    force: FloatArray  # (n_terms,)
+    residual: FloatArray  # (n_modes,) r
+    inputs: FloatArray  # (len(INPUTS),)
+    values: FloatArray  # (largest number of events of a term,)
+    slopes: FloatArray  # (5, n_states)
+    powers: FloatArray  # (5, n_works)
+    trial: FloatArray  # (n_states,)
+    trial_works: FloatArray  # (n_works,)
+
+
+class Excited(NamedTuple):
+    """The excitation of one stretch."""
+
+    table: FloatArray  # (n_half_steps or 0, len(INPUTS))
+    first: int  # half step of the whole simulation in its first row
+
+
+class Outputs(NamedTuple):
+    """Rows are samples of the output."""
+
+    modes: FloatArray  # (n, 3, n_modes)
+    places: FloatArray  # (n, 2, 3)
+    forces: FloatArray  # (n, n_terms)
+    memory: FloatArray  # (n, n_memory)
+    works: FloatArray  # (n, n_works)
+    log: FloatArray  # (largest number of events kept, 4)
+
+
+def empty_outputs(n_rows: int, n_modes: int, n_terms: int, n_memory: int, largest_log: int) -> Outputs:
+    """Room for the results of a simulation."""
+    return Outputs(
+        np.empty((n_rows, 3, n_modes)),
+        np.empty((n_rows, 2, 3)),
+        np.empty((n_rows, n_terms)),
+        np.empty((n_rows, n_memory)),
+        np.empty((n_rows, 2 * n_terms + N_OTHER_WORKS)),
+        np.empty((largest_log, 4)),
+    )
+
+
+def scratch(model: Model, state: FloatArray, n_event_functions: int) -> Scratch:
+    """Working memory of a simulation that starts from `state`."""
+    n_terms, n_modes = model.law.size, model.stiffness.size
+    n_works = 2 * n_terms + N_OTHER_WORKS
+    friction = np.zeros(4)
+    friction[0] = NO_FRICTION if model.friction_frame < 0 else 1.0
+    return Scratch(
+        state, np.zeros(n_works), friction, np.zeros(2 * N_MOTION), np.zeros(n_terms), np.zeros(n_modes),
+        np.zeros(len(INPUTS)), np.zeros(max(n_event_functions, 1)), np.zeros((5, state.size)),
+        np.zeros((5, n_works)), np.zeros(state.size), np.zeros(n_works),
+    )  # fmt: skip

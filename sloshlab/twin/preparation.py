@@ -1,0 +1,283 @@
+"""From blocks to the arrays that the engine works on, and from its numbers back to a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from sloshlab.errors import InputError
+from sloshlab.twin import engine
+from sloshlab.twin.excitation import Excitation
+from sloshlab.twin.model import (
+    DRY_FRICTION,
+    INPUTS,
+    N_OTHER_WORKS,
+    USES_ACCELERATION,
+    Excited,
+    Model,
+    Outputs,
+    Scratch,
+    empty_outputs,
+    scratch,
+)
+from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.status import Ending, Status
+from sloshlab.twin.structure import Structure
+from sloshlab.twin.terms import PLACES, Term
+
+if TYPE_CHECKING:
+    from sloshlab.twin.twin import Twin
+
+FloatArray = npt.NDArray[np.float64]
+Watch = Callable[[int, int], None]
+
+_LARGEST_EVENT_LOG: Final = 100_000
+_LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S, _LARGEST_MEMORY = 100.0, 1e6, 1e15
+_LARGEST_OUTPUTS_BYTES: Final = 4 * 2**30
+_HALF_STEPS_AT_ONCE = 1 << 17
+"""So that the excitation of a long run is never held whole, and progress can be told."""
+_MARGIN = 6
+"""Half steps beyond a stretch, so that a polynomial through its neighbours does not depend on how it is cut."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A twin ready for the engine.
+
+    Attributes
+    ----------
+    model : Model
+    memory : ndarray, shape (n_memory,)
+        Of the terms at the start, in a tank at rest.
+    """
+
+    model: Model
+    memory: FloatArray
+
+
+def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Excitation) -> Prepared:
+    """Blocks as arrays.
+
+    Raises
+    ------
+    InputError
+        If the blocks contradict each other.
+    """
+    n_modes = 0 if structure is None else structure.masses_kg.size
+    masses = np.array([term.mass_kg for term in terms])
+    memories = [np.array(term.kind.memory(term.values, term.table)) for term in terms]
+    blocks = [np.concatenate([m, np.ones(t.kind.n_switches)]) for m, t in zip(memories, terms, strict=True)]
+    numbers = [term.numbers for term in terms]
+    empty = np.empty(0)
+    mobility = 0.0 if structure is None else float((structure.mode_shape**2 / structure.masses_kg).sum())
+    model = Model(
+        shape=empty if structure is None else np.ascontiguousarray(structure.mode_shape),
+        inverse_mass=empty if structure is None else 1.0 / structure.masses_kg,
+        stiffness=empty if structure is None else structure.stiffnesses_n_per_m,
+        damping=empty if structure is None else structure.dampings_kg_per_s,
+        base_participation=_participation(structure, excitation),
+        mobility=mobility,
+        added_mass=_checked_mass(float(masses.sum()), mobility),
+        law=_integers([term.kind.law.address for term in terms]),
+        events=_integers([term.kind.events.address if term.kind.events else 0 for term in terms]),
+        update=_integers([term.kind.update.address if term.kind.update else 0 for term in terms]),
+        kind=_integers([_bits(term) for term in terms]),
+        frame=_integers([PLACES.index(term.place) for term in terms]),
+        mass=masses,
+        parameters=np.concatenate([*numbers, empty]),
+        parameters_at=_offsets(numbers)[:-1],
+        memory_at=2 * n_modes + _offsets(blocks),
+        n_states=_integers([m.size for m in memories]),
+        n_switches=_integers([term.kind.n_switches for term in terms]),
+        n_limits=_integers([len(term.kind.limits) for term in terms]),
+        friction_frame=_friction_frame(terms, excitation),
+        uses_acceleration=any(term.kind.uses_acceleration for term in terms),
+    )
+    return Prepared(model, np.concatenate([*blocks, empty]))
+
+
+def _integers(values: Sequence[int]) -> npt.NDArray[np.int64]:
+    return np.array(values, dtype=np.int64)
+
+
+def _offsets(arrays: Sequence[FloatArray]) -> npt.NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum([array.size for array in arrays])]).astype(np.int64)
+
+
+def _bits(term: Term) -> int:
+    return USES_ACCELERATION * term.kind.uses_acceleration + DRY_FRICTION * term.kind.dry_friction
+
+
+def _checked_mass(added_kg: float, mobility_per_kg: float) -> float:
+    if 1.0 + added_kg * mobility_per_kg <= 0:
+        raise InputError(
+            "twin: mass",
+            got=f"{added_kg:g} kg added by its forces, which leaves a negative modal mass",
+            remedy="the structure's masses contain the frozen liquid; check both",
+        )
+    return added_kg
+
+
+def _participation(structure: Structure | None, excitation: Excitation) -> FloatArray:
+    if structure is None:
+        return np.empty(0)
+    if np.isfinite(structure.base_participation_kg).all():
+        return structure.base_participation_kg
+    if excitation.moves_base:
+        raise InputError(
+            "twin: base participation",
+            got="none",
+            remedy="give the beam's length, width and thickness in the rig file",
+        )
+    return np.zeros(structure.masses_kg.size)
+
+
+def _friction_frame(terms: Sequence[Term], excitation: Excitation) -> int:
+    frames = sorted({PLACES.index(term.place) for term in terms if term.kind.dry_friction})
+    if len(frames) > 1 and excitation.moves_base:
+        raise InputError(
+            "twin: dry friction", got="at structure and tank while the base moves", allowed="one place"
+        )
+    return frames[0] if frames else -1
+
+
+def start_state(
+    twin: Twin, ready: Prepared, first_inputs: FloatArray, displacement_m: float, velocity_m_per_s: float
+) -> FloatArray:
+    """Modes under a static force at the tank, and memories that move with it."""
+    for value, name in (
+        (displacement_m, "initial_displacement_m"),
+        (velocity_m_per_s, "initial_velocity_m_per_s"),
+    ):
+        if not np.isfinite(value) or (value != 0.0 and twin.structure is None):
+            raise InputError(f"twin: {name}", got=str(value), allowed="a number, for twins with a structure")
+    modes = np.empty(0)
+    if twin.structure is not None:
+        deflected = twin.structure.static_deflection
+        modes = np.concatenate([deflected(displacement_m), deflected(velocity_m_per_s)])
+    state = np.concatenate([modes, ready.memory])
+    for term, at in zip(twin.terms, ready.model.memory_at[:-1], strict=True):
+        if term.kind.moves_with_place:
+            state[at] += displacement_m + first_inputs[0]
+            state[at + 1] += velocity_m_per_s + first_inputs[1]
+    return state
+
+
+def run(
+    twin: Twin, excitation: Excitation, start: tuple[float, float], n_substeps: int, watch: Watch | None
+) -> Simulation:
+    """Integrate stretch by stretch; `watch` is told samples done and samples in all after each."""
+    ready = prepared(twin.terms, twin.structure, excitation)
+    model, n_rows = ready.model, excitation.n_samples
+    s = scratch(model, start_state(twin, ready, excitation.at_start(), *start), _n_event_functions(twin.terms))
+    largest = _largest(s, ready)
+    _check_size(n_rows, model, ready.memory.size)
+    out = empty_outputs(n_rows, model.stiffness.size, model.law.size, ready.memory.size, _LARGEST_EVENT_LOG)
+    external, base_motion = np.zeros(n_rows), np.zeros((n_rows, 3))
+    step = 1.0 / (excitation.sampling_rate_hz * n_substeps)
+    status, filled, where, n_events = int(Status.DONE), 1, -1, 0
+    for first_row, last_row in _stretches(n_rows, n_substeps):
+        excited = _excited(excitation, n_substeps, first_row - 1, last_row - 1)
+        _keep_inputs(excited, n_substeps, first_row - 1, last_row, external, base_motion)
+        if first_row == 1:
+            where = engine.begin(model, excited, s, out)
+            if where >= 0:
+                status, filled = int(Status.FAULT), 0
+                break
+        status, filled, where, n_events = engine.integrate(
+            model, excited, s, largest, step, n_substeps, first_row, last_row, out, n_events
+        )
+        if watch is not None:
+            watch(filled, n_rows)
+        if status != Status.DONE:
+            break
+    ending = Ending(Status(status), filled / excitation.sampling_rate_hz, _place_of(twin, model, status, where))
+    return _simulation(twin, excitation, ending, out, external, base_motion, filled, n_events)
+
+
+def _check_size(n_rows: int, model: Model, n_memory: int) -> None:
+    n_columns = 3 * model.stiffness.size + 6 + 3 * model.law.size + n_memory + N_OTHER_WORKS + 4
+    needed = 8 * n_rows * n_columns
+    if needed > _LARGEST_OUTPUTS_BYTES:
+        raise InputError(
+            "simulation",
+            got=f"{n_rows} samples of {n_columns} numbers, {needed / 2**30:.1f} GiB",
+            allowed=f"≤ {_LARGEST_OUTPUTS_BYTES / 2**30:g} GiB",
+            remedy="simulate a shorter run, or fewer samples with more steps each",
+        )
+
+
+def _stretches(n_rows: int, n_substeps: int) -> Iterator[tuple[int, int]]:
+    at_once = max(1, _HALF_STEPS_AT_ONCE // (2 * n_substeps))
+    for first in range(1, n_rows, at_once):
+        yield first, min(first + at_once, n_rows)
+
+
+def _excited(excitation: Excitation, n_substeps: int, first_sample: int, last_sample: int) -> Excited:
+    first = max(0, 2 * n_substeps * first_sample - _MARGIN)
+    stop = min(2 * n_substeps * last_sample + 1 + _MARGIN, 2 * n_substeps * (excitation.n_samples - 1) + 1)
+    return Excited(excitation.half_steps(n_substeps, first, stop), first)
+
+
+def _keep_inputs(
+    excited: Excited, n_substeps: int, first: int, stop: int, external: FloatArray, base_motion: FloatArray
+) -> None:
+    if excited.table.size:
+        rows = 2 * n_substeps * np.arange(first, stop) - excited.first
+        base_motion[first:stop] = excited.table[rows, :3]
+        external[first:stop] = excited.table[rows, INPUTS.index("force")]
+
+
+def _largest(s: Scratch, ready: Prepared) -> FloatArray:
+    n = ready.model.stiffness.size
+    bounds = np.full(s.state.size, _LARGEST_MEMORY)
+    bounds[:n], bounds[n : 2 * n] = _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S
+    return bounds
+
+
+def _n_event_functions(terms: Sequence[Term]) -> int:
+    return max((term.kind.n_switches + len(term.kind.limits) for term in terms), default=0)
+
+
+def _place_of(twin: Twin, model: Model, status: int, where: int) -> str:
+    """Name of what ended the simulation."""
+    if status == Status.FAULT:
+        kind = twin.terms[where].kind
+        return f"{kind.name}: {' or '.join(kind.limits)}"
+    if status == Status.UNSTABLE:
+        n = model.stiffness.size
+        if where < 2 * n:
+            return f"{'displacement' if where < n else 'velocity'} of mode {where % n + 1}"
+        owner = int(np.searchsorted(model.memory_at, where, side="right")) - 1
+        return f"memory of {twin.terms[owner].name}"
+    return "" if status == Status.DONE else "twin"
+
+
+def _simulation(
+    twin: Twin,
+    excitation: Excitation,
+    ending: Ending,
+    out: Outputs,
+    external: FloatArray,
+    base_motion: FloatArray,
+    filled: int,
+    n_events: int,
+) -> Simulation:
+    return Simulation(
+        twin=twin,
+        sampling_rate_hz=excitation.sampling_rate_hz,
+        ending=ending,
+        modes=out.modes[:filled],
+        places=out.places[:filled],
+        base_motion=base_motion[:filled],
+        external_force_n=external[:filled],
+        forces_n=out.forces[:filled],
+        memory=out.memory[:filled],
+        works_j=out.works[:filled],
+        events=out.log[: min(n_events, _LARGEST_EVENT_LOG)].copy(),
+        n_events=n_events,
+    )

@@ -1,0 +1,71 @@
+"""Losses that do not depend on how fast a cycle is run through: structural damping and Bouc–Wen hysteresis.
+
+Both turn where the velocity does; the engine finds that instant, so that no step looks across it.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+from sloshlab.twin.law import DIRECTION, DISPLACEMENT, VELOCITY, law
+from sloshlab.twin.terms import ForceKind, Parameter, register
+
+# the laws are compiled, so their arguments are described once, in sloshlab.twin.law
+# mypy: disable-error-code="no-untyped-def"
+
+
+@law
+def _structural(motion, parameters, memory, rates):
+    amplitude = abs(motion[DISPLACEMENT])
+    return -0.5 * pi * parameters[0] * parameters[1] * amplitude * motion[DIRECTION]
+
+
+@law
+def _bouc_wen(motion, parameters, memory, rates):
+    """ż = α v − βγ |v| |z|^(ν−1) z − βδ v |z|^ν; the switches are the signs of v and z."""
+    z, v = memory[0], motion[VELOCITY]
+    size = memory[2] * z
+    if size < 0.0:
+        size = 0.0
+    power = size if parameters[3] == 1.0 else size ** parameters[3]
+    rates[0] = parameters[0] * v - power * (parameters[1] * memory[1] * v * memory[2] + parameters[2] * v)
+    return -z
+
+
+@law
+def _bouc_wen_events(motion, parameters, memory, values):
+    values[0] = motion[VELOCITY]
+    values[1] = memory[0]
+    return 0.0
+
+
+STRUCTURAL_DAMPING = register(
+    ForceKind(
+        "structural_damping",
+        ("structure",),
+        (Parameter("loss_factor", "1", 0.0, 0.6), Parameter("stiffness_n_per_m", "N m-1", 0.0, 1e9)),
+        _structural,
+        dry_friction=True,
+        equation="−(π/2) η k |x| sgn v, which takes πηkA² per cycle whatever its frequency",
+    )
+)
+"""k is what the place feels; its loss factor η is that of App. A, W/(2πU) with U = kA²/2."""
+
+HYSTERESIS = register(
+    ForceKind(
+        "hysteresis",
+        ("structure",),
+        (
+            Parameter("stiffness_n_per_m", "N m-1", 0.0, 1e9),
+            Parameter("beta_gamma", "N(1-nu) m-1", -1e9, 1e9),
+            Parameter("beta_delta", "N(1-nu) m-1", -1e9, 1e9),
+            Parameter("exponent", "1", 1.0, 5.0, 1.0),
+        ),
+        _bouc_wen,
+        events=_bouc_wen_events,
+        n_switches=2,
+        memory=lambda values, table: (0.0,),
+        equation="−z, ż = α v − βγ |v| |z|^(ν−1) z − βδ v |z|^ν (Bouc–Wen)",
+    )
+)
+"""β, γ and δ of the usual form enter only as these two products; α is the stiffness where z is small."""

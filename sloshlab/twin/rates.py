@@ -1,0 +1,283 @@
+"""Right-hand side of the twin: excitation, motion, forces, accelerations, power of every force."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sloshlab.twin.law import (
+    ACCELERATION,
+    BASE_ACCELERATION,
+    DIRECTION,
+    DISPLACEMENT,
+    FREQUENCY,
+    N_MOTION,
+    PHASE,
+    TIME,
+    VELOCITY,
+)
+from sloshlab.twin.law_call import call_law
+from sloshlab.twin.model import (
+    ABSOLUTE,
+    DRY_FRICTION,
+    RELATIVE,
+    STICKS,
+    USES_ACCELERATION,
+    Excited,
+    FloatArray,
+    Model,
+    Scratch,
+)
+
+_MOST_ITERATIONS = 30
+_ACCELERATION_TOLERANCE = 1e-12
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
+    """Excitation at a position in half steps: the row itself, or a six-point polynomial between rows."""
+    table = excited.table
+    n = table.shape[0]
+    if n == 0:
+        return
+    place = position - excited.first
+    nearest = min(max(int(place + 0.5), 0), n - 1)
+    if abs(place - nearest) < 1e-9 or n < 6:
+        for column in range(inputs.size):
+            inputs[column] = table[nearest, column]
+        return
+    first = min(max(int(np.floor(place)) - 2, 0), n - 6)
+    for column in range(inputs.size):
+        inputs[column] = 0.0
+    for i in range(6):
+        weight = 1.0
+        for j in range(6):
+            if j != i:
+                weight *= (place - first - j) / (i - j)
+        for column in range(inputs.size):
+            inputs[column] += weight * table[first + i, column]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
+    for frame in range(2):
+        at = frame * N_MOTION
+        s.motion[at + TIME] = time
+        s.motion[at + DISPLACEMENT] = x + frame * s.inputs[0]
+        s.motion[at + VELOCITY] = v + frame * s.inputs[1]
+        s.motion[at + ACCELERATION] = np.nan
+        s.motion[at + BASE_ACCELERATION] = s.inputs[2]
+        s.motion[at + PHASE] = s.inputs[3]
+        s.motion[at + FREQUENCY] = s.inputs[4]
+        s.motion[at + DIRECTION] = s.friction[0]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _force(m: Model, i: int, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
+    at = m.memory_at[i]
+    return call_law(  # type: ignore[no-any-return]
+        m.law[i], s.motion, m.frame[i] * N_MOTION, m.parameters, m.parameters_at[i], y, at, dy, at
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _forces_at(m: Model, a: float, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
+    """Sum of the forces that depend on the acceleration, at the relative acceleration a."""
+    s.motion[RELATIVE * N_MOTION + ACCELERATION] = a
+    s.motion[ABSOLUTE * N_MOTION + ACCELERATION] = a + s.inputs[2]
+    total = 0.0
+    for i in range(m.law.size):
+        if m.kind[i] & USES_ACCELERATION:
+            s.force[i] = _force(m, i, y, dy, s)
+            total += s.force[i]
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
+    """Newton's method for the relative acceleration under forces that depend on it; NaN if there is none."""
+    inertia = 1.0 + m.added_mass * m.mobility
+    a = (free + m.mobility * known) / inertia
+    for _ in range(_MOST_ITERATIONS):
+        nearby = a + 1e-3 * (1.0 + abs(a))
+        slope = _forces_at(m, nearby, y, dy, s)
+        there = _forces_at(m, a, y, dy, s)
+        slope = (slope - there) / (nearby - a)
+        correction = free + m.mobility * (known + there) - inertia * a
+        correction /= inertia - m.mobility * slope
+        if not np.isfinite(correction):
+            break
+        a += correction
+        if abs(correction) <= _ACCELERATION_TOLERANCE * (1.0 + abs(a)):
+            return a  # type: ignore[no-any-return]
+    return np.nan
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _hold(m: Model, holding: float, y: FloatArray, dy: FloatArray, s: Scratch) -> None:
+    """Bounds of the holding force of sticking friction, and its shares of the friction terms."""
+    at = m.friction_frame * N_MOTION
+    velocity = s.motion[at + VELOCITY]
+    s.motion[at + VELOCITY] = 0.0
+    for side in range(2):
+        s.motion[DIRECTION] = s.motion[N_MOTION + DIRECTION] = 1.0 - 2.0 * side
+        s.friction[2 + side] = 0.0
+        for i in range(m.law.size):
+            if m.kind[i] & DRY_FRICTION:
+                limit = _force(m, i, y, dy, s)
+                s.friction[2 + side] += limit
+                if (holding > 0) == (side == 1):
+                    s.force[i] = limit
+    bound = s.friction[3] if holding > 0 else s.friction[2]
+    for i in range(m.law.size):
+        if m.kind[i] & DRY_FRICTION:
+            s.force[i] *= holding / bound if bound != 0.0 else 0.0
+    s.motion[at + VELOCITY] = velocity
+    s.motion[DIRECTION] = s.motion[N_MOTION + DIRECTION] = STICKS
+    s.friction[1] = holding
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _known_force(m: Model, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
+    """External force and those terms that depend neither on the acceleration nor on what friction has to hold."""
+    later = USES_ACCELERATION | DRY_FRICTION if s.friction[0] == STICKS else USES_ACCELERATION
+    total = s.inputs[5] - m.added_mass * s.inputs[2]
+    for i in range(m.law.size):
+        if m.kind[i] & later:
+            s.force[i] = 0.0
+        else:
+            s.force[i] = _force(m, i, y, dy, s)
+            total += s.force[i]
+    return total  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _difficult_force(
+    m: Model, free: float, known: float, y: FloatArray, dy: FloatArray, s: Scratch
+) -> tuple[float, bool]:
+    """Sum of all forces where some depend on the acceleration or friction holds, and whether there is one."""
+    inertia = 1.0 + m.added_mass * m.mobility
+    if s.friction[0] == STICKS:
+        a = -s.inputs[2] if m.friction_frame == ABSOLUTE else 0.0
+        known += _forces_at(m, a, y, dy, s)
+        holding = (inertia * a - free) / m.mobility - known
+        _hold(m, holding, y, dy, s)
+        return known + holding, True
+    if m.mobility == 0.0:
+        return known + _forces_at(m, 0.0, y, dy, s), True
+    a = _solve_acceleration(m, free, known, y, dy, s)
+    return (inertia * a - free) / m.mobility, np.isfinite(a)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def rates(
+    m: Model,
+    excited: Excited,
+    time: float,
+    position: float,
+    y: FloatArray,
+    dy: FloatArray,
+    power: FloatArray,
+    s: Scratch,
+) -> bool:
+    """Time derivatives of the state and of the works; forces and motions stay in `s`."""
+    n = m.stiffness.size
+    _read_inputs(excited, position, s.inputs)
+    base = s.inputs[2]
+    x, v, free = 0.0, 0.0, 0.0
+    for j in range(n):
+        residual = -m.stiffness[j] * y[j] - m.damping[j] * y[n + j] - m.base_participation[j] * base
+        residual *= m.inverse_mass[j]
+        s.residual[j] = residual
+        x += m.shape[j] * y[j]
+        v += m.shape[j] * y[n + j]
+        free += m.shape[j] * residual
+    _set_motion(s, time, x, v)
+    total, good = _known_force(m, y, dy, s), True
+    if m.uses_acceleration or s.friction[0] == STICKS:
+        total, good = _difficult_force(m, free, total, y, dy, s)
+    a = (free + m.mobility * total) / (1.0 + m.added_mass * m.mobility)
+    total -= m.added_mass * a
+    for j in range(n):
+        dy[j] = y[n + j]
+        dy[n + j] = s.residual[j] + m.shape[j] * m.inverse_mass[j] * total
+    s.motion[ACCELERATION] = a
+    s.motion[N_MOTION + ACCELERATION] = a + base
+    _set_powers(m, y, power, v, s)
+    return good
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _set_powers(m: Model, y: FloatArray, power: FloatArray, v: float, s: Scratch) -> None:
+    """Power of each term on the modes and in its own frame, then those of `N_OTHER_WORKS`."""
+    n, n_terms, base = m.stiffness.size, m.law.size, s.inputs[2]
+    for i in range(n_terms):
+        s.force[i] -= m.mass[i] * s.motion[N_MOTION + ACCELERATION]
+        power[2 * i] = s.force[i] * v
+        power[2 * i + 1] = s.force[i] * s.motion[m.frame[i] * N_MOTION + VELOCITY]
+    damped, inertia = 0.0, 0.0
+    for j in range(n):
+        damped -= m.damping[j] * y[n + j] ** 2
+        inertia -= m.base_participation[j] * base * y[n + j]
+    at = 2 * n_terms
+    power[at], power[at + 1], power[at + 2] = damped, inertia, s.inputs[5] * v
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def rates_once(
+    m: Model,
+    excited: Excited,
+    time: float,
+    position: float,
+    y: FloatArray,
+    dy: FloatArray,
+    power: FloatArray,
+    s: Scratch,
+) -> bool:
+    """The rates for those who need them now and then."""
+    return rates(m, excited, time, position, y, dy, power, s)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def advance(
+    m: Model, excited: Excited, time: float, position: float, step: float, half_steps: float, s: Scratch
+) -> bool:
+    """One Runge–Kutta step from `state` to `trial`, the rates at its start being in the first slopes."""
+    y, k, p, new = s.state, s.slopes, s.powers, s.trial
+    good = True
+    for stage in range(1, 5):  # one place where the rates are taken, because they are compiled into it
+        c = 1.0 if stage >= 3 else 0.5
+        if stage < 4:
+            for j in range(y.size):
+                new[j] = y[j] + c * step * k[stage - 1, j]
+        else:
+            for j in range(y.size):
+                new[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
+        good &= rates(m, excited, time + c * step, position + c * half_steps, new, k[stage], p[stage], s)
+    for j in range(s.works.size):
+        s.trial_works[j] = s.works[j] + step / 6.0 * (p[0, j] + 2.0 * (p[1, j] + p[2, j]) + p[3, j])
+    return good
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def set_friction(m: Model, excited: Excited, time: float, position: float, s: Scratch) -> None:
+    """At rest: stick if the holding force allows, else slide the way the other forces push."""
+    n = m.stiffness.size
+    velocity = s.motion[m.friction_frame * N_MOTION + VELOCITY]
+    if m.mobility == 0.0:  # prescribed motion cannot be held
+        s.friction[0] = -1.0 if velocity < 0.0 else 1.0
+        return
+    for j in range(n):
+        s.state[n + j] -= m.shape[j] * m.inverse_mass[j] * velocity / m.mobility
+    s.friction[0] = STICKS
+    rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+    let_go(s)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def let_go(s: Scratch) -> None:
+    """Slide where sticking would need more than friction can hold."""
+    if s.friction[1] > s.friction[3]:
+        s.friction[0] = -1.0
+    elif s.friction[1] < s.friction[2]:
+        s.friction[0] = 1.0

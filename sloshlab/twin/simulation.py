@@ -1,0 +1,157 @@
+"""What a twin did: motions, forces, memory, works and events over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.twin.status import Ending, Status
+
+if TYPE_CHECKING:
+    from sloshlab.twin.twin import Twin
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What a twin did.
+
+    Attributes
+    ----------
+    twin : Twin
+    sampling_rate_hz : float
+    ending : Ending
+    modes : ndarray, shape (n, 3, n_modes)
+        Displacement, velocity, acceleration of each mode.
+    places : ndarray, shape (n, 2, 3)
+        The same of structure (relative to the base) and tank (absolute).
+    base_motion : ndarray, shape (n, 3)
+        The same of the base; of the tank where there is no structure.
+    external_force_n : ndarray, shape (n,)
+        On the tank, as prescribed.
+    forces_n : ndarray, shape (n, n_terms)
+        Each term's force at its place, upward positive.
+    memory : ndarray, shape (n, n_memory)
+        States of the terms, one after the other, each followed by its switches.
+    works_j : ndarray, shape (n, 2 n_terms + 3)
+        Work since the start: of each term on the modes and in the frame of its place, then modal damping,
+        inertia of the base motion, external force, on the modes.
+    events : ndarray, shape (n_events, 4)
+        Time [s], term (−1 dry friction), number of its event, new value of the switch.
+    n_events : int
+        All of them; `events` holds the first ones.
+    """
+
+    twin: Twin
+    sampling_rate_hz: float
+    ending: Ending
+    modes: FloatArray
+    places: FloatArray
+    base_motion: FloatArray
+    external_force_n: FloatArray
+    forces_n: FloatArray
+    memory: FloatArray
+    works_j: FloatArray
+    events: FloatArray
+    n_events: int = field(default=0)
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the samples."""
+        return np.arange(self.modes.shape[0]) / self.sampling_rate_hz
+
+    @property
+    def base_acceleration_m_per_s2(self) -> FloatArray:
+        """Acceleration of the base."""
+        return self.base_motion[:, 2]
+
+    @property
+    def displacement_m(self) -> FloatArray:
+        """Displacement of the tank, absolute."""
+        return self.places[:, 1, 0]
+
+    @property
+    def velocity_m_per_s(self) -> FloatArray:
+        """Velocity of the tank, absolute."""
+        return self.places[:, 1, 1]
+
+    @property
+    def acceleration_m_per_s2(self) -> FloatArray:
+        """Acceleration of the tank, absolute."""
+        return self.places[:, 1, 2]
+
+    @property
+    def tank_force_n(self) -> FloatArray:
+        """Δf, the forces of all terms on the tank."""
+        on_tank = [term.place == "tank" for term in self.twin.terms]
+        return np.asarray(self.forces_n[:, on_tank].sum(axis=1))
+
+    @property
+    def interface_force_n(self) -> FloatArray:
+        """Force of the structure (or the shaker) on the tank, static weight removed."""
+        inertia = self.twin.carried_mass_kg * self.acceleration_m_per_s2
+        return np.asarray(inertia - self.tank_force_n - self.external_force_n)
+
+    @property
+    def work_of_terms_j(self) -> FloatArray:
+        """Work of each term in the frame of its place, shape (n, n_terms); dissipated is negative."""
+        return self.works_j[:, 1 : 2 * len(self.twin.terms) : 2]
+
+    @property
+    def mechanical_energy_j(self) -> FloatArray:
+        """Kinetic and elastic energy of the modes, the liquid frozen."""
+        structure = self.twin.structure
+        if structure is None:
+            return np.zeros(self.modes.shape[0])
+        kinetic = self.modes[:, 1] ** 2 @ structure.masses_kg
+        return np.asarray(0.5 * (kinetic + self.modes[:, 0] ** 2 @ structure.stiffnesses_n_per_m))
+
+    @cached_property
+    def energy_residual_j(self) -> FloatArray:
+        """Energy gained less the works that gave it; zero but for the integrator's error."""
+        n = len(self.twin.terms)
+        given = self.works_j[:, 0 : 2 * n : 2].sum(axis=1) + self.works_j[:, 2 * n :].sum(axis=1)
+        return np.asarray(self.mechanical_energy_j - self.mechanical_energy_j[0] - given)
+
+    def require_done(self) -> Simulation:
+        """Itself, if it reached its end.
+
+        Raises
+        ------
+        AnalysisError
+            If it did not; the message says how and when.
+        """
+        if self.ending.status is not Status.DONE:
+            raise AnalysisError(
+                f"twin: {self.ending}", remedy="check the twin's parameters, or take smaller steps"
+            )
+        return self
+
+    def to_dataset(self, *, seed: int | None = None) -> xr.Dataset:
+        """Channels under the names of recordings, as the sensors read them; channels without a sensor are true."""
+        channels = {
+            "acceleration_tip": (self.acceleration_m_per_s2, "m s-2"),
+            "acceleration_root": (self.base_acceleration_m_per_s2, "m s-2"),
+            "displacement_tank": (self.displacement_m, "m"),
+            "force_interface": (self.interface_force_n, "N"),
+        }
+        generator = None if seed is None else np.random.default_rng(seed)
+        for sensor in self.twin.sensors:
+            if sensor.channel not in channels:
+                raise InputError(f"sensor {sensor.channel}", allowed=", ".join(channels))
+            truth, units = channels[sensor.channel]
+            channels[sensor.channel] = (sensor.reading(truth, self.sampling_rate_hz, generator=generator), units)
+        return xr.Dataset(
+            {
+                name: ("time", values, {"units": units, "quantity": name.split("_")[0]})
+                for name, (values, units) in channels.items()
+            },
+            coords={"time": self.time_s},
+        )

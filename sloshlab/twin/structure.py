@@ -1,0 +1,138 @@
+"""What carries the tank: modes, the tank's and the guide's places on them, and how base motion drives them.
+
+The liquid is part of the structure as if it were frozen: Table 2.4 and every modal test of the beam contain it,
+and on the one-degree-of-freedom rig it is added to the moving mass. Forces of the liquid are Δf, beyond that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from sloshlab.errors import RigError
+from sloshlab.rig import Rig
+from sloshlab.twin.rig_beam import base_participation_kg
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Modes with the liquid frozen.
+
+    Attributes
+    ----------
+    masses_kg, stiffnesses_n_per_m, dampings_kg_per_s : ndarray, shape (n_modes,)
+        Of each mode.
+    mode_shape : ndarray, shape (n_modes,)
+        At the tank, which is where the structure's own forces act too.
+    base_participation_kg : ndarray, shape (n_modes,)
+        ∫ µ ψ dx with the tip mass, Γ of f = −Γ a_s (2.31).
+    """
+
+    masses_kg: FloatArray
+    stiffnesses_n_per_m: FloatArray
+    dampings_kg_per_s: FloatArray
+    mode_shape: FloatArray
+    base_participation_kg: FloatArray
+
+    @property
+    def frequencies_hz(self) -> FloatArray:
+        """Undamped natural frequencies."""
+        return np.asarray(np.sqrt(self.stiffnesses_n_per_m / self.masses_kg) / (2 * pi))
+
+    @property
+    def static_stiffness_n_per_m(self) -> float:
+        """Static force at the tank over its deflection."""
+        return float(1.0 / (self.mode_shape**2 / self.stiffnesses_n_per_m).sum())
+
+    def static_deflection(self, deflection_m: float) -> FloatArray:
+        """Modal coordinates under a static force at the tank that deflects it by `deflection_m`."""
+        flexible = self.mode_shape / self.stiffnesses_n_per_m
+        return np.asarray(deflection_m * flexible / float(self.mode_shape @ flexible))
+
+
+def single_degree_of_freedom(mass_kg: float, stiffness_n_per_m: float, damping_kg_per_s: float = 0.0) -> Structure:
+    """One mass on a spring and a viscous damper; its coordinate is its displacement.
+
+    Examples
+    --------
+    >>> round(float(single_degree_of_freedom(2.241, 3808.8).frequencies_hz[0]), 2)
+    6.56
+    """
+    mass, one = np.array([mass_kg]), np.ones(1)
+    return Structure(mass, np.array([stiffness_n_per_m]), np.array([damping_kg_per_s]), one, mass.copy())
+
+
+def modal_structure(
+    frequencies_hz: npt.ArrayLike,
+    damping_ratios: npt.ArrayLike,
+    modal_masses_kg: npt.ArrayLike,
+    *,
+    mode_shape: npt.ArrayLike,
+    base_participation_kg: npt.ArrayLike | None = None,
+) -> Structure:
+    """Structure from what a modal test gives; without a participation, base motion is not allowed to drive it.
+
+    Parameters
+    ----------
+    frequencies_hz, damping_ratios, modal_masses_kg, mode_shape, base_participation_kg : array_like
+        Shape (n_modes,).
+    """
+    f, zeta, mass, shape = (
+        np.atleast_1d(np.asarray(values, dtype=np.float64))
+        for values in (frequencies_hz, damping_ratios, modal_masses_kg, mode_shape)
+    )
+    participation = (
+        np.full(f.shape, np.nan) if base_participation_kg is None else np.asarray(base_participation_kg)
+    )
+    omega = 2 * pi * f
+    return Structure(
+        mass, mass * omega**2, 2 * zeta * mass * omega, shape, np.asarray(participation, dtype=np.float64)
+    )
+
+
+def structure_of_rig(rig: Rig) -> Structure:
+    """The structure that a rig file describes, with the liquid frozen.
+
+    Raises
+    ------
+    RigError
+        If the rig has no structure.
+    """
+    described = rig.structure
+    if described is None:
+        raise RigError(
+            "rig", got="no [structure]", remedy="prescribe the tank's motion, or describe the structure"
+        )
+    if described.kind == "sdof":
+        mass = (described.mass_kg or 0.0) + rig.liquid_mass_kg
+        return single_degree_of_freedom(
+            mass, described.stiffness_n_per_m or 0.0, described.damping_kg_per_s or 0.0
+        )
+    return modal_structure(
+        described.frequencies_hz,
+        described.damping_ratios,
+        described.modal_masses_kg,
+        mode_shape=described.tip_mode_shape,
+        base_participation_kg=base_participation_kg(described),
+    )
+
+
+def guide_friction_n(rig: Rig) -> float:
+    """Coulomb force of the guide [N], zero where the rig has none."""
+    return 0.0 if rig.structure is None else rig.structure.coulomb_force_n or 0.0
+
+
+def critical_damping_kg_per_s(mass_kg: float, stiffness_n_per_m: float) -> float:
+    """2 √(k m).
+
+    Examples
+    --------
+    >>> critical_damping_kg_per_s(1.0, 4.0)
+    4.0
+    """
+    return 2.0 * sqrt(stiffness_n_per_m * mass_kg)

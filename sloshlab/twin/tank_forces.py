@@ -1,0 +1,265 @@
+"""What the liquid does beyond being frozen: Δf = F_S + m_l a on the tank, upward positive, static weight removed.
+
+The structure of a twin always carries the frozen liquid. A liquid that is frozen therefore has no force here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi, sqrt
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from numba import njit
+
+from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.errors import InputError
+from sloshlab.twin.law import ACCELERATION, DISPLACEMENT, VELOCITY, law
+from sloshlab.twin.terms import ForceKind, Parameter, register
+
+# mypy: disable-error-code="no-untyped-def"
+
+FloatArray = npt.NDArray[np.float64]
+_G = GRAVITY_M_PER_S2
+_RADIUS, _STIFFNESS, _DAMPING, _HARDENING, _FROZEN, _LIQUID, _HEIGHT, _IN_FLIGHT = range(8)
+
+
+@law
+def _nothing(motion, parameters, memory, rates):
+    return 0.0
+
+
+@law
+def _bouncing_ball(motion, parameters, memory, rates):
+    """Force of the ball on the tank (2.3, 2.4) and its motion (2.1, with the right sign of F_b)."""
+    radius = parameters[_RADIUS]
+    mass = (1.0 - parameters[_FROZEN]) * parameters[_LIQUID]
+    height = memory[0] - motion[DISPLACEMENT]
+    closing = memory[1] - motion[VELOCITY]
+    contact = parameters[_IN_FLIGHT] * parameters[_DAMPING] * closing
+    for side in range(2):
+        if memory[2 + side] < 0:
+            overlap = height - radius if side == 0 else height - parameters[_HEIGHT] + radius
+            stiffness = parameters[_STIFFNESS] * (
+                1.0 + parameters[_HARDENING] * overlap * overlap / (radius - abs(overlap))
+            )
+            contact = stiffness * overlap + parameters[_DAMPING] * closing
+    rates[0], rates[1] = memory[1], -_G - contact / mass
+    return contact + mass * _G
+
+
+@law
+def _bouncing_ball_events(motion, parameters, memory, values):
+    height = memory[0] - motion[DISPLACEMENT]
+    values[0] = height - parameters[_RADIUS]
+    values[1] = parameters[_HEIGHT] - parameters[_RADIUS] - height
+    values[2] = height
+    values[3] = parameters[_HEIGHT] - height
+    return 0.0
+
+
+def _ball_at_rest(values: Mapping[str, float]) -> tuple[float, float]:
+    """Height of the ball resting on the floor of a tank at rest, found by bisection, and its velocity."""
+    radius = values["radius_m"]
+    weight = (1.0 - values["beta"]) * values["liquid_mass_kg"] * _G
+    low, high = 0.0, radius
+    for _ in range(200):
+        overlap = 0.5 * (low + high)
+        gap = radius - overlap
+        penalty = values["hardening_per_m"] * overlap**2 / gap if gap > 0 else np.inf
+        if values["stiffness_n_per_m"] * (1.0 + penalty) * overlap < weight:
+            low = overlap
+        else:
+            high = overlap
+    return radius - 0.5 * (low + high), 0.0
+
+
+def _check_ball(values: Mapping[str, float]) -> None:
+    if 2 * values["radius_m"] >= values["height_m"]:
+        raise InputError(
+            "bouncing_ball: radius_m",
+            got=f"{values['radius_m']:g} in a tank {values['height_m']:g} m high",
+            allowed="less than half the tank's height",
+        )
+    if _ball_at_rest(values)[0] < 1e-6 * values["radius_m"]:
+        raise InputError(
+            "bouncing_ball: stiffness_n_per_m",
+            got=f"{values['stiffness_n_per_m']:g}, which lets the ball's weight press it through the floor",
+            allowed="stiff enough to carry (1 − beta) m_l g",
+        )
+
+
+BOUNCING_BALL = register(
+    ForceKind(
+        "bouncing_ball",
+        ("tank",),
+        (
+            Parameter("radius_m", "m", 1e-6, 10.0),
+            Parameter("stiffness_n_per_m", "N m-1", 1e-3, 1e8),
+            Parameter("damping_kg_per_s", "kg s-1", 0.0, 1e6),
+            Parameter("hardening_per_m", "m-1", 0.0, 1e6),
+            Parameter("beta", "1", 0.0, 0.999),
+            Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
+            Parameter("height_m", "m", 1e-6, 100.0),
+            # share of the damping that acts in flight too: 0 while in contact only, 1 as (2.3) is printed
+            Parameter("damping_in_flight", "1", 0.0, 1.0, 0.0),
+        ),
+        _bouncing_ball,
+        events=_bouncing_ball_events,
+        n_switches=2,
+        limits=("ball below the floor of its tank", "ball above the ceiling of its tank"),
+        moves_with_place=True,
+        memory=lambda values, table: _ball_at_rest(values),
+        mass=lambda values: -(1.0 - values["beta"]) * values["liquid_mass_kg"],
+        check=_check_ball,
+        equation="F_b + m_b (a + g); F_b = k̂ (1 + α s²/(r₀ − |s|)) s + c ν in contact (2.1–2.5)",
+    )
+)
+
+
+@njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def _map_value(numbers, at, omega_bar, u_bar):
+    """Bilinear value of the map stored from `at` on: sizes, both axes, values; held constant beyond its edges."""
+    n, m = int(numbers[at]), int(numbers[at + 1])
+    first, second = at + 2, at + 2 + n
+    i = 0
+    while i < n - 2 and numbers[first + i + 1] < omega_bar:
+        i += 1
+    j = 0
+    while j < m - 2 and numbers[second + j + 1] < u_bar:
+        j += 1
+    p = (omega_bar - numbers[first + i]) / (numbers[first + i + 1] - numbers[first + i])
+    q = (u_bar - numbers[second + j]) / (numbers[second + j + 1] - numbers[second + j])
+    p, q = min(max(p, 0.0), 1.0), min(max(q, 0.0), 1.0)
+    k = second + m + i * m + j
+    below = numbers[k] * (1 - q) + numbers[k + 1] * q
+    above = numbers[k + m] * (1 - q) + numbers[k + m + 1] * q
+    return below * (1 - p) + above * p
+
+
+@njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def _track(motion, parameters, memory, rates):
+    """Frequency from running mean squares of v and a; amplitude from the present v and a."""
+    omega = min(max(sqrt(memory[1] / memory[0]) if memory[0] > 0 else 0.0, 1e-3), 1e5)
+    rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / parameters[2]
+    rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / parameters[2]
+    return omega, sqrt(motion[VELOCITY] ** 2 + (motion[ACCELERATION] / omega) ** 2) / omega
+
+
+@law
+def _viscous_map(motion, parameters, memory, rates):
+    """−c(ω̄, ū) v with c from (E.4)."""
+    omega, amplitude = _track(motion, parameters, memory, rates)
+    w_bar = _map_value(parameters, 4, omega / sqrt(_G / parameters[1]), amplitude / parameters[1])
+    return -parameters[0] / pi * omega * w_bar * motion[VELOCITY]
+
+
+@law
+def _effective_mass_map(motion, parameters, memory, rates):
+    """−β(ω̄, ū) m_l a."""
+    omega, amplitude = _track(motion, parameters, memory, rates)
+    beta = _map_value(parameters, 4, omega / sqrt(_G / parameters[1]), amplitude / parameters[1])
+    return -parameters[0] * beta * motion[ACCELERATION]
+
+
+def _tracked_at_start(values: Mapping[str, float], table: FloatArray) -> tuple[float, float]:
+    return 1e-12, 1e-12 * (2 * pi * values["start_frequency_hz"]) ** 2
+
+
+_OF_MAPS = (
+    Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
+    Parameter("height_m", "m", 1e-6, 100.0),
+    Parameter("time_constant_s", "s", 1e-4, 100.0, 0.2),
+    Parameter("start_frequency_hz", "Hz", 1e-3, 1e4, 10.0),
+)
+
+VISCOUS_MAP = register(
+    ForceKind(
+        "viscous_map",
+        ("tank",),
+        _OF_MAPS,
+        _viscous_map,
+        memory=_tracked_at_start,
+        uses_acceleration=True,
+        equation="−c(ω̄, ū) v, c = (m_l/π) √(g/h) ω̄ W̄(ω̄, ū) (E.4)",
+    )
+)
+EFFECTIVE_MASS_MAP = register(
+    ForceKind(
+        "effective_mass_map",
+        ("tank",),
+        _OF_MAPS,
+        _effective_mass_map,
+        memory=_tracked_at_start,
+        uses_acceleration=True,
+        equation="−β(ω̄, ū) m_l a",
+    )
+)
+EFFECTIVE_MASS = register(
+    ForceKind(
+        "effective_mass",
+        ("tank",),
+        (Parameter("beta", "1", -0.99, 10.0), Parameter("liquid_mass_kg", "kg", 1e-9, 1e6)),
+        _nothing,
+        mass=lambda values: values["beta"] * values["liquid_mass_kg"],
+        equation="−β m_l a",
+    )
+)
+
+
+@law
+def _linear_response(motion, parameters, memory, rates):
+    return memory[0]
+
+
+@law
+def _linear_response_update(motion, parameters, memory, rates):
+    """Push the velocity into the history and hold Σ b_i v[k − i] until the next step."""
+    n = int(parameters[0])
+    for i in range(n - 1, 0, -1):
+        memory[1 + i] = memory[i]
+    memory[1] = motion[VELOCITY]
+    memory[0] = 0.0
+    for i in range(n):
+        memory[0] += parameters[1 + i] * memory[1 + i]
+    return 0.0
+
+
+LINEAR_RESPONSE = register(
+    ForceKind(
+        "linear_response",
+        ("tank",),
+        (Parameter("n_delays", "1", 1, 10_000),),
+        _linear_response,
+        update=_linear_response_update,
+        memory=lambda values, table: (0.0,) * (1 + int(values["n_delays"])),
+        equation="Δf[k] = Σ b_i v[k − i], held over one output step; the example of a model in discrete time",
+    )
+)
+
+
+def table_of(map_: xr.DataArray) -> FloatArray:
+    """What `viscous_map` (of W̄) and `effective_mass_map` (of β) take as `table`.
+
+    Parameters
+    ----------
+    map_ : xarray.DataArray
+        Over ``omega_bar`` and ``u_bar``, both rising, at least two each, without gaps.
+
+    Raises
+    ------
+    InputError
+        If it is not such a map.
+    """
+    if set(map_.dims) != {"omega_bar", "u_bar"}:
+        raise InputError("map", got=f"dimensions {tuple(map_.dims)}", allowed="(omega_bar, u_bar)")
+    grid = map_.transpose("omega_bar", "u_bar")
+    omega_bar, u_bar = (np.asarray(grid[name].values, dtype=np.float64) for name in ("omega_bar", "u_bar"))
+    for name, axis in (("omega_bar", omega_bar), ("u_bar", u_bar)):
+        if axis.size < 2 or not (np.diff(axis) > 0).all():
+            raise InputError(f"map: {name}", got=f"{axis.size} values", allowed="two or more, rising")
+    values = np.asarray(grid.values, dtype=np.float64)
+    if not np.isfinite(values).all():
+        raise InputError("map", got="gaps", remedy="fill them, or cut the map to the measured region")
+    return np.concatenate([[omega_bar.size, u_bar.size], omega_bar, u_bar, values.ravel()])

@@ -1,0 +1,156 @@
+"""Speed of the twin: `python -m tests.benchmarks.twin` prints JSON.
+
+The rival is the same model by `scipy.integrate.solve_ivp`, piece by piece between contacts, written as anybody
+would write it, at the tolerance at which its error is that of the twin. Errors are those of the tank's motion over
+one second against the twin with 32 times smaller steps; later the contacts make of any error a new history.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from sloshlab.twin.excitation import Excitation, free, recorded
+from sloshlab.twin.structure import Structure, modal_structure
+from sloshlab.twin.tank_forces import BOUNCING_BALL
+from sloshlab.twin.twin import Twin
+
+RATE_HZ, DEFLECTION_M = 20_000.0, -0.0146
+FREE_LABEL = "twin: 10 s of beam and ball at 20 kHz [s]"
+RANDOM_LABEL = "twin: 90 s of random base motion at 20 kHz [s]"
+RIVAL_LABEL = "twin: solve_ivp (RK45) at equal error over ours, 10 s"
+BALL = {
+    "radius_m": 0.009, "stiffness_n_per_m": 3000.0, "damping_kg_per_s": 9.0, "hardening_per_m": 500.0,
+    "beta": 0.002, "liquid_mass_kg": 0.12433, "height_m": 0.0272,
+}  # fmt: skip
+COARSEST = {"RK45": 1e-7, "DOP853": 1e-6}
+
+
+def beam() -> Structure:
+    """Table 2.4."""
+    return modal_structure(
+        [10.87, 78.31, 226.5], [0.0032, 0.0090, 0.0176], [0.8956, 1.0692, 0.9655],
+        mode_shape=[1.0, 1.0, 1.0], base_participation_kg=[1.21, -1.05, 0.85],
+    )  # fmt: skip
+
+
+def sloshing_beam() -> Twin:
+    """The beam with the bouncing ball in its tank."""
+    return Twin(beam()).with_term(BOUNCING_BALL(**BALL))
+
+
+def random_run(duration_s: float = 90.0, rms_g: float = 0.4) -> Excitation:
+    """Gaussian spectrum (2.30) about the first mode, sampled at 1000 Hz."""
+    rate, rng = 1000.0, np.random.default_rng(3)
+    n = round(duration_s * rate)
+    f = np.fft.rfftfreq(n, 1 / rate)
+    lines = np.exp(-((f - 10.87) ** 2) / (4 * 4.0**2)) * np.exp(2j * np.pi * rng.random(f.size))
+    lines[0] = 0.0
+    omega = np.maximum(2 * np.pi * f, 1e-3)  # the mean is zero
+    a, v, x = (np.fft.irfft(lines / (1j * omega) ** k, n) for k in range(3))
+    factor = rms_g * 9.81 / a.std()
+    return recorded(rate, acceleration=factor * a, velocity=factor * v, displacement=factor * x)
+
+
+def rival(method: str, duration_s: float, tolerance: float) -> np.ndarray:
+    """Displacement of the tank at 20 kHz by `solve_ivp`, restarted at every contact."""
+    times = np.arange(round(duration_s * RATE_HZ) + 1) / RATE_HZ
+    s, g, h = beam(), 9.81, BALL["height_m"]
+    r0, k, c, alpha = (BALL[n] for n in ("radius_m", "stiffness_n_per_m", "damping_kg_per_s", "hardening_per_m"))
+    ball_kg = (1 - BALL["beta"]) * BALL["liquid_mass_kg"]
+    mass = np.diag(s.masses_kg) - ball_kg * np.outer(s.mode_shape, s.mode_shape)
+    inverse, shape = np.linalg.inv(mass), s.mode_shape
+
+    def overlap(y: np.ndarray, phase: int) -> float:
+        height = y[6] - shape @ y[:3]
+        return float(height - r0 if phase < 0 else height - h + r0)
+
+    def rhs(t: float, y: np.ndarray, phase: int) -> np.ndarray:
+        force = 0.0
+        if phase:
+            o = overlap(y, phase)
+            force = k * (1 + alpha * o * o / (r0 - abs(o))) * o + c * (y[7] - shape @ y[3:6])
+        q = inverse @ (
+            shape * (force + ball_kg * g) - s.stiffnesses_n_per_m * y[:3] - s.dampings_kg_per_s * y[3:6]
+        )
+        return np.concatenate([y[3:6], q, [y[7], -g - force / ball_kg]])
+
+    def event(which: int, direction: float) -> Callable[..., float]:
+        def gap(t: float, y: np.ndarray, phase: int) -> float:
+            return overlap(y, which)
+
+        gap.terminal, gap.direction = True, direction  # type: ignore[attr-defined]
+        return gap
+
+    events = {-1: [event(-1, 1.0)], 0: [event(-1, -1.0), event(1, 1.0)], 1: [event(1, -1.0)]}
+    rest = brentq(lambda o: k * (1 + alpha * o * o / (r0 - o)) * o - ball_kg * g, 0, 0.9 * r0, xtol=1e-15)
+    tip = DEFLECTION_M
+    state = np.concatenate([s.static_deflection(tip), np.zeros(3), [tip + r0 - rest, 0.0]])
+    found, t, phase = np.full(times.size, np.nan), 0.0, -1
+    while t < duration_s:
+        wanted = times[(times >= t) & (times <= duration_s)]
+        piece = solve_ivp(
+            rhs, (t, duration_s), state, method=method, t_eval=wanted, args=(phase,), events=events[phase],
+            rtol=tolerance, atol=1e-3 * tolerance,
+        )  # fmt: skip
+        if len(piece.t):
+            found[np.searchsorted(times, piece.t)] = shape @ piece.y[:3]
+        if piece.status != 1:
+            break
+        which = next(i for i, hits in enumerate(piece.t_events) if len(hits))
+        t, state = float(piece.t_events[which][0]), piece.y_events[which][0]
+        phase = 0 if phase else (-1 if which == 0 else 1)
+    return found
+
+
+def best_of(action: Callable[[], object], n: int) -> float:
+    """Shortest processor time of `n` calls [s]."""
+    times = []
+    for _ in range(n):
+        start = time.process_time()
+        action()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def errors() -> tuple[float, dict[str, tuple[float, float]]]:
+    """Error of the twin over one second [m]; tolerance of each rival at which it is not worse, and its error."""
+    twin, run = sloshing_beam(), free(1.0, RATE_HZ)
+    finest = twin.simulate(run, initial_displacement_m=DEFLECTION_M, n_substeps=32).displacement_m
+    ours = float(np.abs(twin.simulate(run, initial_displacement_m=DEFLECTION_M).displacement_m - finest).max())
+    found = {}
+    for method, tolerance in COARSEST.items():
+        theirs = np.inf
+        while theirs > ours and tolerance > 1e-13:
+            tolerance /= 10**0.25
+            theirs = float(np.nanmax(np.abs(rival(method, 1.0, tolerance) - finest)))
+        found[method] = (tolerance, theirs)
+    return ours, found
+
+
+def twin_figures() -> dict[str, float]:
+    """Times and their ratios, compiled before."""
+    twin, run, base = sloshing_beam(), free(10.0, RATE_HZ), random_run()
+    twin.simulate(free(0.1, RATE_HZ), initial_displacement_m=DEFLECTION_M)
+    ours = best_of(lambda: twin.simulate(run, initial_displacement_m=DEFLECTION_M), 7)
+    random = best_of(lambda: twin.simulate(base, n_substeps=20).require_done(), 3)
+    error, rivals = errors()
+    figures = {FREE_LABEL: ours, RANDOM_LABEL: random, "twin: its error over 1 s [m]": error}
+    first_second = best_of(lambda: twin.simulate(free(1.0, RATE_HZ), initial_displacement_m=DEFLECTION_M), 7)
+    for method, (tolerance, theirs) in rivals.items():
+        taken = best_of(lambda m=method, t=tolerance: rival(m, 1.0, t), 1)  # type: ignore[misc]
+        figures[f"twin: solve_ivp ({method}) at equal error over ours, first second"] = taken / first_second
+        figures[f"twin: error of {method} over 1 s [m]"] = theirs
+        figures[f"twin: relative tolerance of {method}"] = tolerance
+        taken = best_of(lambda m=method, t=tolerance: rival(m, 10.0, t), 1)  # type: ignore[misc]
+        figures[f"twin: solve_ivp ({method}) at equal error over ours, 10 s"] = taken / ours
+    return figures
+
+
+if __name__ == "__main__":
+    print(json.dumps(twin_figures()))

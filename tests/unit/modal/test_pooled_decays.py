@@ -1,0 +1,78 @@
+"""Repeats pooled over amplitude: means, scatter and intervals against what they were drawn from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sloshlab.errors import AnalysisError
+from sloshlab.modal.instantaneous_damping import InstantaneousDamping, Trust
+from sloshlab.modal.pooled_decays import pooled_damping
+
+
+def reading(
+    amplitude: np.ndarray, damping: np.ndarray, std: float = 1e-4, trust: str = "used"
+) -> InstantaneousDamping:
+    n = amplitude.size
+    return InstantaneousDamping(
+        method="local sine fit",
+        time_s=np.arange(n, dtype=float),
+        acceleration_amplitude_m_per_s2=amplitude,
+        damping_ratio=damping,
+        damping_ratio_std=np.full(n, std),
+        frequency_hz=10.0 + damping,
+        frequency_hz_std=np.full(n, std),
+        coverage_factor=np.full(n, 1.65),
+        trust=np.full(n, trust),
+    )
+
+
+AMPLITUDES = np.array([100.0, 10.0, 1.0])
+
+
+def test_mean_and_scatter_over_repeats() -> None:
+    repeats = [reading(AMPLITUDES, np.array([0.03, 0.02, 0.01]) + shift) for shift in (-0.002, 0.0, 0.002)]
+    pooled = pooled_damping(repeats, bins_per_decade=4)
+    assert pooled.acceleration_amplitude_m_per_s2.tolist() == [1.0, 10.0, 100.0]
+    assert pooled.damping_ratio == pytest.approx([0.01, 0.02, 0.03])
+    assert pooled.damping_ratio_std == pytest.approx([0.002] * 3)
+    assert pooled.frequency_hz == pytest.approx([10.01, 10.02, 10.03])
+    assert pooled.n_repeats.tolist() == [3, 3, 3]
+    # Student with two degrees of freedom, 90 %: 2.920 σ/√3
+    low, high = pooled.damping_ratio_interval
+    assert high - pooled.damping_ratio == pytest.approx([2.920 * 0.002 / np.sqrt(3)] * 3, rel=1e-3)
+    assert low == pytest.approx(2 * pooled.damping_ratio - high)
+
+
+def test_within_a_repeat_values_are_weighted_by_their_errors() -> None:
+    both = reading(np.array([10.0, 10.0]), np.array([0.01, 0.04]))
+    weighted = InstantaneousDamping(**{**vars(both), "damping_ratio_std": np.array([1e-3, 2e-3])})
+    # weights 4 : 1
+    assert pooled_damping([weighted]).damping_ratio == pytest.approx([0.016])
+
+
+def test_one_repeat_has_no_interval_and_others_may_end_earlier() -> None:
+    long, short = reading(AMPLITUDES, np.full(3, 0.02)), reading(AMPLITUDES[:1], np.full(1, 0.03))
+    pooled = pooled_damping([long, short])
+    assert pooled.n_repeats.tolist() == [1, 1, 2]
+    assert pooled.damping_ratio == pytest.approx([0.02, 0.02, 0.025])
+    assert np.isnan(pooled.damping_ratio_interval[:, :2]).all()
+    assert np.isfinite(pooled.damping_ratio_interval[:, 2]).all()
+
+
+def test_only_trusted_values_are_pooled() -> None:
+    good, bad = reading(AMPLITUDES, np.full(3, 0.02)), reading(AMPLITUDES, np.full(3, 0.9), trust=Trust.RELEASE)
+    assert pooled_damping([good, bad]).damping_ratio == pytest.approx([0.02] * 3)
+    with pytest.raises(AnalysisError, match="without a value that may be used"):
+        pooled_damping([bad])
+
+
+def test_intervals_hold_in_nine_of_ten_repeats_of_the_whole_test() -> None:
+    generator = np.random.default_rng(6)
+    held = []
+    for _ in range(300):
+        shifts = generator.normal(0, 0.002, 4)
+        pooled = pooled_damping([reading(np.array([10.0]), np.array([0.02 + shift])) for shift in shifts])
+        low, high = pooled.damping_ratio_interval[:, 0]
+        held.append(low <= 0.02 <= high)
+    assert np.mean(held) == pytest.approx(0.90, abs=0.05)
