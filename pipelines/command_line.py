@@ -13,11 +13,34 @@ from typing import NoReturn
 
 import typer
 
-from pipelines.commands import analysis, laboratory, models, recordings  # noqa: F401 - they register themselves
+from pipelines.commands import recordings  # they register themselves, in the order of the help
+
+# isort: split
+from pipelines.commands import analysis
+
+# isort: split
+from pipelines.commands import models
+
+# isort: split
+from pipelines.commands import laboratory
+
+# isort: split
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, app
 from sloshlab.errors import RecordingInterruptedError, SloshlabError
 
-__all__ = ["DONE_BUT_FLAGGED", "INPUT_IS_BAD", "INTERRUPTED", "USAGE", "app", "main", "run"]
+__all__ = [
+    "DONE_BUT_FLAGGED",
+    "INPUT_IS_BAD",
+    "INTERRUPTED",
+    "USAGE",
+    "analysis",
+    "app",
+    "laboratory",
+    "main",
+    "models",
+    "recordings",
+    "run",
+]
 
 # typer brings its own click or uses the installed one; either way this is the root of its usage errors
 _UsageError = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
