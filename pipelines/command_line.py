@@ -22,6 +22,9 @@ from pipelines.commands import analysis
 from pipelines.commands import models
 
 # isort: split
+from pipelines.commands import diagnosis
+
+# isort: split
 from pipelines.commands import laboratory
 
 # isort: split
@@ -35,6 +38,7 @@ __all__ = [
     "USAGE",
     "analysis",
     "app",
+    "diagnosis",
     "laboratory",
     "main",
     "models",

@@ -1,0 +1,29 @@
+"""Commands that compare simulation and recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.commands.application import Json, app, finish
+
+
+@app.command()
+def diagnose(
+    case: Annotated[
+        Path, typer.Argument(metavar="CASE", help="Folder with rig.toml and recordings/*.nc.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Folder for results; CASE/diagnosis.", show_default=False
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """What physics the simulation of a case left out, or that nothing is missing."""
+    from pipelines.diagnose import diagnose_case
+
+    finish(diagnose_case(case, output), as_json)

@@ -1,0 +1,192 @@
+"""Effects that may be missing, and a candidate: one effect at one place, with sizes to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sloshlab.diagnosis.extension import Extension
+from sloshlab.errors import InputError
+from sloshlab.rig import Rig
+from sloshlab.twin.twin import Twin
+
+BLOCKS: Final = ("excitation", "structure", "tank", "sensor")
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What an effect may know to choose sizes that matter.
+
+    Attributes
+    ----------
+    rig : Rig
+    twin : Twin
+        The baseline.
+    displacement_m, velocity_m_per_s, acceleration_m_per_s2 : float
+        Largest of the tank in the runs that are fitted.
+    frequency_hz : float
+        Of most of the motion.
+    force_n : float
+        The mass that moves times the largest acceleration.
+    channels : mapping of str to float
+        Compared and driving channels with their RMS.
+    driving : tuple of str
+        Channels that drive the simulation.
+    sampling_rate_hz : float
+    longest_run_s : float
+    """
+
+    rig: Rig
+    twin: Twin
+    displacement_m: float
+    velocity_m_per_s: float
+    acceleration_m_per_s2: float
+    frequency_hz: float
+    force_n: float
+    channels: Mapping[str, float]
+    driving: tuple[str, ...]
+    sampling_rate_hz: float
+    longest_run_s: float
+
+    @property
+    def moving_mass_kg(self) -> float:
+        """Force over acceleration."""
+        return self.force_n / max(self.acceleration_m_per_s2, 1e-300)
+
+    @property
+    def omega(self) -> float:
+        """2π times the frequency [rad/s]."""
+        return 2 * 3.141592653589793 * self.frequency_hz
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One number of an effect.
+
+    Attributes
+    ----------
+    name : str
+        With its unit, as in the vocabulary.
+    low, high : float
+    """
+
+    name: str
+    low: float
+    high: float
+
+
+Numbers = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One kind of missing physics.
+
+    Attributes
+    ----------
+    name, block, equation : str
+    parameters : tuple of EffectParameter
+    starts : callable
+        (surroundings) → sets of numbers to start from, each small enough to leave the simulation running.
+    extension : callable
+        (numbers, surroundings, channel) → what it adds to the simulation.
+    look_alikes : tuple of str
+        Effects that the same recordings may show.
+    separated_by : str
+        The experiment that tells it from them.
+    needs : callable
+        (surroundings) → whether it can act there.
+    places : callable
+        (surroundings) → channels on which it may act; one empty name where it acts on none.
+    """
+
+    name: str
+    block: str
+    equation: str
+    parameters: tuple[EffectParameter, ...]
+    starts: Callable[[Surroundings], Iterable[Numbers]]
+    extension: Callable[[Numbers, Surroundings, str], Extension]
+    look_alikes: tuple[str, ...] = ()
+    separated_by: str = ""
+    needs: Callable[[Surroundings], bool] = lambda surroundings: True
+    places: Callable[[Surroundings], Sequence[str]] = lambda surroundings: [""]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at a place.
+
+    Attributes
+    ----------
+    effect : Effect
+    surroundings : Surroundings
+    channel : str
+        Of sensor effects; empty otherwise.
+    """
+
+    effect: Effect
+    surroundings: Surroundings
+    channel: str = ""
+
+    @property
+    def key(self) -> str:
+        """Name that tells candidates of one case apart."""
+        return ".".join(part for part in (self.effect.block, self.effect.name, self.channel) if part)
+
+    def starts(self) -> list[dict[str, float]]:
+        """Sets of numbers to start from, named as in a fit."""
+        return [
+            {f"{self.key}.{name}": value for name, value in numbers.items()}
+            for numbers in self.effect.starts(self.surroundings)
+        ]
+
+    def scale(self, parameter: str) -> float:
+        """Size of a parameter, to count its steps in."""
+        sizes = [abs(start[f"{self.key}.{parameter}"]) for start in self.starts()]
+        return max(max(sizes, default=1.0), 1e-12)
+
+    def extension(self, numbers: Numbers) -> Extension:
+        """What it adds, with these numbers."""
+        added = self.effect.extension(numbers, self.surroundings, self.channel)
+        key = ((self.key, *sorted(numbers.items())),)
+        return Extension(added.terms, added.liquid, added.faults, key)
+
+
+_EFFECTS: dict[str, Effect] = {}
+
+
+def register(effect: Effect) -> Effect:
+    """Make an effect known; returns it.
+
+    Raises
+    ------
+    InputError
+        If its block is none, or another effect has its name.
+    """
+    if effect.block not in BLOCKS:
+        raise InputError(f"effect {effect.name}: block", got=repr(effect.block), allowed=", ".join(BLOCKS))
+    if _EFFECTS.setdefault(f"{effect.block}.{effect.name}", effect) is not effect:
+        raise InputError(f"effect {effect.name}", got="a name that is taken", remedy="choose another name")
+    return effect
+
+
+def known_effects() -> list[Effect]:
+    """All effects, in the order in which they were registered."""
+    return list(_EFFECTS.values())
+
+
+def candidates(surroundings: Surroundings) -> list[Candidate]:
+    """Every effect at every place where it can act.
+
+    Parameters
+    ----------
+    surroundings : Surroundings
+    """
+    found = []
+    for effect in known_effects():
+        if not effect.needs(surroundings):
+            continue
+        places = effect.places(surroundings)
+        found += [Candidate(effect, surroundings, place) for place in places]
+    return found

@@ -1,0 +1,144 @@
+"""A case folder: one rig and its recordings, grouped into tests and their repeats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import xarray as xr
+
+from sloshlab.errors import InputError
+from sloshlab.recording import RunAttributes, read_recording, run_attributes
+from sloshlab.rig import Rig
+
+MOST_RUNS: Final = 200
+_SAME_TEST: Final = (
+    "experiment",
+    "configuration",
+    "initial_displacement_m",
+    "acceleration_g",
+    "sweep_start_hz",
+    "sweep_rate_octave_per_s",
+)
+_LEVELS_AGREE: Final = 0.1
+_LARGEST_CASE_BYTES: Final = 2 * 2**30
+
+
+@dataclass(frozen=True, eq=False)
+class CaseRun:
+    """One recording of a case.
+
+    Attributes
+    ----------
+    name : str
+        File name without its ending.
+    recording : xarray.Dataset
+        In SI units.
+    attributes : RunAttributes
+    """
+
+    name: str
+    recording: xr.Dataset
+    attributes: RunAttributes
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it starts from a release and nothing drives it."""
+        return self.attributes.experiment in ("beam_free", "sdof_free")
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the recording."""
+        return float(self.recording.sizes["time"] / self.attributes.sampling_rate_hz)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A rig and what was recorded on it.
+
+    Attributes
+    ----------
+    name : str
+    folder : Path
+    rig : Rig
+    runs : tuple of CaseRun
+        In the order of their names.
+    """
+
+    name: str
+    folder: Path
+    rig: Rig
+    runs: tuple[CaseRun, ...]
+
+    def tests(self) -> list[tuple[CaseRun, ...]]:
+        """Runs of one test together: those that share everything but `repeat`, and have the same level."""
+        groups: list[list[CaseRun]] = []
+        for run in self.runs:
+            for group in groups:
+                if _same_test(group[0], run):
+                    group.append(run)
+                    break
+            else:
+                groups.append([run])
+        return [tuple(group) for group in groups]
+
+
+def read_case(folder: str | Path) -> Case:
+    """Read ``rig.toml`` and ``recordings/*.nc`` of a case folder.
+
+    Parameters
+    ----------
+    folder : path
+
+    Raises
+    ------
+    InputError
+        If the folder is no case, or holds more than can be judged.
+    """
+    path = Path(folder)
+    rig_file = path / "rig.toml"
+    if not rig_file.is_file():
+        raise InputError(
+            f"case {path}", got="no rig.toml", allowed="rig.toml and recordings/*.nc", remedy="name a case folder"
+        )
+    files = sorted((path / "recordings").glob("*.nc"))
+    if not 1 <= len(files) <= MOST_RUNS:
+        raise InputError(f"case {path}", got=f"{len(files)} recordings", allowed=f"1 … {MOST_RUNS}")
+    rig = Rig.from_toml(rig_file)
+    runs, n_bytes = [], 0
+    for file in files:
+        recording = read_recording(file)
+        n_bytes += recording.nbytes
+        if n_bytes > _LARGEST_CASE_BYTES:
+            raise InputError(
+                f"case {path}", got="more than 2 GiB of samples", allowed="2 GiB", remedy="leave runs out"
+            )
+        runs.append(CaseRun(file.stem, recording, run_attributes(recording)))
+    return Case(path.resolve().name, path, rig, tuple(runs))
+
+
+def _same_test(one: CaseRun, other: CaseRun) -> bool:
+    if any(getattr(one.attributes, name) != getattr(other.attributes, name) for name in _SAME_TEST):
+        return False
+    if one.recording.sizes["time"] != other.recording.sizes["time"]:
+        return False
+    return bool(abs(np.log(max(level(one), 1e-300) / max(level(other), 1e-300))) < _LEVELS_AGREE)
+
+
+def level(run: CaseRun) -> float:
+    """How violent a run is: RMS of its mean acceleration signal [m/s²], or of what it has instead.
+
+    Parameters
+    ----------
+    run : CaseRun
+    """
+    names = [str(name) for name in run.recording.data_vars]
+    for quantity in ("acceleration", "displacement", "velocity", "force"):
+        chosen: Sequence[str] = [name for name in names if name.startswith(quantity)]
+        if chosen:
+            values = [np.nanstd(np.asarray(run.recording[name].values, np.float64)) for name in chosen]
+            return float(np.mean(values))
+    return 0.0

@@ -1,0 +1,3 @@
+"""Effects of the excitation: what the base does beyond the motion that is measured at it."""
+
+from __future__ import annotations

@@ -1,0 +1,79 @@
+"""An effect that is one more force of the twin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
+from sloshlab.diagnosis.extension import Extension
+from sloshlab.twin.terms import ForceKind
+
+
+def has_structure(surroundings: Surroundings) -> bool:
+    """Whether there is a structure to act on."""
+    return surroundings.twin.structure is not None
+
+
+def force_effect(
+    kind: ForceKind,
+    block: str,
+    starts: Callable[[Surroundings], Iterable[Numbers]],
+    *,
+    name: str = "",
+    fixed: Callable[[Surroundings], Mapping[str, float]] | None = None,
+    fitted: tuple[str, ...] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    look_alikes: tuple[str, ...] = (),
+    separated_by: str = "",
+    needs: Callable[[Surroundings], bool] | None = None,
+) -> Effect:
+    """Register a force of the twin as an effect.
+
+    Parameters
+    ----------
+    kind : ForceKind
+    block : {"structure", "tank"}
+    starts : callable
+        (surroundings) → sets of numbers to start from.
+    fixed : callable, optional
+        (surroundings) → numbers that are not fitted.
+    fitted : tuple of str
+        Names of those that are; all by default.
+    name : str, optional
+        That of the kind by default.
+    bounds : mapping, optional
+        Narrower ones than those of the kind.
+    look_alikes, separated_by, needs
+        As of `Effect`.
+
+    Examples
+    --------
+    >>> from sloshlab.twin.structure_forces import QUADRATIC_DRAG
+    >>> [parameter.name for parameter in QUADRATIC_DRAG.parameters]
+    ['drag_n_s2_per_m2']
+    """
+
+    def extension(numbers: Numbers, surroundings: Surroundings, channel: str) -> Extension:
+        del channel
+        known = fixed(surroundings) if fixed is not None else {}
+        return Extension(terms=(kind(place=block, **{**known, **numbers}),))
+
+    narrower = bounds or {}
+    parameters = tuple(
+        EffectParameter(parameter.name, *narrower.get(parameter.name, (parameter.low, parameter.high)))
+        for parameter in kind.parameters
+        if not fitted or parameter.name in fitted
+    )
+    return register(
+        Effect(
+            name or kind.name,
+            block,
+            kind.equation,
+            parameters,
+            starts,
+            extension,
+            look_alikes,
+            separated_by,
+            needs or (has_structure if block == "structure" else lambda surroundings: True),
+        )
+    )

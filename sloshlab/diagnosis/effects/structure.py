@@ -1,0 +1,166 @@
+"""Effects of the structure: friction, losses, springs, masses, modes."""
+
+from __future__ import annotations
+
+from sloshlab.diagnosis.candidate import Numbers, Surroundings
+from sloshlab.diagnosis.effects.force_effect import force_effect
+from sloshlab.twin.rate_independent_forces import HYSTERESIS, STRUCTURAL_DAMPING
+from sloshlab.twin.structure_forces import (
+    ASYMMETRIC_FRICTION,
+    CLEARANCE,
+    CONSTANT_FORCE,
+    COULOMB_FRICTION,
+    CUBIC_STIFFNESS,
+    MASS_ERROR,
+    MISSING_MODE,
+    QUADRATIC_DRAG,
+    QUADRATIC_STIFFNESS,
+    STIFFNESS_CHANGE,
+    STRIBECK_FRICTION,
+    VISCOUS_DAMPING,
+)
+
+_OTHER_LEVELS = "decays or sweeps at two or more amplitudes"
+
+
+def _stiffness(at: Surroundings) -> float:
+    return at.moving_mass_kg * at.omega**2
+
+
+VISCOUS = force_effect(
+    VISCOUS_DAMPING,
+    "structure",
+    lambda at: [{"damping_n_s_per_m": 0.01 * at.moving_mass_kg * at.omega}],
+    bounds={"damping_n_s_per_m": (0.0, 1e4)},
+    look_alikes=("structural_damping", "coulomb_friction", "sensor_delay"),
+    separated_by=_OTHER_LEVELS + ", and at two frequencies",
+)
+COULOMB = force_effect(
+    COULOMB_FRICTION,
+    "structure",
+    lambda at: [{"force_n": share * at.force_n} for share in (0.003, 0.02)],
+    look_alikes=("viscous_damping", "structural_damping", "stribeck_friction", "asymmetric_friction"),
+    separated_by=_OTHER_LEVELS + ", down to rest",
+)
+ASYMMETRIC = force_effect(
+    ASYMMETRIC_FRICTION,
+    "structure",
+    lambda at: [
+        {"force_up_n": 0.015 * at.force_n, "force_down_n": 0.005 * at.force_n},
+        {"force_up_n": 0.005 * at.force_n, "force_down_n": 0.015 * at.force_n},
+    ],
+    look_alikes=("coulomb_friction + constant_force",),
+    separated_by="none: the two are the same force; measure the static rest position with the friction taken off",
+)
+STRIBECK = force_effect(
+    STRIBECK_FRICTION,
+    "structure",
+    lambda at: [
+        {
+            "coulomb_n": 0.01 * at.force_n,
+            "static_n": 0.02 * at.force_n,
+            "stribeck_velocity_m_per_s": share * at.velocity_m_per_s,
+        }
+        for share in (0.05, 0.2)
+    ],
+    look_alikes=("coulomb_friction",),
+    separated_by="slow motion about the Stribeck velocity",
+)
+DRAG = force_effect(
+    QUADRATIC_DRAG,
+    "structure",
+    lambda at: [{"drag_n_s2_per_m2": 0.01 * at.force_n / at.velocity_m_per_s**2}],
+    look_alikes=("viscous_damping",),
+    separated_by=_OTHER_LEVELS,
+)
+STRUCTURAL = force_effect(
+    STRUCTURAL_DAMPING,
+    "structure",
+    lambda at: [{"loss_factor": 0.01}],
+    fixed=lambda at: {"stiffness_n_per_m": _stiffness(at)},
+    fitted=("loss_factor",),
+    look_alikes=("viscous_damping", "coulomb_friction"),
+    separated_by="the same amplitude at two frequencies",
+)
+
+
+def _bouc_wen(at: Surroundings) -> list[Numbers]:
+    stiffness = 0.05 * _stiffness(at)
+    return [
+        {
+            "stiffness_n_per_m": stiffness,
+            "beta_gamma": 0.5 / (share * at.displacement_m),
+            "beta_delta": 0.5 / (share * at.displacement_m),
+        }
+        for share in (0.1, 0.5)
+    ]
+
+
+BOUC_WEN = force_effect(
+    HYSTERESIS,
+    "structure",
+    _bouc_wen,
+    fitted=("stiffness_n_per_m", "beta_gamma", "beta_delta"),
+    look_alikes=("coulomb_friction", "structural_damping"),
+    separated_by="slow loops of several amplitudes",
+)
+CUBIC = force_effect(
+    CUBIC_STIFFNESS,
+    "structure",
+    lambda at: [{"stiffness_n_per_m3": sign * 0.03 * at.force_n / at.displacement_m**3} for sign in (1, -1)],
+    look_alikes=("quadratic_stiffness", "clearance"),
+    separated_by="a larger range of amplitudes on both sides of rest",
+)
+QUADRATIC = force_effect(
+    QUADRATIC_STIFFNESS,
+    "structure",
+    lambda at: [{"stiffness_n_per_m2": sign * 0.03 * at.force_n / at.displacement_m**2} for sign in (1, -1)],
+    look_alikes=("cubic_stiffness",),
+    separated_by="a larger range of amplitudes on both sides of rest",
+)
+STIFFNESS = force_effect(
+    STIFFNESS_CHANGE,
+    "structure",
+    lambda at: [{"stiffness_n_per_m": sign * 0.03 * _stiffness(at)} for sign in (1, -1)],
+    look_alikes=("mass_error",),
+    separated_by="a known mass added to the tank",
+)
+GAP = force_effect(
+    CLEARANCE,
+    "structure",
+    lambda at: [
+        {"gap_m": share * at.displacement_m, "stiffness_n_per_m": 0.2 * _stiffness(at)}
+        for share in (0.2, 0.5, 0.8)
+    ],
+    look_alikes=("cubic_stiffness",),
+    separated_by="amplitudes just below and above the gap",
+)
+MODE = force_effect(
+    MISSING_MODE,
+    "structure",
+    lambda at: [
+        {
+            "frequency_hz": ratio * at.frequency_hz,
+            "damping_ratio": 0.02,
+            "participation": 0.02 * at.moving_mass_kg,
+        }
+        for ratio in (0.6, 1.6, 2.5, 4.0)
+    ],
+    look_alikes=("mass_error", "stiffness_change"),
+    separated_by="a sweep over the missing mode's frequency",
+)
+MASS = force_effect(
+    MASS_ERROR,
+    "structure",
+    lambda at: [{"mass_kg": sign * 0.03 * at.moving_mass_kg} for sign in (1, -1)],
+    bounds={"mass_kg": (-10.0, 10.0)},
+    look_alikes=("stiffness_change", "sensor_gain"),
+    separated_by="a known mass added to the tank",
+)
+OFFSET = force_effect(
+    CONSTANT_FORCE,
+    "structure",
+    lambda at: [{"force_n": sign * 0.01 * at.force_n} for sign in (1, -1)],
+    look_alikes=("asymmetric_friction", "quadratic_stiffness"),
+    separated_by="the static rest position",
+)

@@ -1,0 +1,227 @@
+"""Effects of the tank and its liquid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
+from sloshlab.diagnosis.effects.force_effect import force_effect
+from sloshlab.diagnosis.extension import Extension
+from sloshlab.twin.liquid_effects import AIR_CUSHION, FARADAY_WAVE, LATERAL_MODE, LIQUID_DAMPING, LIQUID_LOSS
+from sloshlab.twin.structure_forces import COULOMB_FRICTION, MASS_ERROR, QUADRATIC_DRAG, VISCOUS_DAMPING
+from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS
+from sloshlab.twin.terms import Term
+
+_LEVELS = "decays or sweeps at accelerations below and above the threshold"
+
+
+def _liquid_force(at: Surroundings) -> float:
+    return at.rig.liquid_mass_kg * at.acceleration_m_per_s2
+
+
+def _largest_g(at: Surroundings) -> float:
+    return at.acceleration_m_per_s2 / GRAVITY_M_PER_S2
+
+
+VISCOUS = force_effect(
+    VISCOUS_DAMPING,
+    "tank",
+    lambda at: [{"damping_n_s_per_m": 0.2 * _liquid_force(at) / at.velocity_m_per_s}],
+    bounds={"damping_n_s_per_m": (0.0, 1e4)},
+    look_alikes=("quadratic_drag", "coulomb_friction", "sensor_delay"),
+    separated_by="two or more amplitudes and frequencies",
+)
+COULOMB = force_effect(
+    COULOMB_FRICTION,
+    "tank",
+    lambda at: [{"force_n": 0.1 * _liquid_force(at)}],
+    look_alikes=("viscous_damping",),
+    separated_by="two or more amplitudes",
+)
+DRAG = force_effect(
+    QUADRATIC_DRAG,
+    "tank",
+    lambda at: [{"drag_n_s2_per_m2": 0.2 * _liquid_force(at) / at.velocity_m_per_s**2}],
+    look_alikes=("viscous_damping", "liquid_sloshing"),
+    separated_by="two or more amplitudes",
+)
+MASS = force_effect(
+    MASS_ERROR,
+    "tank",
+    lambda at: [{"mass_kg": sign * 0.1 * at.rig.liquid_mass_kg} for sign in (1, -1)],
+    bounds={"mass_kg": (-10.0, 10.0)},
+    look_alikes=("effective_mass", "sensor_gain", "stiffness_change"),
+    separated_by="a known mass added to the tank, and a run with frozen liquid",
+)
+EFFECTIVE = force_effect(
+    EFFECTIVE_MASS,
+    "tank",
+    lambda at: [{"beta": sign * 0.1} for sign in (1, -1)],
+    fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
+    fitted=("beta",),
+    look_alikes=("mass_error",),
+    separated_by="runs with frozen and moving liquid, at several amplitudes",
+)
+
+
+def _damping(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
+    del channel
+    damper = LIQUID_DAMPING(
+        liquid_mass_kg=at.rig.liquid_mass_kg, start_frequency_hz=at.frequency_hz, **dict(numbers)
+    )
+    return Extension(terms=(damper,))
+
+
+SLOSHING = register(
+    Effect(
+        "liquid_sloshing",
+        "tank",
+        "−(m_l/π) Ω W̄(â) v; W̄ rises from nothing at the threshold to its peak at twice the threshold",
+        (EffectParameter("threshold_g", 0.02, 20.0), EffectParameter("peak_w_bar", 0.0, 20.0)),
+        lambda at: [{"threshold_g": share * _largest_g(at), "peak_w_bar": 0.5} for share in (0.1, 0.3, 0.6)],
+        _damping,
+        ("viscous_damping", "quadratic_drag"),
+        _LEVELS,
+    )
+)
+
+
+def _changed_damping(change: Callable[[Term, Numbers, Surroundings], Term]) -> Callable[..., Extension]:
+    """What it makes of the dampers of the liquid that are there."""
+
+    def extension(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
+        del channel
+
+        def liquid(terms: tuple[Term, ...]) -> tuple[Term, ...]:
+            return tuple(
+                change(_as_liquid_damping(term, at), numbers, at)
+                if term.name in ("viscous_damping", "liquid_damping")
+                else term
+                for term in terms
+            )
+
+        return Extension(liquid=liquid)
+
+    return extension
+
+
+def _as_liquid_damping(term: Term, at: Surroundings) -> Term:
+    if term.name == "liquid_damping":
+        return term
+    return LIQUID_DAMPING(
+        damping_n_s_per_m=max(term.values["damping_n_s_per_m"], 0.0),
+        liquid_mass_kg=at.rig.liquid_mass_kg,
+        start_frequency_hz=at.frequency_hz,
+    )
+
+
+def _damps(at: Surroundings) -> bool:
+    return any(term.place == "tank" and term.name == "viscous_damping" for term in at.twin.terms)
+
+
+DELAY = register(
+    Effect(
+        "breakup_delay",
+        "tank",
+        "the damping of the liquid times s, ṡ = (1 − s)/τ while it is shaken beyond 1 g",
+        (EffectParameter("time_constant_s", 2e-3, 20.0),),
+        lambda at: [{"time_constant_s": n / at.frequency_hz} for n in (1.0, 5.0)],
+        _changed_damping(lambda term, numbers, at: term.changed(time_constant_s=numbers["time_constant_s"])),
+        ("high_g_saturation",),
+        "a sudden start at constant amplitude",
+        _damps,
+    )
+)
+SATURATION = register(
+    Effect(
+        "high_g_saturation",
+        "tank",
+        "the damping of the liquid times (a_s/â)² beyond a_s: work per cycle stops growing",
+        (EffectParameter("threshold_g", 0.02, 50.0),),
+        lambda at: [{"threshold_g": share * _largest_g(at)} for share in (0.3, 0.7)],
+        _changed_damping(lambda term, numbers, at: term.changed(saturation_g=numbers["threshold_g"])),
+        ("breakup_delay", "liquid_sloshing"),
+        _LEVELS,
+        _damps,
+    )
+)
+
+
+def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
+    del channel
+    height = at.rig.tank.height_m
+    gap = min(numbers["gap_m"], 0.98 * height)
+    ball = BOUNCING_BALL(
+        radius_m=0.5 * (height - gap),
+        stiffness_n_per_m=numbers["stiffness_n_per_m"],
+        damping_kg_per_s=numbers["damping_kg_per_s"],
+        hardening_per_m=0.0,
+        beta=0.0,
+        liquid_mass_kg=at.rig.liquid_mass_kg,
+        height_m=height,
+    )
+    return Extension(terms=(ball,))
+
+
+IMPACT = register(
+    Effect(
+        "ceiling_impact",
+        "tank",
+        "the liquid as one mass that flies between floor and ceiling and meets them through spring and damper",
+        (
+            EffectParameter("gap_m", 1e-4, 1.0),
+            EffectParameter("stiffness_n_per_m", 500.0, 1e7),
+            EffectParameter("damping_kg_per_s", 0.0, 1e4),
+        ),
+        lambda at: [
+            {
+                "gap_m": (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
+                "stiffness_n_per_m": at.rig.liquid_mass_kg * (2 * 3.14159 * 40) ** 2,
+                "damping_kg_per_s": share * at.rig.liquid_mass_kg * 2 * 3.14159 * 40,
+            }
+            for share in (0.2, 0.8)
+        ],
+        _impact,
+        ("liquid_sloshing", "clearance"),
+        "accelerations below and above 1 g, forces sampled fast",
+    )
+)
+LATERAL = force_effect(
+    LATERAL_MODE,
+    "tank",
+    lambda at: [
+        {"frequency_hz": ratio * at.frequency_hz, "mass_kg": 0.2 * at.rig.liquid_mass_kg}
+        for ratio in (0.3, 0.7, 1.4)
+    ],
+    fitted=("frequency_hz", "mass_kg"),
+    look_alikes=("missing_mode",),
+    separated_by="a slow sweep over its frequency at small amplitude",
+)
+FARADAY = force_effect(
+    FARADAY_WAVE,
+    "tank",
+    lambda at: [{"frequency_hz": 0.5 * at.frequency_hz, "growth": 0.5}],
+    fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
+    fitted=("frequency_hz", "growth"),
+    separated_by="spectra at half the frequency below and above the threshold",
+)
+LOSS = force_effect(
+    LIQUID_LOSS,
+    "tank",
+    lambda at: [{"rate_kg_per_s": 0.1 * at.rig.liquid_mass_kg / at.longest_run_s}],
+    look_alikes=("mass_error", "sensor_drift"),
+    separated_by="the same test at the beginning and at the end of the day",
+)
+CUSHION = force_effect(
+    AIR_CUSHION,
+    "tank",
+    lambda at: [{"stiffness_n_per_m": at.rig.liquid_mass_kg * (ratio * at.omega) ** 2} for ratio in (3.0, 8.0)],
+    fixed=lambda at: {
+        "liquid_mass_kg": at.rig.liquid_mass_kg,
+        "gap_m": (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
+    },
+    fitted=("stiffness_n_per_m",),
+    look_alikes=("effective_mass", "lateral_mode"),
+    separated_by="two pressures of the gas",
+)

@@ -1,0 +1,401 @@
+"""From a case to fitted explanations, each judged on runs that chose nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
+from sloshlab.diagnosis.case import Case, CaseRun
+from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.force_surface import surface_effect
+from sloshlab.diagnosis.free_run_fit import (
+    FreeRunFit,
+    FreeRunProblem,
+    extension_of,
+    fitted,
+    huber_cost,
+    robust_weights,
+)
+from sloshlab.diagnosis.observations import Observation, observations, with_scatter, with_typical_scatter
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.split import Split, split
+from sloshlab.errors import SloshlabError
+from sloshlab.recording import channels
+
+FloatArray = NDArray[np.float64]
+_LEAST_PREDICTED: Final = 8.0
+_MOST_FITTED: Final = 10
+_SOFT: Final = 0.1
+Told = Callable[[str, int, int], None]
+
+assert effects.__all__  # importing the vocabulary makes it known
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A simulation with some effects, fitted, and how it does on runs that chose nothing.
+
+    Attributes
+    ----------
+    fit : FreeRunFit
+    held_out : float
+        Sum of squares of the weighted residuals of the held-out runs, large ones counted less.
+    held_out_rms : float
+        Root mean square of the weighted residuals where the recording stands out of the noise.
+    """
+
+    fit: FreeRunFit
+    held_out: float
+    held_out_rms: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its effects, sorted."""
+        return tuple(sorted(one.effect.name for one in self.fit.candidates))
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Blocks, names and channels of its effects."""
+        return tuple(one.key for one in self.fit.candidates)
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """Everything that a verdict is made of.
+
+    Attributes
+    ----------
+    case : Case
+    model : RigModel
+    split : Split
+    surroundings : Surroundings
+    fitting, held_out : list of list of Observation
+    believed, retuned : Explanation
+    explanations : list of Explanation
+        With one effect or more, in the order in which they were tried.
+    ceilings : list of Explanation
+    failed : dict
+        Candidates that could not be fitted, and why.
+    screened : dict
+        Candidates whose first step in free-running simulation promised too little, and how much.
+    """
+
+    case: Case
+    model: RigModel
+    split: Split
+    surroundings: Surroundings
+    fitting: list[list[Observation]]
+    held_out: list[list[Observation]]
+    believed: Explanation
+    retuned: Explanation
+    explanations: list[Explanation]
+    ceilings: list[Explanation]
+    failed: dict[str, str]
+    screened: dict[str, float]
+
+    @property
+    def n_fitting(self) -> int:
+        """Coefficients of the fitting runs."""
+        return sum(one.spectra.size for run in self.fitting for one in run)
+
+    @property
+    def n_held_out(self) -> int:
+        """Coefficients of the held-out runs."""
+        return sum(one.spectra.size for run in self.held_out for one in run)
+
+
+def findings_of(case: Case, told: Told = lambda what, done, of: None) -> Findings:
+    """Retune, fit every candidate, add greedily, and find the ceiling.
+
+    Parameters
+    ----------
+    case : Case
+    told : callable, optional
+        Takes what is being done, how much of it is done, and how much there is.
+    """
+    model = RigModel(case.rig, case.folder, case.runs)
+    parts = split(case)
+    told("retuning the baseline", 0, 1)
+    weighted = _weighted_observations(case, model, parts)
+    fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
+    held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]]
+    search = _Search(case, model, parts, fitting, held_out, told)
+    return search.run()
+
+
+def _weighted_observations(case: Case, model: RigModel, parts: Split) -> dict[str, list[Observation]]:
+    """Observations of all runs, weighted by the scatter of repeats about a retuned baseline."""
+    plain = {run.name: observations(run, model.compared(run)) for run in case.runs}
+    fit, _ = fitted(
+        FreeRunProblem(model, [_loosened(plain[run.name]) for run in case.runs]), model.believed, n_iterations=5
+    )
+    weighted = dict(plain)
+    repeated: list[Observation] = []
+    alone: list[CaseRun] = []
+    for test in case.tests():
+        if len(test) < 2:
+            alone += test
+            continue
+        group = [plain[run.name] for run in test]
+        raw = [_raw_residual(model, observed, fit) for observed in group]
+        for run, observed in zip(test, with_scatter(group, raw), strict=True):
+            weighted[run.name] = observed
+            repeated += observed
+    for run in alone:
+        weighted[run.name] = with_typical_scatter(plain[run.name], repeated)
+    return weighted
+
+
+def _loosened(observed: Sequence[Observation]) -> list[Observation]:
+    """With five per cent of each channel added to its noise: a first fit must not depend on unknown noise."""
+    return [
+        Observation(
+            one.run,
+            one.channel,
+            one.keeps_mean,
+            one.known,
+            one.spectra,
+            one.variance + (0.05**2) * float(np.mean(one.spectra**2)),
+        )
+        for one in observed
+    ]
+
+
+def _raw_residual(model: RigModel, observed: Sequence[Observation], fit: FreeRunFit) -> dict[str, FloatArray]:
+    if not observed:
+        return {}
+    try:
+        readings = model.simulate(observed[0].run, fit.values, NOTHING)
+    except SloshlabError:
+        return {}
+    return {one.channel: one.residual(readings[one.channel]) * np.sqrt(one.variance) for one in observed}
+
+
+class _Search:
+    """One search, with what all of its fits share."""
+
+    def __init__(
+        self,
+        case: Case,
+        model: RigModel,
+        parts: Split,
+        fitting: list[list[Observation]],
+        held_out: list[list[Observation]],
+        told: Told,
+    ) -> None:
+        self.case, self.model, self.parts = case, model, parts
+        self.fitting, self.held_out, self.told = fitting, held_out, told
+        self.failed: dict[str, str] = {}
+        self.screened: dict[str, float] = {}
+        self.explanations: list[Explanation] = []
+
+    def run(self) -> Findings:
+        """The search itself."""
+        problem = FreeRunProblem(self.model, self.fitting)
+        believed_values = problem.values(problem.theta_of(self.model.believed))
+        at_believed = problem.residual(problem.theta_of(believed_values))
+        believed = self.judged(FreeRunFit((), believed_values, huber_cost(at_believed), huber_cost(at_believed)))
+        retuned_fit, jacobian = fitted(problem, believed_values, n_iterations=10)
+        retuned = self.judged(retuned_fit)
+        self.surroundings = self._surroundings(retuned_fit)
+        everything = candidates(self.surroundings)
+        self._one_more(retuned_fit, jacobian, everything, "fitting one effect")
+        self._add_greedily(everything)
+        ceilings = self._ceilings(retuned_fit)
+        return Findings(
+            self.case,
+            self.model,
+            self.parts,
+            self.surroundings,
+            self.fitting,
+            self.held_out,
+            believed,
+            retuned,
+            self.explanations,
+            ceilings,
+            self.failed,
+            self.screened,
+        )
+
+    def judged(self, fit: FreeRunFit) -> Explanation:
+        """A fit with its held-out residuals; only releases and offsets of those runs are fitted to them."""
+        shared = {name: value for name, value in fit.values.items() if not _belongs_to_a_run(name, self.case)}
+        problem = FreeRunProblem(self.model, self.held_out, (), {**shared})
+        problem.candidates = ()
+        problem = _WithEffects(self.model, self.held_out, fit.candidates, shared)
+        theta = problem.theta_of(fit.values)
+        if theta.size:
+            own, _ = fitted(problem, problem.values(theta), n_iterations=3)
+            theta = problem.theta_of(own.values)
+        residual = problem.residual(theta)
+        if not np.isfinite(residual).all():
+            return Explanation(fit, np.inf, np.inf)
+        informative = np.concatenate([one.informative.ravel() for run in problem.runs for one in run])
+        chosen = residual[informative] if informative.any() else residual
+        rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
+        return Explanation(fit, huber_cost(residual), rms)
+
+    def _one_more(
+        self, base: FreeRunFit, jacobian: FloatArray, pool: Sequence[Candidate], what: str
+    ) -> list[Explanation]:
+        """Fit each of some candidates beside what is in `base` already; the promising ones to the end."""
+        promising = self._screen(base, jacobian, pool, what)
+        values = base.values if base.candidates else self.model.believed
+        kept = []
+        for i, (candidate, start) in enumerate(promising):
+            self.told(f"{what}: {candidate.key}", i, len(promising))
+            problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
+            fit, _ = fitted(problem, {**values, **start}, n_iterations=6)
+            if fit.trouble:
+                self.failed[candidate.key] = fit.trouble
+                continue
+            kept.append(self.judged(fit))
+        self.explanations += kept
+        return kept
+
+    def _screen(
+        self, base: FreeRunFit, jacobian: FloatArray, pool: Sequence[Candidate], what: str
+    ) -> list[tuple[Candidate, dict[str, float]]]:
+        """Decrease of the cost that one Gauss–Newton step promises, per start of each candidate."""
+        problem = FreeRunProblem(self.model, self.fitting, base.candidates)
+        residual = problem.residual(problem.theta_of(base.values))
+        softness = problem.softness(_SOFT)
+        weights = softness * robust_weights(softness * residual, 10.0)
+        n = jacobian.shape[1]
+        weighted = jacobian * weights[:, None]
+        prior = np.diag(np.where(np.arange(n) < problem.n_baseline, 1.0, 0.0))
+        inverse = np.linalg.pinv(weighted.T @ weighted + prior)
+        promised = []
+        for i, candidate in enumerate(pool):
+            self.told(f"{what}: first look", i, len(pool))
+            if candidate.key in [one.key for one in base.candidates]:
+                continue
+            best: tuple[float, dict[str, float]] = (-1.0, {})
+            for start in candidate.starts():
+                extended = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
+                moved = extended.residual(extended.theta_of({**base.values, **start}))
+                if not np.isfinite(moved).all():
+                    continue
+                direction = weights * (moved - residual)
+                direction = direction - weighted @ (inverse @ (weighted.T @ direction))
+                size = float(direction @ direction)
+                along = float(direction @ (weights * residual))
+                gain = along**2 / size if size > 0 else 0.0
+                if gain > best[0]:
+                    factor = -along / size if size > 0 else 0.0
+                    best = (gain, _resized(candidate, start, factor))
+            if best[0] < 0:
+                self.failed[candidate.key] = "does not run from any start"
+                continue
+            promised.append((best[0], candidate, best[1]))
+        promised.sort(key=lambda one: -one[0])
+        top = promised[0][0] if promised else 0.0
+        chosen = []
+        for rank, (gain, candidate, start) in enumerate(promised):
+            if gain < max(_LEAST_PREDICTED, 0.02 * top) or rank >= _MOST_FITTED:
+                self.screened[candidate.key] = gain
+            else:
+                chosen.append((candidate, start))
+        return chosen
+
+    def _add_greedily(self, pool: Sequence[Candidate]) -> None:
+        """A second effect beside the best first one."""
+        if not self.explanations:
+            return
+        best = min(self.explanations, key=lambda one: one.fit.cost)
+        problem = FreeRunProblem(self.model, self.fitting, best.fit.candidates)
+        theta = problem.theta_of(best.fit.values)
+        at = problem.residual(theta)
+        jacobian = problem.jacobian(theta, at, range(theta.size))
+        self._one_more(best.fit, jacobian, pool, "fitting a second effect")
+
+    def _ceilings(self, retuned: FreeRunFit) -> list[Explanation]:
+        found = []
+        for i, block in enumerate(("structure", "tank")):
+            effect = surface_effect(block)
+            if not effect.needs(self.surroundings):
+                continue
+            self.told("finding what any force could explain", i, 2)
+            candidate = Candidate(effect, self.surroundings)
+            problem = FreeRunProblem(self.model, self.fitting, (candidate,))
+            fit, _ = fitted(problem, {**retuned.values, **candidate.starts()[0]}, n_iterations=5)
+            if not fit.trouble:
+                found.append(self.judged(fit))
+        return found
+
+    def _surroundings(self, fit: FreeRunFit) -> Surroundings:
+        """Sizes of the motion, from the retuned simulation of the fitting runs."""
+        largest = np.zeros(3)
+        frequencies = []
+        for observed in self.fitting:
+            run = observed[0].run
+            simulation = self.model._simulation(run, fit.values, NOTHING, ())
+            place = simulation.places[:, 1]
+            largest = np.maximum(largest, np.abs(place).max(axis=0))
+            rms = place.std(axis=0)
+            frequencies.append(rms[2] / max(rms[1], 1e-12) / (2 * np.pi))
+        twin = self.model.twin
+        mass = twin.carried_mass_kg
+        if twin.structure is not None:
+            mass = 1.0 / float((twin.structure.mode_shape**2 / twin.structure.masses_kg)[0])
+        return Surroundings(
+            rig=self.case.rig,
+            twin=twin,
+            displacement_m=float(largest[0]),
+            velocity_m_per_s=float(largest[1]),
+            acceleration_m_per_s2=float(largest[2]),
+            frequency_hz=float(np.median(frequencies)),
+            force_n=float(mass * largest[2]),
+            channels=_sizes(self.fitting, self.model),
+            driving=tuple(sorted({name for run in self.parts.fitting for name in self.model.driving(run)})),
+            sampling_rate_hz=self.fitting[0][0].run.attributes.sampling_rate_hz,
+            longest_run_s=max(observed[0].run.duration_s for observed in self.fitting),
+        )
+
+
+class _WithEffects(FreeRunProblem):
+    """Effects whose numbers are fixed; only what belongs to single runs is free."""
+
+    def __init__(
+        self,
+        model: RigModel,
+        runs: Sequence[Sequence[Observation]],
+        effects_: Sequence[Candidate],
+        fixed: dict[str, float],
+    ) -> None:
+        super().__init__(model, runs, (), fixed)
+        self.candidates = tuple(effects_)
+
+
+def _resized(candidate: Candidate, start: dict[str, float], factor: float) -> dict[str, float]:
+    """A start whose first number, the size of the effect, is as large as the first step says."""
+    del candidate
+    first = next(iter(start))
+    factor = min(max(factor, 0.1), 10.0)
+    return {**start, first: start[first] * factor} if len(start) == 1 else start
+
+
+def _belongs_to_a_run(name: str, case: Case) -> bool:
+    return any(name.endswith((f"release of {run.name}", f" in {run.name}")) for run in case.runs)
+
+
+def _sizes(fitting: Sequence[Sequence[Observation]], model: RigModel) -> dict[str, float]:
+    """Channels, compared and driving, with their RMS."""
+    found: dict[str, float] = {}
+    for observed in fitting:
+        run = observed[0].run
+        for name in (*[one.channel for one in observed], *model.driving(run)):
+            if name in channels(run.recording):
+                found[name] = max(found.get(name, 0.0), float(np.nanstd(run.recording[name].values)))
+    return found
+
+
+def explained_extension(explanation: Explanation):  # type: ignore[no-untyped-def]
+    """What an explanation adds to the baseline."""
+    return extension_of(explanation.fit.candidates, explanation.fit.values)

@@ -1,0 +1,72 @@
+"""What an effect adds to a simulation: forces, changed forces of the liquid, faults of sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.twin.terms import Term
+
+FloatArray = NDArray[np.float64]
+Reading = Callable[[FloatArray, float, Mapping[str, FloatArray], FloatArray], FloatArray]
+"""(values, sampling rate, other channels of the run, what was recorded) → values."""
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """What a channel makes of what it should show.
+
+    Attributes
+    ----------
+    channel : str
+    reading : callable
+        From the truth to what is recorded.
+    undone : callable or None
+        From what is recorded to the truth, for channels that drive the simulation; None where that is impossible.
+    key : tuple
+        Tells two faults apart.
+    """
+
+    channel: str
+    reading: Reading
+    undone: Reading | None
+    key: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Extension:
+    """Everything that a simulation has beyond its baseline.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        Forces that are added.
+    liquid : callable or None
+        Changes the baseline's forces of the liquid.
+    faults : tuple of SensorFault
+    key : tuple
+        Tells two extensions apart; names and numbers of all effects.
+    """
+
+    terms: tuple[Term, ...] = ()
+    liquid: Callable[[tuple[Term, ...]], tuple[Term, ...]] | None = None
+    faults: tuple[SensorFault, ...] = ()
+    key: tuple[Any, ...] = field(default=())
+
+    def __add__(self, other: Extension) -> Extension:
+        """Both together; the other's change of the liquid comes after this one's."""
+        liquid = self.liquid or other.liquid
+        if self.liquid is not None and other.liquid is not None:
+            first, second = self.liquid, other.liquid
+
+            def liquid(terms: tuple[Term, ...]) -> tuple[Term, ...]:
+                return second(first(terms))
+
+        return Extension(self.terms + other.terms, liquid, self.faults + other.faults, self.key + other.key)
+
+
+NOTHING = Extension()

@@ -1,0 +1,89 @@
+"""The best correction without a name: any force of two motions of a place, as a sum of Chebyshev polynomials.
+
+It is the ceiling that a named effect is compared with, and the model of what has no name.
+"""
+
+from __future__ import annotations
+
+from math import tanh
+
+from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings
+from sloshlab.diagnosis.extension import Extension
+from sloshlab.twin.law import ACCELERATION, DISPLACEMENT, VELOCITY, law
+from sloshlab.twin.terms import ForceKind, Parameter, register
+
+# the laws are compiled, so their arguments are described once, in sloshlab.twin.law
+# mypy: disable-error-code="no-untyped-def"
+
+DEGREE = 5
+_SHARP = 0.05
+
+
+@law
+def _surface(motion, parameters, memory, rates):
+    """Σ c_ij T_i(p) T_j(q) with i + j ≤ 5, and c tanh(q/0.05); p is x or a, q is v, both over their largest."""
+    p = motion[DISPLACEMENT] if parameters[2] == 0.0 else motion[ACCELERATION]
+    p = min(max(p / parameters[0], -1.0), 1.0)
+    q = min(max(motion[VELOCITY] / parameters[1], -1.0), 1.0)
+    force, at = parameters[3] * tanh(q / _SHARP), 4
+    before_p, now_p = 1.0, 1.0
+    for i in range(DEGREE + 1):
+        before_q, now_q = 1.0, 1.0
+        for j in range(DEGREE + 1 - i):
+            if i + j > 0:
+                force += parameters[at] * now_p * now_q
+                at += 1
+            after_q = q if j == 0 else 2 * q * now_q - before_q
+            before_q, now_q = now_q, after_q
+        after_p = p if i == 0 else 2 * p * now_p - before_p
+        before_p, now_p = now_p, after_p
+    return -force
+
+
+NAMES = ("sharp", *(f"c_{i}{j}" for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i) if i + j > 0))
+
+FORCE_SURFACE = register(
+    ForceKind(
+        "force_surface",
+        ("structure", "tank"),
+        (
+            Parameter("largest_first", "1", 1e-12, 1e12),
+            Parameter("largest_velocity_m_per_s", "m s-1", 1e-12, 1e6),
+            Parameter("first_is_acceleration", "1", 0.0, 1.0),
+            *(Parameter(name, "N", -1e6, 1e6) for name in NAMES),
+        ),
+        _surface,
+        uses_acceleration=True,
+        equation="−Σ c_ij T_i(p) T_j(v), p = x or a",
+    )
+)
+
+
+def surface_effect(block: str) -> Effect:
+    """A force of x and v at the structure, or of a and v at the tank; not part of the vocabulary."""
+    in_tank = block == "tank"
+
+    def extension(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
+        del channel
+        first = at.acceleration_m_per_s2 if in_tank else at.displacement_m
+        return Extension(
+            terms=(
+                FORCE_SURFACE(
+                    place=block,
+                    largest_first=1.1 * first,
+                    largest_velocity_m_per_s=1.1 * at.velocity_m_per_s,
+                    first_is_acceleration=float(in_tank),
+                    **numbers,
+                ),
+            )
+        )
+
+    return Effect(
+        f"any force of {'a and v' if in_tank else 'x and v'}",
+        block,
+        FORCE_SURFACE.equation,
+        tuple(EffectParameter(name, -1e6, 1e6) for name in NAMES),
+        lambda at: [dict.fromkeys(NAMES, 1e-4 * at.force_n)],
+        extension,
+        needs=lambda at: in_tank or at.twin.structure is not None,
+    )

@@ -1,0 +1,290 @@
+"""Parameters from free-running simulations: all runs together, what a laboratory knows kept in mind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.errors import SloshlabError
+
+FloatArray = NDArray[np.float64]
+_STEP: Final = 0.005
+_ROBUST: Final = 4.0
+_LARGEST_DAMPING: Final = 1e8
+N_THREADS: Final = 2
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRunFit:
+    """A fitted simulation.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        Effects beyond the baseline.
+    values : dict
+        Baseline parameters by name, and ``key.parameter`` of every candidate.
+    cost : float
+        Sum of squares of weighted residuals (large ones counted less) and of deviations from what is believed.
+    misfit : float
+        The part of the residuals.
+    covariance : ndarray, shape (n, n)
+        Of the free parameters in scaled values, in the order of `names`.
+    names : tuple of str
+    scales : ndarray, shape (n,)
+    n_simulations : int
+    trouble : str
+        Why there is no result; empty where there is one.
+    """
+
+    candidates: tuple[Candidate, ...]
+    values: dict[str, float]
+    cost: float
+    misfit: float
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    names: tuple[str, ...] = ()
+    scales: FloatArray = field(default_factory=lambda: np.zeros(0))
+    n_simulations: int = 0
+    trouble: str = ""
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of a parameter in its own unit."""
+        i = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)) * self.scales[i])
+
+
+class FreeRunProblem:
+    """Weighted residuals of one set of observations as a function of scaled parameters.
+
+    Parameters
+    ----------
+    model : RigModel
+    runs : sequence of sequences of Observation
+        Per run.
+    candidates : sequence of Candidate
+    fixed : mapping, optional
+        Baseline parameters that are not free.
+    """
+
+    def __init__(
+        self,
+        model: RigModel,
+        runs: Sequence[Sequence[Observation]],
+        candidates: Sequence[Candidate] = (),
+        fixed: Mapping[str, float] | None = None,
+    ) -> None:
+        self.model, self.runs, self.candidates = model, [run for run in runs if run], tuple(candidates)
+        self.fixed = dict(fixed or {})
+        present = {observation.run.name for run in self.runs for observation in run}
+        self._baseline = [
+            parameter
+            for parameter in model.parameters
+            if parameter.name not in self.fixed and _belongs(parameter.name, present, model)
+        ]
+        self.names = tuple(
+            [parameter.name for parameter in self._baseline]
+            + [f"{one.key}.{parameter.name}" for one in self.candidates for parameter in one.effect.parameters]
+        )
+        self.scales = np.array(
+            [parameter.tolerance for parameter in self._baseline]
+            + [one.scale(parameter.name) for one in self.candidates for parameter in one.effect.parameters]
+        )
+        self.centres = np.array(
+            [parameter.believed for parameter in self._baseline] + [0.0] * (len(self.names) - len(self._baseline))
+        )
+        self.n_baseline = len(self._baseline)
+        bounds = [(-np.inf, np.inf)] * self.n_baseline + [
+            (parameter.low, parameter.high) for one in self.candidates for parameter in one.effect.parameters
+        ]
+        self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
+        self.n_simulations = 0
+
+    def values(self, theta: FloatArray) -> dict[str, float]:
+        """Parameters by name in their own units."""
+        physical = np.clip(self.centres + theta * self.scales, self.low, self.high)
+        return {**self.fixed, **dict(zip(self.names, physical.tolist(), strict=True))}
+
+    def theta_of(self, values: Mapping[str, float]) -> FloatArray:
+        """Scaled parameters; those that are not given are as believed."""
+        known = np.array([values.get(name, centre) for name, centre in zip(self.names, self.centres, strict=True)])
+        return np.asarray((known - self.centres) / self.scales)
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
+        values = self.values(theta)
+        with ThreadPoolExecutor(N_THREADS) as pool:
+            parts = list(pool.map(lambda run: self._of_run(run, values), self.runs))
+        return np.concatenate(parts)
+
+    def _of_run(self, run: Sequence[Observation], values: Mapping[str, float]) -> FloatArray:
+        self.n_simulations += 1
+        try:
+            readings = self.model.simulate(run[0].run, values, extension_of(self.candidates, values))
+        except SloshlabError:
+            return np.full(sum(observation.spectra.size for observation in run), np.inf)
+        return np.concatenate([observation.residual(readings[observation.channel]).ravel() for observation in run])
+
+    def softness(self, share: float) -> FloatArray:
+        """Factors of the residuals as if all channels were known only to a share of their RMS."""
+        return np.concatenate(
+            [
+                np.sqrt(one.variance / (one.variance + share**2 * float(np.mean(one.spectra**2)))).ravel()
+                for run in self.runs
+                for one in run
+            ]
+        )
+
+    def jacobian(self, theta: FloatArray, at: FloatArray, columns: Sequence[int]) -> FloatArray:
+        """Derivatives of the residuals by some scaled parameters, by differences of simulations."""
+        found = np.empty((at.size, len(columns)))
+        for place, column in enumerate(columns):
+            step = _STEP if column < self.n_baseline else _STEP * max(abs(theta[column]), 0.05)
+            moved = theta.copy()
+            physical = self.centres[column] + (theta[column] + step) * self.scales[column]
+            moved[column] += step if physical <= self.high[column] else -step
+            difference = (self.residual(moved) - at) / (moved[column] - theta[column])
+            found[:, place] = difference if np.isfinite(difference).all() else 0.0
+        return found
+
+
+def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]):  # type: ignore[no-untyped-def]
+    """What the candidates add, with their numbers taken from the values."""
+    from sloshlab.diagnosis.extension import NOTHING
+
+    total = NOTHING
+    for one in candidates:
+        numbers = {parameter.name: values[f"{one.key}.{parameter.name}"] for parameter in one.effect.parameters}
+        total = total + one.extension(numbers)
+    return total
+
+
+def robust_weights(residual: FloatArray, limit: float = _ROBUST) -> FloatArray:
+    """Square roots of Huber's weights: a burst or a lost block counts with its size, not with its square."""
+    size = np.abs(residual)
+    return np.asarray(np.where(size > limit, np.sqrt(limit / np.maximum(size, 1e-300)), 1.0))
+
+
+def huber_cost(residual: FloatArray, limit: float = _ROBUST) -> float:
+    """Sum of squares, of which those beyond some standard deviations, four by default, grow only linearly."""
+    size = np.abs(residual)
+    return float(np.where(size > limit, 2 * limit * size - limit**2, size**2).sum())
+
+
+def _limit(residual: FloatArray) -> float:
+    """Far from the optimum residuals are large everywhere and none of them is a burst."""
+    return max(_ROBUST, 3.0 * float(np.sqrt(np.mean(residual**2))))
+
+
+def fitted(
+    problem: FreeRunProblem,
+    start: Mapping[str, float],
+    *,
+    n_iterations: int = 8,
+    known_jacobian: FloatArray | None = None,
+    tolerance: float = 1e-3,
+    shares: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 0.0),
+) -> tuple[FreeRunFit, FloatArray]:
+    """Levenberg–Marquardt; deviations of the baseline count against what is believed of it.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    start : mapping
+    n_iterations : int
+        At most, per stage.
+    known_jacobian : ndarray, shape (n_residuals, n_known), optional
+        Of the first parameters at a nearby place; it is then not made again.
+    tolerance : float
+        Of the relative decrease of the cost at which a stage ends.
+    shares : sequence of float
+        Stages. In each, every channel is believed to this share of its RMS only, so that details which jump with
+        the parameters, such as where friction stops a decay, do not hide the way; zero is the last one.
+
+    Returns
+    -------
+    fit : FreeRunFit
+    jacobian : ndarray, shape (n_residuals, n)
+        Unweighted, at the last place where it was made.
+    """
+    theta = problem.theta_of(start)
+    residual = problem.residual(theta)
+    n = theta.size
+    prior = np.where(np.arange(n) < problem.n_baseline, 1.0, 0.0)
+    if not np.isfinite(residual).all():
+        empty = FreeRunFit(
+            problem.candidates, problem.values(theta), np.inf, np.inf, trouble="does not run from its start"
+        )
+        return empty, np.zeros((residual.size, n))
+    jacobian, hessian = np.zeros((residual.size, n)), np.eye(n)
+    for share in shares:
+        softness = problem.softness(share)
+        damping = 1e-3
+        for iteration in range(n_iterations):
+            jacobian = _jacobian(problem, theta, residual, known_jacobian)
+            limit = _limit(softness * residual)
+            weights = softness * robust_weights(softness * residual, limit)
+            weighted = jacobian * weights[:, None]
+            hessian = weighted.T @ weighted + np.diag(prior)
+            gradient = weighted.T @ (weights * residual) + prior * theta
+
+            def cost(at: FloatArray, r: FloatArray, soft: FloatArray = softness, far: float = limit) -> float:
+                return huber_cost(soft * r, far) + float((prior * at**2).sum()) if np.isfinite(r).all() else np.inf
+
+            before = after = cost(theta, residual)
+            while damping < _LARGEST_DAMPING:
+                lift = np.diag(damping * np.maximum(np.diag(hessian), 1e-12))
+                tried = _within(problem, theta - np.linalg.solve(hessian + lift, gradient))
+                new = problem.residual(tried)
+                after = cost(tried, new)
+                if after < before:
+                    break
+                damping *= 8
+            if not after < before:
+                break
+            theta, residual = tried, new
+            damping = max(damping / 10, 1e-9)
+            if (before - after) / before < tolerance and iteration:
+                break
+    misfit = huber_cost(residual)
+    fit = FreeRunFit(
+        problem.candidates,
+        problem.values(theta),
+        misfit + float((prior * theta**2).sum()),
+        misfit,
+        np.linalg.pinv(hessian),
+        problem.names,
+        problem.scales,
+        problem.n_simulations,
+    )
+    return fit, jacobian
+
+
+def _jacobian(
+    problem: FreeRunProblem, theta: FloatArray, residual: FloatArray, known: FloatArray | None
+) -> FloatArray:
+    """Derivatives by all parameters, the first ones as they are known."""
+    n_known = 0 if known is None else known.shape[1]
+    rest = problem.jacobian(theta, residual, range(n_known, theta.size))
+    return rest if known is None else np.hstack([known, rest])
+
+
+def _within(problem: FreeRunProblem, theta: FloatArray) -> FloatArray:
+    low = (problem.low - problem.centres) / problem.scales
+    high = (problem.high - problem.centres) / problem.scales
+    return np.asarray(np.clip(theta, low, high))
+
+
+def _belongs(name: str, present: set[str], model: RigModel) -> bool:
+    """Whether a parameter matters to the runs that are fitted."""
+    for run in model.runs:
+        if name.endswith((f"release of {run.name}", f" in {run.name}")):
+            return run.name in present
+    return True

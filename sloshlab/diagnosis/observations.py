@@ -1,0 +1,218 @@
+"""Recorded channels as short-time spectra, each coefficient weighted by how well it repeats."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times_s, lapped_spectra
+
+FloatArray = NDArray[np.float64]
+BLOCK_S: Final = 0.5
+_INFORMATIVE: Final = 4.0
+_LEAST_SHARE: Final = 1e-4
+"""No channel is believed to better than this share of its RMS per coefficient; quantisation and rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """One channel of one run.
+
+    Attributes
+    ----------
+    run : CaseRun
+    channel : str
+    keeps_mean : bool
+        Whether the static part is compared too; not for channels whose zero means nothing.
+    known : ndarray of bool, shape (n,)
+        Samples that were neither lost nor clipped.
+    spectra : ndarray, shape (n_blocks, n_bands)
+        Of the recording.
+    variance : ndarray, shape (n_blocks, n_bands)
+        Of each coefficient, by what does not repeat.
+    """
+
+    run: CaseRun
+    channel: str
+    keeps_mean: bool
+    known: NDArray[np.bool_]
+    spectra: FloatArray
+    variance: FloatArray
+
+    @property
+    def n_bands(self) -> int:
+        """Coefficients per block."""
+        return self.spectra.shape[1]
+
+    @property
+    def frequencies_hz(self) -> FloatArray:
+        """Of the bands."""
+        return band_frequencies_hz(self.n_bands, self.run.attributes.sampling_rate_hz)
+
+    @property
+    def times_s(self) -> FloatArray:
+        """Of the blocks."""
+        return block_times_s(self.spectra.shape[0], self.n_bands, self.run.attributes.sampling_rate_hz)
+
+    @property
+    def informative(self) -> NDArray[np.bool_]:
+        """Coefficients in whose neighbourhood the recording stands out of what does not repeat."""
+        power = uniform_filter(self.spectra**2, (3, 3), mode="nearest")
+        return np.asarray(power > _INFORMATIVE * self.variance)
+
+    def of(self, values: FloatArray) -> FloatArray:
+        """Spectra of simulated values, treated as the recording was; samples beyond their end are zero."""
+        return _spectra(values, self.known, self.keeps_mean, self.n_bands)
+
+    def residual(self, values: FloatArray) -> FloatArray:
+        """Recorded minus simulated spectra in standard deviations, shape (n_blocks, n_bands)."""
+        return np.asarray((self.spectra - self.of(values)) / np.sqrt(self.variance))
+
+
+def observations(run: CaseRun, names: Sequence[str]) -> list[Observation]:
+    """Channels of a run, weighted by the noise of their sensors alone.
+
+    Parameters
+    ----------
+    run : CaseRun
+    names : sequence of str
+
+    Notes
+    -----
+    The noise of a sensor is `noise_std` where the recording states it, or what the quietest of bands near the
+    end of its spectrum shows; never less than 10⁻⁴ of the channel.
+    """
+    rate = run.attributes.sampling_rate_hz
+    n_bands = max(8, 2 * round(0.5 * BLOCK_S * rate))
+    found = []
+    for name in names:
+        variable = run.recording[name]
+        values = np.asarray(variable.values, np.float64)
+        known = np.isfinite(values) & ~_at_limits(values, variable.attrs)
+        if known.sum() < 2 * n_bands:
+            continue
+        keeps_mean = variable.attrs["quantity"] == "displacement"
+        spectra = _spectra(values, known, keeps_mean, n_bands)
+        stated = float(variable.attrs.get("noise_std", 0.0)) ** 2
+        white = _white_level(spectra)
+        least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
+        variance = np.full(spectra.shape, max(stated, white, least, 1e-300))
+        found.append(Observation(run, name, keeps_mean, known, spectra, variance))
+    return found
+
+
+def with_scatter(
+    group: Sequence[Sequence[Observation]], residuals: Sequence[Mapping[str, FloatArray]]
+) -> list[list[Observation]]:
+    """Observations of the repeats of one test, weighted by how their residuals scatter.
+
+    Parameters
+    ----------
+    group : sequence of sequences of Observation
+        One sequence per repeat, at least two.
+    residuals : sequence of mappings
+        Unweighted residual spectra per channel, of the same repeats and one model.
+
+    Notes
+    -----
+    The scatter about the mean of the repeats is averaged over three blocks and nine bands; it is never taken as less
+    than the noise of the sensor.
+    """
+    n = len(group)
+    scatter: dict[str, FloatArray] = {}
+    for observation in group[0]:
+        name = observation.channel
+        parts = [one[name] for one in residuals if name in one and one[name].shape == observation.spectra.shape]
+        if len(parts) != n:
+            continue
+        stacked = np.stack(parts)
+        about = ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0) / (n - 1)
+        scatter[name] = uniform_filter(about, (3, 9), mode="nearest")
+    return [
+        [
+            _weighted(observation, np.maximum(scatter[observation.channel], _floor(observation)))
+            if observation.channel in scatter
+            else observation
+            for observation in one
+        ]
+        for one in group
+    ]
+
+
+def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observation]) -> list[Observation]:
+    """Observations of a test that was not repeated, weighted as its channels scatter elsewhere.
+
+    The scatter there is taken as noise that is always there, per band, and a share of the signal.
+
+    Parameters
+    ----------
+    target : sequence of Observation
+    sources : sequence of Observation
+        Of repeated tests.
+    """
+    weighted = []
+    for observation in target:
+        alike = [
+            one for one in sources if one.channel == observation.channel and one.n_bands == observation.n_bands
+        ]
+        if not alike:
+            weighted.append(observation)
+            continue
+        quiet = np.min([np.median(one.variance, axis=0) for one in alike], axis=0)
+        share = float(
+            np.median(
+                [one.variance[one.informative].sum() / (one.spectra**2)[one.informative].sum() for one in alike]
+            )
+        )
+        local = uniform_filter(observation.spectra**2, (3, 9), mode="nearest")
+        weighted.append(_weighted(observation, np.maximum(quiet[None, :], share * local)))
+    return weighted
+
+
+def _weighted(observation: Observation, variance: FloatArray) -> Observation:
+    return Observation(
+        observation.run,
+        observation.channel,
+        observation.keeps_mean,
+        observation.known,
+        observation.spectra,
+        np.maximum(variance, _floor(observation)),
+    )
+
+
+def _floor(observation: Observation) -> FloatArray:
+    """Variance by the sensor alone."""
+    return np.asarray(np.full(observation.variance.shape, observation.variance.min()))
+
+
+def _at_limits(values: FloatArray, attributes: Mapping[str, object]) -> NDArray[np.bool_]:
+    clipped = np.zeros(values.size, bool)
+    low, high = attributes.get("range_min"), attributes.get("range_max")
+    if isinstance(low, float | int):
+        clipped |= values <= float(low)
+    if isinstance(high, float | int):
+        clipped |= values >= float(high)
+    return clipped
+
+
+def _spectra(values: FloatArray, known: NDArray[np.bool_], keeps_mean: bool, n_bands: int) -> FloatArray:
+    masked = np.zeros(known.size)
+    n = min(known.size, values.size)
+    chosen = known[:n]
+    part = values[:n][chosen]
+    masked[:n][chosen] = part if keeps_mean or not part.size else part - part.mean()
+    return lapped_spectra(masked, n_bands)
+
+
+def _white_level(spectra: FloatArray) -> float:
+    """Variance per coefficient in the quietest stretch of bands above 0.3 of the sampling rate."""
+    upper = spectra[:, int(0.6 * spectra.shape[1]) :]
+    width = max(4, upper.shape[1] // 8)
+    levels = [float(np.median(upper[:, i : i + width] ** 2)) for i in range(0, upper.shape[1] - width + 1, width)]
+    return min(levels) / 0.4549  # the median of a squared normal number over its mean

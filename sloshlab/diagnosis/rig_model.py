@@ -1,0 +1,318 @@
+"""The twin of a rig as a diagnosis sees it: what its own parameters may be, and what its channels show in a run."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.extension import Extension, SensorFault
+from sloshlab.errors import AnalysisError
+from sloshlab.recording import channels
+from sloshlab.rig import Rig
+from sloshlab.twin.excitation import Excitation
+from sloshlab.twin.recorded_run import Drive, drive_of
+from sloshlab.twin.simulated_channels import true_channel
+from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.structure import Structure
+from sloshlab.twin.structure_forces import MASS_ERROR
+from sloshlab.twin.terms import Term
+from sloshlab.twin.twin import Twin
+
+FloatArray = NDArray[np.float64]
+STEPS_PER_PERIOD: Final = 12.0
+_STEPS_PER_FIRST_PERIOD: Final = 60.0
+_MOST_KEPT_RUNS: Final = 400
+
+
+@dataclass(frozen=True)
+class BaselineParameter:
+    """One number of the baseline that a laboratory knows only so well.
+
+    Attributes
+    ----------
+    name : str
+    believed : float
+    tolerance : float
+        Standard deviation of what it may be, in its own unit.
+    units : str
+    is_reading : bool
+        Whether it changes only what a channel reads, not the motion.
+    """
+
+    name: str
+    believed: float
+    tolerance: float
+    units: str = "1"
+    is_reading: bool = False
+
+
+class RigModel:
+    """The twin of a rig file.
+
+    Parameters
+    ----------
+    rig : Rig
+    folder : Path
+        Of the rig file.
+    runs : sequence of CaseRun
+
+    Raises
+    ------
+    InputError
+        If a run cannot drive the twin.
+    """
+
+    def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun]) -> None:
+        self.rig = rig
+        self.twin = Twin.from_rig(rig, folder=folder)
+        self.runs = tuple(runs)
+        self._drives: dict[tuple[Any, ...], Drive] = {}
+        self._truths: OrderedDict[tuple[Any, ...], dict[str, FloatArray]] = OrderedDict()
+        self._lock = threading.Lock()
+        for run in self.runs:
+            self._drive(run, ())
+        self.parameters = self._parameters()
+
+    @property
+    def believed(self) -> dict[str, float]:
+        """Values of all parameters as the laboratory believes them."""
+        return {parameter.name: parameter.believed for parameter in self.parameters}
+
+    def compared(self, run: CaseRun) -> list[str]:
+        """Channels of a run that the twin has a counterpart for and that do not alone drive it."""
+        drive = self._drive(run, ())
+        n = len(drive.channels)
+        names = [name for name in channels(run.recording) if run.recording[name].attrs["quantity"] != "voltage"]
+        return [
+            name
+            for name in names
+            if not (name in drive.channels and (n == 1 or name == "acceleration_root"))
+            and self._has_counterpart(run, name)
+        ]
+
+    def driving(self, run: CaseRun) -> tuple[str, ...]:
+        """Channels that drive the twin in a run."""
+        return self._drive(run, ()).channels
+
+    def simulate(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> dict[str, FloatArray]:
+        """What the channels of a run read.
+
+        Parameters
+        ----------
+        run : CaseRun
+        values : mapping
+            Of `parameters`; absent ones are as believed.
+        extension : Extension
+
+        Raises
+        ------
+        AnalysisError
+            If the simulation does not reach its end.
+        """
+        truth = self._truth(run, values, extension)
+        rate = run.attributes.sampling_rate_hz
+        readings = {}
+        for name, true in truth.items():
+            reading = true * values.get(f"gain of {name}", 1.0)
+            for fault in extension.faults:
+                if fault.channel == name:
+                    recorded = np.asarray(run.recording[name].values, np.float64)
+                    reading = fault.reading(reading, rate, truth, recorded)
+            readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
+        return readings
+
+    def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> dict[str, FloatArray]:
+        physical = tuple(
+            values.get(parameter.name, parameter.believed)
+            for parameter in self.parameters
+            if not parameter.is_reading
+        )
+        undone = tuple(fault for fault in extension.faults if fault.channel in self.driving(run))
+        others = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
+        key = (run.name, physical, tuple(others), tuple(fault.key for fault in undone))
+        with self._lock:
+            if key in self._truths:
+                self._truths.move_to_end(key)
+                return self._truths[key]
+        simulation = self._simulation(run, values, extension, undone)
+        n_cells = sum(name.startswith("force_cell") for name in channels(run.recording, "force"))
+        truth = {}
+        for name in self.compared(run):
+            found = true_channel(simulation, name, run.recording[name].attrs, self.rig, n_cells=max(n_cells, 1))
+            if found is not None:
+                truth[name] = found
+        with self._lock:
+            self._truths[key] = truth
+            while len(self._truths) > _MOST_KEPT_RUNS:
+                self._truths.popitem(last=False)
+        return truth
+
+    def _simulation(
+        self, run: CaseRun, values: Mapping[str, float], extension: Extension, undone: Sequence[SensorFault]
+    ) -> Simulation:
+        drive = self._drive(run, tuple(undone))
+        twin = self._varied(run, values, extension)
+        rate = drive.excitation.sampling_rate_hz
+        start = values.get(f"release of {run.name}", drive.initial_displacement_m)
+        simulation = twin.simulate(
+            drive.excitation, initial_displacement_m=start, n_substeps=steps_per_sample(twin, rate)
+        )
+        return simulation.require_done()
+
+    def _varied(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> Twin:
+        twin = self.twin
+        structure = twin.structure
+        if structure is not None:
+            structure = _varied_structure(structure, values)
+        terms = tuple(
+            _varied_term(term, values) for term in twin.terms if structure is not None or term.place == "tank"
+        )
+        terms += tuple(term for term in extension.terms if structure is not None or term.place == "tank")
+        liquid = tuple(term for term in terms if term.place == "tank")
+        others = tuple(term for term in terms if term.place == "structure")
+        if extension.liquid is not None:
+            liquid = extension.liquid(liquid)
+        configuration = run.attributes.configuration
+        if configuration != "sloshing":
+            liquid = ()
+        if configuration == "empty":
+            liquid = (MASS_ERROR(place="tank", mass_kg=-self.rig.liquid_mass_kg),)
+        carried = twin.carried_mass_kg * values.get("carried mass", 1.0)
+        return replace(twin, structure=structure, terms=(*others, *liquid), carried_mass_kg=carried)
+
+    def _drive(self, run: CaseRun, undone: tuple[SensorFault, ...]) -> Drive:
+        key = (run.name, *(fault.key for fault in undone))
+        with self._lock:
+            if key in self._drives:
+                return self._drives[key]
+        drive = drive_of(_corrected(run, undone), self.twin)
+        drive = replace(drive, excitation=_remembered(drive.excitation))
+        with self._lock:
+            if len(self._drives) > 20 * max(1, len(self.runs)):
+                self._drives = {known: self._drives[known] for known in self._drives if len(known) == 1}
+            self._drives[key] = drive
+        return drive
+
+    def _has_counterpart(self, run: CaseRun, name: str) -> bool:
+        place = name.partition("_")[2]
+        quantity = run.recording[name].attrs["quantity"]
+        if quantity == "force":
+            return place.startswith("cell") or place in ("interface", "total")
+        if place.startswith("beam"):
+            return self.twin.structure is not None and "x_m" in run.recording[name].attrs
+        return place.startswith(("tank", "tip", "roof", "control", "mean", "root"))
+
+    def _parameters(self) -> tuple[BaselineParameter, ...]:
+        found: list[BaselineParameter] = []
+        if self.twin.structure is not None:
+            found += _of_structure(self.twin.structure, moves=any(not run.is_free for run in self.runs))
+        for term in self.twin.terms:
+            for name, value in term.values.items():
+                if name in _TUNED_NUMBERS and value:
+                    found.append(BaselineParameter(f"{term.name}.{name}", value, 0.2 * abs(value)))
+        names = sorted({name for run in self.runs for name in self.compared(run)})
+        if any(name.startswith("force") for name in names):
+            found.append(BaselineParameter("carried mass", 1.0, 0.01))
+        found += [BaselineParameter(f"gain of {name}", 1.0, 0.01, is_reading=True) for name in names]
+        for run in self.runs:
+            if run.is_free:
+                start = self._drive(run, ()).initial_displacement_m
+                found.append(BaselineParameter(f"release of {run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
+            for name in self.compared(run):
+                if name.startswith("displacement"):
+                    size = float(np.nanmax(np.abs(run.recording[name].values)))
+                    found.append(
+                        BaselineParameter(
+                            f"offset of {name} in {run.name}", 0.0, 0.01 * size, "m", is_reading=True
+                        )
+                    )
+        return tuple(found)
+
+
+_TUNED_NUMBERS: Final = ("damping_n_s_per_m", "damping_kg_per_s", "force_n", "stiffness_n_per_m")
+
+
+def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:
+    """Integration steps that follow every mode within the band of a recording."""
+    if twin.structure is None:
+        return 1
+    frequencies = twin.structure.frequencies_hz
+    needed = max(STEPS_PER_PERIOD * float(frequencies.max()), _STEPS_PER_FIRST_PERIOD * float(frequencies.min()))
+    return max(1, min(1000, math.ceil(needed / sampling_rate_hz)))
+
+
+def _of_structure(structure: Structure, *, moves: bool) -> list[BaselineParameter]:
+    n = structure.masses_kg.size
+    found = []
+    for i in range(n):
+        label = f"mode {i + 1}"
+        found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02))
+        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2))
+    found.append(BaselineParameter("modal mass", 1.0, 0.01))
+    if moves:
+        found += [BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02) for i in range(n)]
+    return found
+
+
+def _varied_structure(structure: Structure, values: Mapping[str, float]) -> Structure:
+    n = structure.masses_kg.size
+    frequency = np.array([values.get(f"frequency of mode {i + 1}", 1.0) for i in range(n)])
+    damping = np.array([values.get(f"damping of mode {i + 1}", 1.0) for i in range(n)])
+    participation = np.array([values.get(f"base participation of mode {i + 1}", 1.0) for i in range(n)])
+    mass = values.get("modal mass", 1.0)
+    return replace(
+        structure,
+        masses_kg=structure.masses_kg * mass,
+        stiffnesses_n_per_m=structure.stiffnesses_n_per_m * mass * frequency**2,
+        dampings_kg_per_s=structure.dampings_kg_per_s * mass * frequency * damping,
+        base_participation_kg=structure.base_participation_kg * mass * participation,
+    )
+
+
+def _varied_term(term: Term, values: Mapping[str, float]) -> Term:
+    changed = {name: values[f"{term.name}.{name}"] for name in term.values if f"{term.name}.{name}" in values}
+    return term.changed(**changed) if changed else term
+
+
+def _corrected(run: CaseRun, undone: Sequence[SensorFault]) -> xr.Dataset:
+    recording = run.recording
+    for fault in undone:
+        if fault.undone is None:
+            raise AnalysisError(
+                f"sensor {fault.channel}", got="a fault that cannot be undone on a channel that drives"
+            )
+        if fault.channel not in recording.data_vars:
+            continue
+        others = {name: np.asarray(recording[name].values, np.float64) for name in channels(recording)}
+        corrected = fault.undone(
+            others[fault.channel], run.attributes.sampling_rate_hz, others, others[fault.channel]
+        )
+        variable = recording[fault.channel].copy(data=corrected)
+        recording = recording.assign({fault.channel: variable})
+    return recording
+
+
+def _remembered(excitation: Excitation) -> Excitation:
+    """The excitation with the interpolated values of earlier simulations kept."""
+    inputs = excitation.inputs
+    if inputs is None:
+        return excitation
+    kept: dict[tuple[float, int, float], FloatArray] = {}
+
+    def remembered(time: FloatArray) -> FloatArray:
+        key = (float(time[0]), time.size, float(time[-1]))
+        if key not in kept:
+            kept[key] = inputs(time)
+        return kept[key]
+
+    return replace(excitation, inputs=remembered)

@@ -1,0 +1,290 @@
+"""What the findings amount to: nothing missing, named, indistinguishable, or unknown.
+
+A gain counts in units of what chance gives: the decrease of the sum of squares on runs that chose nothing, over
+twice the mean square that is left there by the best description (never less than one).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from sloshlab.diagnosis.candidate import Candidate, known_effects
+from sloshlab.diagnosis.explanation import Explanation, Findings
+
+LEAST_GAIN: Final = 12.0
+"""Held-out log-likelihood ratio from which something is missing."""
+LEAST_MORE: Final = 12.0
+"""The same, by which a further effect must improve on fewer."""
+LEAST_SEPARATION: Final = 6.0
+"""The same, by which an explanation must beat another to be the only one."""
+ADEQUATE: Final = 1.15
+"""Held-out error over that of the best correction up to which an explanation is adequate."""
+LEVEL: Final = 0.90
+_NORMAL_90: Final = 1.6449
+_EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
+"""Explanations that are the same force."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """The answer.
+
+    Attributes
+    ----------
+    kind : {"nothing_missing", "named", "indistinguishable", "unknown"}
+    best : Explanation or None
+        The best explanation with a name; None where nothing is missing.
+    alternatives : list of Explanation
+        All that cannot be told from the best, itself first.
+    gain : float
+        Of the best over the retuned baseline, on held-out runs.
+    adequacy : float
+        Held-out error of the best over that of the ceiling.
+    statement, separating_experiment : str
+    probabilities : dict
+    """
+
+    kind: str
+    best: Explanation | None
+    alternatives: list[Explanation]
+    gain: float
+    adequacy: float
+    statement: str
+    separating_experiment: str
+    probabilities: dict[str, float]
+
+
+def verdict_of(found: Findings) -> Verdict:
+    """Judge the findings.
+
+    Parameters
+    ----------
+    found : Findings
+    """
+    ceiling = min([*found.ceilings, *found.explanations, found.retuned], key=lambda one: one.held_out)
+    unit = 2.0 * max(1.0, ceiling.held_out / max(found.n_held_out, 1))
+    named = _shortest_sufficient(found, unit)
+    best_gain = (found.retuned.held_out - ceiling.held_out) / unit
+    fit_gain = (
+        found.retuned.fit.cost - min(one.fit.cost for one in [*found.explanations, *found.ceilings, found.retuned])
+    ) / (2.0 * max(1.0, ceiling.fit.misfit / max(found.n_fitting, 1)))
+    probabilities = _probabilities(found, unit)
+    if best_gain < LEAST_GAIN or fit_gain < LEAST_GAIN:
+        return Verdict(
+            "nothing_missing", None, [], best_gain, 1.0, _nothing(found), "", _certain(probabilities, "none")
+        )
+    gain = (found.retuned.held_out - named.held_out) / unit if named else 0.0
+    adequacy = named.held_out_rms / max(ceiling.held_out_rms, 1e-300) if named else np.inf
+    if named is None or gain < LEAST_GAIN or adequacy > ADEQUATE:
+        statement = _unknown(found, named)
+        return Verdict(
+            "unknown", named, [], best_gain, adequacy, statement, "", _certain(probabilities, "unknown")
+        )
+    alternatives = _alternatives(found, named, unit)
+    kind = "named" if len(alternatives) == 1 and not _has_equal(named) else "indistinguishable"
+    return Verdict(
+        kind,
+        named,
+        alternatives,
+        gain,
+        adequacy,
+        _statement(found, named, alternatives, kind),
+        _experiment(alternatives) if kind == "indistinguishable" else "",
+        probabilities,
+    )
+
+
+def _shortest_sufficient(found: Findings, unit: float) -> Explanation | None:
+    """The best single effect, unless two are better by more than chance."""
+    singles = [one for one in found.explanations if len(one.keys) == 1 and np.isfinite(one.held_out)]
+    pairs = [one for one in found.explanations if len(one.keys) == 2 and np.isfinite(one.held_out)]
+    if not singles:
+        return None
+    single = min(singles, key=lambda one: one.fit.cost + one.held_out)
+    if not pairs:
+        return single
+    pair = min(pairs, key=lambda one: one.fit.cost + one.held_out)
+    better_held_out = (single.held_out - pair.held_out) / unit
+    better_fit = (single.fit.cost - pair.fit.cost) / (2 * max(1.0, pair.fit.misfit / max(found.n_fitting, 1)))
+    return pair if better_held_out > LEAST_MORE and better_fit > LEAST_MORE else single
+
+
+def _alternatives(found: Findings, best: Explanation, unit: float) -> list[Explanation]:
+    """Explanations of at most as many effects that are as good within chance, the best first."""
+    scale_fit = 2.0 * max(1.0, best.fit.misfit / max(found.n_fitting, 1))
+    alike = [best]
+    seen = {best.names}
+    for one in sorted(found.explanations, key=lambda one: one.held_out):
+        if len(one.keys) > len(best.keys) or one.names in seen or not np.isfinite(one.held_out):
+            continue
+        worse = (one.held_out - best.held_out) / unit + (one.fit.cost - best.fit.cost) / scale_fit
+        if worse < LEAST_SEPARATION:
+            alike.append(one)
+            seen.add(one.names)
+    return alike
+
+
+def _has_equal(best: Explanation) -> bool:
+    return best.names in _EQUALS or best.names in _EQUALS.values()
+
+
+def _probabilities(found: Findings, unit: float) -> dict[str, float]:
+    """Weights of the explanations by their held-out likelihood and their number of parameters."""
+    scores: dict[str, float] = {"none": -found.retuned.held_out / unit}
+    for one in found.explanations:
+        if not np.isfinite(one.held_out):
+            continue
+        n = sum(len(candidate.effect.parameters) for candidate in one.fit.candidates)
+        label = " + ".join(one.names)
+        scores[label] = max(scores.get(label, -np.inf), -one.held_out / unit - n)
+    ceiling = min((one.held_out for one in found.ceilings), default=np.inf)
+    scores["unknown"] = -ceiling / unit - 12 if np.isfinite(ceiling) else -np.inf
+    top = max(scores.values())
+    weights = {name: float(np.exp(max(score - top, -700.0))) for name, score in scores.items()}
+    total = sum(weights.values())
+    return {name: weight / total for name, weight in weights.items() if weight / total > 1e-4}
+
+
+def _certain(probabilities: dict[str, float], name: str) -> dict[str, float]:
+    """Probabilities after the gates: half of the weight to what they decided."""
+    shared = {key: 0.5 * value for key, value in probabilities.items()}
+    shared[name] = shared.get(name, 0.0) + 0.5
+    return shared
+
+
+def _nothing(found: Findings) -> str:
+    return (
+        "Nothing is missing: with its own parameters retuned the simulation describes the held-out runs to "
+        f"{found.retuned.held_out_rms:.2f} of the noise floor."
+    )
+
+
+def _unknown(found: Findings, named: Explanation | None) -> str:
+    where = where_of(found)
+    closest = f"; the nearest known effect is {' + '.join(named.keys)}" if named else ""
+    return f"Something is missing that has no name here, most likely in the {where}{closest}."
+
+
+def where_of(found: Findings) -> str:
+    """The block whose correction helps most."""
+    options = [*found.ceilings, *[one for one in found.explanations if len(one.keys) == 1]]
+    best = min(options, key=lambda one: one.held_out, default=None)
+    return best.fit.candidates[0].effect.block if best else "structure"
+
+
+def _statement(found: Findings, best: Explanation, alternatives: Sequence[Explanation], kind: str) -> str:
+    named = " and ".join(_described(best, candidate) for candidate in best.fit.candidates)
+    explained = 1.0
+    excess = found.retuned.held_out_rms**2 - 1.0
+    if excess > 0:
+        explained = (found.retuned.held_out_rms**2 - best.held_out_rms**2) / max(
+            found.retuned.held_out_rms**2 - min(1.0, best.held_out_rms**2), 1e-300
+        )
+    text = f"Left out: {named}; explains {100 * min(max(explained, 0.0), 1.0):.0f} % of what the held-out runs can tell"
+    if kind == "indistinguishable":
+        others = [" + ".join(one.names).replace("_", " ") for one in alternatives[1:]]
+        others += [" + ".join(equal).replace("_", " ") for equal in equals_of(best)]
+        text += f"; cannot be told from {' or '.join(dict.fromkeys(others))}"
+    return text + "."
+
+
+def equals_of(best: Explanation) -> list[tuple[str, ...]]:
+    """Names of explanations that are the same force."""
+    return [
+        other
+        for one, two in _EQUALS.items()
+        for this, other in ((one, two), (two, one))
+        if tuple(sorted(this)) == best.names
+    ]
+
+
+def _described(best: Explanation, candidate: Candidate) -> str:
+    name = candidate.effect.name.replace("_", " ")
+    first = candidate.effect.parameters[0].name
+    estimate, low, high = interval(best, candidate, first)
+    place = f" of {candidate.channel}" if candidate.channel else f" in the {candidate.effect.block}"
+    return f"{name}{place}, {first} {estimate:.3g} ({low:.3g} to {high:.3g})"
+
+
+def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[float, float, float]:
+    """Estimate and 90 % interval of one parameter, widened by what the fit leaves unexplained."""
+    name = f"{candidate.key}.{parameter}"
+    estimate = best.fit.values[name]
+    if name not in best.fit.names:
+        return estimate, estimate, estimate
+    width = _NORMAL_90 * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
+    chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
+    return estimate, max(estimate - width, chosen.low), min(estimate + width, chosen.high)
+
+
+def _experiment(alternatives: Sequence[Explanation]) -> str:
+    names = {name for one in alternatives for name in one.names}
+    told = [effect.separated_by for effect in known_effects() if effect.name in names and effect.separated_by]
+    return "; or ".join(dict.fromkeys(told))
+
+
+def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
+    """The content of ``verdict.json``.
+
+    Parameters
+    ----------
+    found : Findings
+    verdict : Verdict
+    """
+    ceiling = min([*found.ceilings, *found.explanations, found.retuned], key=lambda one: one.held_out)
+    after = verdict.best if verdict.kind in ("named", "indistinguishable") else None
+    return {
+        "format": 1,
+        "verdict": verdict.kind,
+        "effects": _effects(found, verdict),
+        "alternatives": [list(one.names) for one in verdict.alternatives]
+        + [list(names) for one in verdict.alternatives for names in equals_of(one)],
+        "probabilities": verdict.probabilities,
+        "separating_experiment": verdict.separating_experiment,
+        "statement": verdict.statement,
+        "fit": {
+            "metric": "RMS of short-time spectra's residuals over their noise, where the recording stands out of it",
+            "noise_floor": 1.0,
+            "heldout_before": found.believed.held_out_rms,
+            "heldout_retuned": found.retuned.held_out_rms,
+            "heldout_after": (after or found.retuned).held_out_rms,
+            "heldout_ceiling": ceiling.held_out_rms,
+            "heldout_runs": [run.name for run in found.split.held_out],
+        },
+        "limits": list(found.split.limits),
+        "failed": found.failed,
+    }
+
+
+def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
+    if verdict.kind == "nothing_missing" or (verdict.best is None and verdict.kind != "unknown"):
+        return []
+    if verdict.kind == "unknown":
+        return [{"name": "unknown", "block": where_of(found), "parameters": {}, "where": _where(found, ())}]
+    assert verdict.best is not None
+    described = []
+    for candidate in verdict.best.fit.candidates:
+        parameters = {}
+        for parameter in candidate.effect.parameters:
+            estimate, low, high = interval(verdict.best, candidate, parameter.name)
+            parameters[parameter.name] = {"estimate": estimate, "low": low, "high": high, "level": LEVEL}
+        name = candidate.effect.name.removesuffix("_60")
+        described.append(
+            {
+                "name": name,
+                "block": candidate.effect.block,
+                "parameters": parameters,
+                "where": _where(found, (candidate.channel,) if candidate.channel else ()),
+            }
+        )
+    return described
+
+
+def _where(found: Findings, channels: Sequence[str]) -> dict[str, Any]:
+    """Channels, times and frequencies in which the retuned baseline misses the recordings most."""
+    del found
+    return {"channels": list(channels)}
