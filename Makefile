@@ -19,7 +19,7 @@ $(STAMP): pyproject.toml
 	  || { echo "sloshlab needs Python 3.11 or newer; remedy: make PYTHON=/path/to/python3.11 setup" >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade pip
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[formats,dev,docs]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[formats,dev,docs,trial]'
 	@touch $@
 
 shaker: setup  ## the shaker experiment on the numerical tank (or RECORDINGS=folder): maps and report

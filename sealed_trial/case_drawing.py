@@ -1,0 +1,251 @@
+"""Cases drawn from seeds: first what the laboratory does, then what it hides.
+
+Rig and plan come from a generator that never sees the class, so that nothing but its signals can tell it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from sealed_trial.case_signals import Laboratory, scales_of
+from sealed_trial.composition import SINGLES, class_sizes, possible
+from sealed_trial.hidden_physics.effect import Change, DrawnEffect, HiddenEffect, Scales, Signals
+from sealed_trial.hidden_physics.unknown_physics import UNKNOWN_PHYSICS
+from sealed_trial.laboratory.hidden_rig import HiddenRig, drawn_rig
+from sealed_trial.laboratory.sensors import Sensor, drawn_sensor
+from sealed_trial.laboratory.test_plan import PLANS, TestPlan, drawn_plan
+from sealed_trial.look_alikes import possible_look_alikes
+from sealed_trial.strength import ONLY_DAMPING, QUICK, NoiseFloor, magnitude_for
+
+WEAKEST_CLEAR, STRONGEST_CLEAR = 3.5, 30.0
+WEAKEST_MASKED, STRONGEST_MASKED = 0.3, 3.0
+
+
+@dataclass(frozen=True)
+class HiddenTruth:
+    """What is true of a case.
+
+    Attributes
+    ----------
+    case, kind : str
+        Name of the case; its class.
+    effects : list of dict
+        Name, block, parameters, strength, channel.
+    accepted : list of list of str
+        Every set of names that is right; the empty one where nothing is missing.
+    details : dict
+        Rig, plan, seeds, and how reality differs from belief.
+    """
+
+    case: str
+    kind: str
+    effects: list[dict[str, Any]]
+    accepted: list[list[str]]
+    details: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class DrawnCase:
+    """A case ready to be recorded."""
+
+    laboratory: Laboratory
+    sensors: dict[str, Sensor]
+    signals: list[Signals]
+    late: tuple[Change, ...]
+    truth: HiddenTruth
+
+
+def class_order(n_cases: int, generator: np.random.Generator) -> list[str]:
+    """The class of every case, in random order."""
+    order = [name for name, size in class_sizes(n_cases).items() for _ in range(size)]
+    return [order[k] for k in generator.permutation(len(order))]
+
+
+class CaseDrawing:
+    """Draws one case after the other, covering the vocabulary evenly.
+
+    Parameters
+    ----------
+    seed : sequence of int
+        Separates trials, and development from sealed ones.
+    """
+
+    def __init__(self, seed: Sequence[int]) -> None:
+        self._seed = [int(value) for value in seed]
+        self._used: Counter[str] = Counter()
+        self._plans: list[str] = []
+
+    def _generator(self, *more: int) -> np.random.Generator:
+        return np.random.default_rng([*self._seed, *more])
+
+    def _next_plan(self, number: int) -> str:
+        """Plans in random order, each as often as any other."""
+        if not self._plans:
+            self._plans = [PLANS[k] for k in self._generator(number, 1).permutation(len(PLANS))]
+        return self._plans.pop()
+
+    def case(self, number: int, name: str, kind: str) -> DrawnCase:
+        """Draw a case of a class.
+
+        Raises
+        ------
+        ArithmeticError
+            If no draw gives a motion that does not diverge.
+        """
+        plan_name = self._next_plan(number)
+        for attempt in range(12):
+            try:
+                return self._attempted(number, attempt, name, kind, plan_name)
+            except (ArithmeticError, LookupError):
+                continue
+        raise ArithmeticError(f"case {number} of class {kind}: no draw can be measured")
+
+    def _attempted(self, number: int, attempt: int, name: str, kind: str, plan_name: str) -> DrawnCase:
+        generator = self._generator(number, 2, attempt)
+        rig = drawn_rig(plan_name.partition("_")[0], generator)
+        plan = drawn_plan(plan_name, rig, generator)
+        laboratory = Laboratory(rig, plan, int(generator.integers(2**31)))
+        plain = laboratory.signals()
+        scales = scales_of(laboratory, plain)
+        sensors = {
+            channel: drawn_sensor(
+                max(scales.rms[channel], _least_rms(scales, channel)), scales.peak[channel], generator
+            )
+            for channel in plain[0]
+        }
+        hidden = self._generator(number, 3, attempt)
+        drawn, accepted, wanted = self._drawn_effects(kind, plan, rig, scales, hidden)
+        floor = NoiseFloor(laboratory, plain, sensors) if drawn else None
+        changes, described = [], []
+        for effect, strength in zip(drawn, wanted, strict=True):
+            assert floor is not None
+            change, reached = _scaled(effect, strength, laboratory, floor, plain)
+            if reached < (WEAKEST_MASKED if kind == "masked" else 3.0):
+                raise LookupError(f"{effect.name} cannot be made strong enough")
+            changes.append(change)
+            described.append(_description(effect, change, reached))
+        signals = laboratory.signals(changes) if changes else plain
+        nuisance: dict[str, Any] = {}
+        if kind == "nothing":
+            signals, nuisance, extra = _with_nuisance(signals, sensors, laboratory, hidden)
+            accepted = accepted + extra
+        for one in described:
+            self._used[one["name"]] += 1
+        truth = HiddenTruth(
+            name, kind, described, accepted, {"plan": plan_name, "rig_factors": rig.factors, **nuisance}
+        )
+        late = tuple(change for change in changes if change.late_distortion is not None)
+        return DrawnCase(laboratory, sensors, signals, late, truth)
+
+    def _drawn_effects(
+        self, kind: str, plan: TestPlan, rig: HiddenRig, scales: Scales, generator: np.random.Generator
+    ) -> tuple[list[DrawnEffect], list[list[str]], list[float]]:
+        """Effects, the answers that are right, and the strengths wanted."""
+        if kind == "nothing":
+            return [], [[]], []
+        if kind == "look_alike":
+            choices = possible_look_alikes(plan, rig)
+            if not choices:
+                raise LookupError("no look-alike for this plan")
+            chosen = choices[int(generator.integers(len(choices)))]
+            effect = chosen.truth.draw(scales, generator)
+            return [effect], [list(names) for names in chosen.equals], [_clear(generator)]
+        vocabulary = UNKNOWN_PHYSICS if kind == "outside" else SINGLES
+        effects = self._chosen(possible(vocabulary, plan, rig), 2 if kind == "pair" else 1, generator)
+        drawn = [effect.draw(scales, generator) for effect in effects]
+        if kind == "masked":
+            span = math.log(STRONGEST_MASKED / WEAKEST_MASKED)
+            return drawn, [[drawn[0].name]], [WEAKEST_MASKED * math.exp(span * generator.random())]
+        accepted = [["unknown"]] if kind == "outside" else [[effect.name for effect in drawn]]
+        return drawn, accepted, [_clear(generator) for _ in drawn]
+
+    def _chosen(
+        self, effects: Sequence[HiddenEffect], n: int, generator: np.random.Generator
+    ) -> list[HiddenEffect]:
+        """Those least used so far, of different blocks, ties by lot."""
+        if len(effects) < n:
+            raise LookupError("too few effects for this plan")
+        order = sorted(
+            (effects[k] for k in generator.permutation(len(effects))), key=lambda effect: self._used[effect.name]
+        )
+        first = order[0]
+        others = [effect for effect in order[1:] if effect.block != first.block]
+        if n == 1:
+            return [first]
+        if not others:
+            raise LookupError("no second block for this plan")
+        return [first, others[0]]
+
+
+def _clear(generator: np.random.Generator) -> float:
+    return WEAKEST_CLEAR * math.exp(math.log(STRONGEST_CLEAR / WEAKEST_CLEAR) * generator.random())
+
+
+def _least_rms(scales: Scales, channel: str) -> float:
+    """A channel that shows nothing has the noise of its neighbours of the same quantity."""
+    quantity = channel.partition("_")[0]
+    return 0.05 * max(rms for name, rms in scales.rms.items() if name.startswith(quantity))
+
+
+def _scaled(
+    effect: DrawnEffect, wanted: float, laboratory: Laboratory, floor: NoiseFloor, plain: list[Signals]
+) -> tuple[Change, float]:
+    """The effect with the magnitude that shows as strongly as wanted."""
+    rate = laboratory.plan.sampling_rate_hz
+
+    def strength_of(magnitude: float) -> float:
+        change = effect.change(magnitude)
+        try:
+            changed = laboratory.signals([change], relative_tolerance=QUICK) if effect.block != "sensor" else plain
+        except ArithmeticError:
+            return 1e6
+        for distortion in (change.distortion if effect.block == "sensor" else None, change.late_distortion):
+            if distortion is not None:
+                changed = [distortion(run, rate) for run in changed]
+        return floor.strength(changed, damping_is_known=effect.name in ONLY_DAMPING)
+
+    magnitude, reached = magnitude_for(strength_of, wanted, effect.least, effect.most)
+    return effect.change(magnitude), reached
+
+
+def _description(effect: DrawnEffect, change: Change, strength: float) -> dict[str, Any]:
+    described: dict[str, Any] = {
+        "name": effect.name,
+        "block": effect.block,
+        "parameters": {name: float(value) for name, value in change.parameters.items()},
+        "strength": float(strength),
+    }
+    if effect.channel:
+        described["channel"] = effect.channel
+    if effect.description:
+        described["description"] = effect.description
+    return described
+
+
+def _with_nuisance(
+    signals: list[Signals], sensors: dict[str, Sensor], laboratory: Laboratory, generator: np.random.Generator
+) -> tuple[list[Signals], dict[str, Any], list[list[str]]]:
+    """What a laboratory has without anything missing: nothing, a drift, or a burst of noise."""
+    sort = str(generator.choice(["none", "none", "drift", "burst"]))
+    if sort == "none":
+        return signals, {"nuisance": sort}, []
+    channel = str(generator.choice([name for name in sorted(sensors) if name != "acceleration_root"]))
+    rate, noise = laboratory.plan.sampling_rate_hz, sensors[channel].noise
+    changed = [dict(run) for run in signals]
+    if sort == "drift":
+        for run in changed:
+            run[channel] = run[channel] + noise * generator.uniform(0.5, 1.5) * np.arange(run[channel].size) / rate
+        return changed, {"nuisance": sort, "channel": channel}, [["sensor_drift"]]
+    run = changed[int(generator.integers(len(changed)))]
+    start = int(generator.uniform(0.2, 0.8) * run[channel].size)
+    stop = start + int(0.25 * rate)
+    values = run[channel].copy()
+    values[start:stop] += 15 * noise * generator.standard_normal(stop - start)[: values[start:stop].size]
+    run[channel] = values
+    return changed, {"nuisance": sort, "channel": channel}, []

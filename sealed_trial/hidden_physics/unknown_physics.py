@@ -1,0 +1,130 @@
+"""Physics that the vocabulary has no name for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from sealed_trial.hidden_physics.effect import Change, DrawnEffect, HiddenEffect, Scales, Signals
+from sealed_trial.laboratory import kernel_layout as at
+from sealed_trial.laboratory.system import storage_of_springs
+
+_ALL = ("sdof", "beam", "shaker")
+_CARRIED = ("sdof", "beam")
+
+
+def _unknown(
+    block: str, description: str, change: Callable[[float], Change], channel: str = "", most: float = 1e3
+) -> DrawnEffect:
+    return DrawnEffect("unknown", block, change, channel, most=most, description=description)
+
+
+def pumped_stiffness(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A spring whose stiffness is modulated from outside."""
+    unit, rate = 0.03 * scales.stiffness_n_per_m, scales.rate_rad_per_s * generator.uniform(0.15, 0.6)
+    return _unknown(
+        "structure",
+        "stiffness modulated in time",
+        lambda m: Change({}, {at.STIFFNESS_MODULATION: m * unit, at.STIFFNESS_MODULATION_RATE: rate}),
+        most=12.0,
+    )
+
+
+def grip_with_displacement(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """Friction that grips more the further the guide is pushed out."""
+    unit, slope = 0.001 * scales.force_n, generator.uniform(6.0, 12.0) / scales.displacement_m
+
+    def change(m: float) -> Change:
+        return Change({}, {at.FRICTION_UP: m * unit, at.FRICTION_DOWN: m * unit, at.FRICTION_SLOPE: slope})
+
+    return _unknown("structure", "friction that grows with the displacement", change)
+
+
+def fractional(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """Damping of fractional order, stronger than any tolerance of viscous damping."""
+    exponent = generator.uniform(0.35, 0.6)
+    stiffening = storage_of_springs(exponent, scales.rate_rad_per_s)
+
+    def change(m: float) -> Change:
+        gain = 0.06 * m * scales.stiffness_n_per_m / scales.rate_rad_per_s**exponent
+        kernel = {at.RELAXATION_GAIN: gain, at.STIFFNESS_CHANGE: -gain * stiffening}
+        return Change({}, kernel, relaxation_exponent=exponent)
+
+    return _unknown("structure", "fractional damping", change, most=2.0)
+
+
+def damping_with_displacement(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A damper that closes with the displacement: c x² v."""
+    unit = 2 * scales.damping_n_s_per_m / scales.displacement_m**2
+    return _unknown(
+        "structure",
+        "damping that grows with the displacement",
+        lambda m: Change({}, {at.DAMPING_OF_DISPLACEMENT: m * unit}),
+    )
+
+
+def loosening(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A joint loosens in the middle of every run."""
+    unit, instant = -0.03 * scales.stiffness_n_per_m, generator.uniform(0.8, 2.0)
+
+    def change(m: float) -> Change:
+        return Change({}, {at.STIFFNESS_STEP: m * unit, at.STIFFNESS_STEP_TIME: instant})
+
+    return _unknown("structure", "stiffness that drops at an instant", change, most=10.0)
+
+
+def machine(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """Another machine shakes the structure at its own frequency."""
+    unit, rate = 0.005 * scales.force_n, scales.rate_rad_per_s * generator.uniform(1.25, 1.7)
+    return _unknown(
+        "structure", "a foreign tone", lambda m: Change({}, {at.TONE_FORCE: m * unit, at.TONE_RATE: rate})
+    )
+
+
+def one_sided_damping(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A liquid that dissipates on the way down only."""
+    unit = 2 * scales.liquid_mass_kg * scales.rate_rad_per_s * 0.6 / math.pi
+    return _unknown("tank", "damping of downward motion only", lambda m: Change({}, {at.TANK_ONE_SIDED: m * unit}))
+
+
+def heavier_when_violent(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A liquid whose inertia grows with the violence of the motion."""
+    unit = 0.3 / scales.acceleration_g
+    return _unknown(
+        "tank",
+        "inertia that grows with the level",
+        lambda m: Change({}, {at.TANK_SQUARE_INERTIA: m * unit}),
+        most=10.0,
+    )
+
+
+def crooked_sensor(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A sensor whose characteristic is curved."""
+    names = [name for name in sorted(scales.rms) if name not in ("force_interface", "acceleration_root")]
+    channel = str(generator.choice(names))
+    order, peak = int(generator.choice([2, 3])), scales.peak[channel]
+
+    def change(m: float) -> Change:
+        def distort(signals: Signals, rate_hz: float) -> Signals:
+            values = signals[channel]
+            return {**signals, channel: values + 0.03 * m * peak * (values / peak) ** order}
+
+        return Change({}, distortion=distort)
+
+    return _unknown("sensor", f"characteristic with a term of order {order}", change, channel, most=10.0)
+
+
+UNKNOWN_PHYSICS: Final = (
+    HiddenEffect("pumped_stiffness", "structure", pumped_stiffness, _CARRIED),
+    HiddenEffect("grip_with_displacement", "structure", grip_with_displacement, _CARRIED, True, is_friction=True),
+    HiddenEffect("fractional", "structure", fractional, ("sdof",), needs_frequencies=True),
+    HiddenEffect("damping_with_displacement", "structure", damping_with_displacement, _CARRIED, True),
+    HiddenEffect("loosening", "structure", loosening, _CARRIED),
+    HiddenEffect("machine", "structure", machine, _CARRIED),
+    HiddenEffect("one_sided_damping", "tank", one_sided_damping, _ALL),
+    HiddenEffect("heavier_when_violent", "tank", heavier_when_violent, _ALL, True),
+    HiddenEffect("crooked_sensor", "sensor", crooked_sensor, _ALL, True),
+)

@@ -1,0 +1,175 @@
+"""Dormand–Prince of order 5(4) with a step that follows its error, stopped exactly at every switch of a contact.
+
+J. R. Dormand, P. J. Prince, A family of embedded Runge–Kutta formulae, J. Comput. Appl. Math. 6 (1980) 19–26.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from sealed_trial.laboratory import kernel_layout as at
+from sealed_trial.laboratory.kernel import evaluate, margins, switch
+
+FloatArray = npt.NDArray[np.float64]
+
+_A: Final = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0],
+        [44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0],
+        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+_C: Final = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
+_ERROR: Final = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+_SHORTEST: Final = 1e-12
+_MOST_EVENTS: Final = 200_000
+
+
+@njit(cache=True)
+def _step(t, y, h, slopes, trial, seen, conditions, system):  # type: ignore[no-untyped-def]
+    """One step of length h into `trial`; slopes[0] is given, the others are filled."""
+    stage = np.empty(y.size)
+    for i in range(1, 7):
+        for k in range(y.size):
+            total = 0.0
+            for j in range(i):
+                total += _A[i, j] * slopes[j, k]
+            stage[k] = y[k] + h * total
+        if i == 6:
+            trial[:] = stage
+        evaluate(t + _C[i] * h, stage, slopes[i], seen, conditions, system)
+
+
+@njit(cache=True)
+def _error(y, trial, h, slopes, relative, scale):  # type: ignore[no-untyped-def]
+    """Largest error over its tolerance; `scale` holds the largest size seen of every component."""
+    worst = 0.0
+    for k in range(y.size):
+        total = 0.0
+        for i in range(7):
+            total += _ERROR[i] * slopes[i, k]
+        allowed = relative * max(scale[k], abs(trial[k])) + 1e-13
+        worst = max(worst, abs(h * total) / allowed)
+    return worst
+
+
+@njit(cache=True)
+def _first_left(out):  # type: ignore[no-untyped-def]
+    """The condition that is left, or −1."""
+    for which in range(out.size):
+        if out[which] < 0.0:
+            return which
+    return -1
+
+
+@njit(cache=True)
+def _note(row, seen, rates, n):  # type: ignore[no-untyped-def]
+    """What is seen and the accelerations of the coordinates."""
+    row[:] = 0.0
+    row[: at.O_COORDINATES] = seen[: at.O_COORDINATES]
+    for j in range(n):
+        row[at.O_COORDINATES + j] = rates[n + j]
+
+
+@njit(cache=True)
+def integrate(y, n_samples, step, relative, conditions, system, seen_all, events):  # type: ignore[no-untyped-def]
+    """Advance `y` sample by sample and fill what is seen, shape (n_samples, outputs).
+
+    `events` receives time, condition and its new value, shape (most, 3). Returns the number of events, or a
+    negative number where the integration fails.
+    """
+    p = system[5]
+    n = system[4].size
+    slopes, trial, scale = np.zeros((7, y.size)), np.empty(y.size), np.abs(y)
+    seen, out, shifted = np.empty(at.N_OUTPUTS + 4), np.empty(at.N_CONDITIONS), np.empty(y.size)
+    n_events, t, h = 0, 0.0, 0.2 * step
+    evaluate(t, y, slopes[0], seen, conditions, system)
+    _note(seen_all[0], seen, slopes[0], n)
+    for sample in range(1, n_samples):
+        end = sample * step
+        while t < end - _SHORTEST:
+            now = min(h, end - t)
+            _step(t, y, now, slopes, trial, seen, conditions, system)
+            error = _error(y, trial, now, slopes, relative, scale)
+            if not error <= 1.0:
+                if now < 1e-11 or not np.isfinite(error):
+                    return -1
+                h = now * max(0.2, 0.9 * error**-0.2)
+                continue
+            margins(trial, seen, conditions, n, p, out)
+            which = _first_left(out)
+            if which >= 0:
+                early, late = 0.0, now
+                for _ in range(100):
+                    if late - early < _SHORTEST:
+                        break
+                    middle = 0.5 * (early + late)
+                    _step(t, y, middle, slopes, shifted, seen, conditions, system)
+                    margins(shifted, seen, conditions, n, p, out)
+                    which_middle = _first_left(out)
+                    if which_middle >= 0:
+                        late, which = middle, which_middle
+                        trial[:] = shifted
+                    else:
+                        early = middle
+                now = late
+                _step(t, y, now, slopes, trial, seen, conditions, system)
+            y[:] = trial
+            t += now
+            for k in range(y.size):
+                scale[k] = max(scale[k], abs(y[k]))
+            slopes[0] = slopes[6]
+            if which >= 0:
+                switch(which, y, seen, conditions, n, p)
+                evaluate(t, y, slopes[0], seen, conditions, system)
+                if n_events < events.shape[0]:
+                    events[n_events, 0], events[n_events, 1], events[n_events, 2] = t, which, conditions[which]
+                n_events += 1
+                if n_events > _MOST_EVENTS:
+                    return -2
+                h = max(min(h, 0.05 * step), 1e-9)
+            else:
+                h = now * min(4.0, 0.9 * max(error, 1e-4) ** -0.2)
+        _note(seen_all[sample], seen, slopes[0], n)
+    return n_events
+
+
+def integrated(
+    initial: FloatArray,
+    n_samples: int,
+    step_s: float,
+    system: tuple[Any, ...],
+    conditions: npt.NDArray[np.int64],
+    *,
+    relative_tolerance: float = 1e-9,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What is seen at the samples, the final state, and the events.
+
+    Returns
+    -------
+    seen : ndarray, shape (n_samples, N_OUTPUTS)
+    state : ndarray
+        At the last sample.
+    events : ndarray, shape (n_events, 3)
+        Time [s], condition, its new value.
+
+    Raises
+    ------
+    ArithmeticError
+        If the motion diverges or contacts chatter.
+    """
+    y = initial.astype(np.float64)
+    seen = np.empty((n_samples, at.N_OUTPUTS))
+    events = np.empty((20_000, 3))
+    status = integrate(y, n_samples, step_s, relative_tolerance, conditions.copy(), system, seen, events)
+    if status < 0:
+        raise ArithmeticError("the hidden laboratory diverges" if status == -1 else "contacts chatter")
+    return seen, y, events[: min(status, events.shape[0])]

@@ -1,0 +1,139 @@
+"""The rates of all coordinates and states, and what switches contact and friction, compiled.
+
+A system is handed over as a tuple of arrays (see `system.arrays`): inverse mass matrix, damping matrix, stiffness
+matrix, Γ, ψ, parameters, relaxing springs, and the step and the table of the base's motion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sealed_trial.laboratory import kernel_layout as at
+from sealed_trial.laboratory.equations import (
+    base_motion,
+    friction_limit,
+    state_rates,
+    structure_force,
+    tank_extra_mass,
+    tank_force,
+)
+
+STANDSTILL = 1e-10
+"""Velocity that counts as none [m/s]."""
+
+
+@njit(cache=True)
+def evaluate(t, y, rates, seen, conditions, system):  # type: ignore[no-untyped-def]
+    """Rates dy/dt and what is seen (outputs, then hold force, upper and lower limit, sliding velocity)."""
+    inverse_mass, damping, stiffness, gamma, psi, p, bank, step, table = system
+    n = psi.size
+    state = y[2 * n :]
+    base = np.empty(4)
+    base_motion(t, step, table, base)
+    x = v = 0.0
+    for j in range(n):
+        x += psi[j] * y[j]
+        v += psi[j] * y[n + j]
+    tank = np.empty(2)
+    tank[0] = base[1] + v
+    at_tank = p[at.FRICTION_AT_TANK]
+    extra = tank_extra_mass(t, state, p)
+    moved = extra + p[at.STRUCTURE_MASS]
+    on_structure = structure_force(t, x, v, state, p, conditions)
+    on_tank = tank_force(tank[0], state, p, conditions, base[3])
+    sliding = v + at_tank * base[1]
+    friction = hold = 0.0
+    if n == 0:
+        if sliding != 0.0:
+            direction = 1 if sliding > 0 else -1
+            friction = -direction * friction_limit(direction, 0.0, sliding, p)
+        tank[1] = base[2]
+    else:
+        direct, accelerations, answer = np.empty(n), np.empty(n), np.empty(n)
+        freely = mobility = 0.0
+        place = on_structure + on_tank - moved * base[2]
+        for j in range(n):
+            total = -gamma[j] * base[2] + psi[j] * place
+            for k in range(n):
+                total -= damping[j, k] * y[n + k] + stiffness[j, k] * y[k]
+            direct[j] = total
+        for j in range(n):
+            accelerations[j] = answer[j] = 0.0
+            for k in range(n):
+                accelerations[j] += inverse_mass[j, k] * direct[k]
+                answer[j] += inverse_mass[j, k] * psi[k]
+            freely += psi[j] * accelerations[j]
+            mobility += psi[j] * answer[j]
+        heavier = 1.0 + moved * mobility
+        hold = (-at_tank * base[2] * heavier - freely) / mobility
+        side = conditions[at.D_FRICTION]
+        if p[at.FRICTION_UP] != 0.0 or p[at.FRICTION_DOWN] != 0.0:
+            friction = hold if side == 0 else -side * friction_limit(side, x, sliding, p)
+        correction = friction - moved * (freely + friction * mobility) / heavier
+        tank[1] = base[2] + freely + correction * mobility
+        loss = 0.0
+        for j in range(n):
+            rates[j] = y[n + j]
+            rates[n + j] = accelerations[j] + correction * answer[j]
+            for k in range(n):
+                loss += y[n + j] * damping[j, k] * y[n + k]
+        place_acceleration = tank[1] - base[2]
+        loss -= v * (on_structure + on_tank + friction - moved * (place_acceleration + base[2]))
+    state_rates(rates[2 * n :], state, v, tank, p, conditions, bank)
+    if n > 0:
+        rates[2 * n + at.S_DISSIPATED] = loss
+    seen[at.O_DISPLACEMENT] = base[0] + x
+    seen[at.O_ACCELERATION] = tank[1]
+    seen[at.O_LIQUID_FORCE] = on_tank - extra * tank[1] + at_tank * friction
+    seen[at.O_INTERFACE_FORCE] = p[at.CARRIED_MASS] * tank[1] - seen[at.O_LIQUID_FORCE]
+    seen[at.O_RELATIVE_DISPLACEMENT] = x
+    seen[at.O_RELATIVE_VELOCITY] = v
+    seen[at.N_OUTPUTS] = hold
+    seen[at.N_OUTPUTS + 1] = friction_limit(1, x, 0.0, p)
+    seen[at.N_OUTPUTS + 2] = friction_limit(-1, x, 0.0, p)
+    seen[at.N_OUTPUTS + 3] = sliding
+
+
+@njit(cache=True)
+def margins(y, seen, conditions, n, p, out):  # type: ignore[no-untyped-def]
+    """How far each condition is from being left; negative where it has been."""
+    out[:] = 1.0
+    if n > 0 and (p[at.FRICTION_UP] != 0.0 or p[at.FRICTION_DOWN] != 0.0):
+        side = conditions[at.D_FRICTION]
+        if side == 0:
+            hold = seen[at.N_OUTPUTS]
+            out[at.D_FRICTION] = min(hold + seen[at.N_OUTPUTS + 1], seen[at.N_OUTPUTS + 2] - hold)
+        else:
+            out[at.D_FRICTION] = side * seen[at.N_OUTPUTS + 3] + STANDSTILL
+    if p[at.CLEARANCE_STIFFNESS] != 0.0:
+        x, gap, side = seen[at.O_RELATIVE_DISPLACEMENT], p[at.CLEARANCE_GAP], conditions[at.D_CLEARANCE]
+        out[at.D_CLEARANCE] = gap - abs(x) if side == 0 else side * x - gap
+    if p[at.LOOSE_MASS] != 0.0:
+        z, side = y[2 * n + at.S_LOOSE], conditions[at.D_LOOSE]
+        if side == 0:
+            out[at.D_LOOSE] = min(z, p[at.LOOSE_GAP] - z)
+        else:
+            out[at.D_LOOSE] = -z if side < 0 else z - p[at.LOOSE_GAP]
+
+
+@njit(cache=True)
+def switch(which, y, seen, conditions, n, p):  # type: ignore[no-untyped-def]
+    """Take the condition `which` to the one beyond its margin."""
+    if which == at.D_FRICTION:
+        hold, up, down = seen[at.N_OUTPUTS], seen[at.N_OUTPUTS + 1], seen[at.N_OUTPUTS + 2]
+        if hold < -up:
+            conditions[which] = 1
+        elif hold > down:
+            conditions[which] = -1
+        else:
+            conditions[which] = 0
+    elif which == at.D_CLEARANCE:
+        if conditions[which] != 0:
+            conditions[which] = 0
+        else:
+            conditions[which] = 1 if seen[at.O_RELATIVE_DISPLACEMENT] > 0 else -1
+    elif conditions[which] != 0:
+        conditions[which] = 0
+    else:
+        conditions[which] = -1 if y[2 * n + at.S_LOOSE] < 0.5 * p[at.LOOSE_GAP] else 1

@@ -1,0 +1,93 @@
+"""Pairs of explanations that a plan cannot tell apart: the truth, and every set of names that is as good."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from sealed_trial.hidden_physics import structure_effects, tank_effects
+from sealed_trial.hidden_physics.effect import HiddenEffect
+from sealed_trial.laboratory.hidden_rig import HiddenRig
+from sealed_trial.laboratory.test_plan import TestPlan
+
+_CARRIED, _ALL = ("sdof", "beam"), ("sdof", "beam", "shaker")
+
+
+@dataclass(frozen=True)
+class LookAlike:
+    """A truth and its equals.
+
+    Attributes
+    ----------
+    truth : HiddenEffect
+    equals : tuple of tuple of str
+        Sets of effects, each of which explains as much, the truth included.
+    plans : tuple of str
+        Where this holds.
+    """
+
+    truth: HiddenEffect
+    equals: tuple[tuple[str, ...], ...]
+    plans: tuple[str, ...]
+
+
+_DECAYS_OF_SDOF = ("sdof_decays",)
+_ONE_FREQUENCY = ("sdof_one_frequency",)
+_ASYMMETRIC = (("asymmetric_friction",), ("coulomb_friction", "constant_force"))
+_TANK_MASS = (("mass_error",), ("effective_mass",))
+_LOSSES = (("viscous_damping",), ("structural_damping",))
+_RATE = (("mass_error",), ("stiffness_change",))
+
+LOOK_ALIKES: Final = (
+    LookAlike(
+        HiddenEffect(
+            "asymmetric_friction", "structure", structure_effects.asymmetric, _CARRIED, True, is_friction=True
+        ),
+        _ASYMMETRIC,
+        ("sdof_decays", "sdof_base", "sdof_mixed", "beam_decays", "beam_mixed", "beam_base"),
+    ),
+    LookAlike(
+        HiddenEffect("mass_error", "tank", tank_effects.mass, _ALL),
+        _TANK_MASS,
+        ("sdof_base", "sdof_mixed", "beam_decays", "beam_base", "beam_mixed", "shaker_sweeps", "shaker_stepped"),
+    ),
+    LookAlike(
+        HiddenEffect("structural_damping", "structure", structure_effects.structural, ("sdof",)),
+        _LOSSES,
+        _DECAYS_OF_SDOF + _ONE_FREQUENCY,
+    ),
+    LookAlike(
+        HiddenEffect("viscous_damping", "structure", structure_effects.viscous, ("sdof",)),
+        _LOSSES,
+        _DECAYS_OF_SDOF + _ONE_FREQUENCY,
+    ),
+    LookAlike(
+        HiddenEffect("stiffness_change", "structure", structure_effects.stiffness, ("sdof",)),
+        _RATE,
+        _DECAYS_OF_SDOF,
+    ),
+    LookAlike(HiddenEffect("mass_error", "structure", structure_effects.mass, ("sdof",)), _RATE, _DECAYS_OF_SDOF),
+    LookAlike(
+        HiddenEffect("viscous_damping", "tank", tank_effects.viscous, ("shaker",), tank_model="frozen"),
+        (("viscous_damping",), ("sensor_delay",)),
+        ("shaker_one_frequency",),
+    ),
+    LookAlike(
+        HiddenEffect("mass_error", "tank", tank_effects.mass, ("shaker",)),
+        (("mass_error",), ("effective_mass",), ("sensor_gain",)),
+        ("shaker_one_frequency",),
+    ),
+)
+
+
+def possible_look_alikes(plan: TestPlan, rig: HiddenRig) -> list[LookAlike]:
+    """Those that hold for a plan and a rig."""
+    tank_model = "viscous" if rig.tank_damping_kg_per_s else "frozen"
+    return [
+        one
+        for one in LOOK_ALIKES
+        if plan.name in one.plans
+        and plan.kind in one.truth.kinds
+        and one.truth.tank_model in ("", tank_model)
+        and not (one.truth.is_friction and rig.coulomb_n)
+    ]
