@@ -6,33 +6,52 @@ import json
 from pathlib import Path
 from typing import Any
 
+from pipelines.diagnosis_report.results import Diagnosis
+from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
 from sloshlab import atomic_file
-from sloshlab.diagnosis.case import read_case
+from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.explanation import findings_of
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 
 
-def diagnose_case(folder: Path, output: Path | None) -> dict[str, Any]:
-    """Diagnose a case and write ``verdict.json``; return what is to be said.
+def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bool = True) -> dict[str, Any]:
+    """Diagnose a case; write ``verdict.json`` and the report; return what is to be said.
 
     Parameters
     ----------
     folder : Path
     output : Path, optional
-        ``diagnosis/`` in the case folder by default.
+        ``diagnosis/`` in the case folder by default. All files appear together, complete, or none does.
+    command : str
+        What the user typed, for the report.
+    report : bool
+        False leaves the report and its figures out.
     """
     case = read_case(folder)
     with amounts("diagnosing") as advance:
-        found = findings_of(case, lambda what, done, of: advance(done, of))
+        found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)))
     verdict = verdict_of(found)
     facts = verdict_facts(found, verdict)
     target = output or folder / "diagnosis"
-    target.mkdir(parents=True, exist_ok=True)
-    atomic_file.write_bytes(target / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
-    flags = list(found.split.limits)
+    diagnosis = Diagnosis(found, verdict, _provenance(case, command))
+    with atomic_file.filled_folder(target) as complete:
+        atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
+        if report:
+            from pipelines.diagnosis_report import page_of
+            from pipelines.report.writing import write_page
+
+            write_page(page_of(diagnosis), complete)
+    lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
+    if report:
+        lines.append(f"report: {target / 'report.html'}")
+    return {"lines": lines, "flags": list(found.split.limits), **facts}
+
+
+def _provenance(case: Case, command: str) -> dict[str, Any]:
+    files = [case.folder / "rig.toml", *sorted((case.folder / "recordings").glob("*.nc"))]
     return {
-        "lines": [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"],
-        "flags": flags,
-        **facts,
+        "command": command,
+        "inputs": {file.name: sha256_of(file) for file in files},
+        "versions": versions(),
     }

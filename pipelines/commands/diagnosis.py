@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import Json, app, finish
+from pipelines.commands.application import Json, app, command_as_given, finish
 
 
 @app.command()
@@ -21,9 +21,10 @@ def diagnose(
             "-o", "--output", metavar="DIR", help="Folder for results; CASE/diagnosis.", show_default=False
         ),
     ] = None,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write verdict.json only.")] = False,
     as_json: Json = False,
 ) -> None:
     """What physics the simulation of a case left out, or that nothing is missing."""
     from pipelines.diagnose import diagnose_case
 
-    finish(diagnose_case(case, output), as_json)
+    finish(diagnose_case(case, output, command=command_as_given(), report=not no_report), as_json)

@@ -1,5 +1,6 @@
-"""What physics a simulation left out: where it differs from recordings, what explains it, and whether that is unique.
+"""What physics a simulation left out: where it misses recordings, what explains it, and whether that is unique.
 
-The order is that of the four questions: `case` reads, `observations` compares in short-time spectra weighted by what
-repeats, `free_run_fit` retunes the baseline and fits every candidate of `effects`, `verdict` judges on held-out runs.
+The order is that of the four questions: `case` reads, `observations` compares in short-time spectra weighted by
+what repeats, `free_run_fit` retunes the baseline and fits every candidate of `effects`, `verdict` judges on
+held-out runs.
 """

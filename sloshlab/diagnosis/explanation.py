@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
 from sloshlab.diagnosis.case import Case, CaseRun
-from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.force_surface import surface_effect
 from sloshlab.diagnosis.free_run_fit import (
     FreeRunFit,
@@ -98,6 +98,13 @@ class Findings:
     ceilings: list[Explanation]
     failed: dict[str, str]
     screened: dict[str, float]
+
+    def readings(self, explanation: Explanation) -> dict[str, dict[str, FloatArray]]:
+        """What every channel of every run reads in an explanation."""
+        return {
+            run.name: self.model.simulate(run, explanation.fit.values, explained_extension(explanation))
+            for run in self.case.runs
+        }
 
     @property
     def n_fitting(self) -> int:
@@ -226,8 +233,6 @@ class _Search:
     def judged(self, fit: FreeRunFit) -> Explanation:
         """A fit with its held-out residuals; only releases and offsets of those runs are fitted to them."""
         shared = {name: value for name, value in fit.values.items() if not _belongs_to_a_run(name, self.case)}
-        problem = FreeRunProblem(self.model, self.held_out, (), {**shared})
-        problem.candidates = ()
         problem = _WithEffects(self.model, self.held_out, fit.candidates, shared)
         theta = problem.theta_of(fit.values)
         if theta.size:
@@ -396,6 +401,6 @@ def _sizes(fitting: Sequence[Sequence[Observation]], model: RigModel) -> dict[st
     return found
 
 
-def explained_extension(explanation: Explanation):  # type: ignore[no-untyped-def]
+def explained_extension(explanation: Explanation) -> Extension:
     """What an explanation adds to the baseline."""
     return extension_of(explanation.fit.candidates, explanation.fit.values)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.errors import SloshlabError
@@ -155,10 +156,8 @@ class FreeRunProblem:
         return found
 
 
-def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]):  # type: ignore[no-untyped-def]
+def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:
     """What the candidates add, with their numbers taken from the values."""
-    from sloshlab.diagnosis.extension import NOTHING
-
     total = NOTHING
     for one in candidates:
         numbers = {parameter.name: values[f"{one.key}.{parameter.name}"] for parameter in one.effect.parameters}
@@ -259,7 +258,7 @@ def fitted(
         problem.values(theta),
         misfit + float((prior * theta**2).sum()),
         misfit,
-        np.linalg.pinv(hessian),
+        np.asarray(np.linalg.pinv(hessian), np.float64),
         problem.names,
         problem.scales,
         problem.n_simulations,

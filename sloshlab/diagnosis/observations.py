@@ -48,7 +48,7 @@ class Observation:
     @property
     def n_bands(self) -> int:
         """Coefficients per block."""
-        return self.spectra.shape[1]
+        return int(self.spectra.shape[1])
 
     @property
     def frequencies_hz(self) -> FloatArray:
@@ -121,8 +121,8 @@ def with_scatter(
 
     Notes
     -----
-    The scatter about the mean of the repeats is averaged over three blocks and nine bands; it is never taken as less
-    than the noise of the sensor.
+    The scatter about the mean of the repeats is averaged over three blocks and nine bands; it is never taken as
+    less than the noise of the sensor.
     """
     n = len(group)
     scatter: dict[str, FloatArray] = {}

@@ -1,4 +1,4 @@
-"""The twin of a rig as a diagnosis sees it: what its own parameters may be, and what its channels show in a run."""
+"""The twin of a rig as a diagnosis sees it: what its parameters may be, and what its channels show in a run."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from sloshlab.diagnosis.candidate import Candidate, known_effects
 from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.mismatch import mismatches, summary
 
 LEAST_GAIN: Final = 12.0
 """Held-out log-likelihood ratio from which something is missing."""
@@ -184,7 +185,8 @@ def _statement(found: Findings, best: Explanation, alternatives: Sequence[Explan
         explained = (found.retuned.held_out_rms**2 - best.held_out_rms**2) / max(
             found.retuned.held_out_rms**2 - min(1.0, best.held_out_rms**2), 1e-300
         )
-    text = f"Left out: {named}; explains {100 * min(max(explained, 0.0), 1.0):.0f} % of what the held-out runs can tell"
+    share = 100 * min(max(explained, 0.0), 1.0)
+    text = f"Left out: {named}; explains {share:.0f} % of what the held-out runs can tell"
     if kind == "indistinguishable":
         others = [" + ".join(one.names).replace("_", " ") for one in alternatives[1:]]
         others += [" + ".join(equal).replace("_", " ") for equal in equals_of(best)]
@@ -247,7 +249,8 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
         "separating_experiment": verdict.separating_experiment,
         "statement": verdict.statement,
         "fit": {
-            "metric": "RMS of short-time spectra's residuals over their noise, where the recording stands out of it",
+            "metric": "RMS of the residuals of short-time spectra over their noise, where the "
+            "recording stands out",
             "noise_floor": 1.0,
             "heldout_before": found.believed.held_out_rms,
             "heldout_retuned": found.retuned.held_out_rms,
@@ -285,6 +288,6 @@ def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
 
 
 def _where(found: Findings, channels: Sequence[str]) -> dict[str, Any]:
-    """Channels, times and frequencies in which the retuned baseline misses the recordings most."""
-    del found
-    return {"channels": list(channels)}
+    """Where the retuned baseline misses the recordings most; the channel itself for an effect of a sensor."""
+    place = summary(mismatches(found.fitting, found.readings(found.retuned)))
+    return {**place, "channels": list(channels)} if channels else place

@@ -1,4 +1,4 @@
-"""What the liquid of a real tank does beyond a constant damper: thresholds, delays, saturation, waves, cushions, losses.
+"""What a real liquid does beyond a constant damper: thresholds, delays, saturation, waves, cushions, losses.
 
 All are forces Δf on the tank, beyond that of frozen liquid.
 """

@@ -143,7 +143,7 @@ def _clipped(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
         del rate, others
         limit = numbers["limit"] * float(np.nanmax(np.abs(recorded)))
-        return np.clip(values, -limit, limit)
+        return np.asarray(np.clip(values, -limit, limit))
 
     return reading
 
@@ -216,7 +216,7 @@ def _stretched(sign: float) -> Callable[[Numbers], Reading]:
         def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
             del rate, others, recorded
             places = np.arange(values.size) * (1 + sign * numbers["ratio"])
-            return np.interp(places, np.arange(values.size), values)
+            return np.asarray(np.interp(places, np.arange(values.size), values))
 
         return reading
 

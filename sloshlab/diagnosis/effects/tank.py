@@ -68,7 +68,10 @@ EFFECTIVE = force_effect(
 def _damping(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     del channel
     damper = LIQUID_DAMPING(
-        liquid_mass_kg=at.rig.liquid_mass_kg, start_frequency_hz=at.frequency_hz, **dict(numbers)
+        liquid_mass_kg=at.rig.liquid_mass_kg,
+        start_frequency_hz=at.frequency_hz,
+        threshold_g=numbers["threshold_g"],
+        peak_w_bar=numbers["peak_w_bar"],
     )
     return Extension(terms=(damper,))
 
