@@ -25,6 +25,9 @@ from pipelines.commands import models
 from pipelines.commands import diagnosis
 
 # isort: split
+from pipelines.commands import trial
+
+# isort: split
 from pipelines.commands import laboratory
 
 # isort: split
@@ -44,6 +47,7 @@ __all__ = [
     "models",
     "recordings",
     "run",
+    "trial",
 ]
 
 # typer brings its own click or uses the installed one; either way this is the root of its usage errors

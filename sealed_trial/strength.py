@@ -1,7 +1,7 @@
 """How strongly an effect shows: what remains after the baseline was retuned, over the noise floor.
 
 The floor of a channel is what two runs of one test differ by, over √2, plus the sensor's noise. What an effect
-changes is projected on what retuning could change instead – the baseline's own parameters, gains within calibration –
+changes is projected on what retuning could change instead – the baseline's parameters, gains within calibration –
 and the remainder's RMS over the floor, in the channel where it is largest, is the strength.
 """
 

@@ -59,7 +59,8 @@ def write_recording(
 ) -> None:
     """Write one run: counts with their scale, time, attributes."""
     rate = attributes["sampling_rate_hz"]
-    variables, encoding = {}, {}  # the counts themselves, with their scale as an attribute
+    encoding: dict[str, dict[str, Any]] = {}
+    variables = {}  # the counts themselves, with their scale as an attribute
     for name, values in counts.items():
         sensor = sensors[name]
         variables[name] = ("time", values, _channel_attributes(name, sensor, rig))

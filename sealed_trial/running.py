@@ -1,0 +1,191 @@
+"""Every case of a trial diagnosed by a process of its own, which can know no truth."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from sealed_trial.sealing.key import PREFIX, is_key
+from sealed_trial.sealing.trial_folder import (
+    READABLE,
+    Commitments,
+    check_data,
+    read_commitments,
+)
+from sloshlab.atomic_file import write_bytes
+from sloshlab.errors import InputError
+
+DIAGNOSES: Final = "diagnoses"
+OUTCOME: Final = "outcome.json"
+_LOOKED_THROUGH_BYTES: Final = 4096
+DIAGNOSE: Final = (sys.executable, "-m", "pipelines.command_line", "diagnose")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the diagnosis of a case ended.
+
+    Attributes
+    ----------
+    case, status : str
+        'done', 'crashed' or 'timed_out'.
+    exit_code : int
+    wall_s, processor_s, memory_mib : float
+        Of the process and its children.
+    last_words : str
+        End of its stderr.
+    """
+
+    case: str
+    status: str
+    exit_code: int
+    wall_s: float
+    processor_s: float
+    memory_mib: float
+    last_words: str
+
+
+def require_no_key(trial: Path, arguments: Sequence[str], environment: Mapping[str, str]) -> None:
+    """Refuse to go on where the key can be reached.
+
+    Looks at the arguments and files they name, at the environment and files it names, at the trial and beside it.
+
+    Raises
+    ------
+    InputError
+        If a key was found.
+    """
+    for word in (*arguments, *environment.values()):
+        if is_key(word) or any(_holds_key(Path(part)) for part in word.split(os.pathsep)[:64]):
+            raise InputError("trial run", got="a key in an argument or the environment", allowed="no key in reach")
+    beside = trial.resolve().parent
+    for folder in (trial, beside, Path.cwd()):
+        for path in folder.glob("*"):
+            if _holds_key(path):
+                raise InputError(
+                    "trial run", got=f"the key {path}", allowed="no key in reach", remedy="keep it elsewhere"
+                )
+
+
+def _holds_key(path: Path) -> bool:
+    try:
+        if not path.is_file() or path.stat().st_size > _LOOKED_THROUGH_BYTES:
+            return False
+        return path.read_bytes().startswith(PREFIX.encode())
+    except (OSError, ValueError):
+        return False
+
+
+def run_trial(
+    trial: Path,
+    *,
+    n_workers: int,
+    time_limit_s: float,
+    command: Sequence[str] = DIAGNOSE,
+    finished: Callable[[Outcome], None] = lambda outcome: None,
+) -> list[Outcome]:
+    """Diagnose all cases that have not been; what was done before stays.
+
+    Parameters
+    ----------
+    trial : Path
+    n_workers : int
+        Processes at once.
+    time_limit_s : float
+        Of wall time per case.
+    command : sequence of str
+        Is given the case and `-o FOLDER`.
+    finished : callable
+        Told every outcome.
+
+    Raises
+    ------
+    InputError
+        If data are not what was published.
+    """
+    commitments = read_commitments(trial)
+    if commitments.purpose == "sealed" and (trial / READABLE).exists():
+        raise InputError(f"{trial / READABLE}", got="readable truths", allowed="a sealed trial without them")
+    for case in commitments.cases:
+        check_data(trial, case)
+    outcomes = {name: outcome for name in _names(commitments) if (outcome := _known(trial, name)) is not None}
+    waiting = [name for name in _names(commitments) if name not in outcomes]
+    stopping = threading.Event()
+    with ThreadPoolExecutor(n_workers) as pool:
+        tasks = [pool.submit(_diagnosed, trial, name, command, time_limit_s, stopping) for name in waiting]
+        try:
+            for task in as_completed(tasks):
+                outcome = task.result()
+                outcomes[outcome.case] = outcome
+                finished(outcome)
+        except BaseException:
+            stopping.set()
+            pool.shutdown(cancel_futures=True)
+            raise
+    return [outcomes[name] for name in _names(commitments)]
+
+
+def _names(commitments: Commitments) -> list[str]:
+    return [case.case for case in commitments.cases]
+
+
+def _known(trial: Path, case: str) -> Outcome | None:
+    path = trial / DIAGNOSES / case / OUTCOME
+    if not path.exists():
+        return None
+    stored: dict[str, Any] = json.loads(path.read_bytes())
+    return Outcome(**stored)
+
+
+def _diagnosed(
+    trial: Path, case: str, command: Sequence[str], time_limit_s: float, stopping: threading.Event
+) -> Outcome:
+    """One case in a process of its own, watched."""
+    if stopping.is_set():
+        raise KeyboardInterrupt
+    output = trial / DIAGNOSES / case
+    output.mkdir(parents=True, exist_ok=True)
+    words = [*command, str(trial / "cases" / case), "-o", str(output)]
+    with (output / "stderr.txt").open("w+b") as errors:
+        started = time.monotonic()
+        process = subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True
+        )
+        status, code, usage = _waited(process.pid, started + time_limit_s, stopping)
+        wall = time.monotonic() - started
+        errors.seek(max(0, errors.tell() - 2000))
+        last = errors.read().decode(errors="replace").strip()[-500:]
+    process.returncode = code  # was waited for by its number, for its use of processor and memory
+    if status == "done" and (code not in (0, 3) or not (output / "verdict.json").is_file()):
+        status = "crashed"
+    outcome = Outcome(case, status, code, round(wall, 2), round(usage[0], 2), round(usage[1], 1), last)
+    write_bytes(output / OUTCOME, json.dumps(asdict(outcome), indent=1, sort_keys=True).encode() + b"\n")
+    return outcome
+
+
+def _waited(pid: int, until: float, stopping: threading.Event) -> tuple[str, int, tuple[float, float]]:
+    """Status, exit code, processor seconds and peak memory [MiB] of a child, killed when its time is over."""
+    status = "done"
+    while True:
+        found, wait_status, usage = os.wait4(pid, os.WNOHANG)
+        if found:
+            spent = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+            if stopping.is_set():
+                raise KeyboardInterrupt
+            return status, os.waitstatus_to_exitcode(wait_status), spent
+        if stopping.is_set() or time.monotonic() > until:
+            status = "timed_out"
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(pid, signal.SIGKILL)
+        time.sleep(0.05)

@@ -1,0 +1,232 @@
+"""All scores of a trial."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from sealed_trial.composition import CLASSES
+from sealed_trial.running import Outcome
+from sealed_trial.scoring.answer import NO_ANSWER, Answer
+from sealed_trial.scoring.mark import COLUMNS, Mark, marked
+from sealed_trial.scoring.statistics import DetectionCurve, Rate, brier, detection_curve, logarithmic, rate
+
+CLEAR: Final = 3.0
+"""Strength from which an effect counts as clear."""
+
+NOT_COMPARED: Final = frozenset(
+    {
+        ("effective_mass", "beta"),
+        ("faraday_wave", "growth"),
+        ("lateral_mode", "mass_kg"),
+        ("ceiling_impact", "stiffness_n_per_m"),
+        ("ceiling_impact", "damping_n_s_per_m"),
+        ("hysteresis", "stiffness_n_per_m"),
+    }
+)
+"""Parameters whose law differs between laboratory and vocabulary, so that no interval can be held to them."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """One interval against the truth."""
+
+    case: str
+    effect: str
+    parameter: str
+    truth: float
+    low: float
+    high: float
+    inside: bool
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Held-out errors of one case, as its verdict states them."""
+
+    case: str
+    kind: str
+    retuned: float
+    after: float
+    ceiling: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a trial came to.
+
+    Attributes
+    ----------
+    purpose : str
+    marks : tuple of Mark
+    outcomes : dict
+        By case.
+    rates : dict
+        By a sentence that says of what.
+    columns_of_classes : dict
+        Counts by class and column.
+    names : dict
+        Counts by true and answered name.
+    log_score, brier_score : float
+        Mean over cases with one label; NaN without any.
+    held : tuple of Held
+    gains : tuple of Gain
+    after_over_ceiling : float
+        Median over right names.
+    curve : DetectionCurve or None
+    rivals : dict
+        Rates by rival.
+    """
+
+    purpose: str
+    marks: tuple[Mark, ...]
+    outcomes: dict[str, Outcome]
+    rates: dict[str, Rate]
+    columns_of_classes: dict[str, dict[str, int]]
+    names: dict[str, dict[str, int]]
+    log_score: float
+    brier_score: float
+    held: tuple[Held, ...]
+    gains: tuple[Gain, ...]
+    after_over_ceiling: float
+    curve: DetectionCurve | None
+    rivals: dict[str, Rate]
+
+    @property
+    def failures(self) -> tuple[Mark, ...]:
+        """Everything that was not right, by class."""
+        return tuple(mark for kind in CLASSES for mark in self.marks if mark.kind == kind and not mark.right)
+
+    def to_document(self) -> dict[str, Any]:
+        """Everything as JSON can hold it; NaN as None."""
+        document = asdict(self)
+        for name, one in self.rates.items():
+            document["rates"][name]["value"] = one.value
+        return _without_nan(document)  # type: ignore[no-any-return]
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def scored(
+    purpose: str,
+    truths: Mapping[str, dict[str, Any]],
+    answers: Mapping[str, Answer],
+    outcomes: Mapping[str, Outcome],
+    rivals: Mapping[str, Rate],
+) -> Score:
+    """Score a trial.
+
+    Parameters
+    ----------
+    purpose : str
+    truths : mapping
+        By case.
+    answers : mapping
+        By case; a missing one, or one whose process did not end well, is no answer.
+    outcomes : mapping
+    rivals : mapping
+    """
+    given = {case: _valid(answers.get(case), outcomes.get(case)) for case in truths}
+    marks = tuple(marked(truths[case], given[case]) for case in truths)
+    labelled = [(given[mark.case], _labels(truths[mark.case])) for mark in marks if mark.kind != "pair"]
+    labelled = [(answer, labels) for answer, labels in labelled if answer.probabilities]
+    held = tuple(one for mark in marks if mark.right for one in _held(truths[mark.case], given[mark.case]))
+    gains = tuple(one for mark in marks if (one := _gain(mark, given[mark.case])) is not None)
+    right = {mark.case for mark in marks if mark.column == "right name"}
+    ratios = [one.after / one.ceiling for one in gains if one.case in right and one.ceiling > 0]
+    visible = [mark for mark in marks if mark.kind in ("single", "masked", "look_alike", "outside")]
+    return Score(
+        purpose=purpose,
+        marks=marks,
+        outcomes=dict(outcomes),
+        rates=_rates(marks, held),
+        columns_of_classes={
+            kind: {column: sum(m.kind == kind and m.column == column for m in marks) for column in COLUMNS}
+            for kind in CLASSES
+        },
+        names=_confusion(marks),
+        log_score=_mean([logarithmic(answer.probabilities, labels) for answer, labels in labelled]),
+        brier_score=_mean([brier(answer.probabilities, labels) for answer, labels in labelled]),
+        held=held,
+        gains=gains,
+        after_over_ceiling=float(np.median(ratios)) if ratios else math.nan,
+        curve=detection_curve([m.strength for m in visible], [m.detected for m in visible]),
+        rivals=dict(rivals),
+    )
+
+
+def _valid(answer: Answer | None, outcome: Outcome | None) -> Answer:
+    return answer if answer is not None and outcome is not None and outcome.status == "done" else NO_ANSWER
+
+
+def _labels(truth: Mapping[str, Any]) -> list[str]:
+    """Labels of `probabilities` that are true: one name, 'none', 'unknown', or every equal of a look-alike."""
+    return ["+".join(sorted(names)) or "none" for names in truth["accepted"]]
+
+
+def _rates(marks: Sequence[Mark], held: Sequence[Held]) -> dict[str, Rate]:
+    def of(chosen: Sequence[Mark], good: str) -> Rate:
+        return rate(sum(bool(getattr(mark, good)) for mark in chosen), len(chosen))
+
+    def kind(name: str) -> list[Mark]:
+        return [mark for mark in marks if mark.kind == name]
+
+    clear = [mark for mark in kind("single") if mark.strength > CLEAR]
+    return {
+        "false alarms where nothing is missing": of(kind("nothing"), "false_alarm"),
+        "nothing missing, answered right": of(kind("nothing"), "right"),
+        "clear single effects named in the right block": of(clear, "right"),
+        "clear single effects detected": of(clear, "detected"),
+        "pairs with both names": of(kind("pair"), "right"),
+        "look-alikes answered by the set": of(kind("look_alike"), "right"),
+        "outside the vocabulary, unknown with the right block": of(kind("outside"), "right"),
+        "masked effects named or left alone": of(kind("masked"), "right"),
+        "wrong names anywhere": of(list(marks), "wrong_name"),
+        "no answer": rate(sum(mark.column == "no answer" for mark in marks), len(marks)),
+        "intervals that hold the truth": rate(sum(one.inside for one in held), len(held)),
+    }
+
+
+def _confusion(marks: Sequence[Mark]) -> dict[str, dict[str, int]]:
+    counts: dict[str, Counter[str]] = {}
+    for mark in marks:
+        counts.setdefault(mark.truth, Counter())[mark.answered] += 1
+    return {truth: dict(sorted(counter.items())) for truth, counter in sorted(counts.items())}
+
+
+def _held(truth: Mapping[str, Any], answer: Answer) -> list[Held]:
+    """Intervals of rightly named effects, parameter by parameter."""
+    found = []
+    for effect in truth["effects"]:
+        for parameter, value in effect["parameters"].items():
+            interval = answer.intervals.get((effect["name"], parameter))
+            if interval is None or (effect["name"], parameter) in NOT_COMPARED:
+                continue
+            inside = interval.low <= value <= interval.high
+            found.append(
+                Held(truth["case"], effect["name"], parameter, value, interval.low, interval.high, inside)
+            )
+    return found
+
+
+def _gain(mark: Mark, answer: Answer) -> Gain | None:
+    names = ("heldout_retuned", "heldout_after", "heldout_ceiling", "noise_floor")
+    if not all(name in answer.fit for name in names):
+        return None
+    return Gain(mark.case, mark.kind, *(answer.fit[name] for name in names))
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if values else math.nan
