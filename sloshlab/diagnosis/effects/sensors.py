@@ -162,7 +162,7 @@ def _drifted(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
         del others
         time = np.arange(values.size) / rate
-        return values + numbers["rate"] * float(np.nanstd(recorded)) * (time - time.mean())
+        return np.asarray(values + numbers["rate"] * float(np.nanstd(recorded)) * (time - time.mean()))
 
     return reading
 
