@@ -90,6 +90,32 @@ def test_modal_fit_intervals_hold_in_nine_of_ten_repeats() -> None:
     assert np.mean(held, axis=0) == pytest.approx(0.90, abs=0.05)
 
 
+def test_the_model_of_a_modal_fit_is_that_of_the_data() -> None:
+    lines = np.linspace(8, 14, 120)
+    data = responses(lines, poles_of(np.array([10.87]), np.array([0.01])), 2)
+    fit = modal_fit(lines, data, n_modes=1)
+    np.testing.assert_allclose(fit.modelled, data, rtol=1e-8)
+    np.testing.assert_array_equal(fit.line_hz, lines)
+
+
+def test_a_mode_seen_through_the_line_shape_of_the_window_is_modelled_through_it() -> None:
+    """|W|² of a Hann window of 1500 samples by FFT; with it a mode a line wide loses a third of its peak."""
+    n_segment, rate, finer = 1500, 50.0, 32
+    power = np.abs(np.fft.fft(np.hanning(n_segment + 1)[:-1], finer * n_segment)) ** 2
+    offsets = np.arange(-8 * finer, 8 * finer + 1)
+    shares = power[offsets] / power[offsets].sum()
+    spacing = rate / n_segment
+    lines = np.arange(240, 420) * spacing
+    pole = poles_of(np.array([10.87]), np.array([0.0016]))
+    fine = responses((lines[:, None] + offsets / finer * spacing).ravel(), pole, 1)[0].reshape(lines.size, -1)
+    seen, plain = fine @ shares, responses(lines, pole, 1)[0]
+    fit = modal_fit(lines, seen, n_modes=1, hann_lines=True)
+    assert np.abs(seen).max() < 0.8 * np.abs(plain).max()
+    # the line shape is summed at quarters of a line, here at 32nds
+    assert np.abs(fit.modelled[0] - seen).max() < 0.01 * np.abs(seen).max()
+    assert fit.damping_ratio[0] == pytest.approx(0.0016, rel=0.01)
+
+
 def resonator(damping_ratio: float, rate_hz: float) -> tuple[list[float], list[float]]:
     """Digital filter with the sampled poles e^{p/f_s} of a mode at 10.87 Hz."""
     pole = np.exp(poles_of(np.array([10.87]), np.array([damping_ratio]))[0] / rate_hz)

@@ -59,6 +59,12 @@ def test_a_guide_has_one_mode_with_the_liquid_frozen() -> None:
     assert modes.frequency_hz[0] == pytest.approx(np.sqrt(3808.8 / (2.061 + 0.124326)) / (2 * np.pi), rel=1e-5)
 
 
+def test_a_guide_has_no_second_mode() -> None:
+    assert stated_modes(rig(GUIDE), 1).names == ("guide",)
+    with pytest.raises(AnalysisError, match="number of modes: got 2; allowed: 1 on a guide"):
+        stated_modes(rig(GUIDE), 2)
+
+
 def test_places_not_stated_are_tip_and_root() -> None:
     stated = {
         "acceleration_tip": None,

@@ -64,6 +64,14 @@ def test_intervals_hold_in_nine_of_ten_repeats() -> None:
     assert np.mean(held_h1) == pytest.approx(0.90, abs=0.02)
 
 
+@pytest.mark.parametrize("size", [0.0, 1e-120])
+def test_an_output_that_hardly_moves_has_no_h2_or_a_right_one(size: float) -> None:
+    x = np.random.default_rng(7).normal(size=2000)
+    spectra = random_spectra(x, np.stack([size * x, x]), RATE_HZ, segment_length=200)
+    assert spectra.h2[0] == pytest.approx(np.full(100, size or np.nan), rel=1e-9, abs=0, nan_ok=True)
+    assert spectra.h2[1] == pytest.approx(np.ones(100), rel=1e-9)
+
+
 def test_normalisation_goes_with_the_result() -> None:
     x = np.random.default_rng(5).normal(size=2000)
     spectra = random_spectra(x, np.stack([x, -x]), RATE_HZ, segment_length=200, output_names=("tip", "root"))
@@ -91,6 +99,8 @@ def test_segments_with_gaps_are_left_out() -> None:
         (250, {"segment_length": 200}, "at least 2"),
         (2000, {"segment_length": 200, "overlap": 0.95}, "overlap"),
         (2000, {"segment_length": 4}, "segments of at least 8"),
+        # refused before a window of that length is made
+        (2000, {"segment_length": 10**13}, "of which at least 2 fit"),
     ],
 )
 def test_runs_that_are_too_short_are_refused(n_samples: int, options: dict, match: str) -> None:
