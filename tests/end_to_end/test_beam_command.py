@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from short_runs import DONE_BUT_FLAGGED, refusal
 
+from acquisition.virtual_laboratory.cantilever import fitted_to
 from pipelines import experiments
 from pipelines.beam import analyse_beam, checked_settings
 from pipelines.beam_outputs import write_beam
@@ -129,6 +130,22 @@ def test_report_and_figures_are_complete(results: Path) -> None:
         assert text in page
     assert "Not drawn" not in page
     assert "http" not in page.replace("https://doi.org", "")
+
+
+def test_the_structural_update_is_written_down(results: Path) -> None:
+    """The laboratory's beam is a uniform one of the same material and dimensions."""
+    true = fitted_to(beam_runs.FREQUENCIES_HZ[0], 0.74, 0.10, 0.01)
+    with xr.open_dataset(results / "modal.nc") as modal:
+        measured = modal["measured_frequency_hz"].values
+        # damped frequencies are written down
+        undamped = np.array(beam_runs.FREQUENCIES_HZ) / np.sqrt(1 - np.array(beam_runs.DAMPING_RATIOS) ** 2)
+        assert measured == pytest.approx(undamped, rel=5e-5)
+        # the frequencies written down are those of Table 2.4, not of a uniform beam: two parameters, three modes
+        assert modal["natural_frequency_hz"].values == pytest.approx(measured, rel=0.02)
+        assert float(modal["tip_mass_kg"]) == pytest.approx(true.tip_mass_kg, rel=0.1)
+        assert float(modal["tip_mass_kg_std"]) < 0.3 * true.tip_mass_kg
+        assert float(modal["youngs_modulus_pa"]) == pytest.approx(70e9, rel=0.05)
+        assert modal["tip_mass_kg_std"].attrs["long_name"].startswith("standard error")
 
 
 def test_the_summary_for_machines_is_the_last_line(
