@@ -30,8 +30,6 @@ class Simulation:
     ending : Ending
     modes : ndarray, shape (n, 3, n_modes)
         Displacement, velocity, acceleration of each mode.
-    places : ndarray, shape (n, 2, 3)
-        The same of structure (relative to the base) and tank (absolute).
     base_motion : ndarray, shape (n, 3)
         The same of the base; of the tank where there is no structure.
     external_force_n : ndarray, shape (n,)
@@ -53,7 +51,6 @@ class Simulation:
     sampling_rate_hz: float
     ending: Ending
     modes: FloatArray
-    places: FloatArray
     base_motion: FloatArray
     external_force_n: FloatArray
     forces_n: FloatArray
@@ -67,25 +64,39 @@ class Simulation:
         """Times of the samples."""
         return np.arange(self.modes.shape[0]) / self.sampling_rate_hz
 
+    @cached_property
+    def places(self) -> FloatArray:
+        """Displacement, velocity, acceleration of structure (relative) and tank (absolute), shape (n, 2, 3)."""
+        relative = np.stack([self._relative(order) for order in range(3)], axis=-1)
+        return np.stack([relative, relative + self.base_motion], axis=1)
+
+    def _relative(self, order: int) -> FloatArray:
+        """Displacement, velocity or acceleration of the tank relative to the base."""
+        total = np.zeros(self.modes.shape[0])
+        if self.twin.structure is not None:
+            for j, deflection in enumerate(self.twin.structure.mode_shape):
+                total += deflection * self.modes[:, order, j]
+        return total
+
     @property
     def base_acceleration_m_per_s2(self) -> FloatArray:
         """Acceleration of the base."""
         return self.base_motion[:, 2]
 
-    @property
+    @cached_property
     def displacement_m(self) -> FloatArray:
         """Displacement of the tank, absolute."""
-        return self.places[:, 1, 0]
+        return self._relative(0) + self.base_motion[:, 0]
 
-    @property
+    @cached_property
     def velocity_m_per_s(self) -> FloatArray:
         """Velocity of the tank, absolute."""
-        return self.places[:, 1, 1]
+        return self._relative(1) + self.base_motion[:, 1]
 
-    @property
+    @cached_property
     def acceleration_m_per_s2(self) -> FloatArray:
         """Acceleration of the tank, absolute."""
-        return self.places[:, 1, 2]
+        return self._relative(2) + self.base_motion[:, 2]
 
     @property
     def tank_force_n(self) -> FloatArray:
