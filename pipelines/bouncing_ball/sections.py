@@ -32,7 +32,10 @@ def page_of(experiment: BallExperiment) -> Page:
     plans = (
         _decay_plans(experiment, result) if isinstance(result, DecayResult) else _line_plans(experiment, result)
     )
-    found = SectionPlan("The ball", (), (tables.parameter_table(experiment), tables.search_table(experiment)))
+    about_ball = (tables.parameter_table(experiment), tables.search_table(experiment))
+    if isinstance(result, DecayResult) and result.frozen is not None:
+        about_ball = (*about_ball, tables.guide_table(result.frozen))
+    found = SectionPlan("The ball", (), about_ball)
     provenance = SectionPlan("Provenance", (), (tables.provenance_table(experiment),))
     return Page(
         title="Bouncing ball",
@@ -48,6 +51,7 @@ def _decay_plans(experiment: BallExperiment, result: DecayResult) -> tuple[Secti
     decay = {
         "decay": figures_decay.motion_and_damping,
         "sloshing_force": figures_decay.sloshing_force,
+        "guide": figures_decay.guide,
         "damping_shares": figures_decay.damping_shares,
         "loss_factors": figures_decay.loss_factors,
     }
