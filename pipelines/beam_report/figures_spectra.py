@@ -96,7 +96,10 @@ def densities(name: str, experiment: BeamExperiment) -> ReportFigure:
 
 def frequency_responses(name: str, experiment: BeamExperiment) -> ReportFigure:
     """|H₁| of the first modal acceleration over the root with its fit, and the coherence, per level."""
-    runs = random_of(experiment)
+    name_of_first = experiment.modes.names[0]
+    runs = [one for one in random_of(experiment) if one[1].spectra.output_psd[_row(one[1], name_of_first)].any()]
+    if not runs:
+        raise NothingToDrawError("the first mode does not move")
     levels = sorted({_level(run) for run, _ in runs})
     figure = new_figure(4.6)
     grid = figure.subplots(2, len(levels), sharex=True, sharey="row", squeeze=False, height_ratios=[2, 1])
@@ -127,7 +130,7 @@ def _draw_response(
 ) -> None:
     """|H₁| with its band and fit into the upper of two axes, the coherence into the lower one."""
     upper, lower = column
-    row = random.spectra.output_names.index(experiment.modes.names[0])
+    row = _row(random, experiment.modes.names[0])
     f, colour = random.spectra.frequency_hz, group_colour(experiment, run.group)
     low, high = (share * experiment.modes.frequency_hz[0] for share in FIT_RANGE)
     lines = (f >= low) & (f <= high)
@@ -183,6 +186,10 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
         "moved apart by 3 %."
     )
     return ReportFigure(name, caption, "Table 2.5", png_bytes(figure))
+
+
+def _row(random: RandomResponse, output: str) -> int:
+    return random.spectra.output_names.index(output)
 
 
 def _level(run: BeamRun) -> str:
