@@ -12,6 +12,7 @@ import xarray as xr
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.twin.status import Ending, Status
+from sloshlab.twin.terms import PLACES
 
 if TYPE_CHECKING:
     from sloshlab.twin.twin import Twin
@@ -130,6 +131,19 @@ class Simulation:
         n = len(self.twin.terms)
         given = self.works_j[:, 0 : 2 * n : 2].sum(axis=1) + self.works_j[:, 2 * n :].sum(axis=1)
         return np.asarray(self.mechanical_energy_j - self.mechanical_energy_j[0] - given)
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """What the forces have to say, each on its motion and memory: regions that they were not measured in."""
+        said: list[str] = []
+        at = 0
+        for term in self.twin.terms:
+            n_memory = len(term.kind.memory(term.values, term.table)) + term.kind.n_switches
+            if term.kind.remarks is not None:
+                motion = self.places[:, PLACES.index(term.place)]
+                said += term.kind.remarks(term, self.time_s, motion, self.memory[:, at : at + n_memory])
+            at += n_memory
+        return tuple(said)
 
     def require_done(self) -> Simulation:
         """Itself, if it reached its end.
