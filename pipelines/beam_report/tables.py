@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.beam_report.figures_spectra import TABLE_2_5
 from pipelines.beam_report.figures_twin import pairs_of, relative_error
-from pipelines.beam_results import METHODS, BeamExperiment, BeamRun, in_g
+from pipelines.beam_results import CONFIGURATIONS, METHODS, BeamExperiment, BeamRun, in_g
 from pipelines.report.numbers import MISSING, interval, signed, text
 from pipelines.report.tables import Table
 from sloshlab.constants import GRAVITY_M_PER_S2
@@ -161,8 +161,7 @@ def pooled_table(experiment: BeamExperiment) -> Table | None:
         ("liquid", "a [g]", "repeats", *(f"ζ₁ by {method} [%]" for method in METHODS)),
         tuple(rows),
         "Mean over the repeats within an eighth of a decade of amplitude, ± half the 90 % interval of the mean "
-        "from "
-        "the scatter between repeats; no interval with one repeat.",
+        "from the scatter between repeats; no interval with one repeat, and none for twins, which repeat exactly.",
     )
 
 
@@ -175,7 +174,7 @@ def _pooled_at(experiment: BeamExperiment, group: str, method: str, amplitude_g:
     if distance[at] > 0.06:
         return MISSING, 0
     mean, n = text(100 * pooled.damping_ratio[at]), int(pooled.n_repeats[at])
-    if n < 2:
+    if n < 2 or group not in CONFIGURATIONS:
         return mean, n
     low, high = 100 * pooled.damping_ratio_interval[:, at]
     return f"{mean} ± {text(0.5 * (high - low), 2)}", n
