@@ -45,6 +45,15 @@ def test_shapes_are_scaled_to_the_tip_values_and_are_those_of_an_independent_bea
     assert found.mode_shapes[-1] == pytest.approx([1.0, -0.5, 2.0])
 
 
+def test_the_scale_of_the_tip_values_does_not_change_what_the_sensors_see() -> None:
+    plain = rig_modal_filter(rig(BEAM.replace("[1.0, -0.5, 2.0]", "[1.0, 1.0, 1.0]")), PLACES_M)
+    scaled = rig_modal_filter(rig(BEAM), PLACES_M)
+    assert scaled.visibility == pytest.approx(plain.visibility)
+    assert scaled.condition_number == pytest.approx(plain.condition_number)
+    # the first mode is largest at its tip
+    assert rig_modal_filter(rig(BEAM), {"acceleration_tip": 0.74}, n_modes=1).visibility == pytest.approx(1.0)
+
+
 def test_modes_kept_are_the_first() -> None:
     assert stated_modes(rig(BEAM), 2).names == ("mode 1", "mode 2")
     assert rig_modal_filter(rig(BEAM), {"acceleration_tip": 0.74}, n_modes=1).weights == pytest.approx(1.0)
