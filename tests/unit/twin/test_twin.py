@@ -76,6 +76,10 @@ def beam() -> Structure:
     return modal_structure([10.0, 70.0, 200.0], [0.0] * 3, [1.0] * 3, mode_shape=[1.0] * 3)
 
 
+def rubbing_twice() -> Twin:
+    return sdof().with_term(COULOMB_FRICTION(force_n=0.4)).with_term(COULOMB_FRICTION(place="tank", force_n=0.1))
+
+
 def run(twin: Twin) -> object:
     return twin.simulate(harmonic(1e-3, 1.0, 1.0, 99.0))
 
@@ -302,6 +306,7 @@ def test_a_ball_that_leaves_its_tank_is_reported() -> None:
         (lambda: run(sdof().with_term(BOUNCING_BALL(**{**BALL, "liquid_mass_kg": 3.0}))), "negative"),
         (lambda: Twin(beam()).simulate(free(2000.0, 20000.0)), "40000001 samples of 16 numbers, 4.8 GiB"),
         (lambda: run(Twin(modal_structure([1.0], [0.0], [1.0], mode_shape=[1.0]))), "base participation"),
+        (lambda: run(rubbing_twice()), "at structure and tank while the base moves; allowed: one place"),
     ],
 )  # fmt: skip
 def test_contradictions_are_refused_in_one_line(make, message: str) -> None:  # type: ignore[no-untyped-def]
