@@ -66,6 +66,9 @@ def test_a_guide_has_one_mode_with_the_liquid_frozen() -> None:
     modes = stated_modes(rig(GUIDE))
     assert modes.names == ("guide",)
     assert modes.frequency_hz[0] == pytest.approx(np.sqrt(3808.8 / (2.061 + 0.124326)) / (2 * np.pi), rel=1e-5)
+    damped = stated_modes(rig(GUIDE + "damping_kg_per_s = 1.58\n"))
+    # b₁/(2 √(K m)) = 1.58/(2 · 91.23 kg/s)
+    assert damped.damping_ratio[0] == pytest.approx(0.00866, rel=1e-3)
 
 
 def test_a_guide_has_no_second_mode() -> None:
