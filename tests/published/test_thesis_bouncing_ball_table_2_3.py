@@ -85,6 +85,22 @@ def test_of_fifteen_readings_the_one_without_omega_bar_and_with_the_damper_alway
 
 
 @pytest.mark.parametrize(
+    ("powers", "damper", "largest"),
+    [
+        ((2.0, 1.0), "contact", 2.9),
+        ((2.0, 1.0), "always", 0.39),
+        ((0.0, 0.0), "contact", 5.3),
+        ((0.0, 0.0), "always", 1.69),
+    ],
+)
+def test_largest_w_bar_of_a_reading(
+    readings: FloatArray, powers: tuple[float, float], damper: str, largest: float
+) -> None:
+    """Measured were 1.65."""
+    assert readings[POWERS.index(powers), DAMPERS.index(damper)].max() == pytest.approx(largest, rel=0.02)
+
+
+@pytest.mark.parametrize(
     ("powers", "in_flight"),
     # chaotic at two amplitudes, where no two integrations stay together: ω̄² in the stiffness only, in contact
     [(powers, flight) for powers in POWERS for flight in (0.0, 1.0) if (powers, flight) != ((2.0, 0.0), 0.0)],
@@ -106,4 +122,4 @@ def test_the_twin_dissipates_the_same(readings: FloatArray, powers: tuple[float,
     twin = w_bar_at(ball, rig, np.full(U_BAR.shape, OMEGA_BAR), U_BAR, run)
     here = readings[POWERS.index(powers), 2 if in_flight else 0]
     # in contact only the force jumps when the ball strikes, which fixed steps meet 1/400 cycle off
-    assert twin == pytest.approx(here, abs=1e-3 if in_flight else 0.02)
+    assert twin == pytest.approx(here, rel=0.0 if in_flight else 0.012, abs=1e-3)
