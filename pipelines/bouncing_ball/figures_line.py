@@ -115,7 +115,7 @@ def errors(name: str, experiment: BallExperiment, result: LineResult) -> ReportF
         middle, [band.measured_rms for band in result.bands], "k.-", lw=0.9, zorder=4, label="measured W̄, RMS"
     )
     axes.set(xlabel="ω̄ = Ω/√(g/h)", ylabel="RMS of W̄")
-    axes.legend(loc="upper left")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     caption = (
         "RMS of the difference of W̄ between ball and measurement in bands of frequency, over all windows "
         "in each; red: "

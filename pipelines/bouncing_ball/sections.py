@@ -51,10 +51,11 @@ def _decay_plans(experiment: BallExperiment, result: DecayResult) -> tuple[Secti
     decay = {
         "decay": figures_decay.motion_and_damping,
         "sloshing_force": figures_decay.sloshing_force,
-        "guide": figures_decay.guide,
         "damping_shares": figures_decay.damping_shares,
         "loss_factors": figures_decay.loss_factors,
     }
+    if result.frozen is not None:
+        decay["guide"] = figures_decay.guide
     steady = {"hysteresis": figures_map.hysteresis, "maps": figures_map.maps, "lines": figures_map.lines}
     return tuple(
         SectionPlan(

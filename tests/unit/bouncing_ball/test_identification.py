@@ -163,6 +163,10 @@ def test_errors_by_frequency_are_those_of_the_windows() -> None:
     others = [band for band in bands if not band.is_tuned]
     assert sum(band.n_windows for band in others) == 4
     assert [band.error_mean for band in others] == pytest.approx([0.1, 0.1])
+    assert [band.error_rms for band in others] == pytest.approx([0.1, 0.1])
+    first = simulated[:2]
+    assert others[0].ball_rms == pytest.approx(np.hypot(*first) / np.sqrt(2))
+    assert others[0].measured_rms == pytest.approx(np.hypot(*(first - 0.1)) / np.sqrt(2))
 
 
 def soft_ball() -> BouncingBall:
