@@ -106,6 +106,7 @@ def test_friction_of_guide_and_tank_adds_up_where_nothing_moves_the_base() -> No
     np.testing.assert_allclose(result.displacement_m, one.displacement_m, atol=1e-14)
     np.testing.assert_allclose(result.forces_n.sum(axis=1), one.forces_n[:, 0], atol=1e-9)
     assert result.forces_n[-1, 0] * 0.17 == pytest.approx(result.forces_n[-1, 1] * 0.2)
+    assert result.forces_n[-1].sum() == pytest.approx(K * result.displacement_m[-1], rel=1e-9)  # at rest it holds
 
 
 def test_asymmetric_friction_is_friction_and_a_constant_force() -> None:
