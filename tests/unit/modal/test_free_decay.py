@@ -133,6 +133,14 @@ def test_where_the_phase_asks_for_an_extremum_that_is_not_there_the_decrement_is
     assert (one.time_s[one.trust == Trust.NO_EXTREMUM] > 4.3).all()
 
 
+def test_a_sensor_that_is_silent_for_a_while_is_no_division_by_zero() -> None:
+    """A parabola through zeros has no curvature."""
+    silent = np.where((TIME_S > 2.0) & (TIME_S < 2.6), 0.0, DECAY)
+    for one in analyse_free_decay(silent, RATE_HZ).readings:
+        assert np.isfinite(one.damping_ratio_std).all()
+        assert np.isfinite(one.frequency_hz_std).all()
+
+
 def test_a_mode_that_is_not_there_is_not_taken_for_the_foot_of_another() -> None:
     with pytest.raises(AnalysisError, match="got 10 Hz; allowed: 14 … 20 Hz, where the mode is looked for"):
         analyse_free_decay(DECAY, RATE_HZ, frequency_range_hz=(14.0, 20.0))
