@@ -19,8 +19,10 @@ from sloshlab.diagnosis.free_run_fit import (
     FreeRunProblem,
     extension_of,
     fitted,
+    fitted_from,
     huber_cost,
     robust_weights,
+    scanned,
 )
 from sloshlab.diagnosis.observations import Observation, observations, with_scatter, with_typical_scatter
 from sloshlab.diagnosis.rig_model import RigModel
@@ -32,6 +34,7 @@ FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
 _MOST_FITTED: Final = 10
 _SOFT: Final = 0.1
+_MOST_SCANNED: Final = 3
 Told = Callable[[str, int, int], None]
 
 assert effects.__all__  # importing the vocabulary makes it known
@@ -256,11 +259,19 @@ class _Search:
         for i, (candidate, start) in enumerate(promising):
             self.told(f"{what}: {candidate.key}", i, len(promising))
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
-            fit, _ = fitted(problem, {**values, **start}, n_iterations=6)
+            starts = [{**values, **one} for one in (*candidate.starts(), start)]
+            fit = fitted_from(problem, starts)
             if fit.trouble:
                 self.failed[candidate.key] = fit.trouble
                 continue
             kept.append(self.judged(fit))
+        for one in sorted(kept, key=lambda each: each.fit.cost)[:_MOST_SCANNED]:
+            candidate = one.fit.candidates[-1]
+            self.told(f"{what}: {candidate.key} from other sizes", 0, 1)
+            problem = FreeRunProblem(self.model, self.fitting, one.fit.candidates)
+            better = scanned(problem, one.fit, f"{candidate.key}.{candidate.effect.parameters[0].name}")
+            if better is not one.fit:
+                kept[kept.index(one)] = self.judged(better)
         self.explanations += kept
         return kept
 

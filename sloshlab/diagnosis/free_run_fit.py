@@ -18,9 +18,15 @@ from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
 _STEP: Final = 0.005
+"""Of a difference, in tolerances; a frequency must not move by much of a cycle."""
+_COARSE_STEP: Final = 0.03
+_TOLERANCES_OF_DAMPING: Final = 3.0
 _ROBUST: Final = 4.0
 _LARGEST_DAMPING: Final = 1e8
-N_THREADS: Final = 2
+STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
+SCANNED: Final = (0.75, 0.9, 1.1, 1.3)
+N_THREADS = 2
+_POOL: Final = ThreadPoolExecutor(N_THREADS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +127,9 @@ class FreeRunProblem:
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
         values = self.values(theta)
-        with ThreadPoolExecutor(N_THREADS) as pool:
-            parts = list(pool.map(lambda run: self._of_run(run, values), self.runs))
-        return np.concatenate(parts)
+        if N_THREADS == 1 or len(self.runs) == 1:
+            return np.concatenate([self._of_run(run, values) for run in self.runs])
+        return np.concatenate(list(_POOL.map(lambda run: self._of_run(run, values), self.runs)))
 
     def _of_run(self, run: Sequence[Observation], values: Mapping[str, float]) -> FloatArray:
         self.n_simulations += 1
@@ -143,11 +149,21 @@ class FreeRunProblem:
             ]
         )
 
-    def jacobian(self, theta: FloatArray, at: FloatArray, columns: Sequence[int]) -> FloatArray:
-        """Derivatives of the residuals by some scaled parameters, by differences of simulations."""
+    def jacobian(
+        self, theta: FloatArray, at: FloatArray, columns: Sequence[int], *, coarse: bool = False
+    ) -> FloatArray:
+        """Derivatives of the residuals by some scaled parameters, by differences of simulations.
+
+        Coarse ones look further, past the jags that dry friction and contacts give a residual.
+        """
         found = np.empty((at.size, len(columns)))
         for place, column in enumerate(columns):
-            step = _STEP if column < self.n_baseline else _STEP * max(abs(theta[column]), 0.05)
+            is_effect, is_damping = column >= self.n_baseline, self.names[column].startswith("damping")
+            step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
+            if is_effect:
+                step *= max(abs(theta[column]), 0.05)
+            elif is_damping and coarse:
+                step *= _TOLERANCES_OF_DAMPING
             moved = theta.copy()
             physical = self.centres[column] + (theta[column] + step) * self.scales[column]
             moved[column] += step if physical <= self.high[column] else -step
@@ -189,7 +205,7 @@ def fitted(
     n_iterations: int = 8,
     known_jacobian: FloatArray | None = None,
     tolerance: float = 1e-3,
-    shares: Sequence[float] = (0.3, 0.1, 0.03, 0.01, 0.0),
+    shares: Sequence[float] = STAGES,
 ) -> tuple[FreeRunFit, FloatArray]:
     """Levenberg–Marquardt; deviations of the baseline count against what is believed of it.
 
@@ -227,7 +243,7 @@ def fitted(
         softness = problem.softness(share)
         damping = 1e-3
         for iteration in range(n_iterations):
-            jacobian = _jacobian(problem, theta, residual, known_jacobian)
+            jacobian = _jacobian(problem, theta, residual, known_jacobian, coarse=share > 0)
             limit = _limit(softness * residual)
             weights = softness * robust_weights(softness * residual, limit)
             weighted = jacobian * weights[:, None]
@@ -266,12 +282,63 @@ def fitted(
     return fit, jacobian
 
 
+def fitted_from(
+    problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], *, n_iterations: int = 6
+) -> FreeRunFit:
+    """The fit from the best of several starts, judged after its first stage.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    starts : sequence of mappings
+    n_iterations : int
+        At most, per stage.
+    """
+    first, *rest = STAGES
+    softness = problem.softness(first)
+    best: tuple[float, FreeRunFit] | None = None
+    for start in starts:
+        fit, _ = fitted(problem, start, n_iterations=n_iterations, shares=(first,))
+        if fit.trouble:
+            continue
+        residual = softness * problem.residual(problem.theta_of(fit.values))
+        cost = huber_cost(residual) + fit.cost - fit.misfit
+        if best is None or cost < best[0]:
+            best = (cost, fit)
+    if best is None:
+        return FreeRunFit(
+            problem.candidates, dict(starts[0]), np.inf, np.inf, trouble="does not run from any of its starts"
+        )
+    return fitted(problem, best[1].values, n_iterations=n_iterations, shares=rest)[0]
+
+
+def scanned(problem: FreeRunProblem, fit: FreeRunFit, name: str, *, n_iterations: int = 5) -> FreeRunFit:
+    """The best of a fit and of fits from other sizes of one of its numbers, to leave a side valley.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    fit : FreeRunFit
+    name : str
+        Of the number.
+    n_iterations : int
+        At most, per stage.
+    """
+    best = fit
+    for factor in SCANNED:
+        start = {**fit.values, name: fit.values[name] * factor}
+        other, _ = fitted(problem, start, n_iterations=n_iterations, shares=STAGES[1:])
+        if not other.trouble and other.cost < best.cost:
+            best = other
+    return best
+
+
 def _jacobian(
-    problem: FreeRunProblem, theta: FloatArray, residual: FloatArray, known: FloatArray | None
+    problem: FreeRunProblem, theta: FloatArray, residual: FloatArray, known: FloatArray | None, *, coarse: bool
 ) -> FloatArray:
     """Derivatives by all parameters, the first ones as they are known."""
     n_known = 0 if known is None else known.shape[1]
-    rest = problem.jacobian(theta, residual, range(n_known, theta.size))
+    rest = problem.jacobian(theta, residual, range(n_known, theta.size), coarse=coarse)
     return rest if known is None else np.hstack([known, rest])
 
 

@@ -56,6 +56,16 @@ class BaselineParameter:
     is_reading: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class _Channels:
+    """What is needed of a run's channels again and again."""
+
+    compared: tuple[str, ...]
+    attributes: Mapping[str, Mapping[str, Any]]
+    recorded: Mapping[str, FloatArray]
+    n_cells: int
+
+
 class RigModel:
     """The twin of a rig file.
 
@@ -79,8 +89,7 @@ class RigModel:
         self._drives: dict[tuple[Any, ...], Drive] = {}
         self._truths: OrderedDict[tuple[Any, ...], dict[str, FloatArray]] = OrderedDict()
         self._lock = threading.Lock()
-        for run in self.runs:
-            self._drive(run, ())
+        self._channels = {run.name: self._channels_of(run) for run in self.runs}
         self.parameters = self._parameters()
 
     @property
@@ -90,6 +99,18 @@ class RigModel:
 
     def compared(self, run: CaseRun) -> list[str]:
         """Channels of a run that the twin has a counterpart for and that do not alone drive it."""
+        return list(self._channels[run.name].compared)
+
+    def _channels_of(self, run: CaseRun) -> _Channels:
+        names = self._compared(run)
+        return _Channels(
+            tuple(names),
+            {name: dict(run.recording[name].attrs) for name in names},
+            {name: np.asarray(run.recording[name].values, np.float64) for name in names},
+            max(1, sum(name.startswith("force_cell") for name in channels(run.recording, "force"))),
+        )
+
+    def _compared(self, run: CaseRun) -> list[str]:
         drive = self._drive(run, ())
         n = len(drive.channels)
         names = [name for name in channels(run.recording) if run.recording[name].attrs["quantity"] != "voltage"]
@@ -126,8 +147,7 @@ class RigModel:
             reading = true * values.get(f"gain of {name}", 1.0)
             for fault in extension.faults:
                 if fault.channel == name:
-                    recorded = np.asarray(run.recording[name].values, np.float64)
-                    reading = fault.reading(reading, rate, truth, recorded)
+                    reading = fault.reading(reading, rate, truth, self._channels[run.name].recorded[name])
             readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
         return readings
 
@@ -145,10 +165,9 @@ class RigModel:
                 self._truths.move_to_end(key)
                 return self._truths[key]
         simulation = self._simulation(run, values, extension, undone)
-        n_cells = sum(name.startswith("force_cell") for name in channels(run.recording, "force"))
-        truth = {}
-        for name in self.compared(run):
-            found = true_channel(simulation, name, run.recording[name].attrs, self.rig, n_cells=max(n_cells, 1))
+        known, truth = self._channels[run.name], {}
+        for name in known.compared:
+            found = true_channel(simulation, name, known.attributes[name], self.rig, n_cells=known.n_cells)
             if found is not None:
                 truth[name] = found
         with self._lock:
