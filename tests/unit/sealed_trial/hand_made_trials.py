@@ -1,0 +1,54 @@
+"""Trials without a laboratory: tiny cases, truths and a stand-in for the diagnosis."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from sealed_trial.case_drawing import HiddenTruth
+from sealed_trial.sealing.trial_folder import Commitments, _written
+
+KEY = bytes(range(32))
+
+
+def effect(name: str, block: str = "structure", strength: float = 10.0, **parameters: float) -> dict[str, Any]:
+    """A true effect."""
+    return {"name": name, "block": block, "parameters": parameters, "strength": strength}
+
+
+def truth(case: str, kind: str, *effects: dict[str, Any], accepted: list[list[str]] | None = None) -> HiddenTruth:
+    """A truth; its own names are accepted if nothing else is said."""
+    names = [[one["name"] for one in effects]] if accepted is None else accepted
+    return HiddenTruth(case, kind, list(effects), names)
+
+
+def written_trial(folder: Path, truths: list[HiddenTruth], key: bytes | None) -> Commitments:
+    """A sealed (or, without a key, a development) trial whose recordings are text."""
+    for one in truths:
+        place = folder / "cases" / one.case
+        (place / "recordings").mkdir(parents=True)
+        (place / "rig.toml").write_text("[tank]\n")
+        (place / "recordings" / "run_01.nc").write_text(f"samples of {one.case}")
+    purpose = "development" if key is None else "sealed"
+    return _written(folder, purpose, 1, key, b"secret", {one.case: one for one in truths})
+
+
+DIAGNOSIS = """
+import json, os, pathlib, sys, time
+case, output = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[3])
+with open(output / "calls.txt", "a") as file:
+    file.write("called\\n")
+if case.name == "case_002":
+    sys.exit("no way through")
+if case.name == "case_003":
+    time.sleep(60)
+(output / "verdict.json").write_text(json.dumps({"verdict": "nothing_missing", "effects": []}))
+"""
+
+
+def stand_in(folder: Path) -> tuple[str, ...]:
+    """A diagnosis that answers, crashes in case 2 and takes a minute for case 3."""
+    script = folder / "stand_in.py"
+    script.write_text(DIAGNOSIS)
+    return sys.executable, str(script)

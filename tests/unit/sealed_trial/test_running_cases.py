@@ -1,0 +1,76 @@
+"""Cases run in processes of their own: crashes and time-outs are outcomes, what is done stays done."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hand_made_trials import KEY, stand_in, truth, written_trial
+
+from sealed_trial.running import DIAGNOSES, OUTCOME, require_no_key, run_trial
+from sealed_trial.sealing.key import made_or_read_key
+from sealed_trial.sealing.trial_folder import READABLE
+from sloshlab.errors import InputError
+
+FOUR = [truth(f"case_00{k}", "nothing", accepted=[[]]) for k in (1, 2, 3, 4)]
+
+
+def test_every_end_of_a_case_is_an_outcome_and_nothing_is_done_twice(tmp_path) -> None:
+    trial = tmp_path / "trial"
+    written_trial(trial, FOUR, None)
+    told = []
+    command = stand_in(tmp_path)
+    # long enough for a start of Python on a busy machine, shorter than the minute of case 3
+    outcomes = run_trial(trial, n_workers=2, time_limit_s=20.0, command=command, finished=told.append)
+    assert [outcome.status for outcome in outcomes] == ["done", "crashed", "timed_out", "done"]
+    assert outcomes[1].exit_code == 1
+    assert outcomes[1].last_words == "no way through"
+    assert outcomes[2].exit_code == -9
+    assert sorted(outcome.case for outcome in told) == [one.case for one in FOUR]
+    (trial / DIAGNOSES / "case_004" / OUTCOME).unlink()  # as if it had been stopped before its end
+    told.clear()
+    again = run_trial(trial, n_workers=1, time_limit_s=20.0, command=command, finished=told.append)
+    assert [outcome.case for outcome in told] == ["case_004"]
+    assert again[:3] == outcomes[:3]
+    calls = [(trial / DIAGNOSES / one.case / "calls.txt").read_text().count("called") for one in FOUR]
+    assert calls == [1, 1, 1, 2]
+
+
+def test_data_that_were_touched_are_not_diagnosed(tmp_path) -> None:
+    written_trial(tmp_path, FOUR, None)
+    (tmp_path / "cases" / "case_003" / "rig.toml").write_text("[tank]\nhint = 1\n")
+    with pytest.raises(InputError, match=r"case_003: rig\.toml"):
+        run_trial(tmp_path, n_workers=1, time_limit_s=1.0, command=("false",))
+    assert not (tmp_path / DIAGNOSES).exists()
+
+
+def test_a_sealed_trial_with_readable_truths_is_refused(tmp_path) -> None:
+    pytest.importorskip("cryptography")
+    written_trial(tmp_path, FOUR, KEY)
+    (tmp_path / READABLE).write_text(json.dumps({}))
+    with pytest.raises(InputError, match="readable truths"):
+        run_trial(tmp_path, n_workers=1, time_limit_s=1.0, command=("false",))
+
+
+@pytest.mark.parametrize("place", ["argument", "environment", "named by environment", "beside", "within"])
+def test_a_key_in_reach_is_refused(tmp_path, monkeypatch, place: str) -> None:
+    trial, elsewhere = tmp_path / "trials" / "trial", tmp_path / "elsewhere"
+    trial.mkdir(parents=True)
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    made = made_or_read_key(tmp_path / "safe" / "key", trial)
+    require_no_key(trial, ["sloshlab", "trial", "run", str(trial)], {"HOME": str(tmp_path)})
+    line = (tmp_path / "safe" / "key").read_text()
+    arguments, environment = ["sloshlab"], {}
+    if place == "argument":
+        arguments.append(str(tmp_path / "safe" / "key"))
+    elif place == "environment":
+        environment["SECRET"] = line.strip()
+    elif place == "named by environment":
+        environment["KEYS"] = f"nothing:{tmp_path / 'safe' / 'key'}"
+    else:
+        folder = trial if place == "within" else trial.parent
+        (folder / "forgotten.txt").write_text(line)
+    with pytest.raises(InputError, match="no key in reach"):
+        require_no_key(trial, arguments, environment)
+    assert made.hex() in line
