@@ -4,10 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 RESULTS := results
+TRIAL_SEED ?= 1
+TRIAL_KEY ?= $(HOME)/.config/sloshlab/trial_$(TRIAL_SEED).key
 RECORDINGS := raw_data/numerical_tank/shaker
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker beam sdof bouncing-ball replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof bouncing-ball replay campaign tank-campaign pictures trial test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -45,6 +47,11 @@ tank-campaign: setup  ## compute the recordings of raw_data/numerical_tank again
 
 pictures: setup  ## the snapshots and the film of the numerical tank in docs/images again (minutes)
 	$(BIN)/python -m pipelines.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml
+
+trial: setup  ## a blind trial, sealed, diagnosed and scored (hours; goes on where it was stopped)
+	test -f $(RESULTS)/trial/commitments.json || $(BIN)/sloshlab trial seal -o $(RESULTS)/trial --seed $(TRIAL_SEED) --key $(TRIAL_KEY)
+	env -u MAKEFLAGS -u TRIAL_KEY $(BIN)/sloshlab trial run $(RESULTS)/trial || test $$? -eq 3
+	$(BIN)/sloshlab trial score $(RESULTS)/trial --key $(TRIAL_KEY) -o $(RESULTS)/trial_scores
 
 test: setup  ## the tests, at most 10 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"

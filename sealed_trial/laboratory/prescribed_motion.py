@@ -43,7 +43,10 @@ def random_motion(
     duration_s: float, rms_g: float, centre_hz: float, width_hz: float, generator: np.random.Generator
 ) -> Motion:
     """Gaussian motion: sines of random phase under a Gaussian spectrum of the acceleration."""
-    frequencies = np.arange(max(1.0, centre_hz - 2 * width_hz), centre_hz + 2 * width_hz, 0.5 / duration_s)
+    # a shaker's stroke leaves no slow motion
+    frequencies = np.arange(
+        max(0.4 * centre_hz, centre_hz - 2 * width_hz), centre_hz + 2 * width_hz, 0.5 / duration_s
+    )
     frequencies = frequencies + generator.uniform(-0.2, 0.2, frequencies.size) / duration_s
     weights = np.exp(-0.5 * ((frequencies - centre_hz) / width_hz) ** 2)
     amplitudes = weights * rms_g * _GRAVITY * math.sqrt(2) / math.sqrt(float(np.sum(weights**2)))

@@ -21,7 +21,7 @@ from sealed_trial.case_drawing import CaseDrawing, HiddenTruth, class_order
 from sealed_trial.case_recording import write_case
 from sealed_trial.sealing.commitment import case_hashes, commitment, salt_of
 from sealed_trial.sealing.locked_truths import locked, opened
-from sloshlab.atomic_file import write_bytes
+from sloshlab.atomic_file import filled_folder, write_bytes
 from sloshlab.errors import InputError
 
 DOMAINS: Final = {"sealed": b"sloshlab blind trial, sealed", "development": b"sloshlab blind trial, development"}
@@ -66,7 +66,7 @@ def entropy(purpose: str, seed: int, secret: bytes) -> list[int]:
 def seal(
     folder: Path, *, seed: int, n_cases: int, key: bytes | None, said: Callable[[str], None] = lambda step: None
 ) -> Commitments:
-    """Draw a trial and write it.
+    """Draw a trial and write it, whole or not at all.
 
     Parameters
     ----------
@@ -93,13 +93,14 @@ def seal(
     secret = hashlib.sha256(b"salts" + bytes(str(words), "ascii")).digest()
     drawing = CaseDrawing(words)
     truths: dict[str, HiddenTruth] = {}
-    for number, kind in enumerate(class_order(n_cases, np.random.default_rng([*words, 0]))):
-        name = f"case_{number + 1:03d}"
-        case = drawing.case(number, name, kind)
-        write_case(folder / "cases" / name, case, np.random.default_rng([*words, number, 4]))
-        truths[name] = case.truth
-        said(name)
-    return _written(folder, purpose, seed, key, secret, truths)
+    with filled_folder(folder) as complete:
+        for number, kind in enumerate(class_order(n_cases, np.random.default_rng([*words, 0]))):
+            name = f"case_{number + 1:03d}"
+            case = drawing.case(number, name, kind)
+            write_case(complete / "cases" / name, case, np.random.default_rng([*words, number, 4]))
+            truths[name] = case.truth
+            said(name)
+        return _written(complete, purpose, seed, key, secret, truths)
 
 
 def _written(

@@ -7,6 +7,7 @@ import subprocess
 import tomllib
 from pathlib import Path
 
+import click
 import pytest
 import typer.main
 import yaml
@@ -31,6 +32,12 @@ def section_of(command: str) -> str:
     return next((part for part in parts if part.startswith(f"sloshlab {command}\n")), "")
 
 
+def parameters_of(command: str) -> list[click.Parameter]:
+    """Parameters of a command, or of all steps of one that has steps."""
+    steps = getattr(COMMANDS[command], "commands", {}).values()
+    return [parameter for one in steps or [COMMANDS[command]] for parameter in one.params]
+
+
 def tracked_text_files() -> list[Path]:
     """Files that git tracks and that are text."""
     try:
@@ -50,9 +57,10 @@ def test_the_documented_commands_are_those_of_the_program() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_option_is_documented_and_no_other(command: str) -> None:
-    options = {
-        name for parameter in COMMANDS[command].params for name in parameter.opts if name.startswith("-")
-    } - {"-h", "--help"}
+    options = {name for parameter in parameters_of(command) for name in parameter.opts if name.startswith("-")} - {
+        "-h",
+        "--help",
+    }
     section = section_of(command)
     rows = "\n".join(line.split("|")[1] for line in section.splitlines() if line.startswith("| `-"))
     assert set(re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", rows)) == options
@@ -61,7 +69,7 @@ def test_every_option_is_documented_and_no_other(command: str) -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_documented_defaults_are_those_of_the_program(command: str) -> None:
     rows = [line.split("|") for line in section_of(command).splitlines() if line.startswith("| `-")]
-    for parameter in COMMANDS[command].params:
+    for parameter in parameters_of(command):
         if not isinstance(parameter.default, int | float) or isinstance(parameter.default, bool):
             continue
         [row] = [row for row in rows if re.search(rf"`{parameter.opts[0]}[ `]", row[1])]
