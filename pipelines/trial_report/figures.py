@@ -126,6 +126,7 @@ def detection(score: Score) -> Figure | None:
     axes.axvline(3.0, color="black", lw=0.8, ls="--")
     axes.set(xscale="log", xlabel="strength: remainder after retuning / noise floor", ylim=(-0.12, 1.12))
     axes.set_xticks([0.3, 1, 3, 10, 30], ["0.3", "1", "3", "10", "30"])
+    axes.set_xticks([], minor=True)
     axes.set_yticks([0, 0.5, 1], ["left alone", "0.5", "detected"])
     figure.legend(loc="outside upper center", ncols=5)
     return figure
@@ -150,6 +151,11 @@ def gains(score: Score) -> Figure | None:
         rows, [f"{one.case.removeprefix('case_')} {CLASS_WORDS[one.kind]}" for one in chosen], fontsize=6.5
     )
     axes.set(xscale="log", xlabel="error on held-out runs / that of the non-parametric ceiling")
+    largest = float(max(before.max(), after.max(), 1.2))
+    ticks = [tick for tick in (0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 1000) if tick <= 1.1 * largest]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
+    axes.set_xlim(0.9 * float(min(before.min(), after.min(), 1.0)), 1.1 * largest)
     axes.set_ylim(len(chosen) - 0.4, -0.6)
     figure.legend(loc="outside upper center", ncols=2)
     return figure

@@ -1,0 +1,114 @@
+"""Cases tell nothing of what they hide but by their signals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sealed_trial.case_drawing import CaseDrawing, class_order
+from sealed_trial.composition import SINGLES, class_sizes, possible
+from sealed_trial.hidden_physics.unknown_physics import UNKNOWN_PHYSICS
+from sealed_trial.laboratory.hidden_rig import drawn_rig, rig_text
+from sealed_trial.laboratory.recording_file import run_attributes
+from sealed_trial.laboratory.test_plan import PLANS, drawn_plan
+from sealed_trial.look_alikes import possible_look_alikes
+from sealed_trial.scoring.rivals import commonest, metadata_classifier
+from sealed_trial.strength import magnitude_for
+
+VOCABULARY = {
+    "viscous_damping", "coulomb_friction", "asymmetric_friction", "stribeck_friction", "quadratic_drag",
+    "structural_damping", "hysteresis", "cubic_stiffness", "quadratic_stiffness", "stiffness_change", "clearance",
+    "missing_mode", "mass_error", "constant_force", "liquid_sloshing", "effective_mass", "ceiling_impact",
+    "breakup_delay", "high_g_saturation", "faraday_wave", "lateral_mode", "liquid_loss", "air_cushion",
+    "base_rocking", "sensor_gain", "sensor_delay", "sensor_high_pass", "sensor_clipping", "sensor_drift",
+    "mains_hum", "clock_skew", "cross_talk",
+}  # fmt: skip
+
+
+def metadata(number: int) -> dict[str, float]:
+    """Numbers of rig file and attributes of a case of a number, drawn as a trial draws them."""
+    generator = np.random.default_rng([7, number, 2, 0])
+    name = PLANS[int(np.random.default_rng([7, number]).integers(len(PLANS)))]
+    rig = drawn_rig(name.partition("_")[0], generator)
+    plan = drawn_plan(name, rig, generator)
+    features = {name: 1.0}
+    for line in rig_text(rig).splitlines():
+        key, _, value = line.partition(" = ")
+        if value.replace(".", "").isdigit():
+            features[key] = float(value)
+    for k, run in enumerate(plan.runs):
+        for key, value in run_attributes(k, run, plan).items():
+            features[f"{k} {key}" if not isinstance(value, str) else f"{k} {key} = {value}"] = (
+                1.0 if isinstance(value, str) else float(value)
+            )
+    return features
+
+
+def test_a_classifier_on_metadata_alone_scores_at_chance() -> None:
+    classes = class_order(180, np.random.default_rng([7, 0]))
+    rival = metadata_classifier([metadata(number) for number in range(180)], classes)
+    assert rival.low < commonest(classes).value
+
+
+def test_every_effect_of_the_vocabulary_can_be_hidden() -> None:
+    generator = np.random.default_rng(1)
+    found = set()
+    for name in PLANS:
+        for _ in range(6):
+            rig = drawn_rig(name.partition("_")[0], generator)
+            plan = drawn_plan(name, rig, generator)
+            found |= {effect.name for effect in possible(SINGLES, plan, rig)}
+            looks = possible_look_alikes(plan, rig)
+            found |= {one.truth.name for one in looks}
+            assert looks
+            assert len({effect.block for effect in possible(SINGLES, plan, rig)}) > 1
+            assert possible(UNKNOWN_PHYSICS, plan, rig)
+            for one in looks:
+                assert (one.truth.name,) in one.equals
+    assert found == VOCABULARY
+
+
+@pytest.mark.parametrize("n", [6, 24, 60, 61, 100])
+def test_classes_are_in_proportion(n: int) -> None:
+    sizes = class_sizes(n)
+    assert sum(sizes.values()) == n
+    for name, size in class_sizes(60).items():
+        assert abs(sizes[name] - size * n / 60) < 1
+
+
+def test_the_class_of_a_case_changes_neither_rig_nor_plan_nor_sensors() -> None:
+    cases = {}
+    for kind in ("nothing", "single", "outside"):
+        drawing = CaseDrawing([11, 12])
+        drawing._plans = ["shaker_one_frequency"]
+        cases[kind] = drawing.case(0, "case_001", kind)
+    plain = cases["nothing"]
+    for other in (cases["single"], cases["outside"]):
+        assert other.laboratory == plain.laboratory
+        assert other.sensors == plain.sensors
+    assert cases["single"].truth.accepted == [[cases["single"].truth.effects[0]["name"]]]
+    assert cases["outside"].truth.accepted == [["unknown"]]
+    assert cases["single"].truth.effects[0]["strength"] >= 3.0
+    for other in (cases["single"], cases["outside"]):
+        changed = [
+            not np.array_equal(ours[name], theirs[name])
+            for ours, theirs in zip(other.signals, plain.signals, strict=True)
+            for name in ours
+        ]
+        assert any(changed) or other.late
+
+
+def test_the_same_seed_draws_the_same_case() -> None:
+    first, second = (CaseDrawing([5]).case(3, "case_004", "nothing") for _ in range(2))
+    assert first.truth == second.truth
+    for one, other in zip(first.signals, second.signals, strict=True):
+        assert all(np.array_equal(one[name], other[name]) for name in one)
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
+def test_magnitudes_are_found_for_a_wanted_strength(power: float) -> None:
+    magnitude, reached = magnitude_for(lambda m: 4 * m**power, 12.0, 1e-4, 1e3)
+    assert reached == pytest.approx(12.0, rel=0.09)
+    assert 4 * magnitude**power == pytest.approx(reached)
+    # where the bounds do not reach it, the nearer bound
+    assert magnitude_for(lambda m: 4 * m, 12.0, 0.1, 2.0) == (2.0, 8.0)
