@@ -23,6 +23,8 @@ _COARSE_STEP: Final = 0.03
 _TOLERANCES_OF_DAMPING: Final = 3.0
 _ROBUST: Final = 4.0
 _LARGEST_DAMPING: Final = 1e8
+MOST_TOLERANCES: Final = 4.0
+"""How far a baseline's parameter may be from what is believed of it; beyond, something else is the matter."""
 STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
 SCANNED: Final = (0.75, 0.9, 1.1, 1.3)
 N_THREADS = 2
@@ -108,7 +110,10 @@ class FreeRunProblem:
             [parameter.believed for parameter in self._baseline] + [0.0] * (len(self.names) - len(self._baseline))
         )
         self.n_baseline = len(self._baseline)
-        bounds = [(-np.inf, np.inf)] * self.n_baseline + [
+        bounds = [
+            (one.believed - MOST_TOLERANCES * one.tolerance, one.believed + MOST_TOLERANCES * one.tolerance)
+            for one in self._baseline
+        ] + [
             (parameter.low, parameter.high) for one in self.candidates for parameter in one.effect.parameters
         ]
         self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))

@@ -161,9 +161,10 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
         alike = [
             one for one in sources if one.channel == observation.channel and one.n_bands == observation.n_bands
         ]
-        if not alike:
+        if not any(one.informative.any() for one in alike):
             weighted.append(observation)
             continue
+        alike = [one for one in alike if one.informative.any()]
         quiet = np.min([np.median(one.variance, axis=0) for one in alike], axis=0)
         share = float(
             np.median(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -117,7 +117,8 @@ class RigModel:
         return [
             name
             for name in names
-            if not (name in drive.channels and (n == 1 or name == "acceleration_root"))
+            if not (name in drive.channels and n == 1)
+            and not name.endswith("_root")
             and self._has_counterpart(run, name)
         ]
 
@@ -144,7 +145,7 @@ class RigModel:
         rate = run.attributes.sampling_rate_hz
         readings = {}
         for name, true in truth.items():
-            reading = true * values.get(f"gain of {name}", 1.0)
+            reading = true * values.get(f"gain of {name}", 1.0) * _relative_share(name, truth, values)
             for fault in extension.faults:
                 if fault.channel == name:
                     reading = fault.reading(reading, rate, truth, self._channels[run.name].recorded[name])
@@ -214,7 +215,8 @@ class RigModel:
         with self._lock:
             if key in self._drives:
                 return self._drives[key]
-        drive = drive_of(_corrected(run, undone), self.twin)
+        driving = self._drives[(run.name,)].channels if undone else ()
+        drive = drive_of(_corrected(run, undone, driving), self.twin)
         drive = replace(drive, excitation=_remembered(drive.excitation))
         with self._lock:
             if len(self._drives) > 20 * max(1, len(self.runs)):
@@ -243,6 +245,11 @@ class RigModel:
         if any(name.startswith("force") for name in names):
             found.append(BaselineParameter("carried mass", 1.0, 0.01))
         found += [BaselineParameter(f"gain of {name}", 1.0, 0.01, is_reading=True) for name in names]
+        cells = _cells(names)
+        found += [
+            BaselineParameter(f"share of {name}", 1 / len(cells), 0.3 / len(cells), is_reading=True)
+            for name in cells[:-1]
+        ]
         for run in self.runs:
             if run.is_free:
                 start = self._drive(run, ()).initial_displacement_m
@@ -259,6 +266,20 @@ class RigModel:
 
 
 _TUNED_NUMBERS: Final = ("damping_n_s_per_m", "damping_kg_per_s", "force_n", "stiffness_n_per_m")
+
+
+def _cells(names: Iterable[str]) -> list[str]:
+    return sorted(name for name in names if name.startswith("force_cell"))
+
+
+def _relative_share(name: str, truth: Mapping[str, FloatArray], values: Mapping[str, float]) -> float:
+    """Share of the force that a cell carries, over an equal one; the last cell carries the rest."""
+    if not name.startswith("force_cell"):
+        return 1.0
+    cells = _cells(truth)
+    n = len(cells)
+    shares = [values.get(f"share of {cell}", 1 / n) for cell in cells[:-1]]
+    return n * (shares[cells.index(name)] if name != cells[-1] else 1.0 - sum(shares))
 
 
 def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:
@@ -303,9 +324,14 @@ def _varied_term(term: Term, values: Mapping[str, float]) -> Term:
     return term.changed(**changed) if changed else term
 
 
-def _corrected(run: CaseRun, undone: Sequence[SensorFault]) -> xr.Dataset:
+def _corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:
+    """The recording with faults of driving channels undone; one of several is left out instead."""
     recording = run.recording
     for fault in undone:
+        redundant = [name for name in driving if name != fault.channel and name in recording.data_vars]
+        if redundant and fault.channel in recording.data_vars:
+            recording = recording.drop_vars(fault.channel)
+            continue
         if fault.undone is None:
             raise AnalysisError(
                 f"sensor {fault.channel}", got="a fault that cannot be undone on a channel that drives"

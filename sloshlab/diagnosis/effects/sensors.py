@@ -20,7 +20,9 @@ def _all_channels(at: Surroundings) -> list[str]:
 
 
 def _compared_channels(at: Surroundings) -> list[str]:
-    return [name for name in at.channels if name not in at.driving]
+    """Those that are seen beside the simulation: all but one that drives it alone."""
+    alone = at.driving if len(at.driving) == 1 else ()
+    return [name for name in at.channels if name not in alone]
 
 
 def _sensor_effect(
