@@ -134,7 +134,7 @@ def test_all_scores_of_a_trial_of_six_are_those_counted_by_hand() -> None:
         "a": truth("a", "nothing", accepted=[[]]),
         "b": truth("b", "nothing", accepted=[[]]),
         "c": truth("c", "single", effect("coulomb_friction", strength=8.0, force_n=0.37)),
-        "d": truth("d", "single", effect("cubic_stiffness", strength=5.0, stiffness_n_per_m3=1e6)),
+        "d": truth("d", "single", effect("cubic_stiffness", strength=5.0, stiffness_n_per_m3=1e6, offset_m=2.0)),
         "e": truth("e", "single", effect("mains_hum", "sensor", 4.0, amplitude=1.0)),
         "f": truth("f", "outside", effect("unknown", "tank", 9.0), accepted=[["unknown"]]),
     }
@@ -143,9 +143,9 @@ def test_all_scores_of_a_trial_of_six_are_those_counted_by_hand() -> None:
     right["fit"] = {"heldout_retuned": 4.0, "heldout_after": 1.1, "heldout_ceiling": 1.0, "noise_floor": 0.9}
     right["probabilities"] = {"coulomb_friction": 0.8, "none": 0.2}
     outside_interval = verdict("named", ("cubic_stiffness", "structure"))
-    outside_interval["effects"][0]["parameters"] = {
-        "stiffness_n_per_m3": {"estimate": 2e6, "low": 1.5e6, "high": 3e6}
-    }
+    below, above = {"estimate": 2e6, "low": 1.5e6, "high": 3e6}, {"estimate": 1.2, "low": 1.0, "high": 1.5}
+    outside_interval["effects"][0]["parameters"] = {"stiffness_n_per_m3": below, "offset_m": above}
+
     said = {
         "a": {**verdict("nothing_missing"), "probabilities": {"none": 0.5, "mains_hum": 0.5}},
         "b": verdict("named", ("hysteresis", "structure")),
@@ -168,7 +168,7 @@ def test_all_scores_of_a_trial_of_six_are_those_counted_by_hand() -> None:
     assert counts["outside the vocabulary, unknown with the right block"] == (1, 1)
     assert counts["wrong names anywhere"] == (1, 6)
     assert counts["no answer"] == (1, 6)
-    assert counts["intervals that hold the truth"] == (1, 2)
+    assert counts["intervals that hold the truth"] == (1, 3)
     # a: (0.5² + 0.5²), c: (0.2² + 0.2²)
     assert score.brier_score == pytest.approx((0.5 + 0.08) / 2)
     assert score.log_score == pytest.approx((math.log(2) - math.log(0.8)) / 2)
