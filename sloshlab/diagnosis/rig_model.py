@@ -189,6 +189,14 @@ class RigModel:
         )
         return simulation.require_done()
 
+    def extended_twin(self, values: Mapping[str, float], extension: Extension) -> Twin:
+        """The twin with retuned numbers and the forces of an extension, for runs with moving liquid.
+
+        Faults of sensors stay out: they are no part of what is simulated.
+        """
+        run = next((one for one in self.runs if one.attributes.configuration == "sloshing"), self.runs[0])
+        return self._varied(run, values, extension)
+
     def _varied(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> Twin:
         twin = self.twin
         structure = twin.structure
