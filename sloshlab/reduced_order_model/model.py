@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
 from sloshlab.reduced_order_model.networks.network import Network
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
@@ -48,6 +49,13 @@ class Scaling:
         return values * self.output_scale + self.output_offset
 
 
+def scaled_run(run: Run, scaling: Scaling, agitation: Agitation | None, sampling_rate_hz: float) -> Run:
+    """Return a run in the network's values, with the states of the liquid if the model has a memory of them."""
+    if agitation is None:
+        return scaling.scaled(run)
+    return replace(scaling.scaled(run), states=agitation.regressors(run.x, sampling_rate_hz))
+
+
 @dataclass(frozen=True)
 class ReducedOrderModel:
     """NFIR (no output delays) or NARX/NOE model of one input and one output.
@@ -62,6 +70,8 @@ class ReducedOrderModel:
         Of the samples that the delays count.
     facts : dict
         What it was trained on, and how; kept with it.
+    agitation : Agitation, optional
+        Memory of the liquid's state: slow states seen beside the delay line. A run then begins at rest.
     """
 
     network: Network
@@ -70,8 +80,13 @@ class ReducedOrderModel:
     scaling: Scaling
     sampling_rate_hz: float
     facts: dict[str, Any] = field(default_factory=dict)
+    agitation: Agitation | None = None
 
     def __post_init__(self) -> None:
+        n_states = 0 if self.agitation is None else self.agitation.n_states
+        if self.delays.n_states != n_states or (self.agitation and len(self.agitation.scales) != n_states):
+            allowed = f"{self.delays.n_states} scaled states, as many as among the regressors"
+            raise InputError("memory of the model", got=f"{n_states} states", allowed=allowed)
         if self.theta.shape != (self.network.n_parameters,) or not np.isfinite(self.theta).all():
             raise InputError(
                 "parameters of the model",
@@ -103,8 +118,8 @@ class ReducedOrderModel:
             NaN where a regressor is not known.
         """
         chosen = backend or array_backend()
-        run = self.scaling.scaled(Run.of(x, y))
-        known = Run(run.x, np.nan_to_num(run.y) if not self.has_feedback else run.y)
+        run = scaled_run(Run.of(x, y), self.scaling, self.agitation, self.sampling_rate_hz)
+        known = run if self.has_feedback else replace(run, y=np.nan_to_num(run.y))
         theta, predicted = chosen.asarray(self.theta), np.full(run.x.size, np.nan)
         for first, last in segments(known, self.delays):
             for start in range(first, last, _BLOCK):

@@ -16,6 +16,7 @@ from scipy.io import netcdf_file
 
 from sloshlab.atomic_file import replaced
 from sloshlab.errors import InputError
+from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.regressors import Delays
@@ -38,6 +39,8 @@ def save_model(model: ReducedOrderModel, path: str | os.PathLike[str]) -> None:
         file.network = model.network.kind
         file.network_settings = json.dumps(model.network.settings(), sort_keys=True)
         file.facts = json.dumps(model.facts, sort_keys=True, ensure_ascii=True)
+        if model.agitation is not None:
+            file.agitation = json.dumps(model.agitation.facts(), sort_keys=True)
         scaling = [getattr(model.scaling, name) for name in SCALING]
         for name, values, kind in (
             ("theta", model.theta, "f8"),
@@ -87,9 +90,11 @@ def _model(source: Any) -> ReducedOrderModel:
     facts = json.loads(source.facts)
     if not isinstance(settings, dict) or not isinstance(facts, dict):
         raise ValueError("attributes")
-    delays = Delays(
-        *(tuple(int(d) for d in variables.get(name, ())) for name in ("input_delays", "output_delays"))
+    agitation = Agitation.from_facts(json.loads(source.agitation)) if hasattr(source, "agitation") else None
+    inputs, outputs = (
+        tuple(int(d) for d in variables.get(name, ())) for name in ("input_delays", "output_delays")
     )
+    delays = Delays(inputs, outputs, 0 if agitation is None else agitation.n_states)
     return ReducedOrderModel(
         network_of(source.network.decode(), settings),
         variables["theta"].astype(np.float64),
@@ -97,4 +102,5 @@ def _model(source: Any) -> ReducedOrderModel:
         Scaling(*(float(value) for value in variables["scaling"])),
         float(variables["sampling_rate_hz"][0]),
         facts,
+        agitation,
     )

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend, array_backend
 from sloshlab.reduced_order_model.least_squares import LeastSquaresProblem, OneStepProblem, Step, next_step
-from sloshlab.reduced_order_model.model import RUNAWAY, ReducedOrderModel, Scaling, delay_arrays
+from sloshlab.reduced_order_model.model import RUNAWAY, ReducedOrderModel, Scaling, delay_arrays, scaled_run
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.networks.network import Network, NormalSums
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
 
 FloatArray = NDArray[np.float64]
-BLOCK: Final = 1024
+BLOCK: Final = 8192
 _LARGEST_INITIAL: Final = 20_000
 
 
@@ -130,6 +131,7 @@ def fit(
     sampling_rate_hz: float,
     settings: TrainingSettings | None = None,
     *,
+    agitation: Agitation | None = None,
     backend: ArrayBackend | None = None,
     told: Callable[[Epoch], None] | None = None,
 ) -> tuple[ReducedOrderModel, TrainingRecord]:
@@ -146,6 +148,8 @@ def fit(
         Each run stays apart from the others.
     sampling_rate_hz : float
     settings : TrainingSettings, optional
+    agitation : Agitation, optional
+        Memory of the liquid's state; its scales are those of the training runs.
     backend : ArrayBackend, optional
         NumPy by default.
     told : callable, optional
@@ -164,13 +168,16 @@ def fit(
         If input or output is constant, or no start gave a stable model.
     """
     chosen = settings or TrainingSettings()
-    network = network_of(kind, {**settings_of_network, "n_inputs": delays.n_regressors})
     scaling = _scaling(training, validation, delays, chosen)
+    if agitation is not None:
+        agitation = agitation.fitted([run.x for run in training], sampling_rate_hz)
+        delays = replace(delays, n_states=agitation.n_states)
+    network = network_of(kind, {**settings_of_network, "n_inputs": delays.n_regressors})
     task = _Task(
         network,
         delays,
-        [scaling.scaled(run) for run in training],
-        [scaling.scaled(run) for run in validation],
+        [scaled_run(run, scaling, agitation, sampling_rate_hz) for run in training],
+        [scaled_run(run, scaling, agitation, sampling_rate_hz) for run in validation],
         scaling.output_scale,
         backend or array_backend(),
     )
@@ -185,7 +192,7 @@ def fit(
     if best.theta is None or best.epoch is None:
         raise AnalysisError("training", got="no stable model from any start", remedy="fewer output delays")
     ended = "interrupted" if interrupted else best.ended
-    model = ReducedOrderModel(network, best.theta, delays, scaling, sampling_rate_hz)
+    model = ReducedOrderModel(network, best.theta, delays, scaling, sampling_rate_hz, agitation=agitation)
     return model, TrainingRecord(best.epochs, best.epoch, ended, interrupted)
 
 
@@ -200,7 +207,12 @@ def _train_once(
     """One start: one step ahead, then free if there is feedback."""
     rng = np.random.default_rng([settings.seed, start])
     theta = task.backend.asarray(task.network.initial(*_initial_samples(task, rng), rng))
-    one_step = OneStepProblem(task.backend, task.network, lambda: blocks(task.training, task.delays, BLOCK))
+    one_step = OneStepProblem(
+        task.backend,
+        task.network,
+        lambda: blocks(task.training, task.delays, BLOCK),
+        task.delays.is_one_line,
+    )
     problems: list[LeastSquaresProblem] = [one_step]
     if task.delays.outputs:
         problems.append(_FreeRunProblem(task.network, task.delays, task.training))
