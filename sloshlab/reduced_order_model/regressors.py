@@ -74,7 +74,8 @@ class Delays:
     def is_one_line(self) -> bool:
         """Whether φ is a stretch of past inputs without holes, and nothing else."""
         first = self.inputs[0]
-        return not self.outputs and self.inputs == tuple(range(first, first + len(self.inputs)))
+        only_inputs = not self.outputs and not self.n_states
+        return only_inputs and self.inputs == tuple(range(first, first + len(self.inputs)))
 
     @property
     def longest(self) -> int:
