@@ -11,6 +11,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
 from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend
 from sloshlab.reduced_order_model.networks.network import Network, NormalSums
 
@@ -43,15 +46,18 @@ class OneStepProblem:
     network : Network
     blocks : callable
         Returns an iterator over (regressors, outputs), the same at every call.
+    is_delay_line : bool
+        Whether the regressors are past values of one signal, in order.
     """
 
     backend: ArrayBackend
     network: Network
     blocks: Callable[[], Iterator[tuple[Any, Any]]]
+    is_delay_line: bool = False
 
     def normal_sums(self, theta: Array) -> NormalSums:
         """Return Σ J Jᵀ, Σ J e, Σ e²."""
-        sums = self.network.normal_sums(self.backend.xp, theta)
+        sums = self.network.normal_sums(self.backend.xp, theta, is_delay_line=self.is_delay_line)
         for phi, target in self.blocks():
             sums.add(self.backend.asarray(phi), self.backend.asarray(target))
         return sums.sums()
@@ -112,19 +118,25 @@ def next_step(problem: LeastSquaresProblem, at: Step, xp: Any) -> Step | None:
     scale = xp.maximum(diagonal, _FLOOR * xp.max(diagonal))
     damping = at.damping
     while damping <= LARGEST_DAMPING:
-        damped = sums.matrix + xp.eye(scale.shape[0], dtype=scale.dtype, device=xp_device(scale)) * (
-            damping * scale[None, :]
-        )
-        change = xp.linalg.solve(damped, sums.gradient[:, None])[:, 0]
-        theta, squares = problem.improved(at.theta + change)
-        if squares < at.squares:
-            return Step(theta, squares, max(damping / 10, _SMALLEST_DAMPING))
+        change = _solved(xp, sums.matrix, damping * scale, sums.gradient)
+        if change is not None:
+            theta, squares = problem.improved(at.theta + change)
+            if squares < at.squares:
+                return Step(theta, squares, max(damping / 10, _SMALLEST_DAMPING))
         damping *= 10
     return None
 
 
-def xp_device(array: Array) -> Any:
-    """Return the device of an array."""
-    from array_api_compat import device
-
-    return device(array)
+def _solved(xp: Any, matrix: Array, added: Array, right: Array) -> Array | None:
+    """Solution of (matrix + diag added) x = right; None if rounding leaves that not positive definite."""
+    n = right.shape[0]
+    flat = xp.reshape(matrix, (-1,), copy=True)
+    flat[:: n + 1] = flat[:: n + 1] + added
+    damped = xp.reshape(flat, (n, n))
+    if not isinstance(damped, np.ndarray):
+        return xp.linalg.solve(damped, right[:, None])[:, 0]
+    try:
+        factor = cho_factor(damped, overwrite_a=True, check_finite=False)
+    except LinAlgError:
+        return None
+    return cho_solve(factor, right, check_finite=False)

@@ -22,7 +22,9 @@ from sloshlab.reduced_order_model.networks.network import Network, NormalSums
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
 
 FloatArray = NDArray[np.float64]
-BLOCK: Final = 8192
+BLOCK: Final = 1024
+_LINE_BLOCK: Final = 8192
+"""Samples at once where sums are correlations: enough stretches for quick products."""
 _LARGEST_INITIAL: Final = 20_000
 
 
@@ -207,11 +209,10 @@ def _train_once(
     """One start: one step ahead, then free if there is feedback."""
     rng = np.random.default_rng([settings.seed, start])
     theta = task.backend.asarray(task.network.initial(*_initial_samples(task, rng), rng))
+    is_line = task.delays.is_one_line
+    size = _LINE_BLOCK if is_line else BLOCK
     one_step = OneStepProblem(
-        task.backend,
-        task.network,
-        lambda: blocks(task.training, task.delays, BLOCK),
-        task.delays.is_one_line,
+        task.backend, task.network, lambda: blocks(task.training, task.delays, size), is_line
     )
     problems: list[LeastSquaresProblem] = [one_step]
     if task.delays.outputs:
