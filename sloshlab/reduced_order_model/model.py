@@ -153,7 +153,7 @@ class ReducedOrderModel:
             return self.predict(values, np.zeros_like(values))
         outputs = np.zeros_like(values) if start is None else np.nan_to_num(np.asarray(start, np.float64))
         run = self.scaling.scaled(Run.of(values, outputs))
-        theta, n_neurons, kind = self._compiled()
+        theta, n_neurons, kind = self.compiled()
         simulated, delays = np.full(values.size, np.nan), self.delays
         for first, last in segments(run, delays):
             own = run.y.copy()
@@ -169,7 +169,14 @@ class ReducedOrderModel:
             simulated[first:last] = own[first:last]
         return self.scaling.output_of(simulated)
 
-    def _compiled(self) -> tuple[FloatArray, int, int]:
+    def compiled(self) -> tuple[FloatArray, int, int]:
+        """Parameters, neurons and number of the network for the compiled loops of a free run.
+
+        Raises
+        ------
+        AnalysisError
+            If the network has none.
+        """
         if not isinstance(self.network, NormalisedRadialBasis | RadialBasis):
             raise AnalysisError(
                 "model with feedback", got=self.network.kind, allowed="normalised_rbf, rbf", remedy="use NFIR"
