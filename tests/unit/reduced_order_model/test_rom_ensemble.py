@@ -26,9 +26,9 @@ STEP = ReducedOrderModel(NETWORK, np.array([-1.0, 1.0, -1.0, 1.0]), Delays((1,))
 
 
 def noisy_run(n: int, seed: int, constant: float, slope: float) -> Run:
-    """y(k) = x(k−1) + noise of variance a² + b² A², A being the RMS of the wave, which changes now and then."""
+    """y(k) = x(k−1) + noise of variance a² + b² A², A being the RMS of the wave, 0.1 and 1 in turn."""
     rng = np.random.default_rng(seed)
-    level = np.repeat(rng.choice([0.1, 1.0], n // 200), 200)
+    level = np.resize(np.repeat([0.1, 1.0], 500), n)
     x = level * np.sqrt(2) * np.sin(0.7 * np.arange(n))
     y = np.full(n, np.nan)
     std = np.sqrt(constant**2 + slope**2 * level**2)
@@ -55,7 +55,7 @@ def test_intervals_cover_what_they_say_at_every_level():
     for probability in (0.5, 0.9):
         found = ensemble.predicted_range(unseen.x, probability)
         assert found.coverage(unseen.y) == pytest.approx(probability, abs=0.03)
-        loud = np.repeat(np.abs(unseen.x.reshape(-1, 200)).max(axis=1) > 0.5, 200)
+        loud = np.resize(np.repeat([False, True], 500), unseen.x.size)
         for part in (loud, ~loud):
             assert found.coverage(np.where(part, unseen.y, np.nan)) == pytest.approx(probability, abs=0.05)
     assert len(records) == len(ensemble.members) == 4
@@ -67,14 +67,14 @@ def test_intervals_cover_what_they_say_at_every_level():
 def test_members_disagree_as_the_mean_of_their_blocks_does():
     """One neuron says the mean of what it was trained on: its standard error is σ/√n."""
     rng = np.random.default_rng(5)
-    n, sigma = 2000, 3.0
+    n, sigma = 600, 3.0
     runs = [Run(rng.normal(size=n), sigma * rng.normal(size=n)) for _ in range(2)]
     ensemble, _ = fit_ensemble(
         "normalised_rbf", {"n_neurons": 1}, Delays((1,)), runs, runs[:1], RATE_HZ,
-        TrainingSettings(n_epochs=1), n_members=40, block_s=0.1,
+        TrainingSettings(n_epochs=1), n_members=30, block_s=0.1,
     )  # fmt: skip
     found = ensemble.predicted_range(runs[0].x)
-    assert found.members_std[1:] == pytest.approx(sigma / np.sqrt(2 * n), rel=0.25)
+    assert found.members_std[1:] == pytest.approx(sigma / np.sqrt(2 * n), rel=0.35)
     assert ensemble.residual.constant == pytest.approx(sigma, rel=0.1)
 
 
