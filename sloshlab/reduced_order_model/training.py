@@ -15,6 +15,7 @@ from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
 from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend, array_backend
+from sloshlab.reduced_order_model.early_stop import EarlyStop
 from sloshlab.reduced_order_model.least_squares import LeastSquaresProblem, OneStepProblem, Step, next_step
 from sloshlab.reduced_order_model.model import RUNAWAY, ReducedOrderModel, Scaling, delay_arrays, scaled_run
 from sloshlab.reduced_order_model.network_list import network_of
@@ -37,7 +38,7 @@ class TrainingSettings:
     n_epochs : int
         At most.
     patience : int
-        Rises of the validation error one after another after which training stops.
+        Rises of the validation error one after another after which training stops (`EarlyStop`).
     n_starts : int
         Trainings from different random starts; the best by validation error is kept.
     seed : int
@@ -214,15 +215,23 @@ def _train_once(
     one_step = OneStepProblem(
         task.backend, task.network, lambda: blocks(task.training, task.delays, size), is_line
     )
-    problems: list[LeastSquaresProblem] = [one_step]
-    if task.delays.outputs:
-        problems.append(_FreeRunProblem(task.network, task.delays, task.training))
+    stages: list[tuple[LeastSquaresProblem, ArrayBackend]] = [(one_step, task.backend)]
+    if task.delays.outputs:  # sample by sample, compiled: on the host
+        stages.append((_FreeRunProblem(task.network, task.delays, task.training), array_backend()))
     number = 0
-    for problem in problems:
-        is_last = problem is problems[-1]
+    for problem, backend in stages:
+        is_last = problem is stages[-1][0]
         own = best if is_last else _Best()
         own_settings = settings if is_last else replace(settings, patience=settings.n_epochs)
-        theta, number = _descend(task, problem, theta, own_settings, own, (start, number, started), told)
+        theta, number = _descend(
+            replace(task, backend=backend),
+            problem,
+            backend.asarray(theta),
+            own_settings,
+            own,
+            (start, number, started),
+            told,
+        )
 
 
 def _descend(
@@ -233,13 +242,13 @@ def _descend(
     best: _Best,
     place: tuple[int, int, float],
     told: Callable[[Epoch], None],
-) -> tuple[Array, int]:
+) -> tuple[FloatArray, int]:
     """Epoch after epoch until the validation error keeps rising, nothing improves, or the epochs are used up."""
     start, number, started = place
     n_training, n_validation = n_samples(task.training, task.delays), n_samples(task.validation, task.delays)
     unit = task.output_scale**2
     step: Step | None = Step(*problem.improved(theta))
-    rises, before, ended = 0, math.inf, "epochs used up"
+    stop, ended = EarlyStop(settings.patience), "epochs used up"
     for done in range(settings.n_epochs + 1):
         assert step is not None
         theta = step.theta
@@ -255,10 +264,8 @@ def _descend(
         best.take(epoch, parameters)
         told(epoch)
         number += 1
-        rises = rises + 1 if validation > before else 0
-        before = validation
-        if rises >= settings.patience:
-            ended = f"validation error rose {rises} times"
+        if reason := stop.reason(validation):
+            ended = reason
             break
         if done == settings.n_epochs:
             break
@@ -268,7 +275,7 @@ def _descend(
             break
     if best.epoch is not None and best.epoch.start == start:
         best.ended = ended
-    return theta, number
+    return task.backend.to_numpy(theta), number
 
 
 @dataclass(frozen=True)

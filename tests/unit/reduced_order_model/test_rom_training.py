@@ -1,10 +1,13 @@
 """Training on systems whose answer is known; gaps, borders of runs, bad input, files."""
 
+import array_api_strict
 import numpy as np
 import pytest
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
+from sloshlab.reduced_order_model.early_stop import EarlyStop
 from sloshlab.reduced_order_model.fit_quality import fit_quality
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
@@ -61,13 +64,54 @@ def test_a_model_with_feedback_learns_to_run_free():
     assert any(epoch.number > 30 for epoch in record.epochs)  # one step ahead first, then free
 
 
-def test_training_ends_after_rises_of_the_validation_error():
+@pytest.mark.parametrize("delays", [Delays.tapped(2), Delays.tapped(1, 2)], ids=["nfir", "noe"])
+@pytest.mark.parametrize("library", ["strict", "torch"])
+def test_a_training_gives_the_same_model_whatever_the_library(delays, library):
+    """With one that has nothing but the standard, and with PyTorch where it is installed."""
+    if library == "torch":
+        pytest.importorskip("torch")
+    other = array_backend("torch") if library == "torch" else ArrayBackend(array_api_strict)
+    runs = [feedback_run(200, 1)], [feedback_run(100, 2)]
+    models = [
+        fit("normalised_rbf", {"n_neurons": 4}, delays, *runs, RATE_HZ, TrainingSettings(n_epochs=4), backend=one)[
+            0
+        ]
+        for one in (array_backend(), other)
+    ]
+    unseen = feedback_run(100, 3)
+    first, second = (model.simulate(unseen.x, unseen.y) for model in models)
+    known = np.isfinite(first)
+    assert np.abs(second - first)[known].max() < 1e-8 * np.abs(first[known]).max()
+    predicted = models[0].predict(unseen.x, unseen.y, other)
+    assert predicted[known] == pytest.approx(models[0].predict(unseen.x, unseen.y)[known], rel=1e-8)
+
+
+def test_a_training_that_overfits_ends_and_the_best_model_is_kept():
     noisy = [network_run(60, 1, noise=0.5)]
-    _, record = trained(noisy, [network_run(60, 2, noise=0.5)], neurons=10, n_starts=1, patience=3)
+    model, record = trained(noisy, [network_run(60, 2, noise=0.5)], neurons=10, n_starts=1, patience=3)
     errors = [epoch.validation_mse for epoch in record.epochs]
-    assert record.ended == "validation error rose 3 times"
-    assert errors[-4] < errors[-3] < errors[-2] < errors[-1]
+    assert record.ended == "validation error no lower for 6 epochs"
+    assert record.best.number == len(errors) - 1 - 6
     assert record.best.validation_mse == min(errors)
+    run = network_run(60, 2, noise=0.5)
+    assert np.nanmean((model.simulate(run.x) - run.y) ** 2) == pytest.approx(min(errors))
+
+
+@pytest.mark.parametrize(
+    ("errors", "n_taken", "reason"),
+    [
+        ([5, 4, 3, 4, 5, 6, 7], 6, "validation error rose 3 times"),
+        ([5, 4, 4, 4, 4, 4, 4, 4, 4], 8, "validation error no lower for 6 epochs"),
+        ([5, 3, 4, 3.5, 4, 3.5, 4, 3.5, 4], 8, "validation error no lower for 6 epochs"),
+        ([5, 4, 5, 6, 3, 4, 5, 2, 3, 4], None, ""),  # two rises each time, then a new lowest
+    ],
+)
+def test_the_validation_error_ends_a_training_when_it_rises_or_wavers(errors, n_taken, reason):
+    stop = EarlyStop(3)
+    reasons = [stop.reason(float(error)) for error in errors]
+    first = next((k + 1 for k, one in enumerate(reasons) if one), None)
+    assert first == n_taken
+    assert reason in reasons
 
 
 def test_an_interrupt_keeps_the_best_model_so_far():
