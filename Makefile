@@ -7,7 +7,7 @@ RESULTS := results
 RECORDINGS := raw_data/numerical_tank/shaker
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker beam sdof bouncing-ball replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -33,6 +33,12 @@ sdof: setup  ## the guided tank of raw_data/numerical_tank: damping and report
 
 bouncing-ball: setup  ## bouncing balls in place of the liquid of raw_data: parameters, maps, errors, reports (minutes)
 	$(BIN)/python -m pipelines.experiments ball raw_data $(RESULTS)/bouncing_ball
+
+rom: setup  ## the reduced-order model (70 delays, 35 neurons) of raw_data/numerical_tank and its validation report (minutes)
+	$(BIN)/python -m pipelines.experiments rom raw_data/numerical_tank/shaker $(RESULTS)/rom
+
+rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
+	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study
 
 replay: setup  ## every recording of raw_data/shaker through simulated serial and CAN devices
 	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay

@@ -143,7 +143,7 @@ def segments(run: Run, delays: Delays) -> list[tuple[int, int]]:
     for of, ds in ((x_known, delays.inputs), (y_known, delays.outputs)):
         for delay in ds:
             known[:delay] = False
-            known[delay:] &= of[: n - delay]
+            known[delay:] &= of[: max(n - delay, 0)]  # none where the run is shorter
     edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
 
