@@ -109,6 +109,11 @@ class CaseResult:
     ended: str
 
     @property
+    def is_trained(self) -> bool:
+        """Whether there is a model."""
+        return math.isfinite(self.validation_mse)
+
+    @property
     def mean_mse(self) -> float:
         """Mean of both, which is what the source shows."""
         return 0.5 * (self.training_mse + self.validation_mse)
@@ -288,7 +293,7 @@ def picked(results: Sequence[CaseResult]) -> Pick:
         If no case could be trained.
     """
     trained = sorted(
-        (one for one in results if math.isfinite(one.validation_mse)),
+        (one for one in results if one.is_trained),
         key=lambda one: (one.validation_mse, one.n_parameters),
     )
     if not trained:

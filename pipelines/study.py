@@ -99,14 +99,15 @@ def study(
         "inputs": {path.name: sha256_of(path) for path in inputs},
         "versions": versions(),
     }
-    found = StudiedModels(tuple(results), pick, settings, runs.rate.reason, runs.flags, provenance)
+    flags = (*runs.flags, *(f"{one.case.name}: {one.ended}" for one in results if not one.is_trained))
+    found = StudiedModels(tuple(results), pick, settings, runs.rate.reason, flags, provenance)
     with atomic_file.filled_folder(folder) as complete:
         write_dataset(dataset_of(results), complete / "study.nc")
         atomic_file.write_bytes(complete / BEST_NAME, best.read_bytes())
         write_page(page_of(found), complete)
     return {
         "lines": [f"picked: {pick.reason}", f"model: {folder / BEST_NAME}", f"report: {folder / 'report.html'}"],
-        "flags": [*runs.flags, *_failures(results)],
+        "flags": list(flags),
         "output": str(folder),
         "picked": pick.best.case.name,
         "lighter": pick.lighter.case.name,
@@ -114,10 +115,6 @@ def study(
         "cases": len(results),
         "training_s": sum(result.seconds for result in results),
     }
-
-
-def _failures(results: list[CaseResult]) -> list[str]:
-    return [f"{one.case.name}: {one.ended}" for one in results if not math.isfinite(one.validation_mse)]
 
 
 def dataset_of(results: list[CaseResult]) -> xr.Dataset:

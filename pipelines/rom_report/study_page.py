@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from sloshlab.reduced_order_model.training import TrainingSettings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+_LARGEST_SHOWN: Final = 1.15
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class StudiedModels:
     @property
     def trained(self) -> list[CaseResult]:
         """Results with a model."""
-        return [one for one in self.results if math.isfinite(one.validation_mse)]
+        return [one for one in self.results if one.is_trained]
 
 
 def page_of(found: StudiedModels) -> Page:
@@ -98,7 +101,8 @@ def sensitivity(name: str, found: StudiedModels) -> ReportFigure:
         "number of "
         "neurons. Right: RMS error of a free run on the validation runs over the number of parameters; "
         "the circle is "
-        f"the pick. {found.pick.reason[0].upper()}{found.pick.reason[1:]}."
+        f"the pick. Errors more than {100 * (_LARGEST_SHOWN - 1):.0f} % behind it are beyond the axis. Picked: "
+        f"{found.pick.reason}."
     )
     return ReportFigure(name, caption, "Fig. 2.26", png_bytes(figure))
 
@@ -149,6 +153,8 @@ def _over_parameters(axes: Axes, found: StudiedModels) -> None:
     best = found.pick.best
     ring: dict[str, Any] = {"mfc": "none", "mec": REFERENCE_COLOUR, "ms": 11, "mew": 1.6, "zorder": 5}
     axes.plot(best.n_parameters, best.validation_mse**0.5, "o", **ring)
+    low_n, high_n = axes.get_ylim()
+    axes.set_ylim(low_n, min(high_n, _LARGEST_SHOWN * best.validation_mse**0.5))
     axes.set(xlabel="parameters", ylabel="RMS error, validation [N]", xscale="log")
     sizes = np.array([one.n_parameters for one in found.trained])
     low, high = sizes.min() / 2, 2 * sizes.max()
