@@ -16,6 +16,7 @@ from pathlib import Path
 
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
 from tests.benchmarks.reduced_order_model import MEMORY_LABEL, PRODUCT_LABEL, TIME_LABEL, model_figures
+from tests.benchmarks.reduced_order_model_in_the_twin import LOOP_LABEL
 from tests.benchmarks.twin import FREE_LABEL, RANDOM_LABEL, RIVAL_LABEL
 
 TRANSPORTS = ("serial", "socketcand", "slcan")
@@ -26,6 +27,7 @@ AIMS = {
     "10 × longer recording costs": 11.0,
     FREE_LABEL: 0.1,
     RANDOM_LABEL: 1.0,
+    LOOP_LABEL: 0.05,
     TIME_LABEL: 300.0,
     MEMORY_LABEL: 1.5,
     **{label(layers): aim for layers, aim in RESOLUTIONS.items()},
