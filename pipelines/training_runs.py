@@ -18,6 +18,7 @@ from sloshlab.errors import AnalysisError, InputError
 from sloshlab.recording import read_recording
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals, liquid_signals
 from sloshlab.reduced_order_model.model_rate import ModelRate, chosen_rate
+from sloshlab.reduced_order_model.tank_scaling import tank_facts
 from sloshlab.reduced_order_model.validity_domain import ValidityDomain, motion_cycles
 from sloshlab.rig import Rig
 
@@ -107,9 +108,7 @@ class TrainingRuns:
         return {
             "training": {path.name: sha256_of(path) for path in self.files.training},
             "validation": {path.name: sha256_of(path) for path in self.files.validation},
-            "fill_level": self.rig.liquid.fill_level,
-            "tank_height_m": self.rig.tank.height_m,
-            "liquid_mass_kg": self.rig.liquid_mass_kg,
+            **tank_facts(self.rig),
             "dry_mass_kg": self.rig.tank.dry_mass_kg if self.dry is None else self.dry.mass_kg,
             "domain": self.domain.facts(),
         }
