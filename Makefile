@@ -5,9 +5,11 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 RESULTS := results
 RECORDINGS := raw_data/numerical_tank/shaker
+ROM := $(RESULTS)/rom/ROM.nc
+BALLS :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -36,6 +38,10 @@ bouncing-ball: setup  ## bouncing balls in place of the liquid of raw_data: para
 
 rom: setup  ## the reduced-order model (70 delays, 35 neurons) of raw_data/numerical_tank and its validation report (minutes)
 	$(BIN)/python -m pipelines.experiments rom raw_data/numerical_tank/shaker $(RESULTS)/rom
+
+closed-loop: setup  ## the beam with the model of `make rom` (or ROM=file) and balls (BALLS=files) in its tank: report
+	$(BIN)/sloshlab beam raw_data/numerical_tank/beam/*.nc --rig raw_data/numerical_tank/beam/rig_beam.toml \
+	  --rom $(ROM) $(addprefix --ball ,$(BALLS)) -o $(RESULTS)/closed_loop || [ $$? -eq 3 ]
 
 rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
 	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study
