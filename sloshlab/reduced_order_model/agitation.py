@@ -1,16 +1,12 @@
 """Memory of the liquid's state: slow states that the motion drives, which the network sees beside its delay line.
 
-After a sudden start the liquid is still in one piece and takes some cycles to break up; a model that sees only
-the last velocities cannot know that. Here each state follows what stirs the liquid, p, with a time constant τ,
+A model that sees only the last velocities cannot know whether the liquid is still calm after a sudden start or
+still agitated after a decay. Here each state follows what stirs the liquid, p, with a time constant τ,
 
-    ṡ = (p − s)/τ,        p = (v/v₀)²  or  p = max(|v̇|/g − 1, 0),
+    ṡ = (p − s)/τ,        p = (v/v₀)²,  v₀ = 1 m/s,  or  p = max(|v̇|/g − 1, 0),
 
-the square of the velocity or the acceleration beyond that which holds the liquid down, or it is the share of the
-liquid that is broken up,
-
-    ḃ = κ p (1 − b) − b/τ,    p = max(|v̇|/g − 1, 0),
-
-and the network gets √s or b. All is sampled at the rate of the model: p is taken from the two samples before.
+the square of the velocity or the acceleration beyond that which holds the liquid down;
+the network gets √s. All is sampled at the rate of the model: p is taken from the two samples before.
 """
 
 from __future__ import annotations
@@ -28,10 +24,10 @@ from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import AnalysisError, InputError
 
 FloatArray = NDArray[np.float64]
-Kind = Literal["speed", "excess_acceleration", "break_up"]
+Kind = Literal["speed", "excess_acceleration"]
 
-KINDS: Final = ("speed", "excess_acceleration", "break_up")
-_SPEED, _BREAK_UP = 0, 2
+KINDS: Final = ("speed", "excess_acceleration")
+_SPEED: Final = 0
 FORGOTTEN: Final = 3.0
 """So many time constants after a gap a state that began at rest is taken to be known."""
 
@@ -42,11 +38,9 @@ class Agitation:
 
     Attributes
     ----------
-    kind : {'speed', 'excess_acceleration', 'break_up'}
+    kind : {'speed', 'excess_acceleration'}
     time_constants_s : tuple of float
         τ, one for each state.
-    rate_per_s : float
-        κ of the break-up; the others have none.
     spread : float
         Standard deviation of each state in the network's values; that of its whole delay line is the
         `input_spread` of training.
@@ -56,7 +50,6 @@ class Agitation:
 
     kind: Kind
     time_constants_s: tuple[float, ...]
-    rate_per_s: float = 1.0
     spread: float = 1.0
     offsets: tuple[float, ...] = ()
     scales: tuple[float, ...] = ()
@@ -64,11 +57,11 @@ class Agitation:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise InputError("kind of memory", got=repr(self.kind), allowed=", ".join(KINDS))
-        positive = (*self.time_constants_s, self.rate_per_s, self.spread, *self.scales)
+        positive = (*self.time_constants_s, self.spread, *self.scales)
         wrong = [value for value in positive if not 1e-6 < value < 1e6]
         if wrong or not self.time_constants_s:
             got = f"{wrong[0]:g}" if wrong else "no time constant"
-            raise InputError("memory: time constants, rate, spread and scales", got=got, allowed="> 0")
+            raise InputError("memory: time constants, spread and scales", got=got, allowed="> 0")
         if {len(self.offsets), len(self.scales)} - {0, self.n_states} or not np.isfinite(self.offsets).all():
             raise InputError(
                 "memory: offsets and scales", got=f"{len(self.offsets)}", allowed="one for each state"
@@ -91,7 +84,7 @@ class Agitation:
         Returns
         -------
         ndarray, shape (n_states, n)
-            √s [1] or b [1]; NaN for `FORGOTTEN` time constants after a gap.
+            √s [1]; NaN for `FORGOTTEN` time constants after a gap.
 
         Examples
         --------
@@ -100,13 +93,12 @@ class Agitation:
         [0.0, 0.795, 0.991]
         """
         velocity = np.ascontiguousarray(velocity_m_per_s, np.float64)
-        step_s = 1 / sampling_rate_hz
         rows = []
         for time_constant_s in self.time_constants_s:
             row = np.empty(velocity.size)
             unknown = round(FORGOTTEN * time_constant_s * sampling_rate_hz)
-            _follow(KINDS.index(self.kind), velocity, step_s, time_constant_s, self.rate_per_s, unknown, row)
-            rows.append(row if self.kind == "break_up" else np.sqrt(row))
+            _follow(KINDS.index(self.kind), velocity, 1 / sampling_rate_hz, time_constant_s, unknown, row)
+            rows.append(np.sqrt(row))
         return np.stack(rows)
 
     def regressors(self, velocity_m_per_s: FloatArray, sampling_rate_hz: float) -> FloatArray:
@@ -150,9 +142,7 @@ class Agitation:
         else:
             rescaled = self.offsets, self.scales
         taus = tuple(tau * time for tau in self.time_constants_s)
-        return replace(
-            self, time_constants_s=taus, rate_per_s=self.rate_per_s / time, offsets=rescaled[0], scales=rescaled[1]
-        )
+        return replace(self, time_constants_s=taus, offsets=rescaled[0], scales=rescaled[1])
 
     def facts(self) -> dict[str, Any]:
         """Return what `from_facts` needs to make it again."""
@@ -172,7 +162,7 @@ class Agitation:
 
 
 @njit(cache=True)
-def _follow(kind, velocity, step_s, time_constant_s, rate_per_s, unknown, state):  # type: ignore[no-untyped-def]
+def _follow(kind, velocity, step_s, time_constant_s, unknown, state):  # type: ignore[no-untyped-def]
     """One state along a run; exact for a p that is constant over each step."""
     value, wait = 0.0, 0
     for k in range(velocity.size):
@@ -188,8 +178,6 @@ def _follow(kind, velocity, step_s, time_constant_s, rate_per_s, unknown, state)
                     stirred = last * last
                 else:
                     stirred = max(abs(last - before) / (step_s * GRAVITY_M_PER_S2) - 1.0, 0.0)
-                rise = rate_per_s * stirred if kind == _BREAK_UP else stirred / time_constant_s
-                fall = 1 / time_constant_s + (rise if kind == _BREAK_UP else 0.0)
-                value = rise / fall + (value - rise / fall) * math.exp(-fall * step_s)
+                value = stirred + (value - stirred) * math.exp(-step_s / time_constant_s)
                 wait = max(wait - 1, 0)
         state[k] = np.nan if wait else value

@@ -12,6 +12,7 @@ from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
 from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
+from sloshlab.reduced_order_model.break_up import BreakUp
 from sloshlab.reduced_order_model.networks.network import Network
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
 from sloshlab.reduced_order_model.regressors import Delays, Run, regressors, segments
@@ -72,6 +73,8 @@ class ReducedOrderModel:
         What it was trained on, and how; kept with it.
     agitation : Agitation, optional
         Memory of the liquid's state: slow states seen beside the delay line. A run then begins at rest.
+    break_up : BreakUp, optional
+        Memory of the liquid's state: a gain on the output. A run then begins at rest.
     """
 
     network: Network
@@ -81,12 +84,15 @@ class ReducedOrderModel:
     sampling_rate_hz: float
     facts: dict[str, Any] = field(default_factory=dict)
     agitation: Agitation | None = None
+    break_up: BreakUp | None = None
 
     def __post_init__(self) -> None:
         n_states = 0 if self.agitation is None else self.agitation.n_states
         if self.delays.n_states != n_states or (self.agitation and len(self.agitation.scales) != n_states):
             allowed = f"{self.delays.n_states} scaled states, as many as among the regressors"
             raise InputError("memory of the model", got=f"{n_states} states", allowed=allowed)
+        if self.break_up is not None and self.delays.outputs:
+            raise InputError("memory of the model", got="a break-up and feedback", allowed="one of them")
         if self.theta.shape != (self.network.n_parameters,) or not np.isfinite(self.theta).all():
             raise InputError(
                 "parameters of the model",
@@ -126,7 +132,10 @@ class ReducedOrderModel:
                 stop = min(start + _BLOCK, last)
                 phi = chosen.asarray(regressors(known, self.delays, start, stop))
                 predicted[start:stop] = chosen.to_numpy(self.network.output(chosen.xp, theta, phi))
-        return self.scaling.output_of(predicted)
+        outputs = self.scaling.output_of(predicted)
+        if self.break_up is not None:
+            outputs *= self.break_up.share(np.asarray(x, np.float64), self.sampling_rate_hz)
+        return outputs
 
     def simulate(self, x: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
         """Return ŷ of a free run: the model sees the input and its own outputs.

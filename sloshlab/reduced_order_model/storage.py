@@ -17,6 +17,7 @@ from scipy.io import netcdf_file
 from sloshlab.atomic_file import replaced
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.agitation import Agitation
+from sloshlab.reduced_order_model.break_up import BreakUp
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.regressors import Delays
@@ -41,6 +42,8 @@ def save_model(model: ReducedOrderModel, path: str | os.PathLike[str]) -> None:
         file.facts = json.dumps(model.facts, sort_keys=True, ensure_ascii=True)
         if model.agitation is not None:
             file.agitation = json.dumps(model.agitation.facts(), sort_keys=True)
+        if model.break_up is not None:
+            file.break_up = json.dumps(model.break_up.facts(), sort_keys=True)
         scaling = [getattr(model.scaling, name) for name in SCALING]
         for name, values, kind in (
             ("theta", model.theta, "f8"),
@@ -103,4 +106,5 @@ def _model(source: Any) -> ReducedOrderModel:
         float(variables["sampling_rate_hz"][0]),
         facts,
         agitation,
+        BreakUp(**json.loads(source.break_up)) if hasattr(source, "break_up") else None,
     )

@@ -154,4 +154,5 @@ def scaled_to(model: ReducedOrderModel, factors: TankScaling) -> ReducedOrderMod
         sampling_rate_hz=model.sampling_rate_hz / factors.time,
         facts=facts,
         agitation=memory,
+        break_up=model.break_up and model.break_up.scaled(factors.time),
     )

@@ -118,7 +118,7 @@ def test_an_interrupt_keeps_the_members_so_far():
 
 @pytest.fixture
 def ensemble():
-    memory = Agitation("speed", (0.3,), 1.0, 1.0, (0.1,), (0.5,))
+    memory = Agitation("speed", (0.3,), 1.0, (0.1,), (0.5,))
     rng, network = np.random.default_rng(3), RadialBasis(3, 2)
     members = [
         ReducedOrderModel(
