@@ -92,6 +92,18 @@ def test_the_width_is_that_of_a_normal_distribution():
     assert ensemble.residual.reach_of(0.905) == pytest.approx(1.670, rel=0.02)
 
 
+def test_members_that_disagree_widen_the_interval():
+    """±1 and ±2 without residual: standard deviation 1/√2 about 1.5; with a residual the variances add."""
+    other = ReducedOrderModel(NETWORK, np.array([-1.0, 1.0, 2.0, 2.0]), Delays((1,)), Scaling(), RATE_HZ)
+    one = ReducedOrderModel(NETWORK, np.array([-1.0, 1.0, 1.0, 1.0]), Delays((1,)), Scaling(), RATE_HZ)
+    for constant in (0.0, 0.8):
+        residual = ResidualSpread(constant, 0.0, (2.0,) * len(PROBABILITIES))
+        found = Ensemble((one, other), residual).predicted_range(np.zeros(10))
+        half = 2.0 * np.sqrt(0.5 + constant**2)
+        assert found.upper[1:] == pytest.approx(1.5 + half)
+        assert found.lower[1:] == pytest.approx(1.5 - half)
+
+
 def test_blocks_are_drawn_as_often_as_there_are_blocks():
     runs = [Run(np.arange(95.0), np.ones(95)), Run(np.arange(40.0), np.ones(40))]
     drawn = drawn_blocks(runs, 10, np.random.default_rng(1))
