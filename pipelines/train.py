@@ -19,6 +19,7 @@ from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.network_list import NETWORKS
 from sloshlab.reduced_order_model.regressors import Delays
+from sloshlab.reduced_order_model.stability import stability
 from sloshlab.reduced_order_model.storage import load_model, save_model
 from sloshlab.reduced_order_model.training import Epoch, TrainingRecord, TrainingSettings, fit
 from sloshlab.reduced_order_model.validity_domain import ValidityDomain
@@ -152,6 +153,7 @@ def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
     """
     save_model(trained.model, output)
     best, quality = trained.record.best, trained.quality
+    forgetting = stability(trained.model, [one.velocity_m_per_s for one in trained.runs.training])
     lines = [
         f"model: {output}",
         f"rate: {trained.runs.rate.reason}",
@@ -159,10 +161,14 @@ def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
         f"start {best.start}",
         f"free run on the validation runs: fit {quality.fit_percent:.1f} % (as printed in the source "
         f"{quality.fit_percent_as_printed:.1f} %), error {quality.rms_error:.3g} N RMS",
+        forgetting.line("N"),
     ]
+    unstable = (
+        [] if forgetting.is_stable else ["the model does not forget its start: small errors grow in a free run"]
+    )
     return {
         "lines": lines,
-        "flags": list(trained.flags),
+        "flags": [*trained.flags, *unstable],
         "output": str(output),
         "fit_percent": quality.fit_percent,
         "fit_percent_as_printed": quality.fit_percent_as_printed,

@@ -49,15 +49,23 @@ class Stability:
         """Whether starts are forgotten."""
         return self.exponent_per_s < 0
 
-    def line(self) -> str:
+    def line(self, unit: str = "") -> str:
         """Say it in one line.
+
+        Parameters
+        ----------
+        unit : str
+            Of the output.
 
         Examples
         --------
-        >>> Stability(-20.0, 9.0, 4.0).line()
-        'stability: starts are forgotten, to 1/e in 0.05 s; outputs within ±9, on random input ±4'
+        >>> Stability(-20.0, 9.0, 4.0).line("N")
+        'stability: starts are forgotten, to 1/e in 0.05 s; outputs within ±9 N, on random input ±4 N'
         """
-        limits = f"outputs within ±{self.output_bound:.3g}, on random input ±{self.largest_output:.3g}"
+        suffix = f" {unit}" if unit else ""
+        limits = (
+            f"outputs within ±{self.output_bound:.3g}{suffix}, on random input ±{self.largest_output:.3g}{suffix}"
+        )
         if math.isinf(self.exponent_per_s):
             return f"stability: no feedback; {limits}"
         if self.is_stable:
