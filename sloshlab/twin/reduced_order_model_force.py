@@ -8,6 +8,7 @@ samples of another length, and nothing is resampled.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import astuple, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sloshlab.errors import InputError
+from sloshlab.reduced_order_model.break_up import BreakUp
 from sloshlab.reduced_order_model.free_run import kind_of
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.network_list import LARGEST_PARAMETERS
@@ -60,16 +62,20 @@ def _parts(table: FloatArray) -> dict[str, FloatArray]:
     if not whole or header.min() < 0 or header.max() > 10 * LARGEST_PARAMETERS:
         raise _broken("sizes")
     sizes = [int(value) for value in header[2:]]
-    edges = np.cumsum([N_HEADER, sizes[0] + sizes[1], sizes[2], sizes[3], sizes[4]])
+    edges = np.cumsum([N_HEADER, sizes[0] + sizes[1], *sizes[2:]])
     if edges[-1] != table.size or header[0] != table.size or header[1] not in NETWORK_NUMBERS:
         raise _broken("sizes")
-    delays, layers, theta, domain = (table[a:b] for a, b in pairwise(edges))
+    delays, layers, theta, break_up, domain = (table[a:b] for a, b in pairwise(edges))
+    if break_up.size not in (0, len(fields(BreakUp))) or (break_up.size and sizes[1]):
+        raise _broken("break-up")
+    if break_up.size:
+        BreakUp(*break_up.tolist())  # refuses impossible ones
     for values, largest in ((delays, MOST_DELAYS), (layers, LARGEST_PARAMETERS)):
         if not values.size or not ((values >= 1) & (values <= largest) & (values == np.floor(values))).all():
             raise _broken("delays or layers")
     if theta.size != _n_parameters(int(header[1]), delays.size, layers) or not np.isfinite(theta).all():
         raise _broken("parameters")
-    return {"delays": delays, "layers": layers, "theta": theta, "domain": domain}
+    return {"delays": delays, "layers": layers, "theta": theta, "break_up": break_up, "domain": domain}
 
 
 def _broken(what: str) -> InputError:
@@ -139,9 +145,8 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
         If the model sees the present input, does not tell its tank, or was trained at another fill level.
     """
     if model.agitation is not None:
-        raise InputError(
-            "rom", got="a model with memory of the liquid's state", allowed="models without, in the twin"
-        )
+        got = "a model with slow states among its regressors"
+        raise InputError("rom", got=got, allowed="models without, or with a break-up", remedy="train another")
     if min(model.delays.inputs) < 1:
         raise InputError(
             "rom: input delays",
@@ -152,7 +157,7 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
     factors = TankScaling.of_facts(model.facts, rig)
     scaled = model if factors.is_same else scaled_to(model, factors)
     return REDUCED_ORDER_MODEL(
-        table=_table(model),
+        table=_table(scaled),
         sampling_rate_hz=scaled.sampling_rate_hz,
         input_offset_m_per_s=scaled.scaling.input_offset,
         input_scale_m_per_s=scaled.scaling.input_scale,
@@ -166,9 +171,10 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
 
 def _table(model: ReducedOrderModel) -> FloatArray:
     network, layers = _network(model.network)
-    domain = _domain_numbers(model.facts)
-    sizes = [len(model.delays.inputs), len(model.delays.outputs), len(layers), model.theta.size, domain.size]
-    parts = [[network, *sizes], [*model.delays.inputs, *model.delays.outputs], layers, model.theta, domain]
+    domain, delays = _domain_numbers(model.facts), model.delays
+    break_up = () if model.break_up is None else astuple(model.break_up)
+    sizes = [len(delays.inputs), len(delays.outputs), len(layers), model.theta.size, len(break_up), domain.size]
+    parts = [[network, *sizes], [*delays.inputs, *delays.outputs], layers, model.theta, break_up, domain]
     numbers = np.concatenate([np.asarray(part, np.float64) for part in parts])
     return np.concatenate([[numbers.size + 1.0], numbers])
 
@@ -205,9 +211,10 @@ def description_of(term: Term) -> list[str]:
     """What a reader must know of the model in a tank: its size and rate, and how it was scaled."""
     parts, values = _parts(term.table), term.values
     n_in, n_out = (int(n) for n in term.table[2:4])
+    memory = ", memory of whether the liquid is broken up" if parts["break_up"].size else ""
     lines = [
         f"model: {n_in} past velocities and {n_out} past forces, {' + '.join(f'{n:g}' for n in parts['layers'])} "
-        f"neurons, its own steps at {values['sampling_rate_hz']:g} Hz"
+        f"neurons{memory}, its own steps at {values['sampling_rate_hz']:g} Hz"
     ]
     height, mass = values["height_ratio"], values["liquid_mass_ratio"]
     if max(abs(height - 1), abs(mass - 1)) > 1e-9:

@@ -5,13 +5,15 @@ instants the force is the cubic through f(k−2) … f(k+1), so that nothing is 
 
 Its numbers are one flat array: the values of the force's parameters, then the table::
 
-    size of the table, network, n input delays, n output delays, n sizes, n parameters, n numbers of the domain,
-    input delays, output delays, sizes (neurons, or neurons of each layer), θ, domain
+    size of the table, network, n input delays, n output delays, n sizes, n parameters, n numbers of the break-up,
+    n numbers of the domain,
+    input delays, output delays, sizes (neurons, or neurons of each layer), θ, break-up, domain
 
 and then the workspace that a simulation writes::
 
-    steps taken, f(k−2) … f(k+1) [N], velocities and outputs of the delay lines (in the network's values),
-    regressors, two rows for the values of the neurons
+    steps taken, f(k−2) … f(k+1) [N], share that is broken up, velocity of the step before,
+    velocities and outputs of the delay lines (in the network's values), regressors,
+    two rows for the values of the neurons
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import carray, njit
 
+from sloshlab.reduced_order_model.break_up import next_share
 from sloshlab.reduced_order_model.free_run import NORMALISED, PLAIN, evaluate
 from sloshlab.reduced_order_model.model import RUNAWAY
 from sloshlab.twin.law import TIME, VELOCITY, law
@@ -39,11 +42,11 @@ NETWORK_NUMBERS: Final = (NORMALISED, PLAIN, TANH, RADIAL)
 RATE, INPUT_OFFSET, INPUT_SCALE, OUTPUT_OFFSET, OUTPUT_SCALE = range(5)
 N_VALUES: Final = 8
 """Parameters of the force before the table; the law reads the first five."""
-N_HEADER: Final = 7
+N_HEADER: Final = 8
 REST_STEPS: Final = 500
 """Steps for which a model with feedback has been at rest when a simulation begins."""
-_FORCES, _LINES = 1, 5
-"""Places in the workspace: four forces, then the delay lines."""
+_FORCES, _SHARE, _VELOCITY, _LINES = 1, 5, 6, 7
+"""Places in the workspace: four forces, the state of the liquid, then the delay lines."""
 
 
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
@@ -105,6 +108,12 @@ def longest_delay(table):
     return longest
 
 
+@njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def break_up_at(table):
+    """Where the numbers of the break-up begin."""
+    return N_HEADER + int(table[2]) + int(table[3]) + int(table[4]) + int(table[5])
+
+
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def workspace_size(table):
     """Numbers that a simulation needs behind this table."""
@@ -124,6 +133,8 @@ def rest(numbers):
     for d in range(n_line):
         lines[d] = -numbers[INPUT_OFFSET] / numbers[INPUT_SCALE]
         lines[n_line + d] = -numbers[OUTPUT_OFFSET] / numbers[OUTPUT_SCALE]
+    if table[6] > 0:
+        work[_SHARE] = numbers[break_up_at(table) + N_VALUES + int(table[6]) - 1]
     for _ in range(REST_STEPS if table[3] > 0 else 4):
         take_step(numbers, 0.0)
     work[0] = 0.0
@@ -143,7 +154,14 @@ def take_step(numbers, velocity):
     lines[n_line] = (work[_FORCES + 3] - offset) / scale
     for i in range(3):
         work[_FORCES + i] = work[_FORCES + i + 1]
-    work[_FORCES + 3] = next_output(table, lines, n_line) * scale + offset
+    ahead = next_output(table, lines, n_line) * scale + offset
+    if table[6] > 0:
+        at = break_up_at(table)
+        parameters = table[at : at + int(table[6])]
+        work[_SHARE] = next_share(work[_SHARE], velocity, work[_VELOCITY], 1.0 / numbers[RATE], parameters)
+        work[_VELOCITY] = velocity
+        ahead *= work[_SHARE]
+    work[_FORCES + 3] = ahead
     work[0] += 1.0
 
 

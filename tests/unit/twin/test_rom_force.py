@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sloshlab.errors import InputError, RigError
+from sloshlab.reduced_order_model.break_up import BreakUp
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.networks.multilayer import Multilayer
 from sloshlab.reduced_order_model.networks.network import Network
@@ -67,6 +68,11 @@ SHAPES = {
     "plain_noe": strange(RadialBasis(5, 4), Delays((2, 3, 7), (1, 5))),
     "tanh": strange(Multilayer(6, (9, 3), "tanh"), Delays.tapped(6)),
     "radial": strange(Multilayer(6, (2, 7, 4), "radial"), Delays.tapped(6)),
+    "break_up": replace(
+        strange(NormalisedRadialBasis(6, 5), Delays.tapped(6)),
+        scaling=Scaling(0.03, 0.7, 0.0, 1.3),
+        break_up=BreakUp(20.0, 0.7, 0.8, 0.02),
+    ),
 }
 
 
@@ -135,9 +141,10 @@ def test_its_own_steps_survive_events_of_other_forces() -> None:
     np.testing.assert_allclose(coarse.displacement_m, fine.displacement_m, atol=1e-7)
 
 
-def test_another_tank_and_liquid_answer_in_similarity() -> None:
+@pytest.mark.parametrize("name", ["normalised", "break_up"])
+def test_another_tank_and_liquid_answer_in_similarity(name: str) -> None:
     """Height × 4 and density × 0.8: times × 2, velocities × 2, forces by the masses (2.33–2.35)."""
-    model = SHAPES["normalised"]
+    model = SHAPES[name]
     other = rig(height_m=4 * HEIGHT_M, density=800.0)
     velocity = 0.5 * np.sin(np.arange(900) / 20) + 0.1
     results = [
@@ -146,8 +153,9 @@ def test_another_tank_and_liquid_answer_in_similarity() -> None:
     ]
     ratio = 4 * 0.8  # of the masses: the base area is the same
     np.testing.assert_allclose(results[1].tank_force_n, ratio * results[0].tank_force_n, atol=1e-9)
+    memory = ", memory of whether the liquid is broken up" if name == "break_up" else ""
     assert description_of(term_of(model, rig())) == [
-        "model: 6 past velocities and 0 past forces, 5 neurons, its own steps at 170 Hz"
+        f"model: 6 past velocities and 0 past forces, 5 neurons{memory}, its own steps at 170 Hz"
     ]
     stated = description_of(term_of(model, other))[1]
     assert "times × 2, velocities × 2, forces × 3.2" in stated
@@ -175,7 +183,17 @@ def test_a_saved_twin_needs_no_model_file_and_gives_the_same_bytes(tmp_path: Pat
 
 def test_a_damaged_saved_twin_is_refused_in_one_line(tmp_path: Path) -> None:
     term = term_of(SHAPES["tanh"], rig())
-    for at, value in ((0, 3.0), (2, 5.0), (2, 1e300), (3, -1.0), (1, 7.0), (7, 1e6), (14, np.nan), (14, 2.5)):
+    for at, value in (
+        (0, 3.0),
+        (2, 5.0),
+        (2, 1e300),
+        (3, -1.0),
+        (1, 7.0),
+        (8, 1e6),
+        (15, np.nan),
+        (15, 2.5),
+        (6, 6.0),
+    ):
         table = term.table.copy()
         table[at] = value
         save_twin(Twin(None, (replace(term, table=table),)), tmp_path / "bad.toml")
