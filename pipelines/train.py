@@ -9,11 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.model_extensions import remembering, trained_ensemble
 from pipelines.outputs import sha256_of
 from pipelines.progress import amounts
 from pipelines.training_runs import RunFiles, TrainingRuns, require_new_runs, training_runs
 from sloshlab.errors import InputError
 from sloshlab.recording import read_attributes
+from sloshlab.reduced_order_model.agitation import Agitation
+from sloshlab.reduced_order_model.ensemble import Ensemble
+from sloshlab.reduced_order_model.ensemble_storage import save_ensemble
 from sloshlab.reduced_order_model.fit_quality import FitQuality, fit_quality
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.model import ReducedOrderModel
@@ -40,6 +44,12 @@ class ModelSettings:
         One of `NETWORKS`.
     rate_hz : float, optional
         By default chosen from the data.
+    memory_s : float, optional
+        Time constant of a slow state of the speed that the network sees, too.
+    sudden_starts : tuple of Path
+        Recordings from rest, to which a break-up of the liquid is fitted.
+    n_members : int
+        Of an ensemble trained besides; 0 for none.
     """
 
     structure: str
@@ -48,6 +58,9 @@ class ModelSettings:
     neurons: int
     network: str = "normalised_rbf"
     rate_hz: float | None = None
+    memory_s: float | None = None
+    sudden_starts: tuple[Path, ...] = ()
+    n_members: int = 0
 
     def checked(self) -> ModelSettings:
         """Return self if nothing is impossible.
@@ -63,8 +76,16 @@ class ModelSettings:
             raise InputError("--network", got=repr(self.network), allowed=", ".join(NETWORKS))
         if self.structure == "noe" and self.network == "multilayer":
             raise InputError("--network with feedback", got="multilayer", allowed="normalised_rbf, rbf")
-        self.delay_lines()
+        if self.structure == "noe" and (self.memory_s is not None or self.sudden_starts):
+            raise InputError("memory of the liquid", got="--model noe", allowed="--model nfir")
+        if self.n_members == 1:
+            raise InputError("--ensemble", got="1", allowed="0, or at least 2")
+        self.delay_lines(), self.agitation()
         return self
+
+    def agitation(self) -> Agitation | None:
+        """Return the slow state, if there shall be one."""
+        return None if self.memory_s is None else Agitation("speed", (self.memory_s,))
 
     def delay_lines(self) -> Delays:
         """Return the delays of the model."""
@@ -89,6 +110,7 @@ class TrainedModel:
     settings : TrainingSettings
     quality : FitQuality
         Of the free run over all validation runs together.
+    ensemble : Ensemble, optional
     """
 
     model: ReducedOrderModel
@@ -96,6 +118,7 @@ class TrainedModel:
     runs: TrainingRuns
     settings: TrainingSettings
     quality: FitQuality
+    ensemble: Ensemble | None = None
 
     @property
     def flags(self) -> tuple[str, ...]:
@@ -136,11 +159,15 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
             [one.run() for one in runs.validation],
             runs.rate_hz,
             settings,
+            agitation=wanted.agitation(),
             told=told,
         )
     errors = {"training_mse_n2": record.best.training_mse, "validation_mse_n2": record.best.validation_mse}
     model.facts.update(runs.facts() | errors)
-    return TrainedModel(model, record, runs, settings, _quality(model, runs.validation))
+    ensemble = trained_ensemble(model, wanted.n_members, runs, settings) if wanted.n_members else None
+    if wanted.sudden_starts:
+        model = remembering(model, wanted.sudden_starts, runs)
+    return TrainedModel(model, record, runs, settings, _quality(model, runs.validation), ensemble)
 
 
 def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
@@ -162,6 +189,7 @@ def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
         f"free run on the validation runs: fit {quality.fit_percent:.1f} % (as printed in the source "
         f"{quality.fit_percent_as_printed:.1f} %), error {quality.rms_error:.3g} N RMS",
         forgetting.line("N"),
+        *_extension_lines(trained, output),
     ]
     unstable = (
         [] if forgetting.is_stable else ["the model does not forget its start: small errors grow in a free run"]
@@ -227,6 +255,25 @@ def train_and_report(
     said = write_validation(trained.model, trained.runs, test, folder, command=command, training=training)
     lines, flags = summary["lines"] + said.pop("lines"), dict.fromkeys([*summary["flags"], *said.pop("flags")])
     return summary | said | {"lines": lines, "flags": list(flags)}
+
+
+def _extension_lines(trained: TrainedModel, output: Path) -> list[str]:
+    """Write the ensemble beside the model; say what there is beyond the model without memory."""
+    lines = []
+    if (break_up := trained.model.break_up) is not None:
+        lines.append(
+            f"break-up: growth {break_up.growth_per_s:.3g}/s, exponent {break_up.exponent:.2g}, "
+            f"calming {break_up.calming_s:.3g} s, {100 * break_up.at_rest:.2g} % broken up at rest"
+        )
+    if trained.ensemble is not None:
+        path = output.with_name(f"{output.stem}_ensemble.nc")
+        save_ensemble(trained.ensemble, path)
+        residual = trained.ensemble.residual
+        lines.append(
+            f"ensemble: {path}, {len(trained.ensemble.members)} members; residual on the validation runs "
+            f"{residual.constant:.3g} N and {residual.slope:.2g} of the force"
+        )
+    return lines
 
 
 def report_folder(model: Path) -> Path:

@@ -57,6 +57,15 @@ def train(
     epochs: Annotated[int, typer.Option(min=1, help="At most so many.")] = 60,
     starts: Starts = 1,
     seed: StartSeed = 0,
+    memory_s: Annotated[
+        float | None,
+        typer.Option(help="Time constant of a slow state that the network sees, too.", show_default=False),
+    ] = None,
+    sudden_start: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="RUN.nc", help="Run from rest, for the break-up of the liquid.", show_default=False),
+    ] = None,
+    ensemble: Annotated[int, typer.Option(min=0, help="Members of an ensemble for intervals.")] = 0,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write the model only.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -66,7 +75,9 @@ def train(
     from sloshlab.reduced_order_model.training import TrainingSettings
 
     files = RunFiles.of(runs, still or [], rig)
-    wanted = ModelSettings(model, delays, output_delays, neurons, network, rate_hz)
+    wanted = ModelSettings(
+        model, delays, output_delays, neurons, network, rate_hz, memory_s, tuple(sudden_start or ()), ensemble
+    )
     settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed)
     command = None if no_report else command_as_given()
     finish(train_and_report(files, test or [], wanted, settings, output, command), as_json)
