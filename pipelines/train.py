@@ -313,7 +313,8 @@ def validate_model(
         if sha256_of(run) in known:
             raise InputError(f"run {run}", got="one that the model was trained on", allowed="other runs")
     require_new_runs(test, files)
-    return write_validation(model, training_runs(files, model.sampling_rate_hz), test, folder, command=command)
+    runs = training_runs(files, model.sampling_rate_hz)
+    return write_validation(model, runs, test, folder, command=command, model_file=path)
 
 
 def _quality(model: ReducedOrderModel, runs: Sequence[LiquidSignals]) -> FitQuality:

@@ -15,6 +15,8 @@ from pipelines.rom_report.results import ValidatedModel
 
 SYMBOLS: Final = {"w_bar": "W̄", "beta": "β"}
 _N_SHADES: Final = 24
+_MOST_DOTS: Final = 300
+"""Windows beyond which dots would hide the map."""
 
 
 def compared_maps(name: str, validated: ValidatedModel, *, quantity: str, counterpart: str) -> ReportFigure:
@@ -45,7 +47,10 @@ def compared_maps(name: str, validated: ValidatedModel, *, quantity: str, counte
         axes.set_title(title)
     for axes in panels[1:]:
         axes.set_ylabel("")
-    draw_runs(panels[0], measured.plane, maps.runs)
+    dots = ""
+    if maps.measured.windows.sizes["window"] <= _MOST_DOTS:
+        draw_runs(panels[0], measured.plane, maps.runs)
+        dots = "; dots: windows"
     error = maps.errors["beta" if signed else "w_bar"]
     over_u = not quantity.endswith("v_bar")
     said = (
@@ -59,7 +64,7 @@ def compared_maps(name: str, validated: ValidatedModel, *, quantity: str, counte
     caption = (
         f"{meaning} over {'ū' if over_u else 'v̄'} and ω̄ from the measured force, from the force that the model "
         f"predicts for the same motion, and their difference; {maps.source}, the same cycles and the same "
-        f"interpolation for both. Dashed: lines of constant acceleration; dots: windows.{said}"
+        f"interpolation for both. Dashed: lines of constant acceleration{dots}.{said}"
     )
     return ReportFigure(name, caption, counterpart, png_bytes(figure))
 

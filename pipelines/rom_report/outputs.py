@@ -33,6 +33,7 @@ def write_validation(
     *,
     command: str,
     training: Training | None = None,
+    model_file: Path | None = None,
 ) -> dict[str, Any]:
     """Compare a model with recordings and write the report; return what is to be said.
 
@@ -47,12 +48,15 @@ def write_validation(
     command : str
         What the user typed, for the report.
     training : Training, optional
+    model_file : Path, optional
+        Where the model was read from.
     """
     files = runs.files
     n_steps = 3 + len(files.validation) + len(test) + _N_FIGURES
     with progress("validation", n_steps) as advance:
         found = validated(model, runs, test, training=training, advance=advance)
-        inputs = (*files.training, *files.validation, *test, *files.still, files.rig)
+        read = () if model_file is None else (model_file,)
+        inputs = (*read, *files.training, *files.validation, *test, *files.still, files.rig)
         provenance = {
             "command": command,
             "inputs": {path.name: sha256_of(path) for path in inputs},
