@@ -7,6 +7,7 @@ the others is then that of the reduced problem, because the gradient of the line
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
@@ -19,9 +20,11 @@ from sloshlab.reduced_order_model.networks.network import Network, NormalSums
 
 FIRST_DAMPING: Final = 1e-3
 LARGEST_DAMPING: Final = 1e10
-_SMALLEST_DAMPING: Final = 1e-12
+_SMALLEST_DAMPING: Final = 1e-6
 _RIDGE: Final = 1e-10
 _FLOOR: Final = 1e-9
+_RATIO: Final = 4.0
+_MARKEDLY: Final = 1.01
 
 
 class LeastSquaresProblem(Protocol):
@@ -111,20 +114,38 @@ def next_step(problem: LeastSquaresProblem, at: Step, xp: Any) -> Step | None:
 
     Notes
     -----
-    (H + λ diag H) Δθ = g; λ falls to a tenth after a step and grows tenfold until there is one (Marquardt 1963).
+    (H + λ diag H) Δθ = g (Marquardt 1963). H costs far more than a trial of λ, so the λ of least error is sought:
+    downwards from the last one if that lowers the error at all, else, or if smaller ones are worse, upwards.
     """
     sums = problem.normal_sums(at.theta)
     diagonal = xp.linalg.diagonal(sums.matrix)
     scale = xp.maximum(diagonal, _FLOOR * xp.max(diagonal))
-    damping = at.damping
-    while damping <= LARGEST_DAMPING:
+
+    def attempt(damping: float) -> Step:
         change = _solved(xp, sums.matrix, damping * scale, sums.gradient)
-        if change is not None:
-            theta, squares = problem.improved(at.theta + change)
-            if squares < at.squares:
-                return Step(theta, squares, max(damping / 10, _SMALLEST_DAMPING))
-        damping *= 10
-    return None
+        if change is None:
+            return Step(at.theta, math.inf, damping)
+        return Step(*problem.improved(at.theta + change), damping)
+
+    found = attempt(at.damping)
+    if found.squares < at.squares:
+        lower = _best_along(attempt, found, at.squares, 1 / _RATIO)
+        return lower if lower is not found else _best_along(attempt, found, at.squares, _RATIO)
+    while not found.squares < at.squares:
+        if found.damping > LARGEST_DAMPING:
+            return None
+        found = attempt(found.damping * _RATIO)
+    return _best_along(attempt, found, at.squares, _RATIO)
+
+
+def _best_along(attempt: Callable[[float], Step], best: Step, before: float, factor: float) -> Step:
+    """Change the damping by a factor as long as that gains markedly more."""
+    while _SMALLEST_DAMPING <= best.damping * factor <= LARGEST_DAMPING:
+        other = attempt(best.damping * factor)
+        if not before - other.squares > _MARKEDLY * (before - best.squares):
+            return best
+        best = other
+    return best
 
 
 def _solved(xp: Any, matrix: Array, added: Array, right: Array) -> Array | None:
