@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
+from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from sloshlab.errors import AnalysisError, InputError
@@ -34,6 +34,7 @@ LEVEL_TIME_CONSTANT_S: Final = 0.2
 """Over which the mean square of the prediction is taken."""
 PROBABILITIES: Final = tuple(np.round(np.arange(0.05, 1.0, 0.01), 2).tolist())
 """Of the intervals whose reach is kept; others are interpolated."""
+_LEAST_SHARE: Final = 1e-6
 
 
 @dataclass(frozen=True)
@@ -281,7 +282,8 @@ def residual_spread(members: Sequence[ReducedOrderModel], runs: Sequence[Run]) -
 
     Notes
     -----
-    a² and b² are the non-negative least squares of (e² − Var(members)) on 1 and ⟨ŷ²⟩.
+    a and b are those of the greatest likelihood of normal errors, Σ ln σ² + e²/σ² least: weak and strong motion
+    then count alike, while least squares of e² would look at the strongest only.
     """
     errors, variances, levels = [], [], []
     for run in runs:
@@ -293,11 +295,18 @@ def residual_spread(members: Sequence[ReducedOrderModel], runs: Sequence[Run]) -
     error, variance, level = (np.concatenate(parts) for parts in (errors, variances, levels))
     if error.size < len(PROBABILITIES):
         raise AnalysisError("residuals of an ensemble", got=f"{error.size} samples", allowed="more than 95")
-    scale = max(float(level.max()), 1e-300)
-    found, _ = nnls(np.stack([np.ones_like(level), level / scale], axis=1), error**2 - variance)
-    constant, slope = float(np.sqrt(found[0])), float(np.sqrt(found[1] / scale))
+    least = _LEAST_SHARE * float(np.mean(error**2)) + 1e-300
+
+    def unlikelihood(logarithms: FloatArray) -> float:
+        squared = variance + least + np.exp(logarithms[0]) + np.exp(logarithms[1]) * level
+        return float(np.mean(np.log(squared) + error**2 / squared))
+
+    start = np.log([np.mean(error**2) + least, 0.1])
+    found = minimize(unlikelihood, start, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-9})
+    a_squared, b_squared = np.exp(found.x)
+    constant, slope = float(np.sqrt(a_squared + least)), float(np.sqrt(b_squared))
     sigma = np.sqrt(variance + constant**2 + slope**2 * level)
-    reach = np.quantile(np.abs(error) / np.maximum(sigma, 1e-300), PROBABILITIES)
+    reach = np.quantile(np.abs(error) / sigma, PROBABILITIES)
     return ResidualSpread(constant, slope, tuple(reach.tolist()))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model.break_up import BreakUp
-from sloshlab.reduced_order_model.break_up_fit import with_break_up
+from sloshlab.reduced_order_model.break_up_fit import _in_phase, with_break_up
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis
 from sloshlab.reduced_order_model.regressors import Delays, Run
@@ -129,3 +129,14 @@ def test_what_is_no_break_up_is_refused():
         )
     with pytest.raises(AnalysisError, match="no sample"):
         with_break_up(steady_model(), [Run(np.zeros(5), np.full(5, np.nan))])
+
+
+def test_only_what_is_in_phase_with_the_velocity_counts():
+    """A force 3 v gives 3 √(Σ v²) in each block, one a quarter of a cycle away nothing."""
+    phase = 2 * np.pi * np.arange(80) / 20
+    v = np.repeat([1.0, 5.0], 40) * np.sin(phase)
+    found = _in_phase(3 * v + 7 * np.cos(phase), v, 20, 0.0)
+    assert found == pytest.approx(3 * np.sqrt(10) * np.array([1, 1, 5, 5]))
+    assert _in_phase(3 * v, v, 20, 0.5) == pytest.approx(
+        np.repeat([3 * 10 / np.sqrt(10 + 20 * 0.25), 3 * 250 / np.sqrt(250 + 20 * 0.25)], 2)
+    )

@@ -28,7 +28,7 @@ STEP = ReducedOrderModel(NETWORK, np.array([-1.0, 1.0, -1.0, 1.0]), Delays((1,))
 def noisy_run(n: int, seed: int, constant: float, slope: float) -> Run:
     """y(k) = x(k−1) + noise of variance a² + b² A², A being the RMS of the wave, 0.1 and 1 in turn."""
     rng = np.random.default_rng(seed)
-    level = np.resize(np.repeat([0.1, 1.0], 500), n)
+    level = np.resize(np.repeat([0.1, 1.0], 2000), n)
     x = level * np.sqrt(2) * np.sin(0.7 * np.arange(n))
     y = np.full(n, np.nan)
     std = np.sqrt(constant**2 + slope**2 * level**2)
@@ -47,15 +47,15 @@ def test_intervals_cover_what_they_say_at_every_level():
     """Noise twenty times larger where the wave is ten times larger: one width for all would cover 100 and 80 %."""
     noise = {"constant": 0.01, "slope": 0.3}
     training, validation = (
-        [noisy_run(4000, 1, **noise), noisy_run(2000, 2, **noise)],
-        [noisy_run(6000, 3, **noise)],
+        [noisy_run(4000, 1, **noise), noisy_run(4000, 2, **noise)],
+        [noisy_run(8000, 3, **noise)],
     )
     ensemble, records = ensemble_of(training, validation, n_members=4, block_s=2.0)
     unseen = noisy_run(20_000, 4, **noise)
     for probability in (0.5, 0.9):
         found = ensemble.predicted_range(unseen.x, probability)
         assert found.coverage(unseen.y) == pytest.approx(probability, abs=0.03)
-        loud = np.resize(np.repeat([False, True], 500), unseen.x.size)
+        loud = np.resize(np.repeat([False, True], 2000), unseen.x.size)
         for part in (loud, ~loud):
             assert found.coverage(np.where(part, unseen.y, np.nan)) == pytest.approx(probability, abs=0.05)
     assert len(records) == len(ensemble.members) == 4
