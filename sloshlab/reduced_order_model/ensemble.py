@@ -301,7 +301,7 @@ def residual_spread(members: Sequence[ReducedOrderModel], runs: Sequence[Run]) -
         squared = variance + least + np.exp(logarithms[0]) + np.exp(logarithms[1]) * level
         return float(np.mean(np.log(squared) + error**2 / squared))
 
-    start = np.log([np.mean(error**2) + least, 0.1])
+    start = np.array([math.log(float(np.mean(error**2)) + least), math.log(0.1)])
     found = minimize(unlikelihood, start, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-9})
     a_squared, b_squared = np.exp(found.x)
     constant, slope = float(np.sqrt(a_squared + least)), float(np.sqrt(b_squared))
