@@ -111,7 +111,7 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
             amplitude = in_g(reading.acceleration_amplitude_m_per_s2)
             axes.plot(amplitude[reading.used], values[reading.used], color=colour,
                       marker=DISTINCT_MARKERS[number % len(DISTINCT_MARKERS)], ms=3.5, ls="none", alpha=0.7,
-                      label=_label(group, number, len(runs)))  # fmt: skip
+                      label=f"{group}, run {number + 1}" if len(runs) > 1 else group)  # fmt: skip
             shown.append(values[reading.used])
         _draw_pooled(axes, experiment, group, quantity)
     axes.set_xlabel("amplitude of acceleration a [g]")
@@ -126,13 +126,6 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
         "are two or more."
     )
     return ReportFigure(name, caption, f"{_SOURCE_FIGURES[experiment.kind]}, measured", png_bytes(figure))
-
-
-def _label(group: str, number: int, n_runs: int) -> str | None:
-    """Repeats of a recording are told apart; those of a twin are all alike, and its line says whose they are."""
-    if n_runs == 1:
-        return group
-    return f"{group}, run {number + 1}" if group in CONFIGURATIONS else None
 
 
 def _limit_to_measured(axes: Axes, experiment: BeamExperiment) -> None:
@@ -157,14 +150,8 @@ def _draw_pooled(axes: Axes, experiment: BeamExperiment, group: str, quantity: Q
     mean = 100 * pooled.damping_ratio if quantity == "damping" else pooled.frequency_hz
     low, high = 100 * pooled.damping_ratio_interval if quantity == "damping" else pooled.frequency_interval_hz
     axes.plot(amplitude, mean, color=colour, lw=1.4, ls="-" if group in CONFIGURATIONS else "--",
-              label=_label_of_mean(group, int(pooled.n_repeats.max())))  # fmt: skip
+              label=f"{group}, mean" if pooled.n_repeats.max() > 1 else None)  # fmt: skip
     axes.fill_between(amplitude, low, high, where=np.isfinite(low), color=colour, alpha=0.18, lw=0)
-
-
-def _label_of_mean(group: str, n_repeats: int) -> str | None:
-    if n_repeats == 1:
-        return None
-    return f"{group}, mean" if group in CONFIGURATIONS else group
 
 
 def higher_modes(name: str, experiment: BeamExperiment) -> ReportFigure:
