@@ -159,7 +159,7 @@ def sklearn(budget_s: str) -> dict[str, float]:
     from sklearn.neural_network import MLPRegressor
 
     phi, y, phi_validation, y_validation = rival_data()
-    network = MLPRegressor((N_NEURONS,), random_state=0)
+    network = MLPRegressor(hidden_layer_sizes=(N_NEURONS,), random_state=0)
 
     def epochs() -> Iterator[Callable[[FloatArray], FloatArray]]:
         while True:
