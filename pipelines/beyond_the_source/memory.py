@@ -30,7 +30,7 @@ CANDIDATES: Final[Mapping[str, Agitation | None]] = {
 }
 STARTS: Final = (0, 1)
 FIRST_CYCLES: Final = 8
-DECAYS_MM: Final = (14.6, 6.5)
+DECAYS_MM: Final = (14.6, 10.0, 6.5)
 
 
 @dataclass(frozen=True)
