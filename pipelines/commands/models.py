@@ -112,7 +112,7 @@ def study(
     still: Still = None,
     cases: Annotated[str, typer.Option(help="'source': its 24 NFIR and 3 NOE, or 'all': more.")] = "all",
     rate_hz: Rate = None,
-    epochs: Annotated[int, typer.Option(min=1, help="Of each case, at most so many.")] = 40,
+    epochs: Annotated[int, typer.Option(min=1, help="Of each case, at most so many.")] = 20,
     starts: Starts = 1,
     seed: StartSeed = 0,
     workers: Annotated[int, typer.Option(min=1, max=256, help="Processes, one case each.")] = 2,
