@@ -184,6 +184,8 @@ def _updated(rig: Rig, frozen: dict[int, FrozenMode]) -> tuple[UpdatedBeam | Non
     if n_modes < 2:
         return None, f"{n_modes} frequencies of the frozen liquid were measured; tip mass and stiffness need two"
     measured = np.array([frozen[mode].frequency_hz for mode in range(n_modes)])
+    if not (np.diff(measured) > 0).all():
+        return None, f"the measured frequencies {', '.join(f'{one:.4g}' for one in measured)} Hz do not rise"
     return update_beam(uniform_beam(rig), measured), ""
 
 

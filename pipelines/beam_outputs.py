@@ -57,7 +57,7 @@ def modal_dataset(experiment: BeamExperiment) -> xr.Dataset:
     }
     dataset = xr.Dataset(variables, coordinates)
     _describe(dataset)
-    return _with_filter(dataset, experiment)
+    return _with_update(_with_filter(dataset, experiment), experiment)
 
 
 def _readings(runs: Sequence[BeamRun], index: int, point: str) -> dict[str, Any]:
@@ -141,6 +141,31 @@ def _with_filter(dataset: xr.Dataset, experiment: BeamExperiment) -> xr.Dataset:
         )
     )
     return dataset.merge(added)
+
+
+def _with_update(dataset: xr.Dataset, experiment: BeamExperiment) -> xr.Dataset:
+    """Frequencies with the liquid frozen, and the beam model fitted to them; NaN where there is none."""
+    updated, frozen = experiment.updated, experiment.frozen_modes
+    numbers = range(len(experiment.modes.names))
+    modelled = np.full(len(numbers), np.nan)
+    scalars = dict.fromkeys(
+        ("tip_mass_kg", "tip_mass_kg_std", "youngs_modulus_pa", "youngs_modulus_pa_std"), np.nan
+    )
+    if updated is not None:
+        modelled[: updated.modelled_hz.size] = updated.modelled_hz
+        scalars |= {
+            "tip_mass_kg": updated.beam.tip_mass_kg,
+            "tip_mass_kg_std": updated.tip_mass_kg_std,
+            "youngs_modulus_pa": updated.beam.youngs_modulus_pa,
+            "youngs_modulus_pa_std": updated.youngs_modulus_pa_std,
+        }
+    over_mode = {
+        "measured_frequency_hz": [frozen[n].frequency_hz if n in frozen else np.nan for n in numbers],
+        "measured_frequency_hz_std": [frozen[n].frequency_hz_std if n in frozen else np.nan for n in numbers],
+        "natural_frequency_hz": modelled,
+    }
+    added = {name: ("mode", values) for name, values in over_mode.items()}
+    return dataset.merge(described(xr.Dataset({**added, **{name: ((), one) for name, one in scalars.items()}})))
 
 
 def spectra_dataset(experiment: BeamExperiment) -> xr.Dataset:
@@ -243,6 +268,12 @@ def _summary(experiment: BeamExperiment, folder: Path, report: bool) -> dict[str
         },
         "frozen_frequency_hz": {
             str(mode + 1): found.frequency_hz for mode, found in sorted(experiment.frozen_modes.items())
+        },
+        "updated_beam": {}
+        if experiment.updated is None
+        else {
+            "tip_mass_kg": experiment.updated.beam.tip_mass_kg,
+            "youngs_modulus_pa": experiment.updated.beam.youngs_modulus_pa,
         },
         "output": str(folder),
     }

@@ -260,9 +260,10 @@ class BeamExperiment:
 
     @property
     def random_runs(self) -> tuple[BeamRun, ...]:
-        """Runs with spectra, weakest first."""
-        found = [run for run in self.runs if run.random is not None]
-        return tuple(sorted(found, key=lambda run: run.random.root_rms_g if run.random else 0.0))
+        """Runs with spectra, weakest first, recordings before the twins that they drove."""
+        found = [(run.random.root_rms_g, run.is_simulated, run) for run in self.runs if run.random is not None]
+        # a twin's root is that of its recording but for rounding
+        return tuple(run for *_, run in sorted(found, key=lambda one: (float(f"{one[0]:.3g}"), one[1])))
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -298,7 +299,8 @@ def group_of(attributes: RunAttributes) -> str:
     forces = [one.strip() for one in str(more.get("simulated_forces", "")).split(",")]
     liquid = [one.removesuffix("(tank)").strip().replace("_", " ") for one in forces if one.endswith("(tank)")]
     liquid = [_SHORT.get(one, one) for one in liquid]
-    return f"twin {PurePath(attributes.rig).stem}: {', '.join(liquid) or 'frozen'}"
+    rig, what = PurePath(attributes.rig).stem, ", ".join(liquid) or "frozen"
+    return f"twin {what}" if rig == what else f"twin {rig}: {what}"
 
 
 def in_g(values: FloatArray) -> FloatArray:

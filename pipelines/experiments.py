@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 from typing import Final
 
 from pipelines.command_line import DONE_BUT_FLAGGED, INPUT_IS_BAD, run
 from sloshlab.errors import InputError, SloshlabError
+
+_MINUTES_PER_BALL: Final = 1
 
 
 def shaker_arguments(folder: Path, output: Path, rigs_folder: Path | None = None) -> list[str]:
@@ -78,7 +81,7 @@ def _beam(folder: Path, output: Path) -> int:
 
 
 def _ball(folder: Path, output: Path) -> int:
-    """Balls from every experiment of the folder that is there: decays, and both shakers filled half."""
+    """Balls by both dampers from what is there of the folder: decays, and both shakers filled half."""
     whole = folder / "numerical_tank"
     found = {
         "decay": (sorted((whole / "sdof").glob("*.nc")), whole / "sdof" / "rig_sdof.toml"),
@@ -90,14 +93,20 @@ def _ball(folder: Path, output: Path) -> int:
     }
     if not any(runs for runs, _ in found.values()):
         raise InputError(f"{folder}", got="no recordings", remedy="make them with `make campaign`")
-    for name, (runs, rig) in found.items():
+    tasks = [(name, damper) for name in found for damper in ("contact", "always")]
+    print(f"{len(tasks)} balls, about {_MINUTES_PER_BALL:g} minutes each on one core", flush=True)  # noqa: T201
+    for number, (name, damper) in enumerate(tasks, 1):
+        runs, rig = found[name]
         if not runs:
             print(f"{name}: no recordings; make them with `make tank-campaign`")  # noqa: T201
             continue
-        code = run(["ball", *map(str, runs), "--rig", str(rig), "--damper", "always", "-o", str(output / name)])
+        begin, place = time.monotonic(), output / f"{name}_{damper}"
+        print(f"{number} of {len(tasks)}: {name}, the damper acts {damper}", flush=True)  # noqa: T201
+        code = run(["ball", *map(str, runs), "--rig", str(rig), "--damper", damper, "-o", str(place)])
         if code not in (0, DONE_BUT_FLAGGED):
             return code
-        print(f"The report is {(output / name / 'report.html').resolve()}")  # noqa: T201
+        minutes = (time.monotonic() - begin) / 60
+        print(f"The report is {(place / 'report.html').resolve()}; {minutes:.1f} minutes", flush=True)  # noqa: T201
     return 0
 
 

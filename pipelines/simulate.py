@@ -185,7 +185,7 @@ def _summary(
 ) -> dict[str, Any]:
     passed = float(np.abs(simulation.works_j).max(initial=0.0)) + float(simulation.mechanical_energy_j.max())
     error = float(np.abs(simulation.energy_residual_j).max()) / passed if passed else 0.0
-    flags = list(drive.flags)
+    flags = [*drive.flags, *simulation.remarks]
     if error > _LARGEST_ENERGY_ERROR:
         flags.append(f"energy balance closes only to {error:.1e} of the energy passed on: give more --steps")
     recorded, now = run_attributes(recording).configuration, simulated.recording.attrs["configuration"]

@@ -154,7 +154,9 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "predicted_beta": Quantity("1", "β of the force that a model predicts for the same motion", "β"),
     "w_bar_difference": Quantity("1", "W̄ predicted − measured"),
     "beta_difference": Quantity("1", "β predicted − measured"),
-    "residual_test": Quantity("1", "what the residual is correlated with: its own past, or powers of the velocity"),
+    "residual_test": Quantity(
+        "1", "what the residual is correlated with: its own past, or powers of the velocity"
+    ),
     "lag_s": Quantity("s", "time by which the other signal comes earlier"),
     "residual_correlation": Quantity("1", "correlation of the residual with another signal, −1 … 1"),
     "residual_band": Quantity("1", "half-width of the 95 % band of a correlation around zero"),

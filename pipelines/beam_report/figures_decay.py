@@ -29,6 +29,7 @@ Quantity = Literal["damping", "frequency"]
 
 _LABELS: Final = {"damping": "damping ratio ζ₁ [%]", "frequency": "frequency f₁ [Hz]"}
 _SOURCE_FIGURES: Final = {"beam": "Fig. 2.39", "sdof": "Fig. 2.8(b)"}
+_SOURCE_FIGURES_OF_TWINS: Final = {"beam": "Figs. 2.39 and E.2(b) … E.4(b)", "sdof": "Figs. 2.8(b) and 2.9(b)"}
 
 
 def values_of(reading: InstantaneousDamping, quantity: Quantity) -> tuple[FloatArray, FloatArray]:
@@ -101,31 +102,40 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
     axes = figure.subplots()
     shown = []
     for group in experiment.groups:
-        runs = [run for run in experiment.free_runs if run.group == group]
-        colour = group_colour(experiment, group)
-        for number, run in enumerate(runs):
-            reading = run.first_decay.local_sine_fit if run.first_decay is not None else None
-            if reading is None:
-                continue
-            values, _ = values_of(reading, quantity)
-            amplitude = in_g(reading.acceleration_amplitude_m_per_s2)
-            axes.plot(amplitude[reading.used], values[reading.used], color=colour,
-                      marker=DISTINCT_MARKERS[number % len(DISTINCT_MARKERS)], ms=3.5, ls="none", alpha=0.7,
-                      label=f"{group}, run {number + 1}" if len(runs) > 1 else group)  # fmt: skip
-            shown.append(values[reading.used])
-        _draw_pooled(axes, experiment, group, quantity)
+        if group in CONFIGURATIONS:
+            shown += _draw_runs(axes, experiment, group, quantity)
+        shown += _draw_pooled(axes, experiment, group, quantity)
     axes.set_xlabel("amplitude of acceleration a [g]")
     axes.set_ylabel(_LABELS[quantity])
     _arrange(axes, np.concatenate(shown) if shown else np.array([]), quantity)
     _limit_to_measured(axes, experiment)
     legend_above(figure, axes, columns=4)
     caption = (
-        "The first mode in every free run, by the local sine fit; dashed lines are simulations. Lines are means "
-        "over the repeats within bins of "
-        "amplitude; bands are 90 % intervals of the mean, from the scatter between repeats (Student), where there "
-        "are two or more."
+        "The first mode in every measured free run, by the local sine fit. Lines are means over the repeats "
+        "within bins of amplitude, dashed ones those of twins; bands are 90 % intervals of the mean, from the "
+        "scatter between repeats (Student), where there are two or more."
     )
-    return ReportFigure(name, caption, f"{_SOURCE_FIGURES[experiment.kind]}, measured", png_bytes(figure))
+    has_twins = any(run.is_simulated for run in experiment.free_runs)
+    sources = _SOURCE_FIGURES_OF_TWINS if has_twins else _SOURCE_FIGURES
+    like = "" if quantity == "damping" else "like "
+    return ReportFigure(name, caption, like + sources[experiment.kind], png_bytes(figure))
+
+
+def _draw_runs(axes: Axes, experiment: BeamExperiment, group: str, quantity: Quantity) -> list[FloatArray]:
+    """The runs of a measured group, one marker each; what was drawn."""
+    runs = [run for run in experiment.free_runs if run.group == group]
+    colour, shown = group_colour(experiment, group), []
+    for number, run in enumerate(runs):
+        if run.first_decay is None:
+            continue
+        reading = run.first_decay.local_sine_fit
+        values, _ = values_of(reading, quantity)
+        amplitude = in_g(reading.acceleration_amplitude_m_per_s2)
+        axes.plot(amplitude[reading.used], values[reading.used], color=colour,
+                  marker=DISTINCT_MARKERS[number % len(DISTINCT_MARKERS)], ms=3.5, ls="none", alpha=0.7, zorder=4,
+                  label=f"{group}, run {number + 1}" if len(runs) > 1 else group)  # fmt: skip
+        shown.append(values[reading.used])
+    return shown
 
 
 def _limit_to_measured(axes: Axes, experiment: BeamExperiment) -> None:
@@ -142,16 +152,19 @@ def _limit_to_measured(axes: Axes, experiment: BeamExperiment) -> None:
         axes.set_xlim(*limits)
 
 
-def _draw_pooled(axes: Axes, experiment: BeamExperiment, group: str, quantity: Quantity) -> None:
+def _draw_pooled(axes: Axes, experiment: BeamExperiment, group: str, quantity: Quantity) -> list[FloatArray]:
+    """The mean over the repeats of a group with its band; what was drawn."""
     pooled = experiment.pooled.get((group, "local sine fit"))
     if pooled is None:
-        return
+        return []
+    is_measured = group in CONFIGURATIONS
     amplitude, colour = in_g(pooled.acceleration_amplitude_m_per_s2), group_colour(experiment, group)
     mean = 100 * pooled.damping_ratio if quantity == "damping" else pooled.frequency_hz
     low, high = 100 * pooled.damping_ratio_interval if quantity == "damping" else pooled.frequency_interval_hz
-    axes.plot(amplitude, mean, color=colour, lw=1.4, ls="-" if group in CONFIGURATIONS else "--",
-              label=f"{group}, mean" if pooled.n_repeats.max() > 1 else None)  # fmt: skip
+    named = f"{group}, mean" if is_measured and pooled.n_repeats.max() > 1 else None if is_measured else group
+    axes.plot(amplitude, mean, color=colour, lw=1.4, ls="-" if is_measured else "--", label=named)
     axes.fill_between(amplitude, low, high, where=np.isfinite(low), color=colour, alpha=0.18, lw=0)
+    return [mean]
 
 
 def higher_modes(name: str, experiment: BeamExperiment) -> ReportFigure:

@@ -73,7 +73,8 @@ def modal_accelerations(name: str, experiment: BeamExperiment) -> ReportFigure:
             panel_letter(grid[row, column], row * len(runs) + column, f"{run.group}, {mode}")
             grid[row, column].set_xlim(run.time_s[0], run.time_s[0] + _shown_s(run))
         grid[-1, column].set_xlabel("time [s]")
-    figure.supylabel("modal acceleration at the tip [g]", fontsize=9)
+    where = " at the tip" if experiment.kind == "beam" else ""
+    figure.supylabel(f"modal acceleration{where} [g]", fontsize=9)
     caption = (
         "Modal accelerations q̈ in the scale of the rig's tip values, from the pseudo-inverse of the mode "
         "shapes at "

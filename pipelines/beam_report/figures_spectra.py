@@ -13,7 +13,7 @@ from pipelines.beam_report.marks import RELEASE_COLOUR, group_colour, legend_abo
 from pipelines.beam_results import BeamExperiment, BeamRun, RandomResponse
 from pipelines.report.axes import plain_log_ticks
 from pipelines.report.figure import NothingToDrawError, ReportFigure
-from pipelines.report.style import new_figure, ordered_colours, png_bytes
+from pipelines.report.style import NEUTRAL_COLOUR, new_figure, ordered_colours, png_bytes
 from sloshlab.constants import GRAVITY_M_PER_S2
 
 if TYPE_CHECKING:
@@ -38,8 +38,9 @@ def random_of(experiment: BeamExperiment) -> list[tuple[BeamRun, RandomResponse]
 
 
 def excitation(name: str, experiment: BeamExperiment) -> ReportFigure:
-    """Density of the root's acceleration (Fig. 2.35b)."""
-    runs = random_of(experiment)
+    """Density of the root's acceleration (Fig. 2.35b); twins have that of their recordings."""
+    found = random_of(experiment)
+    runs = [(run, random) for run, random in found if not run.is_simulated] or found
     figure = new_figure(2.8)
     axes = figure.subplots()
     for colour, (run, random) in zip(ordered_colours(len(runs)), runs, strict=True):
@@ -89,49 +90,58 @@ def densities(name: str, experiment: BeamExperiment) -> ReportFigure:
         "smooth noise, fitted by maximum likelihood and seen through the line shape of the window; its damping is "
         "that of Table 2.5's counterpart."
     )
-    return ReportFigure(name, caption, "Fig. 2.41, measured", png_bytes(figure))
+    source = "Figs. 2.41 and E.6" if any(run.is_simulated for run, _ in runs) else "Fig. 2.41, measured"
+    return ReportFigure(name, caption, source, png_bytes(figure))
 
 
 def frequency_responses(name: str, experiment: BeamExperiment) -> ReportFigure:
-    """|H₁| of the first modal acceleration over the root with its fit, and the coherence."""
-    runs = random_of(experiment)
+    """|H₁| of the first modal acceleration over the root with its fit, and the coherence, per level."""
+    name_of_first = experiment.modes.names[0]
+    runs = [one for one in random_of(experiment) if one[1].spectra.output_psd[_row(one[1], name_of_first)].any()]
+    if not runs:
+        raise NothingToDrawError("the first mode does not move")
+    levels = sorted({_level(run) for run, _ in runs})
     figure = new_figure(4.6)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
-    low, high = (share * experiment.modes.frequency_hz[0] for share in _SHOWN_RANGE)
-    for colour, (run, random) in zip(ordered_colours(len(runs)), runs, strict=True):
-        row = random.spectra.output_names.index(experiment.modes.names[0])
-        f = random.spectra.frequency_hz
-        lines = (f >= low) & (f <= high)
-        size, radius = np.abs(random.spectra.h1[row, lines]), random.spectra.h1_radius[row, lines]
-        upper.semilogy(f[lines], size, color=colour, lw=1.1, label=_label(run))
-        upper.fill_between(
-            f[lines], np.maximum(size - radius, 1e-3 * size), size + radius, color=colour, alpha=0.15, lw=0
-        )
-        fit = random.fits[0].fit
-        if fit is not None:
-            near = np.linspace(*(share * experiment.modes.frequency_hz[0] for share in FIT_RANGE), 2000)
-            upper.semilogy(
-                near, np.abs(fit.fit.response(near)[0]), color="black", lw=0.8, ls=(0, (4, 2)), label="fit"
-            )
-        lower.plot(f[lines], random.spectra.coherence[row, lines], color=colour, lw=1.1)
-    plain_log_ticks(upper.yaxis)
-    upper.set_ylabel("|q̈₁ / root|")
-    panel_letter(upper, 0, "first modal acceleration over the root's acceleration")
-    panel_letter(lower, 1, "coherence")
-    lower.set_ylim(0, 1.03)
-    lower.set_xlim(low, high)
-    lower.set_xlabel("frequency [Hz]")
-    legend_above(figure, upper)
+    grid = figure.subplots(2, len(levels), sharex=True, sharey="row", squeeze=False, height_ratios=[2, 1])
+    for number, level in enumerate(levels):
+        for run, random in runs:
+            if _level(run) == level:
+                _draw_response(grid[:, number], experiment, run, random)
+        panel_letter(grid[0, number], number, f"{level} of the root")
+        grid[1, number].set_xlabel("frequency [Hz]")
+    plain_log_ticks(grid[0, 0].yaxis)
+    grid[0, 0].set_ylabel("|q̈₁ / root|")
+    grid[1, 0].set_ylabel("coherence")
+    grid[1, 0].set_ylim(0, 1.03)
+    grid[1, 0].set_xlim(*(share * experiment.modes.frequency_hz[0] for share in FIT_RANGE))
+    legend_above(figure, list(grid[0]))
     caption = (
-        "Frequency response H₁ = S_xy/S_xx of the first modal acceleration, relative to the root, "
-        f"{_welch(runs[0][1])}. "
-        "Bands hold the true value in 90 % of repeats if the structure is linear. Dashed: rational fit (vector "
-        "fitting) "
-        "before the window's line shape is laid over it, so its peak is higher and narrower than the measured "
-        "one. A "
-        "coherence below one inside the resonance is leakage, noise, or a structure that is not linear."
+        "Frequency response H₁ = S_xy/S_xx of the first modal acceleration, relative to the root, over the "
+        f"acceleration of the root, {_welch(runs[0][1])}. Bands hold the true value in 90 % of repeats if the "
+        "structure is linear. Dashed: rational fit (vector fitting, then least squares) seen through the line "
+        "shape of the window. A coherence below one inside the resonance is leakage, noise, or a structure that "
+        "is not linear."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def _draw_response(
+    column: npt.NDArray[np.object_], experiment: BeamExperiment, run: BeamRun, random: RandomResponse
+) -> None:
+    """|H₁| with its band and fit into the upper of two axes, the coherence into the lower one."""
+    upper, lower = column
+    row = _row(random, experiment.modes.names[0])
+    f, colour = random.spectra.frequency_hz, group_colour(experiment, run.group)
+    low, high = (share * experiment.modes.frequency_hz[0] for share in FIT_RANGE)
+    lines = (f >= low) & (f <= high)
+    size, radius = np.abs(random.spectra.h1[row, lines]), random.spectra.h1_radius[row, lines]
+    upper.semilogy(f[lines], size, color=colour, lw=1.1, label=run.group)
+    below = np.maximum(size - radius, 1e-3 * size)
+    upper.fill_between(f[lines], below, size + radius, color=colour, alpha=0.15, lw=0)
+    lower.plot(f[lines], random.spectra.coherence[row, lines], color=colour, lw=1.1)
+    fit = random.fits[0].fit
+    if fit is not None:
+        upper.semilogy(fit.line_hz, np.abs(fit.modelled[0]), color="black", lw=0.9, ls=(0, (4, 2)), label="fit")
 
 
 def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
@@ -139,7 +149,7 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
     runs = random_of(experiment)
     figure = new_figure(3.4)
     axes = figure.subplots()
-    drawn = False
+    seen: dict[str, tuple[str, str]] = {}
     for run, random in runs:
         colour = group_colour(experiment, run.group)
         points: list[tuple[float, float, float, str, str]] = []
@@ -154,10 +164,13 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
             points.append((1.03, float(modal.damping_ratio[0]), half, "s", "H₁"))
         for shift, value, half, marker, how in points:
             axes.errorbar(shift * random.root_rms_g, 100 * value, 100 * half, color=colour, marker=marker, ms=5,
-                          lw=0, elinewidth=1.0, label=f"{run.group}, {how}")  # fmt: skip
-            drawn = True
-    if not drawn:
+                          lw=0, elinewidth=1.0)  # fmt: skip
+            seen[run.group] = (colour, "D")
+            seen[how] = (NEUTRAL_COLOUR, marker)
+    if not seen:
         raise NothingToDrawError("no fit of the first mode")
+    for label, (colour, marker) in sorted(seen.items(), key=lambda one: one[1][1] != "D"):
+        axes.plot([], [], color=colour, marker=marker, ms=5, ls="none", label=label)
     for which, marker in (("experiment", "*"), ("frozen", "x")):
         rms, damping = np.array(TABLE_2_5[which]).T
         axes.plot(rms, damping, color=RELEASE_COLOUR, marker=marker, ms=7, ls=":", lw=0.8, mfc="none",
@@ -170,10 +183,13 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
         "Damping of the first mode in random motion: from the tank's density alone, as in the source, and from "
         "H₁, "
         "with 90 % intervals; red: the source's values (its frozen ones are simulated). Points of one run are "
-        "moved "
-        "apart by 3 %."
+        "moved apart by 3 %."
     )
     return ReportFigure(name, caption, "Table 2.5", png_bytes(figure))
+
+
+def _row(random: RandomResponse, output: str) -> int:
+    return random.spectra.output_names.index(output)
 
 
 def _level(run: BeamRun) -> str:

@@ -57,7 +57,8 @@ def decay_against_twins(name: str, experiment: BeamExperiment) -> ReportFigure:
     grid[-1].set_xlabel("time [s]")
     legend_above(figure, list(grid), columns=3)
     caption = f"First cycles of {measured.name}, measured, and of the twins released as it was. Δf as above."
-    return ReportFigure(name, caption, "Figs. 2.38 and E.2", png_bytes(figure))
+    source = "Figs. 2.38 and E.2(a) … E.4(a)" if experiment.kind == "beam" else "Figs. 2.9(a) and 2.10"
+    return ReportFigure(name, caption, source, png_bytes(figure))
 
 
 def random_against_twins(name: str, experiment: BeamExperiment) -> ReportFigure:
@@ -81,7 +82,7 @@ def random_against_twins(name: str, experiment: BeamExperiment) -> ReportFigure:
         "largest "
         f"response after the first {_AROUND_S:g} s."
     )
-    return ReportFigure(name, caption, "Fig. 2.40", png_bytes(figure))
+    return ReportFigure(name, caption, "Figs. 2.40 and E.5", png_bytes(figure))
 
 
 def relative_error(measured: BeamRun, simulated: BeamRun) -> tuple[float, float]:

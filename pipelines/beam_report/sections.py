@@ -110,10 +110,11 @@ def _decay_section(experiment: BeamExperiment) -> SectionPlan:
 
 
 def _twin_section(experiment: BeamExperiment) -> SectionPlan:
-    plans = {
-        "decay_against_twins": figures_twin.decay_against_twins,
-        "random_against_twins": figures_twin.random_against_twins,
-    }
+    plans = {}
+    if any(run.is_simulated for run in experiment.free_runs):
+        plans["decay_against_twins"] = figures_twin.decay_against_twins
+    if any(run.is_simulated for run in experiment.random_runs):
+        plans["random_against_twins"] = figures_twin.random_against_twins
     drawn = tuple(FigurePlan(name, partial(draw, experiment=experiment)) for name, draw in plans.items())
     shown = _present(
         tables.twin_table(experiment), twin_damping.decay_table(experiment), twin_damping.random_table(experiment)

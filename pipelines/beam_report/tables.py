@@ -9,11 +9,12 @@ import numpy as np
 
 from pipelines.beam_report.figures_spectra import TABLE_2_5
 from pipelines.beam_report.figures_twin import pairs_of, relative_error
-from pipelines.beam_results import METHODS, BeamExperiment, BeamRun, in_g
+from pipelines.beam_results import CONFIGURATIONS, METHODS, BeamExperiment, BeamRun, in_g
 from pipelines.report.numbers import MISSING, interval, signed, text
 from pipelines.report.tables import Table
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping
+from sloshlab.modal.pooled_decays import pooled_damping
 
 _AMPLITUDES_G: Final = (6.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5, 0.25)
 
@@ -99,9 +100,10 @@ def filter_table(experiment: BeamExperiment) -> Table | None:
 
 
 def decay_table(experiment: BeamExperiment) -> Table | None:
-    """Every free run: release, transient, amplitude, first mode by three methods at three amplitudes."""
+    """Every measured free run: release, transient, amplitude, first mode by three methods at three amplitudes."""
     rows = []
-    for run in experiment.free_runs:
+    measured = [run for run in experiment.free_runs if not run.is_simulated]
+    for run in measured or experiment.free_runs:
         decay = run.first_decay
         if decay is None:
             continue
@@ -159,8 +161,7 @@ def pooled_table(experiment: BeamExperiment) -> Table | None:
         ("liquid", "a [g]", "repeats", *(f"ζ₁ by {method} [%]" for method in METHODS)),
         tuple(rows),
         "Mean over the repeats within an eighth of a decade of amplitude, ± half the 90 % interval of the mean "
-        "from "
-        "the scatter between repeats; no interval with one repeat.",
+        "from the scatter between repeats; no interval with one repeat, and none for twins, which repeat exactly.",
     )
 
 
@@ -173,7 +174,7 @@ def _pooled_at(experiment: BeamExperiment, group: str, method: str, amplitude_g:
     if distance[at] > 0.06:
         return MISSING, 0
     mean, n = text(100 * pooled.damping_ratio[at]), int(pooled.n_repeats[at])
-    if n < 2:
+    if n < 2 or group not in CONFIGURATIONS:
         return mean, n
     low, high = 100 * pooled.damping_ratio_interval[:, at]
     return f"{mean} ± {text(0.5 * (high - low), 2)}", n
@@ -247,35 +248,55 @@ def twin_table(experiment: BeamExperiment) -> Table | None:
     for measured, simulated in pairs_of(experiment, experiment.runs):
         for run in simulated:
             acceleration, force = relative_error(measured, run)
+            own, of_twin = _damping_of_both(measured, run)
             rows.append(
                 (
                     measured.name,
                     run.group,
                     text(100 * acceleration, 3),
                     text(100 * force, 3),
-                    _mean_damping(measured),
-                    _mean_damping(run),
+                    own,
+                    of_twin,
                 )
             )
     if not rows:
         return None
     header = ("recording", "twin", "error of ü [%]", "error of F [%]", "ζ₁ measured [%]", "ζ₁ of the twin [%]")
     note = (
-        "Error: RMS of the difference over RMS of the recording, over the whole run. ζ₁: mean over the "
-        "amplitudes of a "
-        "decay (local sine fit), or from the density of the tank in random motion. A small difference of "
-        "frequency "
-        "makes a large error of a long decay."
+        "Error: RMS of the difference over RMS of the recording, over the whole run; a small difference of "
+        "frequency makes a large error of a long decay. ζ₁ of decays: local sine fit, mean over the bins of the "
+        "recording's amplitude that the twin passes through too, each counted once however long the decay stays "
+        "there. ζ₁ of random motion: from the density of the tank."
     )
     return Table("Twins against recordings", header, tuple(rows), note)
 
 
-def _mean_damping(run: BeamRun) -> str:
-    if run.first_decay is not None and run.first_decay.local_sine_fit.used.any():
-        reading = run.first_decay.local_sine_fit
-        return text(100 * float(reading.damping_ratio[reading.used].mean()))
-    fit = run.random.density_fit if run.random is not None else None
-    return MISSING if fit is None else text(100 * fit.damping_ratio)
+def _damping_of_both(measured: BeamRun, simulated: BeamRun) -> tuple[str, str]:
+    """ζ₁ [%] of a recording and its twin over the same amplitudes."""
+    if measured.random is not None and simulated.random is not None:
+        fits = measured.random.density_fit, simulated.random.density_fit
+        first, second = (MISSING if fit is None else text(100 * fit.damping_ratio) for fit in fits)
+        return first, second
+    decays = measured.first_decay, simulated.first_decay
+    readings = [decay.local_sine_fit for decay in decays if decay is not None and decay.local_sine_fit.used.any()]
+    if len(readings) < 2:
+        return MISSING, MISSING
+    own, of_twin = mean_at_common_amplitudes(readings[0], readings[1])
+    return text(100 * own), text(100 * of_twin)
+
+
+def mean_at_common_amplitudes(one: InstantaneousDamping, other: InstantaneousDamping) -> tuple[float, float]:
+    """Mean ζ of two decays over the bins of the first that lie within the amplitudes of the second.
+
+    The second is interpolated over the logarithm of the amplitude; NaN where they have no amplitude in common.
+    """
+    first, second = pooled_damping([one]), pooled_damping([other])
+    at, known = (np.log(pooled.acceleration_amplitude_m_per_s2) for pooled in (first, second))
+    common = (at >= known.min()) & (at <= known.max())
+    if not common.any():
+        return float("nan"), float("nan")
+    of_second = np.interp(at[common], known, second.damping_ratio)
+    return float(first.damping_ratio[common].mean()), float(of_second.mean())
 
 
 def run_table(runs: Sequence[BeamRun]) -> Table:

@@ -10,6 +10,7 @@ from pipelines.report.style import DISTINCT_COLOURS, NEUTRAL_COLOUR, REFERENCE_C
 from sloshlab.constants import GRAVITY_M_PER_S2
 
 _CYCLES_OF_FORCE = 12
+_STILL_G = 0.2
 _SHARE_COLOURS = dict(zip(("all", "ball", "coulomb", "viscous"), DISTINCT_COLOURS, strict=False))
 _SHARE_NAMES = {"all": "all together", "ball": "ball", "coulomb": "Coulomb friction", "viscous": "viscous damping"}
 
@@ -23,7 +24,9 @@ def motion_and_damping(name: str, experiment: BallExperiment, result: DecayResul
                label="measured")  # fmt: skip
     upper.plot(ball.time_s, ball.acceleration_m_per_s2 / GRAVITY_M_PER_S2, "--", color=REFERENCE_COLOUR, lw=1.0,
                label="bouncing ball")  # fmt: skip
-    upper.set(xlabel="time from the release [s]", ylabel="acceleration of the tank [g]")
+    moving = np.flatnonzero(np.abs(measured.acceleration_m_per_s2) > _STILL_G * GRAVITY_M_PER_S2)
+    upper.set(xlabel="time from the release [s]", ylabel="acceleration of the tank [g]",
+              xlim=(0, 1.05 * float(measured.time_s[moving[-1]])))  # fmt: skip
     lower.plot(result.measured.acceleration_g, 100 * result.measured.damping_ratio, "o", color=NEUTRAL_COLOUR,
                ms=3.5, label="measured")  # fmt: skip
     lower.plot(result.simulated.acceleration_g, 100 * result.simulated.damping_ratio, "-", color=REFERENCE_COLOUR,
@@ -93,6 +96,32 @@ def damping_shares(name: str, experiment: BallExperiment, result: DecayResult) -
     return ReportFigure(name, caption, "Fig. 2.14", png_bytes(figure))
 
 
+def guide(name: str, experiment: BallExperiment, result: DecayResult) -> ReportFigure:
+    """ζ of the frozen decay beside that of the sloshing one."""
+    if result.frozen is None:
+        raise NothingToDrawError("no decay with the liquid frozen was given")
+    figure = new_figure(3.0)
+    axes = figure.subplots()
+    frozen, sloshing = result.frozen.measured, result.measured
+    axes.plot(sloshing.acceleration_g, 100 * sloshing.damping_ratio, "o", color=NEUTRAL_COLOUR, ms=3.5,
+              label="sloshing, measured")  # fmt: skip
+    axes.plot(frozen.acceleration_g, 100 * frozen.damping_ratio, "o", color=DISTINCT_COLOURS[2], ms=3.5,
+              label="frozen, measured")  # fmt: skip
+    axes.plot(result.frozen.simulated.acceleration_g, 100 * result.frozen.simulated.damping_ratio, "-",
+              color=REFERENCE_COLOUR, lw=1.0, label="guide fitted to it")  # fmt: skip
+    axes.set(
+        xlabel="amplitude of acceleration a [g]", ylabel="damping ratio ζ [%]",
+        xlim=(0, 1.05 * float(frozen.acceleration_g.max())),
+        ylim=(0, 1.3 * 100 * float(max(frozen.damping_ratio.max(), sloshing.damping_ratio.max()))),
+    )  # fmt: skip
+    axes.legend(loc="upper right")
+    caption = (
+        "Damping ratio with the liquid frozen and sloshing. What the guide does alone, dry friction and viscous "
+        "damping, is fitted to the frozen decay and is in every simulation of the sloshing one."
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
 def loss_factors(name: str, experiment: BallExperiment, result: DecayResult) -> ReportFigure:
     """η_tr of the decay and η_sh of steady motion."""
     figure = new_figure(3.0)
@@ -103,7 +132,7 @@ def loss_factors(name: str, experiment: BallExperiment, result: DecayResult) -> 
     axes.plot(
         ball.acceleration_g, 2 * ball.damping_ratio, "--", color=DISTINCT_COLOURS[2], label="η_tr = 2ζ, decay"
     )
-    largest = max(float(result.steady_loss_factor.max()), 2 * float(ball.damping_ratio.max()))
+    largest = max(float(np.nanmax(result.steady_loss_factor)), 2 * float(ball.damping_ratio.max()))
     axes.set(
         xlabel="amplitude of acceleration a [g]", ylabel="loss factor", xlim=(0, 1.05 * float(steady_g.max())),
         ylim=(0, 1.15 * largest),

@@ -35,7 +35,7 @@ def tuned_line(name: str, experiment: BallExperiment, result: LineResult) -> Rep
     right.plot(result.line.u_bar, result.line_of_ball, "-", color=REFERENCE_COLOUR, label="ball, decaying motion")
     right.plot(result.line.u_bar, result.steady_w_bar, "--", color=DISTINCT_COLOURS[2], lw=1.0,
                label="ball, steady motion")  # fmt: skip
-    right.set(xlabel="ū = u₀/h", ylabel="W̄", ylim=(min(0.0, float(result.line.w_bar.min())), None))
+    right.set(xlabel="ū = u₀/h", ylabel="W̄", xlim=(0, None), ylim=(min(0.0, float(result.line.w_bar.min())), None))
     right.legend(loc="lower right")
     caption = (
         f"Left: measured map of W̄, the line ω̄ = {result.line.omega_bar:g} in yellow. Right: W̄ along it, "
@@ -69,7 +69,7 @@ def map_of_ball(name: str, experiment: BallExperiment, result: LineResult) -> Re
     caption = (
         "W̄ measured, and of the identified ball in steady harmonic motion, on one scale; the yellow line is the "
         "frequency at which the ball was tuned. Both should agree there; elsewhere the ball dissipates as a "
-        "ball does."
+        "ball does. White: nothing measured, or the ball is pressed through floor or ceiling."
     )
     return ReportFigure(name, caption, "Fig. 2.18", png_bytes(figure))
 
@@ -86,7 +86,8 @@ def other_frequencies(name: str, experiment: BallExperiment, result: LineResult)
         axes.plot(
             line.u_bar, ball, "-", color=REFERENCE_COLOUR, label=f"ball tuned at ω̄ = {result.line.omega_bar:g}"
         )
-        axes.set(xlabel="ū = u₀/h", ylabel="W̄", title=f"ω̄ = {line.omega_bar:.2f}", ylim=(0, None))
+        axes.set(xlabel="ū = u₀/h", ylabel="W̄", title=f"ω̄ = {line.omega_bar:.2f}", xlim=(0, None),
+                 ylim=(0, None))  # fmt: skip
     for axes in grid[n:]:
         axes.set_visible(False)
     handles, labels = grid[0].get_legend_handles_labels()
@@ -103,17 +104,18 @@ def errors(name: str, experiment: BallExperiment, result: LineResult) -> ReportF
     """RMS error of W̄ by frequency, the tuned band marked."""
     figure = new_figure(2.8)
     axes = figure.subplots()
+    labels = {True: "error at the tuned frequency", False: "error elsewhere"}
     for band in result.bands:
         colour = REFERENCE_COLOUR if band.is_tuned else NEUTRAL_COLOUR
         axes.bar(0.5 * (band.low + band.high), band.error_rms, width=0.92 * (band.high - band.low), color=colour,
                  alpha=0.95 if band.is_tuned else 0.6, zorder=3 if band.is_tuned else 2,
-                 label="tuned frequency" if band.is_tuned else None)  # fmt: skip
+                 label=labels.pop(band.is_tuned, None))  # fmt: skip
     middle = [0.5 * (band.low + band.high) for band in result.bands]
     axes.plot(
         middle, [band.measured_rms for band in result.bands], "k.-", lw=0.9, zorder=4, label="measured W̄, RMS"
     )
-    axes.set(xlabel="ω̄ = Ω/√(g/h)", ylabel="RMS error of W̄")
-    axes.legend(loc="upper left")
+    axes.set(xlabel="ω̄ = Ω/√(g/h)", ylabel="RMS of W̄")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     caption = (
         "RMS of the difference of W̄ between ball and measurement in bands of frequency, over all windows "
         "in each; red: "

@@ -60,7 +60,8 @@ def maps(name: str, experiment: BallExperiment, result: DecayResult) -> ReportFi
         "amplitude and "
         f"frequency, with lines of constant acceleration. η is largest, "
         f"{float(response['loss_factor'].max()):.2f}, "
-        f"at {1e3 * amplitude[column]:.1f} mm and {omega[row]:.1f} rad/s."
+        f"at {1e3 * amplitude[column]:.1f} mm and {omega[row]:.1f} rad/s. White: an impact presses the "
+        "ball through floor or ceiling."
     )
     return ReportFigure(name, caption, "Fig. 2.12", png_bytes(figure))
 

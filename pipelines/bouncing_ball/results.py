@@ -12,6 +12,7 @@ import xarray as xr
 from sloshlab.bouncing_ball.free_decay import DampingCurve
 from sloshlab.bouncing_ball.frequency_error import FrequencyBand
 from sloshlab.bouncing_ball.from_work_line import WorkLine
+from sloshlab.bouncing_ball.guide import FrozenDecay
 from sloshlab.bouncing_ball.identification import IdentifiedBall
 from sloshlab.rig import Rig
 
@@ -46,6 +47,8 @@ class DecayResult:
         Work and loss factor of the ball over frequency and amplitude.
     loop : tuple
         Amplitude [m], frequency [Hz], displacement and force of one hysteresis cycle.
+    frozen : FrozenDecay or None
+        The guide without sloshing, if a frozen decay was given.
     """
 
     measured: DampingCurve
@@ -58,6 +61,7 @@ class DecayResult:
     steady_loss_factor: FloatArray
     response: xr.Dataset
     loop: tuple[float, float, FloatArray, FloatArray]
+    frozen: FrozenDecay | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +101,7 @@ class LineResult:
 
 @dataclass(frozen=True, eq=False)
 class BallExperiment:
-    """One identified ball with all that the report shows."""
+    """One identified ball with all that the report shows; of decays, `rig` is on the guide that was measured."""
 
     rig: Rig
     rig_name: str

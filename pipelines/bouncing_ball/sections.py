@@ -32,7 +32,10 @@ def page_of(experiment: BallExperiment) -> Page:
     plans = (
         _decay_plans(experiment, result) if isinstance(result, DecayResult) else _line_plans(experiment, result)
     )
-    found = SectionPlan("The ball", (), (tables.parameter_table(experiment), tables.search_table(experiment)))
+    about_ball = (tables.parameter_table(experiment), tables.search_table(experiment))
+    if isinstance(result, DecayResult) and result.frozen is not None:
+        about_ball = (*about_ball, tables.guide_table(result.frozen))
+    found = SectionPlan("The ball", (), about_ball)
     provenance = SectionPlan("Provenance", (), (tables.provenance_table(experiment),))
     return Page(
         title="Bouncing ball",
@@ -51,6 +54,8 @@ def _decay_plans(experiment: BallExperiment, result: DecayResult) -> tuple[Secti
         "damping_shares": figures_decay.damping_shares,
         "loss_factors": figures_decay.loss_factors,
     }
+    if result.frozen is not None:
+        decay["guide"] = figures_decay.guide
     steady = {"hysteresis": figures_map.hysteresis, "maps": figures_map.maps, "lines": figures_map.lines}
     return tuple(
         SectionPlan(

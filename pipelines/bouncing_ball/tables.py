@@ -10,6 +10,7 @@ import numpy as np
 from pipelines.bouncing_ball.results import BallExperiment, LineResult
 from pipelines.report.numbers import MISSING, signed, text
 from pipelines.report.tables import Table
+from sloshlab.bouncing_ball.guide import FrozenDecay
 
 _PARAMETERS = {
     "radius_m": ("radius r₀", "m", "r₀/h", "radius"),
@@ -39,16 +40,25 @@ def parameter_table(experiment: BallExperiment) -> Table:
         )
     law = "always" if experiment.identified.ball.damping_in_flight else "in contact only"
     caption = (
-        f"90 % intervals from the Jacobian; “bound” where they leave the range of the search. Profile: "
-        f"growth of the "
-        "sum of squares at the ends of the interval with all other parameters fitted again, over the growth "
-        "that the "
-        "Jacobian predicts; 1 where the interval is right, less where it is too short. Non-dimensional by "
-        "(2.19) at ω̄ "
-        f"= {text(experiment.omega_bar)}. The damper acts {law}."
+        "90 % intervals: where the sum of squares, with all other parameters fitted again, has grown by t² times "
+        "the variance of the residuals; “bound” where it has not at the bound of the search. Profile: that growth "
+        "at the ends over the wanted one, far from 1 where the residuals are too rough to follow. Non-dimensional "
+        f"by (2.19) at ω̄ = {text(experiment.omega_bar)}. The damper acts {law}."
     )
     header = ("parameter", "value", "90 % interval", "profile", "bound", "non-dimensional")
     return Table("Parameters of the ball", header, tuple(rows), caption)
+
+
+def guide_table(frozen: FrozenDecay) -> Table:
+    """What carries the tank."""
+    guide = frozen.guide
+    rows = (
+        ("stiffness K [N/m]", text(guide.stiffness_n_per_m, 4)),
+        ("dry friction b₀ [N]", text(guide.coulomb_force_n, 3)),
+        ("viscous damping b₁ [kg/s]", text(guide.damping_kg_per_s, 3)),
+    )
+    caption = "Fitted to frequency and ζ(a) of the frozen decay, with the masses of the rig file; used throughout."
+    return Table("The guide", ("quantity", "value"), rows, caption)
 
 
 def band_table(result: LineResult) -> Table:
@@ -56,7 +66,7 @@ def band_table(result: LineResult) -> Table:
     rows = tuple(
         (
             f"{band.low:.2f} … {band.high:.2f}" + (" (tuned)" if band.is_tuned else ""),
-            str(band.n_windows),
+            str(band.n_windows) + (f" (+ {band.n_outside} outside)" if band.n_outside else ""),
             text(band.measured_rms, 3),
             text(band.ball_rms, 3),
             text(band.error_rms, 2),
@@ -70,6 +80,11 @@ def band_table(result: LineResult) -> Table:
         "W̄ of the ball in steady harmonic motion at frequency and amplitude of each window, minus the "
         "measured one. "
         "The windows of the tuned band are in no other. Relative: RMS error over RMS of the measured W̄."
+        + (
+            " Outside: the ball leaves its tank, nothing is compared."
+            if any(b.n_outside for b in result.bands)
+            else ""
+        )
     )
     return Table("Error at and away from the tuning frequency", header, rows, caption)
 

@@ -135,7 +135,8 @@ def ball(
 ) -> None:
     """A bouncing ball in place of the liquid, from free decays or from runs on the shaker."""
     from pipelines.bouncing_ball.outputs import write_ball
-    from pipelines.bouncing_ball.stages import BallSettings, analyse_ball
+    from pipelines.bouncing_ball.settings import BallSettings
+    from pipelines.bouncing_ball.stages import analyse_ball
     from sloshlab.bouncing_ball.identification import SearchSettings
 
     if damper not in ("contact", "always"):

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sloshlab.bouncing_ball.ball import BouncingBall
-from sloshlab.bouncing_ball.harmonic_response import HarmonicRun, loss_factor
+from sloshlab.bouncing_ball.harmonic_response import HarmonicRun, w_bar_at
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import AnalysisError, RigError
 from sloshlab.modal.free_decay import analyse_free_decay
@@ -202,10 +202,14 @@ def natural_frequency_hz(rig: Rig) -> float:
 def steady_loss_factor(
     ball: BouncingBall, rig: Rig, acceleration_m_per_s2: FloatArray, run: HarmonicRun | None = None
 ) -> FloatArray:
-    """η_sh = m_l/(m_l + m_s) η(a, ω₀) (2.17), to be compared with η_tr = 2ζ of the ball alone."""
-    frequency = natural_frequency_hz(rig)
-    amplitude = acceleration_m_per_s2 / (2 * np.pi * frequency) ** 2
+    """η_sh = m_l/(m_l + m_s) η(a, ω₀) (2.17), to be compared with η_tr = 2ζ of the ball alone.
+
+    NaN where the ball leaves its tank.
+    """
+    omega = 2 * np.pi * natural_frequency_hz(rig)
+    u_bar = acceleration_m_per_s2 / omega**2 / rig.tank.height_m
     if rig.structure is None or rig.structure.mass_kg is None:
         raise RigError("rig", got="no mass of one degree of freedom", remedy="give the sdof rig")
     share = rig.liquid_mass_kg / (rig.liquid_mass_kg + rig.structure.mass_kg)
-    return share * np.array([loss_factor(ball, rig, float(a), frequency, run) for a in amplitude])
+    omega_bar = np.full(u_bar.shape, omega / rig.frequency_scale_rad_per_s)
+    return np.asarray(share / np.pi * w_bar_at(ball, rig, omega_bar, u_bar, run))

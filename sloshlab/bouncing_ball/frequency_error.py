@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,10 +28,13 @@ class FrequencyBand:
     is_tuned : bool
         The ball was identified in it.
     n_windows : int
+        That are compared.
     measured_rms, ball_rms : float
         RMS of W̄ in the windows.
     error_rms, error_mean : float
         Of ball minus measured.
+    n_outside : int
+        Windows that are not compared, because the ball leaves its tank there.
     """
 
     low: float
@@ -42,6 +45,7 @@ class FrequencyBand:
     ball_rms: float
     error_rms: float
     error_mean: float
+    n_outside: int = 0
 
     @property
     def relative_error(self) -> float:
@@ -60,6 +64,7 @@ def error_by_frequency(
     n_bands: int = 7,
     tuned_half_width: float = 0.05,
     run: HarmonicRun | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[FrequencyBand, ...], FloatArray]:
     """Compare a ball with measured windows, band by band.
 
@@ -76,20 +81,21 @@ def error_by_frequency(
     tuned_half_width : float
         Of that band, relative to its centre.
     run : HarmonicRun, optional
+    progress : callable, optional
+        Called with (windows done, windows in all).
 
     Returns
     -------
     bands : tuple of FrequencyBand
         By frequency; the one around the tuned frequency holds its windows alone.
     simulated : ndarray, shape (n_windows,)
-        W̄ of the ball in every window.
+        W̄ of the ball in every window, NaN where it leaves its tank.
 
     Raises
     ------
     AnalysisError
         If no window lies at the tuned frequency.
     """
-    simulated = w_bar_at(ball, rig, omega_bar, u_bar, run)
     low, high = tuned_omega_bar * (1 - tuned_half_width), tuned_omega_bar * (1 + tuned_half_width)
     tuned = (omega_bar >= low) & (omega_bar <= high)
     if not tuned.any():
@@ -98,6 +104,7 @@ def error_by_frequency(
             got=f"none within ω̄ = {low:.3g} … {high:.3g}",
             allowed=f"ω̄ = {omega_bar.min():.3g} … {omega_bar.max():.3g}",
         )
+    simulated = w_bar_at(ball, rig, omega_bar, u_bar, run, progress=progress)
     parts = [
         (a, b, ~tuned & (omega_bar >= a) & (omega_bar < b)) for a, b in _limits(omega_bar, low, high, n_bands)
     ]
@@ -116,15 +123,28 @@ def _limits(omega_bar: FloatArray, low: float, high: float, n_bands: int) -> lis
 
 
 def _band(low: float, high: float, is_tuned: bool, measured: FloatArray, ball: FloatArray) -> FrequencyBand:
-    error = ball - measured
-    rms = [float(np.sqrt((values**2).mean())) for values in (measured, ball, error)]
-    return FrequencyBand(low, high, is_tuned, int(measured.size), rms[0], rms[1], rms[2], float(error.mean()))
+    inside = np.isfinite(ball)
+    counts = int(inside.sum()), int((~inside).sum())
+    error = (ball - measured)[inside]
+    means = [
+        float(np.mean(values)) if counts[0] else float("nan")
+        for values in (
+            measured[inside] ** 2,
+            ball[inside] ** 2,
+            error**2,
+            error,
+        )
+    ]
+    rms = np.sqrt(means[:3])
+    return FrequencyBand(
+        low, high, is_tuned, counts[0], float(rms[0]), float(rms[1]), float(rms[2]), means[3], counts[1]
+    )
 
 
 def summary(bands: Sequence[FrequencyBand]) -> tuple[float, float]:
     """Relative error at the tuned frequency, and over all other windows together."""
     (tuned,) = (band for band in bands if band.is_tuned)
-    others = [band for band in bands if not band.is_tuned]
+    others = [band for band in bands if not band.is_tuned and band.n_windows]
     n = np.array([band.n_windows for band in others], dtype=float)
     squares = [np.array([getattr(band, name) for band in others]) ** 2 for name in ("error_rms", "measured_rms")]
     error, measured = (float((n * square).sum()) for square in squares)

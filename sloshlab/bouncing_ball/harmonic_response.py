@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +10,14 @@ import numpy.typing as npt
 import xarray as xr
 
 from sloshlab.bouncing_ball.ball import BouncingBall
-from sloshlab.errors import InputError
+from sloshlab.errors import AnalysisError, InputError
 from sloshlab.quantities import described
 from sloshlab.rig import Rig
 from sloshlab.twin.excitation import harmonic
 from sloshlab.twin.twin import Simulation
 
 FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
 
 _MOST_POINTS = 100_000
 _STEPS_PER_CONTACT_RADIAN, _STEPS_PER_RELAXATION = 2.5, 0.75
@@ -114,12 +116,24 @@ def loss_factor(
     return work / (np.pi * rig.liquid_mass_kg * (2 * np.pi * frequency_hz * amplitude_m) ** 2)
 
 
+def _work_if_inside(
+    ball: BouncingBall, rig: Rig, amplitude_m: float, frequency_hz: float, run: HarmonicRun | None
+) -> tuple[float, float]:
+    """`work_per_cycle`, NaN where the ball leaves its tank."""
+    try:
+        return work_per_cycle(ball, rig, amplitude_m, frequency_hz, run)
+    except AnalysisError:
+        return float("nan"), float("nan")
+
+
 def response_map(
     ball: BouncingBall,
     rig: Rig,
     amplitudes_m: FloatArray,
     frequencies_hz: FloatArray,
     run: HarmonicRun | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Work per cycle and loss factor over frequency and amplitude (Fig. 2.12).
 
@@ -130,20 +144,29 @@ def response_map(
     amplitudes_m, frequencies_hz : ndarray, shape (n,) and (m,)
         Grid lines, > 0.
     run : HarmonicRun, optional
+    progress : callable, optional
+        Called with (frequencies done, frequencies in all).
 
     Returns
     -------
     xarray.Dataset
         ``work_j``, ``work_j_std`` (scatter from cycle to cycle), ``loss_factor`` and ``w_bar`` over
-        (frequency_hz, amplitude_m).
+        (frequency_hz, amplitude_m); NaN where an impact presses the ball through floor or ceiling.
+
+    Raises
+    ------
+    InputError
+        If the ball does not fit into the tank, or there are too many points.
     """
     if amplitudes_m.size * frequencies_hz.size > _MOST_POINTS:
         raise InputError(
             "map of a ball", got=f"{amplitudes_m.size * frequencies_hz.size} points", allowed=f"≤ {_MOST_POINTS}"
         )
-    works = np.array(
-        [[work_per_cycle(ball, rig, float(a), float(f), run) for a in amplitudes_m] for f in frequencies_hz]
-    )
+    works = np.empty((frequencies_hz.size, amplitudes_m.size, 2))
+    for i, frequency in enumerate(frequencies_hz):
+        works[i] = [_work_if_inside(ball, rig, float(a), float(frequency), run) for a in amplitudes_m]
+        if progress is not None:
+            progress(i + 1, frequencies_hz.size)
     energy = rig.liquid_mass_kg * (2 * np.pi * frequencies_hz[:, None] * amplitudes_m) ** 2
     along = ("frequency_hz", "amplitude_m")
     return described(
@@ -160,9 +183,23 @@ def response_map(
 
 
 def w_bar_at(
-    ball: BouncingBall, rig: Rig, omega_bar: FloatArray, u_bar: FloatArray, run: HarmonicRun | None = None
+    ball: BouncingBall,
+    rig: Rig,
+    omega_bar: FloatArray,
+    u_bar: FloatArray,
+    run: HarmonicRun | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> FloatArray:
-    """W̄ of the ball in steady harmonic motion at points (ω̄, ū), shape (n,)."""
-    frequency = omega_bar * rig.frequency_scale_rad_per_s / (2 * np.pi)
-    points = zip(u_bar * rig.tank.height_m, frequency, strict=True)
-    return np.pi * np.array([loss_factor(ball, rig, float(a), float(f), run) for a, f in points])
+    """W̄ of the ball in steady harmonic motion at points (ω̄, ū), shape (n,); NaN where it leaves its tank.
+
+    `progress` is called with (points done, points in all).
+    """
+    omega = omega_bar * rig.frequency_scale_rad_per_s
+    amplitude = u_bar * rig.tank.height_m
+    work = np.empty(omega.shape)
+    for i, (a, frequency) in enumerate(zip(amplitude, omega / (2 * np.pi), strict=True)):
+        work[i], _ = _work_if_inside(ball, rig, float(a), float(frequency), run)
+        if progress is not None:
+            progress(i + 1, work.size)
+    return np.asarray(work / (rig.liquid_mass_kg * (omega * amplitude) ** 2))

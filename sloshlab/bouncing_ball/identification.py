@@ -30,6 +30,9 @@ _STEPS = (2e-3, 2e-4)
 """Finite differences in the unit box, first across the roughness of impacts, then within it."""
 _AT_BOUND = 0.005
 _EXTRA_LOCAL_STARTS = 2
+_PROFILE_STEPS, _PROFILE_TOLERANCE = 8, 0.05
+"""Fits per end of an interval, and how well the root of the growth meets the wanted one."""
+_SHORTEST = 1e-9
 
 
 @dataclass(frozen=True)
@@ -65,10 +68,10 @@ class ParameterInterval:
     name : str
         Field of `BouncingBall`.
     value, low, high : float
-        Value and ends of its 90 % interval, from the Jacobian, cut at the bounds of the search.
+        Value and ends of its 90 % interval: where the sum of squares, all other parameters fitted again, has grown
+        by t² times the variance of the residuals; infinite where it has not at the bound of the search.
     profile_ratio : float
-        Growth of the sum of squares at the ends with all others fitted again, over the growth that the
-        Jacobian predicts: 1 where the interval is right, less where it is too short.
+        Growth of the sum of squares at the finite ends over the wanted one: 1, unless roughness hides the end.
     at_bound : str
         ``"lower"`` or ``"upper"`` if the value sits at the end of its search, else empty.
     """
@@ -264,11 +267,9 @@ def _jacobian(search: _Search, point: FloatArray) -> FloatArray:
 
 def _intervals(search: _Search, best: OptimizeResult, settings: SearchSettings) -> tuple[ParameterInterval, ...]:
     n, p = best.fun.size, best.x.size
-    variance = 2 * best.cost / (n - p)
     factor = float(student_t.ppf(0.5 + CONFIDENCE / 2, n - p))
-    half = factor * np.sqrt(variance * np.diag(_inverse(best.jac.T @ best.jac)))
-    predicted = variance * factor**2
-    return tuple(_interval(search, best, i, float(half[i]), predicted, settings) for i in range(p))
+    covariance = 2 * best.cost / (n - p) * _inverse(best.jac.T @ best.jac)
+    return tuple(_interval(search, best, i, factor, covariance, settings) for i in range(p))
 
 
 def _inverse(matrix: FloatArray) -> FloatArray:
@@ -279,24 +280,26 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 
 
 def _interval(
-    search: _Search, best: OptimizeResult, i: int, half: float, predicted: float, settings: SearchSettings
+    search: _Search, best: OptimizeResult, i: int, factor: float, covariance: FloatArray, settings: SearchSettings
 ) -> ParameterInterval:
-    centre = float(best.x[i])
-    ends = [centre - half, centre + half]
-    inside = [end for end in ends if 0 < end < 1]
-    ratios = [_profile(search, best, i, end, settings) / max(predicted, 1e-300) for end in inside]
-    values = [
-        search.space.parameter(i, _moved(best.x, i, end)) if 0 < end < 1 else open_end
-        for end, open_end in zip(ends, (-np.inf, np.inf), strict=True)
+    centre, half = float(best.x[i]), factor * float(np.sqrt(covariance[i, i]))
+    growth = factor**2 * 2 * best.cost / (best.fun.size - best.x.size)
+    ends = [
+        _end(_Profile(search, best, i, side, covariance, settings), half, max(growth, 1e-300)) for side in (-1, 1)
     ]
-    side = "lower" if centre < _AT_BOUND else "upper" if centre > 1 - _AT_BOUND else ""
+    values, open_ends = [], (-np.inf, np.inf)
+    for (distance, _), side, open_end in zip(ends, (-1, 1), open_ends, strict=True):
+        moved = _moved(best.x, i, centre + side * distance)
+        values.append(search.space.parameter(i, moved) if np.isfinite(distance) else open_end)
+    ratios = [ratio for distance, ratio in ends if np.isfinite(distance)]
+    at_bound = "lower" if centre < _AT_BOUND else "upper" if centre > 1 - _AT_BOUND else ""
     return ParameterInterval(
         name=BOUNDS[i].name,
         value=search.space.parameter(i, best.x),
         low=values[0],
         high=values[1],
         profile_ratio=float(np.mean(ratios)) if ratios else float("nan"),
-        at_bound=side,
+        at_bound=at_bound,
     )
 
 
@@ -306,8 +309,62 @@ def _moved(point: FloatArray, i: int, share: float) -> FloatArray:
     return moved
 
 
-def _profile(search: _Search, best: OptimizeResult, i: int, share: float, settings: SearchSettings) -> float:
-    """Growth of the sum of squares with one parameter held elsewhere and the others fitted again."""
-    free = np.arange(best.x.size) != i
-    again = _local(search, _moved(best.x, i, share), settings.n_local_evaluations // 2, free)
-    return float(2 * again.cost - 2 * best.cost)
+class _Profile:
+    """Growth of the sum of squares with one parameter held away from its best value, the others fitted again.
+
+    The others start where the last fit on this side, or else the Jacobian, expects them.
+    """
+
+    def __init__(
+        self,
+        search: _Search,
+        best: OptimizeResult,
+        i: int,
+        side: int,
+        covariance: FloatArray,
+        settings: SearchSettings,
+    ) -> None:
+        self._search, self._best, self._side = search, best, side
+        self._free = np.arange(best.x.size) != i
+        self._n_evaluations = settings.n_local_evaluations // 2
+        self._direction = side * covariance[:, i] / covariance[i, i]
+        self.room = float(best.x[i] if side < 0 else 1 - best.x[i])
+
+    def growth(self, distance: float) -> float:
+        """At a distance, 0 … room."""
+        start = np.clip(self._best.x + distance * self._direction, 0.0, 1.0)
+        again = _local(self._search, start, self._n_evaluations, self._free)
+        self._direction = (again.x - self._best.x) / distance
+        return max(float(2 * again.cost - 2 * self._best.cost), 0.0)
+
+
+def _end(profile: _Profile, first: float, wanted: float) -> tuple[float, float]:
+    """Distance at which the growth is the wanted one, and growth over wanted there; infinite if out of bounds.
+
+    The root of the growth is a straight line where the residuals are linear, so that secants find it. Where the
+    growth jumps, the far side of the jump is the end.
+    """
+    low, high = (0.0, 0.0), (np.inf, np.inf)
+    distance = min(first, profile.room)
+    if distance < _SHORTEST:
+        return (np.inf, np.nan) if profile.room < _SHORTEST else (distance, 1.0)
+    for _ in range(_PROFILE_STEPS):
+        root = float(np.sqrt(profile.growth(distance) / wanted))
+        if abs(root - 1) < _PROFILE_TOLERANCE:
+            return distance, root**2
+        if root < 1:
+            if distance >= profile.room:
+                return np.inf, root**2
+            low = (distance, root)
+        else:
+            high = (distance, root)
+        distance = _next_distance(low, high, profile.room)
+    return (high[0], high[1] ** 2) if np.isfinite(high[0]) else (low[0], low[1] ** 2)
+
+
+def _next_distance(low: tuple[float, float], high: tuple[float, float], room: float) -> float:
+    """Secant between the ends of the bracket, away from both; outward, at most fourfold, without a far end."""
+    if not np.isfinite(high[0]):
+        return min(low[0] / max(low[1], 0.25), room)
+    share = (1 - low[1]) / (high[1] - low[1])
+    return low[0] + min(max(share, 0.1), 0.9) * (high[0] - low[0])

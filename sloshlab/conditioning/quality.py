@@ -261,7 +261,8 @@ def _statistics(values: npt.NDArray[Any]) -> tuple[int, float, float, float, flo
     if n == 0:
         return 0, math.nan, math.nan, math.nan, math.nan
     mean = total / n
-    return n, minimum, maximum, origin + mean, math.sqrt(max(squares / n - mean**2, 0.0))
+    variance = squares / n - mean * mean
+    return n, minimum, maximum, origin + mean, math.sqrt(max(variance, 0.0)) if variance < math.inf else math.inf
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -89,7 +89,7 @@ def analyse_free_decay(
     Raises
     ------
     AnalysisError
-        If the amplitude does not fall, or there are gaps or too few cycles.
+        If the amplitude does not fall, the frequency lies outside the range, or there are gaps or too few cycles.
     """
     if not (np.isfinite(sampling_rate_hz) and sampling_rate_hz > 0) or n_cycles < 2:
         raise AnalysisError(
@@ -98,11 +98,12 @@ def analyse_free_decay(
             allowed="a rate above 0, at least 2 cycles",
         )
     release = find_release(signal, sampling_rate_hz, frequency_range_hz=frequency_range_hz)
-    first = round(release.release_s * sampling_rate_hz)
-    part = np.asarray(signal, dtype=np.float64)[first:]
+    first, last = (round(at * sampling_rate_hz) for at in (release.release_s, release.rest_s))
+    part = np.asarray(signal, dtype=np.float64)[first : last + 1]
     frequency = release.frequency_hz
     by_fit, noise = local_sine_fit(part, sampling_rate_hz, frequency_hz=frequency, n_cycles=n_cycles)
     _refuse_without_decay(by_fit)
+    _refuse_other_frequency(by_fit, frequency_range_hz)
     by_envelope = envelope(part, sampling_rate_hz, frequency_hz=frequency, noise=noise, n_cycles=n_cycles)
     by_peaks = log_decrement(part, sampling_rate_hz, frequency_hz=frequency, noise=noise)
     half_s = 0.5 * n_cycles / frequency
@@ -157,3 +158,16 @@ def _refuse_without_decay(reading: InstantaneousDamping) -> None:
         allowed="an amplitude that falls",
         remedy="check that nothing drives the structure, and the mode's frequency range",
     )
+
+
+def _refuse_other_frequency(reading: InstantaneousDamping, frequency_range_hz: tuple[float, float] | None) -> None:
+    """A mode that is not there shows the foot of another one; the fit walks to where that is."""
+    low, high = frequency_range_hz or (0.0, np.inf)
+    seen = float(np.median(reading.frequency_hz[reading.used]))
+    if not low <= seen <= high:
+        raise AnalysisError(
+            "free decay",
+            got=f"{seen:.4g} Hz",
+            allowed=f"{low:.4g} … {high:.4g} Hz, where the mode is looked for",
+            remedy="check the frequencies that the rig states, or the mode's frequency range",
+        )

@@ -29,6 +29,7 @@ class Trust(StrEnum):
     RELEASE = "release transient"
     EDGE = "edge of the record"
     NOISE = "amplitude too near the noise"
+    NO_EXTREMUM = "extremum missing"
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student_t
 
+from sloshlab.errors import AnalysisError
 from sloshlab.modal.decaying_sine import N_PARAMETERS, DecayingSine, fit_decaying_sine
 from sloshlab.modal.instantaneous_damping import CONFIDENCE, InstantaneousDamping, Trust, damping_ratio_of
 
@@ -72,8 +73,20 @@ def local_sine_fit(
     InstantaneousDamping
         The values of one decay; their errors are independent of each other.
     DecayNoise
+
+    Raises
+    ------
+    AnalysisError
+        If the signal is shorter than a stretch.
     """
     length = n_cycles * sampling_rate_hz / frequency_hz
+    if signal.size < length:
+        raise AnalysisError(
+            "free decay",
+            got=f"{n_cycles * signal.size / length:.1f} cycles of {frequency_hz:.4g} Hz",
+            allowed=f"at least {n_cycles}, one stretch",
+            remedy="take fewer cycles per stretch, or record longer",
+        )
     edges = np.round(np.arange(int(signal.size / length) + 1) * length).astype(int)
     fits: list[DecayingSine] = []
     guess = frequency_hz, 0.0

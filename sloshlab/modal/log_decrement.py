@@ -44,7 +44,7 @@ def log_decrement(
     InstantaneousDamping
         One value per half cycle; values within `n_cycles` of each other share extrema.
     """
-    time, value, sign, unit_time_std, unit_value_std = _extrema(signal, sampling_rate_hz, frequency_hz)
+    time, value, sign, found, unit_time_std, unit_value_std = _extrema(signal, sampling_rate_hz, frequency_hz)
     apart = 2 * n_cycles
     amplitude = sign[1:-1] * np.convolve(value, _NEIGHBOURS, mode="valid")
     lost = 1e-6 * np.abs(amplitude).max()
@@ -58,6 +58,7 @@ def log_decrement(
     log_std = _log_ratio_std(amplitude[first], amplitude[last], apart) * (std * unit_value_std[1:-1])[first]
     time_std = np.hypot((std * unit_time_std[1:-1])[first], (std * unit_time_std[1:-1])[last])
     damping, damping_std = damping_ratio_of(decay, omega, log_std / duration, omega * time_std / duration)
+    whole = found[:-2] & found[1:-1] & found[2:]
     relative = (std * unit_value_std[1:-1])[last] * np.sqrt((_NEIGHBOURS**2).sum()) / amplitude[last]
     return InstantaneousDamping(
         method="log decrement",
@@ -68,10 +69,13 @@ def log_decrement(
         frequency_hz=omega / (2 * np.pi),
         frequency_hz_std=omega * time_std / duration / (2 * np.pi),
         coverage_factor=np.full(duration.size, noise.coverage_factor),
-        trust=np.where(
-            (relative > LARGEST_AMPLITUDE_ERROR) | (amplitude[last] <= lost), str(Trust.NOISE), str(Trust.USED)
-        ),
+        trust=_trust(whole[first] & whole[last], (relative > LARGEST_AMPLITUDE_ERROR) | (amplitude[last] <= lost)),
     )
+
+
+def _trust(has_extrema: npt.NDArray[np.bool_], in_noise: npt.NDArray[np.bool_]) -> npt.NDArray[np.str_]:
+    trust = np.where(has_extrema, str(Trust.USED), str(Trust.NO_EXTREMUM))
+    return np.where(in_noise, str(Trust.NOISE), trust)
 
 
 def _log_ratio_std(first: FloatArray, last: FloatArray, apart: int) -> FloatArray:
@@ -83,8 +87,12 @@ def _log_ratio_std(first: FloatArray, last: FloatArray, apart: int) -> FloatArra
 
 def _extrema(
     signal: FloatArray, sampling_rate_hz: float, frequency_hz: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Times [s], values, ±1 for maximum or minimum, standard errors of times and values for white noise of 1."""
+) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], FloatArray, FloatArray]:
+    """Extrema that the phase asks for.
+
+    Times [s], values, ±1 for maximum or minimum, whether there is one, and standard errors of times and values for
+    white noise of 1.
+    """
     phase = np.unwrap(np.angle(analytic_signal(signal, sampling_rate_hz, frequency_hz=frequency_hz)))
     phase = np.maximum.accumulate(phase)
     halves = np.arange(np.ceil(phase[0] / np.pi), np.floor(phase[-1] / np.pi) + 1)
@@ -93,12 +101,14 @@ def _extrema(
     design = np.stack([np.ones_like(offset), offset, offset**2], axis=1).astype(np.float64)
     covariance = np.linalg.inv(design.T @ design)
     vertex = np.interp(halves * np.pi, phase, np.arange(signal.size))
+    # a parabola over three samples of a sine of 1e-9 of the signal: flatter than any extremum that can be read
+    flat = 1e-9 * max(float(np.ptp(signal)), np.finfo(float).tiny) / half_width**2
     for _ in range(2):  # the second time centred on the first vertex
         centre = np.round(vertex).astype(int)
         whole = (centre >= half_width) & (centre + half_width < signal.size)
         centre, halves = centre[whole], halves[whole]
         constant, slope, curvature = covariance @ design.T @ signal[centre[:, None] + offset].T
-        curvature = np.where(curvature == 0, np.finfo(float).tiny, curvature)
+        curvature = np.where(np.abs(curvature) < flat, -flat * np.cos(np.pi * halves), curvature)
         shift = np.clip(-slope / (2 * curvature), -half_width, half_width)
         vertex = centre + shift
     at_vertex = np.stack([np.ones_like(shift), shift, shift**2])
@@ -108,4 +118,5 @@ def _extrema(
     )
     value = constant + slope * shift + curvature * shift**2
     sign = np.where(halves % 2 == 0, 1.0, -1.0)
-    return vertex / sampling_rate_hz, value, sign, shift_std / sampling_rate_hz, value_std
+    found = (sign * curvature < 0) & (np.abs(shift) < half_width)
+    return vertex / sampling_rate_hz, value, sign, found, shift_std / sampling_rate_hz, value_std

@@ -42,6 +42,10 @@ class ModalFit:
         Of the poles with positive imaginary part.
     half_power_width_in_lines : ndarray, shape (n_modes,)
         2ζf over the distance of lines; below about 2 a random run is too short to tell ζ.
+    line_hz : ndarray, shape (n_lines,)
+        Lines that were fitted.
+    modelled : ndarray of complex, shape (n_outputs, n_lines)
+        The fitted responses there, seen through the line shape of the window where the data were.
     fit : RationalFit
         The vector fit that the least squares started from.
     """
@@ -53,6 +57,8 @@ class ModalFit:
     coverage_factor: float
     residues: ComplexArray
     half_power_width_in_lines: FloatArray
+    line_hz: FloatArray
+    modelled: ComplexArray
     fit: RationalFit
 
     @property
@@ -141,11 +147,12 @@ def modal_fit(
             remedy="ask for fewer modes, widen the frequency range, or give extra pairs",
         )
     kernel = hann_line_shape(float(np.median(np.diff(f)))) if hann_lines else (np.zeros(1), np.ones(1))
-    poles, residues, covariance, n_free = _least_squares(f, h, weights, fit, kernel)
+    refined = _least_squares(f, h, weights, fit, kernel)
+    poles = refined.poles
     own = np.flatnonzero(poles.imag > 0)
     own = own[np.argsort(-poles.real[own] / np.abs(poles[own]), kind="stable")[:n_modes]]
     own = own[np.argsort(np.abs(poles[own]))]
-    return _modes(poles, residues, covariance, own, fit, f, response_std is not None, n_free)
+    return _modes(refined, own, fit, f, known_errors=response_std is not None)
 
 
 def modal_fit_of_spectra(
@@ -191,36 +198,68 @@ def _floored(std: FloatArray) -> FloatArray:
     return np.maximum(np.asarray(std, dtype=np.float64), floor)
 
 
+@dataclass(frozen=True)
+class _Refined:
+    """Poles and residues [rad/s] after the least squares, and what they make of the lines.
+
+    `covariance` is that of Re p and Im p of all poles, shape (2 n_poles, 2 n_poles); `n_free` counts the degrees
+    of freedom of the residual.
+    """
+
+    poles: ComplexArray
+    residues: ComplexArray
+    modelled: ComplexArray
+    covariance: FloatArray
+    n_free: int
+
+
 def _least_squares(
     f: FloatArray, h: ComplexArray, weights: FloatArray, fit: RationalFit, kernel: tuple[FloatArray, FloatArray]
-) -> tuple[ComplexArray, ComplexArray, FloatArray, int]:
-    """Poles, residues, covariance of the pole parameters and degrees of freedom of the residual."""
+) -> _Refined:
+    """Gauss–Newton on poles, residues and constants together; a step that makes the fit worse is taken back."""
     scale = 2 * np.pi * float(f.max())
     offsets, shares = kernel
     s = np.asarray(2j * np.pi * (f[:, None] + offsets) / scale, dtype=np.complex128)
-    poles = np.asarray(fit.poles / scale, dtype=np.complex128)
-    residues = np.asarray(fit.residues / scale, dtype=np.complex128)
-    constant = fit.constant.astype(np.complex128)
-    best, kept = np.inf, (poles, residues)
-    for step in range(_N_STEPS + 1):
-        blocks, residual = _linearised(s, shares, h, weights, poles, residues, constant)
-        cost = float((residual**2).sum())
-        if step == _N_STEPS or cost > best * (1 - 1e-12):
-            poles, residues = (poles, residues) if cost <= best else kept
+    found = (
+        np.asarray(fit.poles / scale, dtype=np.complex128),
+        np.asarray(fit.residues / scale, dtype=np.complex128),
+        fit.constant.astype(np.complex128),
+    )
+    blocks, error = _linearised(s, shares, h, weights, *found)
+    for _ in range(_N_STEPS):
+        change = np.asarray(np.linalg.lstsq(blocks, _stacked(weights * error), rcond=None)[0], dtype=np.float64)
+        moved = _moved(found, change)
+        moved_blocks, moved_error = _linearised(s, shares, h, weights, *moved)
+        before, after = (float((np.abs(weights * one) ** 2).sum()) for one in (error, moved_error))
+        if after > before * (1 - 1e-12):
             break
-        best, kept = cost, (poles, residues)
-        change = np.linalg.lstsq(blocks, residual, rcond=None)[0]
-        n = poles.size
-        poles = poles + np.where(poles.imag == 0, change[:n], change[:n] + 1j * change[n : 2 * n])
-        own = change[2 * n :].reshape(h.shape[0], 2 * n + 1)
-        residues = residues + own[:, :n] + 1j * np.where(poles.imag == 0, 0.0, own[:, n : 2 * n])
-        constant = constant + own[:, -1]
-    n_parameters = int(np.linalg.matrix_rank(blocks))
-    n_free = max(residual.size - n_parameters, 1)
+        found, blocks, error = moved, moved_blocks, moved_error
+    poles, residues, _ = found
+    n_free = max(2 * h.size - int(np.linalg.matrix_rank(blocks)), 1)
     bread = np.linalg.pinv(blocks.T @ blocks, rcond=1e-18)
     scatter = _scatter(blocks.reshape(-1, f.size, blocks.shape[1]), offsets.size > 1)
-    covariance = (bread @ scatter @ bread)[: 2 * poles.size, : 2 * poles.size] * min(cost, best) / n_free
-    return poles * scale, residues * scale, covariance * scale**2, n_free
+    cost = float((np.abs(weights * error) ** 2).sum())
+    covariance = (bread @ scatter @ bread)[: 2 * poles.size, : 2 * poles.size] * cost / n_free
+    return _Refined(poles * scale, residues * scale, h - error, covariance * scale**2, n_free)
+
+
+def _moved(
+    found: tuple[ComplexArray, ComplexArray, ComplexArray], change: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Poles, residues and constants after a step; real poles stay real."""
+    poles, residues, constant = found
+    n, paired = poles.size, poles.imag != 0
+    own = change[2 * n :].reshape(residues.shape[0], 2 * n + 1)
+    return (
+        poles + change[:n] + 1j * np.where(paired, change[n : 2 * n], 0.0),
+        residues + own[:, :n] + 1j * np.where(paired, own[:, n : 2 * n], 0.0),
+        constant + own[:, -1],
+    )
+
+
+def _stacked(rows: ComplexArray) -> FloatArray:
+    """Real and imaginary part of each output behind each other."""
+    return np.concatenate([part for row in rows for part in (row.real, row.imag)])
 
 
 def _scatter(blocks: FloatArray, hann_lines: bool) -> FloatArray:
@@ -243,15 +282,15 @@ def _linearised(
     poles: ComplexArray,
     residues: ComplexArray,
     constant: ComplexArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Weighted Jacobian over Re p, Im p of all poles, then Re r, Im r, d of each output; weighted residual."""
+) -> tuple[FloatArray, ComplexArray]:
+    """Weighted Jacobian over Re p, Im p of all poles, then Re r, Im r, d of each output; error of each output."""
     n, n_outputs = poles.size, h.shape[0]
     pair = (poles.imag != 0).astype(float)
     # s holds the points of the line shape of each line, shape (n_lines, n_points)
     single, partner = 1 / (s[:, :, None] - poles), pair / (s[:, :, None] - poles.conj())
     plus, minus = (np.einsum("lkp,k->lp", one, shares) for one in (single, partner))
     plus_squared, minus_squared = (np.einsum("lkp,k->lp", one**2, shares) for one in (single, partner))
-    rows, residuals = [], []
+    rows, errors = [], []
     for output in range(n_outputs):
         r = residues[output]
         first, second = r * plus_squared, r.conj() * minus_squared
@@ -261,35 +300,28 @@ def _linearised(
         block[:, start : start + n] = plus + minus
         block[:, start + n : start + 2 * n] = pair * 1j * (plus - minus)
         block[:, start + 2 * n] = 1.0
-        error = h[output] - plus @ r - minus @ r.conj() - constant[output]
+        errors.append(h[output] - plus @ r - minus @ r.conj() - constant[output])
         weighted = weights[output][:, None] * block
         rows += [weighted.real, weighted.imag]
-        residuals += [(weights[output] * error).real, (weights[output] * error).imag]
-    return np.vstack(rows), np.concatenate(residuals)
+    return np.vstack(rows), np.array(errors)
 
 
 def _modes(
-    poles: ComplexArray,
-    residues: ComplexArray,
-    covariance: FloatArray,
-    own: npt.NDArray[np.intp],
-    fit: RationalFit,
-    f: FloatArray,
-    known_errors: bool,
-    n_free: int,
+    refined: _Refined, own: npt.NDArray[np.intp], fit: RationalFit, f: FloatArray, *, known_errors: bool
 ) -> ModalFit:
-    n = poles.size
+    poles, n = refined.poles, refined.poles.size
     decay, omega = -poles[own].real, poles[own].imag
     damping, _ = damping_ratio_of(decay, omega, np.zeros(own.size), np.zeros(own.size))
     size = np.abs(poles[own])
     damping_std, frequency_std = [], []
     for index, s, w, modulus in zip(own, decay, omega, size, strict=True):
-        part = covariance[np.ix_([index, n + index], [index, n + index])]
+        part = refined.covariance[np.ix_([index, n + index], [index, n + index])]
         to_damping = np.array([-(w**2), -s * w]) / modulus**3
         to_frequency = np.array([-s, w]) / modulus / (2 * np.pi)
         damping_std.append(np.sqrt(max(to_damping @ part @ to_damping, 0.0)))
         frequency_std.append(np.sqrt(max(to_frequency @ part @ to_frequency, 0.0)))
-    quantile = norm.ppf(0.5 + CONFIDENCE / 2) if known_errors else student_t.ppf(0.5 + CONFIDENCE / 2, n_free)
+    tail = 0.5 + CONFIDENCE / 2
+    quantile = norm.ppf(tail) if known_errors else student_t.ppf(tail, refined.n_free)
     frequency = size / (2 * np.pi)
     spacing = float(np.median(np.diff(f)))
     return ModalFit(
@@ -298,7 +330,9 @@ def _modes(
         damping_ratio=damping,
         damping_ratio_std=np.array(damping_std),
         coverage_factor=float(quantile),
-        residues=residues[:, own],
+        residues=refined.residues[:, own],
         half_power_width_in_lines=2 * damping * frequency / spacing,
+        line_hz=f,
+        modelled=refined.modelled,
         fit=fit,
     )

@@ -21,6 +21,10 @@ _RATIO_TO_LATER = 3.0
 _SMALLEST_SHARE = 0.02
 _LARGEST_N_CYCLES = 5
 _N_LATER = 10
+_LARGEST_RANGE = 1e50
+"""Its square, and that of its inverse, are still numbers."""
+_REST_SHARE = 1e-6
+"""Of the range of the signal: what stays closer to its last value is at rest."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,9 @@ class Release:
         When the motion begins, from the first sample.
     transient_end_s : float
         From here on the motion is a decaying sine as good as later; equal to `release_s` without a transient.
+    rest_s : float
+        When the motion ends, because dry friction holds the structure or nothing is left; the end of the record
+        where it goes on.
     frequency_hz : float
         Frequency of the largest line after the release.
     unexplained_share : ndarray, shape (n_cycles,)
@@ -41,6 +48,7 @@ class Release:
 
     release_s: float
     transient_end_s: float
+    rest_s: float
     frequency_hz: float
     unexplained_share: FloatArray
 
@@ -69,6 +77,7 @@ def find_release(
         If there are gaps, no motion, or fewer than five cycles after the release.
     """
     values = _checked(signal)
+    values = values[: _n_moving(values)]
     centred = values - values.mean()
     start = int(np.argmax(np.abs(centred) > 0.5 * np.abs(centred).max()))
     frequency = largest_line_hz(centred[start:], sampling_rate_hz, frequency_range_hz)
@@ -87,7 +96,8 @@ def find_release(
         values[start:], sampling_rate_hz, frequency, min(n_cycles, _LARGEST_N_CYCLES + _N_LATER)
     )
     end = start + _n_transient(shares) * per_cycle
-    return Release(float(start / sampling_rate_hz), float(end / sampling_rate_hz), frequency, shares)
+    release_s, end_s, rest_s = (float(at / sampling_rate_hz) for at in (start, end, values.size - 1))
+    return Release(release_s, end_s, rest_s, frequency, shares)
 
 
 def largest_line_hz(
@@ -143,7 +153,21 @@ def _checked(signal: FloatArray) -> FloatArray:
         )
     if np.ptp(values) == 0:
         raise AnalysisError("free decay", got="a constant signal", allowed="a motion")
+    if not 1 / _LARGEST_RANGE <= np.ptp(values) <= _LARGEST_RANGE:
+        raise AnalysisError(
+            "free decay",
+            got=f"a range of {np.ptp(values):.4g}",
+            allowed=f"{1 / _LARGEST_RANGE:g} … {_LARGEST_RANGE:g} m/s² or m",
+            remedy="check gains and units",
+        )
     return values
+
+
+def _n_moving(values: FloatArray) -> int:
+    """Samples up to the first one at rest."""
+    away = np.abs(values - values[-1]) > _REST_SHARE * np.ptp(values)
+    n_moving = int(np.flatnonzero(away)[-1]) + 1
+    return n_moving if n_moving < values.size - 1 else int(values.size)
 
 
 def _unexplained_shares(

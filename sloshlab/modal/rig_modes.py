@@ -80,6 +80,8 @@ def stated_modes(rig: Rig, n_modes: int | None = None) -> ModeNames:
     """
     structure = structure_of(rig)
     if structure.kind == "sdof":
+        if n_modes not in (None, 1):
+            raise AnalysisError("number of modes", got=str(n_modes), allowed="1 on a guide")
         mass_kg = (structure.mass_kg or 0.0) + rig.liquid_mass_kg
         omega = float(np.sqrt((structure.stiffness_n_per_m or 0.0) / mass_kg))
         damping = (structure.damping_kg_per_s or 0.0) / (2 * mass_kg * omega)

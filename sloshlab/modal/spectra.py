@@ -110,8 +110,11 @@ class Spectra:
     @property
     def h2(self) -> ComplexArray:
         """S_yy/S_yx: unbiased by noise of the input."""
-        quiet = np.where(self.cross_psd == 0, np.nan, self.cross_psd)
-        return np.asarray(self.output_psd / quiet.conj())
+        size = np.abs(self.cross_psd)
+        safe = np.where(size > 0, size, 1.0)
+        # S_yy S_xy/|S_xy|² in two steps: the square of a small density would underflow
+        ratio = self.cross_psd / safe * (self.output_psd / safe)
+        return np.asarray(np.where(size > 0, ratio, np.nan))
 
     @property
     def coherence(self) -> FloatArray:
@@ -216,11 +219,12 @@ def random_spectra(
     """
     x = np.asarray(excitation, dtype=np.float64)
     y = np.atleast_2d(np.asarray(responses, dtype=np.float64))
-    if x.ndim != 1 or y.shape[1] != x.size or not 0 <= overlap <= 0.9 or segment_length < 8:
+    if x.ndim != 1 or y.shape[1] != x.size or not 0 <= overlap <= 0.9 or not 8 <= segment_length <= x.size:
         raise AnalysisError(
             "random run",
-            got=f"{x.shape} and {y.shape} samples, overlap {overlap}, segments of {segment_length}",
-            allowed="equal lengths, overlap 0 … 0.9, segments of at least 8 samples",
+            got=f"{x.shape} and {y.shape} samples, overlap {overlap}, segments of {segment_length} samples",
+            allowed="equal lengths, overlap 0 … 0.9, segments of at least 8 samples of which at least 2 fit",
+            remedy="take other segments or record longer",
         )
     window = np.hanning(segment_length + 1)[:-1]
     hop = max(1, round(segment_length * (1 - overlap)))

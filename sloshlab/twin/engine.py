@@ -17,10 +17,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sloshlab.twin.law import DISPLACEMENT, N_MOTION, VELOCITY
+from sloshlab.twin.law import N_MOTION, VELOCITY
 from sloshlab.twin.law_call import call_law
 from sloshlab.twin.model import NO_FRICTION, STICKS, Excited, FloatArray, Model, Outputs, Scratch
-from sloshlab.twin.rates import advance, let_go, rates_once, set_friction
+from sloshlab.twin.rates import advance, advance_once, let_go, rates_once, set_friction
 from sloshlab.twin.status import Status
 
 DONE, UNSTABLE, FAULT, CHATTER, NO_ACCELERATION = (int(status) for status in Status)
@@ -78,7 +78,7 @@ def _to_event(
         if above > 0.0:
             middle = low + (high - low) * above / (above - below)
             middle = min(max(middle, low + 0.01 * (high - low)), high - 0.01 * (high - low))
-        advance(m, excited, time, position, middle * step, 2.0 * middle, s)
+        advance_once(m, excited, time, position, middle * step, 2.0 * middle, s)
         value = _margin(m, s.trial, s)
         if value < -_SWITCH_TOLERANCE or not np.isfinite(value):
             high, below = middle, value
@@ -88,7 +88,7 @@ def _to_event(
             low, above = middle, max(value, 0.0)
             below *= 0.5 if kept == -1 else 1.0
             kept = -1
-    advance(m, excited, time, position, high * step, 2.0 * high, s)
+    advance_once(m, excited, time, position, high * step, 2.0 * high, s)
     return high
 
 
@@ -130,17 +130,18 @@ def _logged(log: FloatArray, n: int, time: float, term: int, event: int, value: 
 def _record(m: Model, row: int, s: Scratch, out: Outputs) -> None:
     """The present state as a row of the outputs; the rates there are in the first slopes."""
     n, y = m.stiffness.size, s.state
+    forces = n + y.size
+    works = forces + s.force.size
+    for j in range(2 * n):
+        out.rows[row, j] = y[j]
     for j in range(n):
-        out.modes[row, 0, j], out.modes[row, 1, j], out.modes[row, 2, j] = y[j], y[n + j], s.slopes[0, n + j]
-    for frame in range(2):
-        for c in range(3):
-            out.places[row, frame, c] = s.motion[frame * N_MOTION + DISPLACEMENT + c]
-    for i in range(m.law.size):
-        out.forces[row, i] = s.force[i]
-    for j in range(out.memory.shape[1]):
-        out.memory[row, j] = y[2 * n + j]
+        out.rows[row, 2 * n + j] = s.slopes[0, n + j]
+    for j in range(2 * n, y.size):
+        out.rows[row, n + j] = y[j]
+    for i in range(s.force.size):
+        out.rows[row, forces + i] = s.force[i]
     for j in range(s.works.size):
-        out.works[row, j] = s.works[j]
+        out.rows[row, works + j] = s.works[j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -270,7 +271,8 @@ def integrate(
                 n_switched += 1
                 if n_switched > _MOST_EVENTS_PER_STEP:
                     return CHATTER, row, -1, n_logged
-        _update(m, excited, row * n_substeps * step, 2.0 * row * n_substeps, s)
+        if m.updates:
+            _update(m, excited, row * n_substeps * step, 2.0 * row * n_substeps, s)
         where = _fault_of(s.state, largest)
         if where >= 0:
             return UNSTABLE, row, where, n_logged

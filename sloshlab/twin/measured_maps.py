@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 from scipy.ndimage import distance_transform_edt
 
@@ -29,6 +30,8 @@ from sloshlab.twin.structure import structure_of_rig
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING
 from sloshlab.twin.tank_forces import EFFECTIVE_MASS_MAP, VISCOUS_MAP, table_of
 from sloshlab.twin.terms import Term
+
+FloatArray = npt.NDArray[np.float64]
 
 METRICS: Final = ("c_1", "c_2", "c_3", "c_rand", "map")
 _PARAMETERS: Final = ("maps", "metric", "frequency_hz", "u_bar", "effective_mass", "time_constant_s")
@@ -60,10 +63,14 @@ def terms_from_maps(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tu
     following["start_frequency_hz"] = frequency
     if "time_constant_s" in parameters:
         following["time_constant_s"] = parameters["time_constant_s"]
-    terms = [VISCOUS_MAP(**following, table=table_of(filled(maps["w_bar"])))]
+    terms = [VISCOUS_MAP(**following, table=_table(maps["w_bar"]))]
     if parameters.get("effective_mass", False):
-        terms.append(EFFECTIVE_MASS_MAP(**following, table=table_of(filled(maps["beta"]))))
+        terms.append(EFFECTIVE_MASS_MAP(**following, table=_table(maps["beta"])))
     return tuple(terms)
+
+
+def _table(grid: xr.DataArray) -> FloatArray:
+    return table_of(filled(grid), measured=grid.notnull())
 
 
 def read_maps(path: Path, *, fill_level: float) -> xr.Dataset:

@@ -45,6 +45,7 @@ class Model(NamedTuple):
     base_participation: FloatArray  # (n_modes,)
     mobility: float  # s
     added_mass: float  # m_a
+    inverse_inertia: float  # 1/(1 + m_a s)
     law: IntArray  # (n_terms,) addresses
     events: IntArray  # (n_terms,) addresses, 0 without events
     update: IntArray  # (n_terms,) addresses, 0 without an update
@@ -60,6 +61,7 @@ class Model(NamedTuple):
     n_limits: IntArray  # (n_terms,) events that end the simulation, after the switches
     friction_frame: int  # −1 without dry friction
     uses_acceleration: bool  # any of the laws
+    updates: bool  # any of the terms
 
 
 class Scratch(NamedTuple):
@@ -88,26 +90,25 @@ class Excited(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """Rows are samples of the output."""
+    """What is kept; motions of the places are not, because they follow from those of modes and base.
 
-    modes: FloatArray  # (n, 3, n_modes)
-    places: FloatArray  # (n, 2, 3)
-    forces: FloatArray  # (n, n_terms)
-    memory: FloatArray  # (n, n_memory)
-    works: FloatArray  # (n, n_works)
+    One table, since fresh memory is touched for the first time here and a large block of it costs least.
+    """
+
+    rows: FloatArray  # (n, 3 n_modes + n_memory + n_terms + n_works): q, q̇, q̈, memory, forces, works at a sample
     log: FloatArray  # (largest number of events kept, 4)
 
 
-def empty_outputs(n_rows: int, n_modes: int, n_terms: int, n_memory: int, largest_log: int) -> Outputs:
-    """Room for the results of a simulation."""
-    return Outputs(
-        np.empty((n_rows, 3, n_modes)),
-        np.empty((n_rows, 2, 3)),
-        np.empty((n_rows, n_terms)),
-        np.empty((n_rows, n_memory)),
-        np.empty((n_rows, 2 * n_terms + N_OTHER_WORKS)),
-        np.empty((largest_log, 4)),
-    )
+def n_columns(n_modes: int, n_terms: int, n_memory: int) -> int:
+    """Numbers kept of every sample."""
+    return 3 * n_modes + n_memory + n_terms + 2 * n_terms + N_OTHER_WORKS
+
+
+def columns(rows: FloatArray, n_modes: int, n_terms: int, n_memory: int) -> tuple[FloatArray, ...]:
+    """Views of modes (n, 3, n_modes), memory, forces and works."""
+    memory, forces, works = np.cumsum([3 * n_modes, n_memory, n_terms])
+    modes = rows[:, :memory].reshape(rows.shape[0], 3, n_modes)
+    return modes, rows[:, memory:forces], rows[:, forces:works], rows[:, works:]
 
 
 def scratch(model: Model, state: FloatArray, n_event_functions: int) -> Scratch:

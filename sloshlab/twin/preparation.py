@@ -15,13 +15,13 @@ from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.model import (
     DRY_FRICTION,
     INPUTS,
-    N_OTHER_WORKS,
     USES_ACCELERATION,
     Excited,
     Model,
     Outputs,
     Scratch,
-    empty_outputs,
+    columns,
+    n_columns,
     scratch,
 )
 from sloshlab.twin.simulation import Simulation
@@ -82,6 +82,7 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
         base_participation=_participation(structure, excitation),
         mobility=mobility,
         added_mass=_checked_mass(float(masses.sum()), mobility),
+        inverse_inertia=1.0 / (1.0 + float(masses.sum()) * mobility),
         law=_integers([term.kind.law.address for term in terms]),
         events=_integers([term.kind.events.address if term.kind.events else 0 for term in terms]),
         update=_integers([term.kind.update.address if term.kind.update else 0 for term in terms]),
@@ -97,6 +98,7 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
         n_limits=_integers([len(term.kind.limits) for term in terms]),
         friction_frame=_friction_frame(terms, excitation),
         uses_acceleration=any(term.kind.uses_acceleration for term in terms),
+        updates=any(term.kind.update is not None for term in terms),
     )
     return Prepared(model, np.concatenate([*blocks, empty]))
 
@@ -180,8 +182,9 @@ def run(
     model, n_rows = ready.model, excitation.n_samples
     s = scratch(model, start_state(twin, ready, excitation.at_start(), *start), _n_event_functions(twin.terms))
     largest = _largest(s, ready)
-    _check_size(n_rows, model, ready.memory.size)
-    out = empty_outputs(n_rows, model.stiffness.size, model.law.size, ready.memory.size, _LARGEST_EVENT_LOG)
+    n_kept = n_columns(model.stiffness.size, model.law.size, ready.memory.size)
+    _check_size(n_rows, n_kept)
+    out = Outputs(np.empty((n_rows, n_kept)), np.empty((_LARGEST_EVENT_LOG, 4)))
     external, base_motion = np.zeros(n_rows), np.zeros((n_rows, 3))
     step = 1.0 / (excitation.sampling_rate_hz * n_substeps)
     status, filled, where, n_events = int(Status.DONE), 1, -1, 0
@@ -204,13 +207,13 @@ def run(
     return _simulation(twin, excitation, ending, out, external, base_motion, filled, n_events)
 
 
-def _check_size(n_rows: int, model: Model, n_memory: int) -> None:
-    n_columns = 3 * model.stiffness.size + 6 + 3 * model.law.size + n_memory + N_OTHER_WORKS + 4
-    needed = 8 * n_rows * n_columns
+def _check_size(n_rows: int, n_kept: int) -> None:
+    with_inputs = n_kept + 4
+    needed = 8 * n_rows * with_inputs
     if needed > _LARGEST_OUTPUTS_BYTES:
         raise InputError(
             "simulation",
-            got=f"{n_rows} samples of {n_columns} numbers, {needed / 2**30:.1f} GiB",
+            got=f"{n_rows} samples of {with_inputs} numbers, {needed / 2**30:.1f} GiB",
             allowed=f"≤ {_LARGEST_OUTPUTS_BYTES / 2**30:g} GiB",
             remedy="simulate a shorter run, or fewer samples with more steps each",
         )
@@ -272,17 +275,20 @@ def _simulation(
     filled: int,
     n_events: int,
 ) -> Simulation:
+    n_modes = 0 if twin.structure is None else twin.structure.masses_kg.size
+    n_terms = len(twin.terms)
+    n_memory = out.rows.shape[1] - n_columns(n_modes, n_terms, 0)
+    modes, memory, forces, works = columns(out.rows[:filled], n_modes, n_terms, n_memory)
     return Simulation(
         twin=twin,
         sampling_rate_hz=excitation.sampling_rate_hz,
         ending=ending,
-        modes=out.modes[:filled],
-        places=out.places[:filled],
+        modes=modes,
         base_motion=base_motion[:filled],
         external_force_n=external[:filled],
-        forces_n=out.forces[:filled],
-        memory=out.memory[:filled],
-        works_j=out.works[:filled],
+        forces_n=forces,
+        memory=memory,
+        works_j=works,
         events=out.log[: min(n_events, _LARGEST_EVENT_LOG)].copy(),
         n_events=n_events,
     )

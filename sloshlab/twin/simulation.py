@@ -12,6 +12,7 @@ import xarray as xr
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.twin.status import Ending, Status
+from sloshlab.twin.terms import PLACES
 
 if TYPE_CHECKING:
     from sloshlab.twin.twin import Twin
@@ -30,8 +31,6 @@ class Simulation:
     ending : Ending
     modes : ndarray, shape (n, 3, n_modes)
         Displacement, velocity, acceleration of each mode.
-    places : ndarray, shape (n, 2, 3)
-        The same of structure (relative to the base) and tank (absolute).
     base_motion : ndarray, shape (n, 3)
         The same of the base; of the tank where there is no structure.
     external_force_n : ndarray, shape (n,)
@@ -53,7 +52,6 @@ class Simulation:
     sampling_rate_hz: float
     ending: Ending
     modes: FloatArray
-    places: FloatArray
     base_motion: FloatArray
     external_force_n: FloatArray
     forces_n: FloatArray
@@ -67,25 +65,39 @@ class Simulation:
         """Times of the samples."""
         return np.arange(self.modes.shape[0]) / self.sampling_rate_hz
 
+    @cached_property
+    def places(self) -> FloatArray:
+        """Displacement, velocity, acceleration of structure (relative) and tank (absolute), shape (n, 2, 3)."""
+        relative = np.stack([self._relative(order) for order in range(3)], axis=-1)
+        return np.stack([relative, relative + self.base_motion], axis=1)
+
+    def _relative(self, order: int) -> FloatArray:
+        """Displacement, velocity or acceleration of the tank relative to the base."""
+        total = np.zeros(self.modes.shape[0])
+        if self.twin.structure is not None:
+            for j, deflection in enumerate(self.twin.structure.mode_shape):
+                total += deflection * self.modes[:, order, j]
+        return total
+
     @property
     def base_acceleration_m_per_s2(self) -> FloatArray:
         """Acceleration of the base."""
         return self.base_motion[:, 2]
 
-    @property
+    @cached_property
     def displacement_m(self) -> FloatArray:
         """Displacement of the tank, absolute."""
-        return self.places[:, 1, 0]
+        return self._relative(0) + self.base_motion[:, 0]
 
-    @property
+    @cached_property
     def velocity_m_per_s(self) -> FloatArray:
         """Velocity of the tank, absolute."""
-        return self.places[:, 1, 1]
+        return self._relative(1) + self.base_motion[:, 1]
 
-    @property
+    @cached_property
     def acceleration_m_per_s2(self) -> FloatArray:
         """Acceleration of the tank, absolute."""
-        return self.places[:, 1, 2]
+        return self._relative(2) + self.base_motion[:, 2]
 
     @property
     def tank_force_n(self) -> FloatArray:
@@ -119,6 +131,19 @@ class Simulation:
         n = len(self.twin.terms)
         given = self.works_j[:, 0 : 2 * n : 2].sum(axis=1) + self.works_j[:, 2 * n :].sum(axis=1)
         return np.asarray(self.mechanical_energy_j - self.mechanical_energy_j[0] - given)
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """What the forces have to say, each on its motion and memory: regions that they were not measured in."""
+        said: list[str] = []
+        at = 0
+        for term in self.twin.terms:
+            n_memory = len(term.kind.memory(term.values, term.table)) + term.kind.n_switches
+            if term.kind.remarks is not None:
+                motion = self.places[:, PLACES.index(term.place)]
+                said += term.kind.remarks(term, self.time_s, motion, self.memory[:, at : at + n_memory])
+            at += n_memory
+        return tuple(said)
 
     def require_done(self) -> Simulation:
         """Itself, if it reached its end.

@@ -16,6 +16,7 @@ from numba import njit
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError
 from sloshlab.twin.law import ACCELERATION, DISPLACEMENT, VELOCITY, law
+from sloshlab.twin.map_region import outside_remarks
 from sloshlab.twin.terms import ForceKind, Parameter, register
 
 # mypy: disable-error-code="no-untyped-def"
@@ -164,7 +165,10 @@ def _effective_mass_map(motion, parameters, memory, rates):
 
 
 def _tracked_at_start(values: Mapping[str, float], table: FloatArray) -> tuple[float, float]:
-    return 1e-12, 1e-12 * (2 * pi * values["start_frequency_hz"]) ** 2
+    """Mean squares of a motion of h/10: a release begins with v = 0, which is no infinite frequency."""
+    omega = 2 * pi * values["start_frequency_hz"]
+    velocity = 0.1 * values["height_m"] * omega / sqrt(2.0)
+    return velocity**2, (omega * velocity) ** 2
 
 
 _OF_MAPS = (
@@ -182,6 +186,7 @@ VISCOUS_MAP = register(
         _viscous_map,
         memory=_tracked_at_start,
         uses_acceleration=True,
+        remarks=outside_remarks,
         equation="−c(ω̄, ū) v, c = (m_l/π) √(g/h) ω̄ W̄(ω̄, ū) (E.4)",
     )
 )
@@ -193,6 +198,7 @@ EFFECTIVE_MASS_MAP = register(
         _effective_mass_map,
         memory=_tracked_at_start,
         uses_acceleration=True,
+        remarks=outside_remarks,
         equation="−β(ω̄, ū) m_l a",
     )
 )
@@ -239,13 +245,15 @@ LINEAR_RESPONSE = register(
 )
 
 
-def table_of(map_: xr.DataArray) -> FloatArray:
+def table_of(map_: xr.DataArray, *, measured: xr.DataArray | None = None) -> FloatArray:
     """What `viscous_map` (of W̄) and `effective_mass_map` (of β) take as `table`.
 
     Parameters
     ----------
     map_ : xarray.DataArray
         Over ``omega_bar`` and ``u_bar``, both rising, at least two each, without gaps.
+    measured : xarray.DataArray, optional
+        Where on the same grid the map was measured; everywhere by default. Motion elsewhere is remarked on.
 
     Raises
     ------
@@ -262,4 +270,7 @@ def table_of(map_: xr.DataArray) -> FloatArray:
     values = np.asarray(grid.values, dtype=np.float64)
     if not np.isfinite(values).all():
         raise InputError("map", got="gaps", remedy="fill them, or cut the map to the measured region")
-    return np.concatenate([[omega_bar.size, u_bar.size], omega_bar, u_bar, values.ravel()])
+    known = np.ones_like(values)
+    if measured is not None:
+        known = np.asarray(measured.transpose("omega_bar", "u_bar").values, dtype=np.float64)
+    return np.concatenate([[omega_bar.size, u_bar.size], omega_bar, u_bar, values.ravel(), known.ravel()])

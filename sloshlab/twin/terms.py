@@ -101,6 +101,9 @@ class ForceKind:
         The law states the sliding force for DIRECTION = ±1; the engine sticks where that is enough to hold.
     moves_with_place : bool
         Its first two states are a displacement and a velocity, which start as those of its place.
+    remarks : callable or None
+        (term, times, motion of its place (n, 3), its memory (n, n_memory)) → lines on a finished simulation, for
+        example that it left the region in which the force is known.
     check : callable or None
         Raises InputError for parameters that contradict each other.
     equation : str
@@ -122,6 +125,7 @@ class ForceKind:
     uses_acceleration: bool = False
     dry_friction: bool = False
     moves_with_place: bool = False
+    remarks: Callable[[Term, FloatArray, FloatArray, FloatArray], tuple[str, ...]] | None = None
     check: Callable[[Mapping[str, float]], None] | None = None
     equation: str = ""
 

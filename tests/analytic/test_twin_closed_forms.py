@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from scipy.special import ellipk
 
 from sloshlab.twin.excitation import free, harmonic, harmonic_force, recorded, stepped_sine
@@ -12,13 +13,19 @@ from sloshlab.twin.structure import Structure, modal_structure, single_degree_of
 from sloshlab.twin.structure_forces import (
     ASYMMETRIC_FRICTION,
     CLEARANCE,
+    CONSTANT_FORCE,
     COULOMB_FRICTION,
     CUBIC_STIFFNESS,
     MASS_ERROR,
+    MISSING_MODE,
     QUADRATIC_DRAG,
+    QUADRATIC_STIFFNESS,
+    STIFFNESS_CHANGE,
+    STRIBECK_FRICTION,
     VISCOUS_DAMPING,
 )
-from sloshlab.twin.tank_forces import BOUNCING_BALL
+from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS
+from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
 M, K = 2.241, 3808.8
@@ -99,6 +106,7 @@ def test_friction_of_guide_and_tank_adds_up_where_nothing_moves_the_base() -> No
     np.testing.assert_allclose(result.displacement_m, one.displacement_m, atol=1e-14)
     np.testing.assert_allclose(result.forces_n.sum(axis=1), one.forces_n[:, 0], atol=1e-9)
     assert result.forces_n[-1, 0] * 0.17 == pytest.approx(result.forces_n[-1, 1] * 0.2)
+    assert result.forces_n[-1].sum() == pytest.approx(K * result.displacement_m[-1], rel=1e-9)  # at rest it holds
 
 
 def test_asymmetric_friction_is_friction_and_a_constant_force() -> None:
@@ -139,6 +147,67 @@ def test_cubic_spring_has_the_period_of_the_elliptic_integral() -> None:
     x = result.displacement_m
     crossings = (down + x[down] / (x[down] - x[down + 1])) / 4000.0
     assert np.diff(crossings).mean() == pytest.approx(period, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("term", "stiffness", "mass", "mean_m"),
+    [
+        (STIFFNESS_CHANGE(stiffness_n_per_m=-700.0), K - 700.0, M, 0.0),
+        (CONSTANT_FORCE(force_n=2.0), K, M, 2.0 / K),
+        (EFFECTIVE_MASS(beta=-0.8, liquid_mass_kg=0.18), K, M - 0.8 * 0.18, 0.0),
+        (EFFECTIVE_MASS(beta=0.3, liquid_mass_kg=0.18), K, M + 0.3 * 0.18, 0.0),
+    ],
+)
+def test_linear_terms_change_frequency_and_mean(term: Term, stiffness: float, mass: float, mean_m: float) -> None:
+    result = rig().with_term(term).simulate(free(0.5, 8000.0), initial_displacement_m=0.01)
+    expected = mean_m + (0.01 - mean_m) * np.cos(np.sqrt(stiffness / mass) * result.time_s)
+    np.testing.assert_allclose(result.displacement_m, expected, atol=1e-8)
+
+
+def test_quadratic_spring_turns_where_its_potential_energy_is_that_of_the_release() -> None:
+    """K x²/2 + k₂ x³/3 at both turning points: less far on the stiffer side."""
+    k2, x0 = 6e4, 0.02
+    result = (
+        rig()
+        .with_term(QUADRATIC_STIFFNESS(stiffness_n_per_m2=k2))
+        .simulate(free(0.5, 8000.0), initial_displacement_m=x0)
+    )
+    roots = np.roots([k2 / 3, K / 2, 0.0, -(K / 2 * x0**2 + k2 / 3 * x0**3)])
+    other = max(root.real for root in roots if root.real < 0)
+    assert result.displacement_m.min() == pytest.approx(other, rel=1e-5)
+    assert result.displacement_m.min() < -1.2 * x0
+    assert result.displacement_m.max() == pytest.approx(x0, rel=1e-12)
+
+
+def test_a_missing_mode_makes_two_degrees_of_freedom() -> None:
+    """Released with the mass of the mode at rest beside the tank: both masses deflected alike."""
+    f, zeta, mass = 8.0, 0.03, 0.4
+    k, c, x0 = mass * (2 * np.pi * f) ** 2, 2 * zeta * mass * 2 * np.pi * f, 0.01
+    term = MISSING_MODE(frequency_hz=f, damping_ratio=zeta, participation=mass)
+    result = rig().with_term(term).simulate(free(1.0, 8000.0), initial_displacement_m=x0)
+    inverse = np.diag([1 / M, 1 / mass])
+    lower = np.hstack([-inverse @ [[K + k, -k], [-k, k]], -inverse @ [[c, -c], [-c, c]]])
+    system = np.vstack([np.eye(4)[2:], lower])
+    at = slice(0, None, 400)
+    expected = [(expm(system * t) @ [x0, x0, 0.0, 0.0])[:2] for t in result.time_s[at]]
+    np.testing.assert_allclose(result.displacement_m[at], [x[0] for x in expected], atol=1e-9)
+    np.testing.assert_allclose(result.memory[at, 0], [x[1] for x in expected], atol=1e-9)
+
+
+def test_stribeck_friction_holds_with_its_static_force_and_slides_with_its_curve() -> None:
+    """Held below F_s/K; beyond, energy is lost to F(v) as the curve says, here by quadrature over each sample."""
+    kinetic, static, v_s = 0.3, 0.9, 0.05
+    twin = rig().with_term(STRIBECK_FRICTION(coulomb_n=kinetic, static_n=static, stribeck_velocity_m_per_s=v_s))
+    held = twin.simulate(free(0.2, 2000.0), initial_displacement_m=0.99 * static / K)
+    assert np.ptp(held.displacement_m) == 0.0
+    slid = twin.simulate(free(0.07, 20000.0), initial_displacement_m=5 * static / K)  # less than half a period
+    x, v = slid.displacement_m, slid.velocity_m_per_s
+    assert (v[1:] < 0).all()
+    lost = np.trapezoid(kinetic + (static - kinetic) * np.exp(-((v / v_s) ** 2)), -x)
+    energy = 0.5 * M * v**2 + 0.5 * K * x**2
+    assert energy[0] - energy[-1] == pytest.approx(lost, rel=1e-5)
+    # between the two forces, far enough from both for any slip of the curve to show
+    assert 1.02 * kinetic < lost / (x[0] - x[-1]) < 0.9 * static
 
 
 def test_mass_that_is_added_is_solved_for_and_not_lagged() -> None:

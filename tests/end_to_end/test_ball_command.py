@@ -97,6 +97,25 @@ def test_files_of_a_decay(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixtu
         assert result["loss_factor"].attrs["long_name"]
 
 
+def test_the_frozen_decay_gives_the_guide(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The true guide has 0.30 N and 1.20 kg/s; the rig file says 0.37 and 1.58."""
+    true_rig = Rig.from_toml_text(RIG.replace("0.37", "0.30").replace("1.58", "1.20"))
+    ball = BouncingBall(0.0244, 1103.0, 13.04, 74.04, 0.0017)
+    runs = []
+    for name, inside in (("frozen", None), ("sloshing", ball)):
+        decay = simulated_decay(inside, true_rig, 0.03, 2.5, sampling_rate_hz=RATE_HZ)
+        runs.append(str(write_decay(tmp_path / f"{name}.nc", decay.acceleration_m_per_s2,
+                                    decay.interface_force_n, configuration=name)))  # fmt: skip
+    out = tmp_path / "out"
+    assert run(["ball", *runs, "--rig", str(rig), "-o", str(out), "--generations", "1", "--json"]) == 3
+    flags = json.loads(capsys.readouterr().out.strip().splitlines()[-1])["flags"]
+    assert any("structure.coulomb_force_n is stated as 0.37; frozen decay: 0.3" in flag for flag in flags)
+    assert any("structure.damping_kg_per_s is stated as 1.58; frozen decay: 1." in flag for flag in flags)
+    assert not any("stiffness_n_per_m is stated" in flag for flag in flags)
+    assert (out / "figures" / "guide.png").is_file()
+    assert "The guide" in (out / "report.html").read_text(encoding="utf-8")
+
+
 def test_a_decay_that_never_decays(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     time = np.arange(2400) / RATE_HZ
     recording = write_decay(tmp_path / "steady.nc", 20 * np.cos(2 * np.pi * 6.5 * time))
@@ -158,6 +177,8 @@ def test_a_ball_comes_back_from_its_own_decay(
     assert run(["ball", str(recording), "--rig", str(rig), "-o", str(out), "--damper", damper]) in (0, 3)
     with xr.open_dataset(out / "ball.nc") as result:
         assert result["ball_damping_ratio"].values == pytest.approx(result["damping_ratio"].values, rel=0.03)
+        if damper == "always":  # in contact only the search ends in a neighbouring valley
+            assert result["ball_value"].values == pytest.approx([0.0244, 1103.0, 13.04, 74.04, 0.0017], rel=1e-3)
     names = {path.stem for path in (out / "figures").glob("*.png")}
     assert names == {"decay", "sloshing_force", "damping_shares", "loss_factors", "hysteresis", "maps", "lines"}
     assert "Not drawn" not in (out / "report.html").read_text(encoding="utf-8")

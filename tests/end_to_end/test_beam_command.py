@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from short_runs import DONE_BUT_FLAGGED, refusal
 
+from acquisition.virtual_laboratory.cantilever import fitted_to
 from pipelines import experiments
 from pipelines.beam import analyse_beam, checked_settings
 from pipelines.beam_outputs import write_beam
@@ -131,6 +132,22 @@ def test_report_and_figures_are_complete(results: Path) -> None:
     assert "http" not in page.replace("https://doi.org", "")
 
 
+def test_the_structural_update_is_written_down(results: Path) -> None:
+    """The laboratory's beam is a uniform one of the same material and dimensions."""
+    true = fitted_to(beam_runs.FREQUENCIES_HZ[0], 0.74, 0.10, 0.01)
+    with xr.open_dataset(results / "modal.nc") as modal:
+        measured = modal["measured_frequency_hz"].values
+        # damped frequencies are written down
+        undamped = np.array(beam_runs.FREQUENCIES_HZ) / np.sqrt(1 - np.array(beam_runs.DAMPING_RATIOS) ** 2)
+        assert measured == pytest.approx(undamped, rel=5e-5)
+        # the frequencies written down are those of Table 2.4, not of a uniform beam: two parameters, three modes
+        assert modal["natural_frequency_hz"].values == pytest.approx(measured, rel=0.02)
+        assert float(modal["tip_mass_kg"]) == pytest.approx(true.tip_mass_kg, rel=0.1)
+        assert float(modal["tip_mass_kg_std"]) < 0.3 * true.tip_mass_kg
+        assert float(modal["youngs_modulus_pa"]) == pytest.approx(70e9, rel=0.05)
+        assert modal["tip_mass_kg_std"].attrs["long_name"].startswith("standard error")
+
+
 def test_the_summary_for_machines_is_the_last_line(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -237,6 +254,13 @@ def driven(recording: xr.Dataset) -> xr.Dataset:
     return recording
 
 
+def of_another_frequency(recording: xr.Dataset) -> xr.Dataset:
+    time = recording["time"].values
+    for name in recording.data_vars:
+        recording[name].values[:] = 20.0 * np.exp(-time) * np.cos(2 * np.pi * 30.0 * time)
+    return recording
+
+
 def of_a_shaker(recording: xr.Dataset) -> xr.Dataset:
     return recording.assign_attrs(experiment="shaker_sweep")
 
@@ -252,6 +276,7 @@ def of_a_guide(recording: xr.Dataset) -> xr.Dataset:
         (without_places, ("acceleration_beam_2", "x_m", "remedy")),
         (at_the_root, ("cannot see", "mode 2", "remedy")),
         (driven, ("an amplitude that falls", "remedy")),
+        (of_another_frequency, ("got 30 Hz", "7.609 … 15.22 Hz", "remedy")),
         (of_a_shaker, ("'shaker_sweep'", "beam_free", "remedy")),
         (of_a_guide, ("'sdof_free'", "beam_free", "remedy")),
     ],
@@ -291,6 +316,7 @@ def test_one_sensor_is_enough_for_one_mode(folder: Path, tmp_path: Path) -> None
         (("--cycles", "1"), ("--cycles", "≥ 2")),
         (("--segment-s", "-3"), ("--segment-s", "> 0")),
         (("--segment-s", "50"), ("random run", "at least 2")),
+        (("--segment-s", "1e9"), ("random run", "at least 2 fit", "remedy")),
     ],
 )
 def test_options_out_of_range(
@@ -302,6 +328,21 @@ def test_options_out_of_range(
 ) -> None:
     arguments = ["beam", str(folder / "random_sloshing.nc"), "--rig", str(folder / "rig_beam.toml")]
     refusal(capsys, [*arguments, "-o", str(tmp_path / "out"), *more], tmp_path / "out", *fragments)
+
+
+def test_more_cycles_per_stretch_than_there_are(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """6 s at 10.87 Hz are 65 cycles."""
+    arguments = ["beam", str(folder / "decay_frozen.nc"), "--rig", str(folder / "rig_beam.toml"), "--cycles", "66"]
+    arguments += ["-o", str(tmp_path / "out")]
+    refusal(capsys, arguments, tmp_path / "out", "got 65", "at least 66", "fewer cycles")
+
+
+def test_a_guide_has_one_mode(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    beam_runs.make_guide_folder(tmp_path / "guide")
+    arguments = [*experiments.beam_arguments(tmp_path / "guide", tmp_path / "out"), "--modes", "2"]
+    refusal(capsys, arguments, tmp_path / "out", "number of modes", "1 on a guide")
 
 
 def test_a_run_given_twice_is_refused(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -220,6 +220,27 @@ def test_a_simulation_ends_at_a_long_gap_and_says_so(folder: Path, tmp_path: Pat
     assert (found["quality"].values[3000:] & LOST).all()
 
 
+def test_motion_beyond_the_measured_map_is_flagged_with_when_and_where(
+    folder: Path, tmp_path: Path, capsys: Any
+) -> None:
+    """The release of 64 mm in a tank of 60 mm is beyond ū = 1 at once; a map up to ū = 2 has all of it."""
+    for name, largest in (("short", 1.0), ("wide", 2.0)):
+        axes = {"omega_bar": np.linspace(0.5, 20.0, 40), "u_bar": np.linspace(0.0, largest, 11)}
+        ones = xr.DataArray(np.ones((40, 11)), coords=axes, dims=("omega_bar", "u_bar"))
+        xr.Dataset({"w_bar": ones, "beta": -0.5 * ones}).to_netcdf(tmp_path / f"{name}.nc", engine="netcdf4")
+        text = rig_with("sdof", "viscous", f'maps = "{name}.nc"\nmetric = "map"')
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    simulated(tmp_path / "wide.toml", folder / "sdof_free.nc", tmp_path / "wide_sim.nc")
+    command = ["simulate", "--rig", str(tmp_path / "short.toml"), "--input", str(folder / "sdof_free.nc")]
+    capsys.readouterr()
+    assert run([*command, "-o", str(tmp_path / "sim.nc")]) == DONE_BUT_FLAGGED
+    said = [line for line in capsys.readouterr().err.splitlines() if "viscous_map" in line]
+    assert len(said) == 1
+    assert "outside of the measured region" in said[0]
+    assert "first at t = 0 s" in said[0]
+    assert "u_bar 1.07" in said[0]
+
+
 def test_a_stated_deflection_that_the_measured_one_contradicts_is_flagged(
     folder: Path, tmp_path: Path, capsys: Any
 ) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import runpy
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -82,3 +84,21 @@ def test_modes_of_three_hammer_blows_agree(hammer: list[np.ndarray]) -> None:
     assert np.ptp(frequencies) < 1e-3 * frequencies.mean()
     assert np.ptp(damping) < 0.2 * damping.mean()
     assert (damping > 0).all()
+
+
+def test_the_worked_example_prints_what_its_page_says(
+    external_data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    needed = ("sloshing_decay/xData.mat", "hammer/measurements_3.npy")
+    if not all((external_data / name).is_file() for name in needed):
+        pytest.skip(f"no {' or '.join(needed)} among the recordings of other laboratories")
+    docs = Path(__file__).parents[2] / "docs"
+    script = docs / "examples" / "decays_of_other_laboratories.py"
+    monkeypatch.setattr(sys, "argv", [str(script), str(external_data)])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(script), run_name="__main__")
+    assert ended.value.code == 0
+    rows = [row for row in capsys.readouterr().out.splitlines() if row]
+    assert len(rows) == 6 + 5 + 1
+    page = (docs / "beam.md").read_text(encoding="utf-8")
+    assert [row for row in rows if row not in page] == []

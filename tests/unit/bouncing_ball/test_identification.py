@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from bouncing_rigs import shaker
+from bouncing_rigs import guided_tank, shaker
 from scipy.stats import t as student_t
 
 from sloshlab.bouncing_ball.ball import BouncingBall
 from sloshlab.bouncing_ball.frequency_error import FrequencyBand, error_by_frequency, summary
 from sloshlab.bouncing_ball.from_work_line import work_line
-from sloshlab.bouncing_ball.harmonic_response import HarmonicRun, w_bar_at
+from sloshlab.bouncing_ball.harmonic_response import HarmonicRun, response_map, w_bar_at
 from sloshlab.bouncing_ball.identification import IdentifiedBall, SearchSettings, identified
 from sloshlab.bouncing_ball.search_space import SearchSpace
 from sloshlab.errors import AnalysisError, InputError
@@ -49,6 +49,38 @@ def test_linear_least_squares_and_its_intervals() -> None:
         assert one.is_determined
     assert found.flags == ()
     assert found.rms == pytest.approx(np.sqrt(left @ left / 40), rel=1e-4)
+
+
+def test_ends_of_a_curved_interval_are_where_the_sum_of_squares_has_grown() -> None:
+    """S = A² (e^{3(x − x₀)} − 1)² + B² Σ (others)² + S₀ with S₀ = 40 e²: ends at x₀ + ln(1 ± t √(S₀/40)/A)/3."""
+    answer, a, e = np.array([0.5, 0.5, 0.6, 0.45, 0.55]), 1.0, 0.15
+
+    def residuals(ball: BouncingBall) -> FloatArray:
+        off = SPACE.point(ball) - answer
+        return np.concatenate([[a * np.expm1(3 * off[0])], 2 * off[1:], np.full(40, e)])
+
+    one = identified(residuals, SPACE, SETTINGS).intervals[0]
+    growth = student_t.ppf(0.95, 40) * e / a
+    for end, sign in ((one.low, -1), (one.high, 1)):
+        moved = answer.copy()
+        moved[0] += np.log1p(sign * growth) / 3
+        # the root of the growth is met within 5 %
+        assert end - one.value == pytest.approx(SPACE.parameter(0, moved) - one.value, rel=0.07)
+    assert one.value - one.low > 1.2 * (one.high - one.value)
+    assert one.profile_ratio == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_parameter_that_the_data_do_not_hold_has_no_ends() -> None:
+    generator = np.random.default_rng(2)
+    error = 0.1 * generator.standard_normal(40)
+    matrix = generator.standard_normal((40, 5)) * [1, 1, 1e-3, 1, 1]
+
+    def residuals(ball: BouncingBall) -> FloatArray:
+        return matrix @ (SPACE.point(ball) - 0.5) + error
+
+    intervals = identified(residuals, SPACE, SETTINGS).intervals
+    assert [one.is_determined for one in intervals] == [True, True, False, True, True]
+    assert (intervals[2].low, intervals[2].high) == (-np.inf, np.inf)
 
 
 def test_a_parameter_at_its_bound_is_one_clear_line() -> None:
@@ -131,6 +163,40 @@ def test_errors_by_frequency_are_those_of_the_windows() -> None:
     others = [band for band in bands if not band.is_tuned]
     assert sum(band.n_windows for band in others) == 4
     assert [band.error_mean for band in others] == pytest.approx([0.1, 0.1])
+    assert [band.error_rms for band in others] == pytest.approx([0.1, 0.1])
+    first = simulated[:2]
+    assert others[0].ball_rms == pytest.approx(np.hypot(*first) / np.sqrt(2))
+    assert others[0].measured_rms == pytest.approx(np.hypot(*(first - 0.1)) / np.sqrt(2))
+
+
+def soft_ball() -> BouncingBall:
+    """Strikes so hard, where the tank shakes much, that its weak penalty does not hold it."""
+    return BouncingBall(0.026, 1000.0, 1.0, 0.001, 0.1)
+
+
+def test_where_the_ball_leaves_its_tank_nothing_is_compared() -> None:
+    rig, run = guided_tank(), HarmonicRun(4, 2, 100)
+    omega_bar, u_bar = np.array([2.0, 4.0, 4.1, 6.0, 6.1]), np.array([0.1, 0.1, 2.0, 0.05, 3.0])
+    bands, simulated = error_by_frequency(
+        soft_ball(), rig, omega_bar=omega_bar, u_bar=u_bar, w_bar=np.full(5, 0.5), tuned_omega_bar=4.0, n_bands=2,
+        run=run,
+    )  # fmt: skip
+    assert np.isnan(simulated).tolist() == [False, False, True, False, True]
+    assert [(band.n_windows, band.n_outside) for band in bands] == [(1, 0), (1, 1), (1, 1)]
+    assert all(np.isfinite(band.error_rms) for band in bands)
+    assert np.isfinite(summary(bands)).all()
+    maps = response_map(soft_ball(), rig, np.array([0.006, 0.12]), np.array([8.0]), run)
+    assert np.isnan(maps["loss_factor"].values).tolist() == [[False, True]]
+
+
+def test_a_band_without_a_window_to_compare_is_not_a_number() -> None:
+    bands, _ = error_by_frequency(
+        soft_ball(), guided_tank(), omega_bar=np.array([4.0, 6.0]), u_bar=np.array([0.1, 3.0]),
+        w_bar=np.full(2, 0.5), tuned_omega_bar=4.0, n_bands=2, run=HarmonicRun(4, 2, 100),
+    )  # fmt: skip
+    assert [(band.n_windows, band.n_outside) for band in bands] == [(1, 0), (0, 1)]
+    assert np.isnan(bands[1].error_rms)
+    assert np.isnan(summary(bands)[1])
 
 
 def test_summary_weighs_bands_by_their_windows() -> None:

@@ -100,6 +100,14 @@ def test_everything_lost_is_said_not_raised():
     assert math.isnan(quality.channels[0].rms)
 
 
+def test_numbers_whose_squares_cannot_be_held_are_told_not_raised():
+    run = swept_tank(noise=0.01)
+    run["force_cell_1"] = run["force_cell_1"].astype(np.float64)
+    run["force_cell_1"][100] = 1e200
+    one = by_name(quality_of(run), "force_cell_1")
+    assert (one.maximum, one.rms) == (1e200, math.inf)
+
+
 def test_a_short_run_is_not_compared_and_says_so():
     quality = quality_of(swept_tank(duration_s=0.1))
     assert quality.accelerometers is None

@@ -64,6 +64,8 @@ def test_displacement_is_turned_into_acceleration() -> None:
         (np.zeros(3000), "a constant signal"),
         (DECAY[:120], "at least 5 cycles"),
         (np.where(TIME_S == 1.0, np.nan, DECAY), "1 samples missing"),
+        (1e-120 * DECAY, r"a range of 9\.804e-119; allowed"),
+        (1e120 * DECAY, r"a range of 9\.804e\+121; allowed"),
     ],
 )
 def test_what_is_no_decay_is_refused_in_one_line(signal: np.ndarray, match: str) -> None:
@@ -89,6 +91,64 @@ def test_a_motion_that_is_driven_again_is_no_decay() -> None:
     envelope = np.interp(TIME_S, [0.0, 4.0, 6.0], [0.0, -2.0, 0.2])
     with pytest.raises(AnalysisError, match="an amplitude that falls"):
         analyse_free_decay(np.exp(envelope) * np.cos(2 * np.pi * 10.0 * TIME_S), RATE_HZ)
+
+
+def held_by_friction(offset: float) -> tuple[np.ndarray, float]:
+    """A motion of 10 Hz from 50 under dry friction, and when it ends: half cosines about ±`offset`, then nothing.
+
+    The acceleration over −ω² is the distance from the side's equilibrium; it falls by 2 `offset` per half cycle.
+    """
+    half = np.floor(20.0 * TIME_S)
+    sign = np.where(half % 2 == 0, 1.0, -1.0)
+    left = 50.0 - offset - 2 * offset * half
+    end_s = np.ceil((50.0 / offset - 1) / 2) / 20.0
+    return np.where(left > 0, sign * left * np.cos(2 * np.pi * 10.0 * TIME_S - np.pi * half), 0.0), float(end_s)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.3])
+def test_a_motion_that_friction_holds_is_read_until_there(level: float) -> None:
+    """At level 0 all samples after it are exactly 0, and a parabola through them has no curvature."""
+    motion, end_s = held_by_friction(0.9)
+    decay = analyse_free_decay(motion + level, RATE_HZ)
+    assert decay.release.rest_s == pytest.approx(end_s, abs=1.5 / RATE_HZ)
+    for one in decay.readings:
+        assert one.used.any()
+        assert one.time_s.max() <= end_s
+        for values in (one.damping_ratio_std, one.frequency_hz_std, one.acceleration_amplitude_m_per_s2):
+            assert np.isfinite(values).all()
+        # friction of a constant force takes 4 X x_f per cycle: ζ = 2 x_f/(π X), to first order in x_f/X
+        clear = one.used & (one.acceleration_amplitude_m_per_s2 > 20.0)
+        assert one.damping_ratio[clear] == pytest.approx(
+            2 * 0.9 / (np.pi * one.acceleration_amplitude_m_per_s2[clear]), rel=0.06
+        )
+
+
+def test_where_the_phase_asks_for_an_extremum_that_is_not_there_the_decrement_is_marked() -> None:
+    """At the end of a decay over six decades the edge of the record moves the phase by half a cycle."""
+    time = np.arange(4680) / 1024.0
+    motion = 65.0 * np.exp(-0.0415 * 2 * np.pi * 10.86 * time) * np.cos(2 * np.pi * 10.86 * time)
+    one = analyse_free_decay(motion, 1024.0).log_decrement
+    assert one.damping_ratio[one.used] == pytest.approx(0.0415 / np.hypot(1, 0.0415), rel=0.01)
+    assert Trust.NO_EXTREMUM in one.trust
+    assert (one.time_s[one.trust == Trust.NO_EXTREMUM] > 4.3).all()
+
+
+def test_a_sensor_that_is_silent_for_a_while_is_no_division_by_zero() -> None:
+    """A parabola through zeros has no curvature."""
+    silent = np.where((TIME_S > 2.0) & (TIME_S < 2.6), 0.0, DECAY)
+    for one in analyse_free_decay(silent, RATE_HZ).readings:
+        assert np.isfinite(one.damping_ratio_std).all()
+        assert np.isfinite(one.frequency_hz_std).all()
+
+
+def test_a_mode_that_is_not_there_is_not_taken_for_the_foot_of_another() -> None:
+    with pytest.raises(AnalysisError, match="got 10 Hz; allowed: 14 … 20 Hz, where the mode is looked for"):
+        analyse_free_decay(DECAY, RATE_HZ, frequency_range_hz=(14.0, 20.0))
+
+
+def test_stretches_longer_than_the_decay_are_refused() -> None:
+    with pytest.raises(AnalysisError, match=r"got 60\.0 cycles of 10 Hz; allowed: at least 61, one stretch"):
+        analyse_free_decay(DECAY, RATE_HZ, n_cycles=61)
 
 
 def test_a_burst_within_the_decay_spoils_only_itself() -> None:

@@ -39,8 +39,17 @@ def test_visibility_is_the_inverse_of_the_gain_of_noise() -> None:
     assert 1 / one.visibility == pytest.approx(scatter, rel=0.01)
 
 
+def test_visibility_is_over_the_largest_deflection() -> None:
+    one = modal_filter(np.diag([0.5, 0.5]), sensor_names=("a", "b"), largest_deflection=np.array([0.5, -2.0]))
+    assert one.visibility == pytest.approx([1.0, 0.25])
+    with pytest.raises(AnalysisError, match=r"cannot see mode 2: got visibility 0\.01;"):
+        modal_filter(np.eye(2), sensor_names=("a", "b"), largest_deflection=np.array([1.0, 100.0]))
+
+
 def test_conditioning_of_orthogonal_and_of_similar_shapes() -> None:
     assert modal_filter(np.eye(2), sensor_names=("a", "b")).condition_number == pytest.approx(1.0)
+    # the scale of a mode says nothing of how well it is told from others
+    assert modal_filter(np.diag([1.0, 50.0]), sensor_names=("a", "b")).condition_number == pytest.approx(1.0)
     # columns at an angle of 0.1 rad: singular values √2 cos 0.05 and √2 sin 0.05
     similar = np.array([[1.0, np.cos(0.1)], [0.0, np.sin(0.1)]])
     assert modal_filter(similar, sensor_names=("a", "b")).condition_number == pytest.approx(1 / np.tan(0.05))

@@ -45,6 +45,15 @@ def test_shapes_are_scaled_to_the_tip_values_and_are_those_of_an_independent_bea
     assert found.mode_shapes[-1] == pytest.approx([1.0, -0.5, 2.0])
 
 
+def test_the_scale_of_the_tip_values_does_not_change_what_the_sensors_see() -> None:
+    plain = rig_modal_filter(rig(BEAM.replace("[1.0, -0.5, 2.0]", "[1.0, 1.0, 1.0]")), PLACES_M)
+    scaled = rig_modal_filter(rig(BEAM), PLACES_M)
+    assert scaled.visibility == pytest.approx(plain.visibility)
+    assert scaled.condition_number == pytest.approx(plain.condition_number)
+    # the first mode is largest at its tip
+    assert rig_modal_filter(rig(BEAM), {"acceleration_tip": 0.74}, n_modes=1).visibility == pytest.approx(1.0)
+
+
 def test_modes_kept_are_the_first() -> None:
     assert stated_modes(rig(BEAM), 2).names == ("mode 1", "mode 2")
     assert rig_modal_filter(rig(BEAM), {"acceleration_tip": 0.74}, n_modes=1).weights == pytest.approx(1.0)
@@ -57,6 +66,15 @@ def test_a_guide_has_one_mode_with_the_liquid_frozen() -> None:
     modes = stated_modes(rig(GUIDE))
     assert modes.names == ("guide",)
     assert modes.frequency_hz[0] == pytest.approx(np.sqrt(3808.8 / (2.061 + 0.124326)) / (2 * np.pi), rel=1e-5)
+    damped = stated_modes(rig(GUIDE + "damping_kg_per_s = 1.58\n"))
+    # b₁/(2 √(K m)) = 1.58/(2 · 91.23 kg/s)
+    assert damped.damping_ratio[0] == pytest.approx(0.00866, rel=1e-3)
+
+
+def test_a_guide_has_no_second_mode() -> None:
+    assert stated_modes(rig(GUIDE), 1).names == ("guide",)
+    with pytest.raises(AnalysisError, match="number of modes: got 2; allowed: 1 on a guide"):
+        stated_modes(rig(GUIDE), 2)
 
 
 def test_places_not_stated_are_tip_and_root() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,11 @@ import xarray as xr
 from sloshlab.errors import RigError
 from sloshlab.rig import Rig
 from sloshlab.twin import rate_independent_forces, tank_models
-from sloshlab.twin.excitation import free, harmonic
+from sloshlab.twin.excitation import free, harmonic, stepped_sine
 from sloshlab.twin.law import VELOCITY, law
+from sloshlab.twin.structure import single_degree_of_freedom
+from sloshlab.twin.structure_forces import VISCOUS_DAMPING
+from sloshlab.twin.tank_forces import VISCOUS_MAP, table_of
 from sloshlab.twin.tank_models import tank_model, tank_terms
 from sloshlab.twin.terms import _KINDS, ForceKind, Parameter, Term, register
 from sloshlab.twin.twin import Twin
@@ -110,6 +114,71 @@ def test_maps_are_continued_constant_beyond_the_measured_region(folder: Path) ->
     work = -(result.work_of_terms_j[-1, 0] - result.work_of_terms_j[-4001, 0]) / 10
     w_bar = work / (LIQUID_KG * (u0 * 2 * math.pi * f) ** 2)
     assert 1 + 3.9 * 0.02 < w_bar < 1 + 4.8 * 0.12
+
+
+def test_motion_that_leaves_the_measured_region_is_remarked_with_when_and_where(folder: Path) -> None:
+    """At ω̄ = 3, ū goes from 0.3 to 0.6 by a quintic that reaches 0.5, the edge, where 6x⁵ − 15x⁴ + 10x³ = 2/3."""
+    rig = rig_of("viscous", 'maps = "maps.nc"\nmetric = "map"\neffective_mass = true\ntime_constant_s = 1.0')
+    tank = Twin.from_rig(rig, folder=folder).tank_alone()
+    f, levels = 3.0 * SCALE / (2 * math.pi), np.array([0.3, 0.6]) * HEIGHT_M * (3.0 * SCALE) ** 2
+    motion = stepped_sine([f, f], list(levels), dwell_s=2.0, change_s=2.0, sampling_rate_hz=4000.0)
+    remarks = tank.simulate(motion).require_done().remarks
+    assert len(remarks) == 2
+    found = [
+        re.search(r"outside .* for (\S+) % .* t = (\S+) s \(omega_bar (\S+), u_bar (\S+)\)", r) for r in remarks
+    ]
+    x = np.roots([6, -15, 10, 0, 0, -2 / 3])
+    edge = 4.0 + 2.0 * float(x[(abs(x.imag) < 1e-9) & (x.real > 0) & (x.real < 1)].real[0])
+    for name, match in zip(("viscous_map", "effective_mass_map"), found, strict=True):
+        assert match is not None, remarks
+        assert match.string.startswith(name)
+        share, time, omega_bar, u_bar = (float(number) for number in match.groups())
+        assert share == pytest.approx(100 * (8.0 - edge) / 8.0, rel=0.02)
+        assert time == pytest.approx(edge, abs=0.05)  # the amplitude is one of present v and a
+        assert omega_bar == pytest.approx(3.0, rel=0.02)
+        assert u_bar == pytest.approx(0.5, rel=0.01)
+    assert tank.simulate(harmonic(0.3 * HEIGHT_M, f, 1.0, 4000.0)).remarks == ()
+
+
+@pytest.mark.parametrize(
+    ("omega_bar", "u_bar", "said"),
+    [(4.5, 0.05, "outside"), (3.0, 0.05, ""), (3.0, 0.01, "below"), (5.5, 0.3, "outside"), (1.7, 0.3, "outside")],
+)
+def test_gaps_and_edges_of_a_map_are_told_apart(folder: Path, omega_bar: float, u_bar: float, said: str) -> None:
+    """Measured from ū = 0.04 on, and with a corner unmeasured at ω̄ ≥ 4, ū ≤ 0.08."""
+    with xr.open_dataset(folder / "maps.nc") as source:
+        maps = source.load()
+    maps["w_bar"][0, :, :2] = np.nan
+    maps.to_netcdf(folder / "cut.nc", engine="netcdf4")
+    f = omega_bar * SCALE / (2 * math.pi)
+    rig = rig_of("viscous", f'maps = "cut.nc"\nmetric = "map"\nfrequency_hz = {f}\ntime_constant_s = 1.0')
+    tank = Twin.from_rig(rig, folder=folder).tank_alone()
+    remarks = tank.simulate(harmonic(u_bar * HEIGHT_M, f, 20 / f, 200 * f)).remarks
+    assert [said in remark for remark in remarks] == ([True] if said else [])
+    shares = [re.search(r"for (\S+) % of the time, first at t = 0 s", remark) for remark in remarks]
+    assert all(share is not None and float(share[1]) > 90 for share in shares), remarks
+
+
+def test_a_damper_that_follows_the_motion_does_so_from_the_release_on() -> None:
+    """A constant map is a constant damper; at the release v = 0 and a is largest, which is no high frequency."""
+    table = table_of(
+        xr.DataArray(
+            np.full((2, 2), 1.2), coords={"omega_bar": [1, 6], "u_bar": [0, 2]}, dims=("omega_bar", "u_bar")
+        )
+    )
+    mass, stiffness, liquid_kg, height_m = 2.241, 3808.8, 0.18, 0.06
+    omega = math.sqrt(stiffness / mass)
+    rig, run = Twin(single_degree_of_freedom(mass, stiffness)), free(math.pi / omega, 20000.0)
+    following = VISCOUS_MAP(
+        liquid_mass_kg=liquid_kg, height_m=height_m, start_frequency_hz=omega / (2 * math.pi), table=table
+    )
+    constant = VISCOUS_DAMPING(place="tank", damping_n_s_per_m=liquid_kg / math.pi * omega * 1.2)
+    found, expected = (
+        rig.with_term(term).simulate(run, initial_displacement_m=0.02) for term in (following, constant)
+    )
+    lost = 0.02 - abs(expected.displacement_m[-1])
+    assert abs(found.displacement_m[-1] - expected.displacement_m[-1]) < 0.15 * lost
+    assert found.remarks == ()
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from sloshlab.twin.rig_beam import base_participation_kg, beam_of_rig, scale_rem
 from sloshlab.twin.sensors import Sensor
 from sloshlab.twin.status import Status
 from sloshlab.twin.storage import load_twin, save_twin
-from sloshlab.twin.structure import modal_structure, single_degree_of_freedom
+from sloshlab.twin.structure import Structure, modal_structure, single_degree_of_freedom
 from sloshlab.twin.structure_forces import COULOMB_FRICTION, QUADRATIC_DRAG, VISCOUS_DAMPING
 from sloshlab.twin.tank_forces import (
     BOUNCING_BALL,
@@ -70,6 +70,14 @@ OWN_DRAG = register(
 
 def sdof() -> Twin:
     return Twin(single_degree_of_freedom(2.241, 3808.8))
+
+
+def beam() -> Structure:
+    return modal_structure([10.0, 70.0, 200.0], [0.0] * 3, [1.0] * 3, mode_shape=[1.0] * 3)
+
+
+def rubbing_twice() -> Twin:
+    return sdof().with_term(COULOMB_FRICTION(force_n=0.4)).with_term(COULOMB_FRICTION(place="tank", force_n=0.1))
 
 
 def run(twin: Twin) -> object:
@@ -296,8 +304,9 @@ def test_a_ball_that_leaves_its_tank_is_reported() -> None:
         (lambda: Sensor("x", noise_std=-1.0), "noise_std"),
         (lambda: sdof().simulate(free(1.0, 100.0), initial_displacement_m=np.nan), "initial_displacement_m"),
         (lambda: run(sdof().with_term(BOUNCING_BALL(**{**BALL, "liquid_mass_kg": 3.0}))), "negative"),
-        (lambda: sdof().simulate(free(2000.0, 20000.0)), "40000001 samples of 16 numbers, 4.8 GiB"),
+        (lambda: Twin(beam()).simulate(free(2000.0, 20000.0)), "40000001 samples of 16 numbers, 4.8 GiB"),
         (lambda: run(Twin(modal_structure([1.0], [0.0], [1.0], mode_shape=[1.0]))), "base participation"),
+        (lambda: run(rubbing_twice()), "at structure and tank while the base moves; allowed: one place"),
     ],
 )  # fmt: skip
 def test_contradictions_are_refused_in_one_line(make, message: str) -> None:  # type: ignore[no-untyped-def]
