@@ -60,7 +60,7 @@ class Delays:
         Examples
         --------
         >>> Delays.tapped(2, 1)
-        Delays(inputs=(1, 2), outputs=(1,))
+        Delays(inputs=(1, 2), outputs=(1,), n_states=0)
         """
         first = 0 if with_present else 1
         return cls(tuple(range(first, n_inputs + 1)), tuple(range(1, n_outputs + 1)))
