@@ -7,20 +7,18 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from scipy.io import netcdf_file
 
 from sloshlab.atomic_file import replaced
-from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.ensemble import Ensemble, ResidualSpread
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.regressors import Delays
-from sloshlab.reduced_order_model.storage import LARGEST_BYTES, SCALING
+from sloshlab.reduced_order_model.storage import SCALING, read_classic
 
 FORMAT: Final = 1
 
@@ -65,26 +63,7 @@ def load_ensemble(path: str | os.PathLike[str]) -> Ensemble:
     InputError
         If the file is missing, too large, damaged, or no ensemble.
     """
-    file = Path(path)
-    try:
-        size = file.stat().st_size
-        if size > LARGEST_BYTES:
-            raise InputError(f"ensemble {file}", got=f"{size} bytes", allowed=f"at most {LARGEST_BYTES}")
-        with netcdf_file(file, "r", mmap=False) as source:
-            return _ensemble(source)
-    except InputError as error:
-        raise error if str(file) in str(error) else _damaged(file, error) from error
-    except OSError as error:
-        raise InputError(
-            f"ensemble {file}", got=error.strerror or str(error), allowed="a readable file"
-        ) from error
-    except (TypeError, ValueError, KeyError, IndexError, AttributeError, AssertionError, MemoryError) as error:
-        raise _damaged(file, error) from error
-
-
-def _damaged(file: Path, error: Exception) -> InputError:
-    reason = " ".join(str(error).split())[:160]
-    return InputError(f"ensemble {file}", got=f"contents that are no ensemble ({reason})", remedy="train it again")
+    return read_classic(path, "ensemble", _ensemble)
 
 
 def _scaling(model: ReducedOrderModel) -> list[float]:
