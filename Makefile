@@ -7,9 +7,11 @@ RESULTS := results
 TRIAL_SEED ?= 1
 TRIAL_KEY ?= $(HOME)/.config/sloshlab/trial_$(TRIAL_SEED).key
 RECORDINGS := raw_data/numerical_tank/shaker
+ROM := $(RESULTS)/rom/ROM.nc
+BALLS :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker beam sdof bouncing-ball replay campaign tank-campaign pictures trial test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures trial test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -35,6 +37,16 @@ sdof: setup  ## the guided tank of raw_data/numerical_tank: damping and report
 
 bouncing-ball: setup  ## bouncing balls in place of the liquid of raw_data: parameters, maps, errors, reports (minutes)
 	$(BIN)/python -m pipelines.experiments ball raw_data $(RESULTS)/bouncing_ball
+
+rom: setup  ## the reduced-order model (70 delays, 35 neurons) of raw_data/numerical_tank and its validation report (minutes)
+	$(BIN)/python -m pipelines.experiments rom raw_data/numerical_tank/shaker $(RESULTS)/rom
+
+closed-loop: setup  ## the beam with the model of `make rom` (or ROM=file) and balls (BALLS=files) in its tank: report
+	$(BIN)/sloshlab beam raw_data/numerical_tank/beam/*.nc --rig raw_data/numerical_tank/beam/rig_beam.toml \
+	  --rom $(ROM) $(addprefix --ball ,$(BALLS)) -o $(RESULTS)/closed_loop || [ $$? -eq 3 ]
+
+rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
+	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study
 
 replay: setup  ## every recording of raw_data/shaker through simulated serial and CAN devices
 	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay

@@ -26,6 +26,7 @@ from sloshlab.rig import Rig
 FloatArray = npt.NDArray[np.float64]
 
 CONFIGURATIONS: Final = ("frozen", "empty", "sloshing")
+_SHORT: Final = {"reduced order model": "ROM"}
 METHODS: Final = ("log decrement", "envelope", "local sine fit")
 """Of reading a decay, in the order of `FreeDecay.readings`."""
 
@@ -297,6 +298,7 @@ def group_of(attributes: RunAttributes) -> str:
         return attributes.configuration
     forces = [one.strip() for one in str(more.get("simulated_forces", "")).split(",")]
     liquid = [one.removesuffix("(tank)").strip().replace("_", " ") for one in forces if one.endswith("(tank)")]
+    liquid = [_SHORT.get(one, one) for one in liquid]
     rig, what = PurePath(attributes.rig).stem, ", ".join(liquid) or "frozen"
     return f"twin {what}" if rig == what else f"twin {rig}: {what}"
 

@@ -13,8 +13,9 @@ import xarray as xr
 from scipy.signal import butter, resample_poly, sosfiltfilt
 
 from pipelines.beam_random import random_response
-from pipelines.beam_results import BeamRun, BeamSettings, ModeDecay, RandomResponse
+from pipelines.beam_results import BeamRun, BeamSettings, ModeDecay, RandomResponse, group_of
 from pipelines.outputs import sha256_of
+from pipelines.simulated_tank_model import departures_of
 from pipelines.sweep_stages import require_usable
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
@@ -119,7 +120,7 @@ def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
     motion = _motion(run, rig, is_random)
     its_filter, response = _modal_response(motion, rig, settings, rate_hz, is_random)
     modes = stated_modes(rig, settings.n_modes)
-    flags = [*motion.flags, *_residual_flags(run, its_filter, response, motion.tank)]
+    flags = [*motion.flags, *_residual_flags(run, its_filter, response, motion.tank), *_domain_flags(run)]
     return BeamRun(
         path=run.path,
         sha256=sha256_of(run.path),
@@ -226,6 +227,12 @@ def _residual_flags(
         f"{run.attributes.run_id}: the modes leave {', '.join(loud)} RMS unexplained, more than "
         f"{100 * _LARGEST_RESIDUAL_SHARE:.0f} % of the tank's acceleration; check gains, places and mode shapes"
     ]
+
+
+def _domain_flags(run: Loaded) -> list[str]:
+    """Where the tank model of a simulated run was beyond what it was trained on."""
+    name = f"{run.attributes.run_id} ({group_of(run.attributes)})"
+    return [f"{name}: {one}" for one in departures_of(run.attributes.model_extra or {})]
 
 
 def _decays(

@@ -110,6 +110,54 @@ def _ball(folder: Path, output: Path) -> int:
     return 0
 
 
+def rom_arguments(folder: Path, output: Path) -> list[str]:
+    """Arguments of `sloshlab train` for the runs of the tank filled half in a folder.
+
+    The longest VFA run trains, the shortest validates, still runs identify the dry mass, sweeps are tests.
+
+    Raises
+    ------
+    InputError
+        If there are not two VFA runs and a rig.
+    """
+    runs, rig, options = _rom_files(folder)
+    sweeps = [part for path in sorted(folder.glob("fill_0.50_sweep_*.nc")) for part in ("--test", str(path))]
+    return ["train", *runs, "--rig", str(rig), *options, *sweeps, "-o", str(output / "ROM.nc")]
+
+
+def study_arguments(folder: Path, output: Path) -> list[str]:
+    """Arguments of `sloshlab study` for the runs of the tank filled half in a folder."""
+    runs, rig, options = _rom_files(folder)
+    return ["study", *runs, "--rig", str(rig), *options, "-o", str(output)]
+
+
+def _rom_files(folder: Path) -> tuple[list[str], Path, list[str]]:
+    """Training and validation run, rig, and options for the still runs."""
+    vfa = sorted(folder.glob("fill_0.50_vfa_*.nc"), key=lambda path: (-path.stat().st_size, path.name))
+    rig = folder / "rig_fill_0.50.toml"
+    if len(vfa) < 2 or not rig.is_file():
+        raise InputError(
+            f"{folder}",
+            got=f"{len(vfa)} VFA runs filled half and {'a' if rig.is_file() else 'no'} rig file {rig.name}",
+            allowed="two VFA runs and the rig",
+            remedy="make them with `make tank-campaign`, or name the files to `sloshlab train`",
+        )
+    still = [path for kind in ("empty", "frozen") for path in sorted(folder.glob(f"fill_0.50_{kind}_*.nc"))]
+    return [str(vfa[0]), str(vfa[-1])], rig, [part for path in still for part in ("--still", str(path))]
+
+
+def _rom(folder: Path, output: Path) -> int:
+    """The reduced-order model and its report; a flagged result is a result."""
+    code = run(rom_arguments(folder, output))
+    return 0 if code == DONE_BUT_FLAGGED else code
+
+
+def _study(folder: Path, output: Path) -> int:
+    """The sensitivity study; it goes on where it was stopped."""
+    code = run(study_arguments(folder, output))
+    return 0 if code == DONE_BUT_FLAGGED else code
+
+
 def _replay(folder: Path, output: Path) -> int:
     """Every recording through simulated devices; any difference is a failure."""
     from pipelines.replayed_campaign import replayed_campaign
@@ -120,7 +168,15 @@ def _replay(folder: Path, output: Path) -> int:
     return 1 if summary["flags"] else 0
 
 
-EXPERIMENTS: Final = {"shaker": _shaker, "beam": _beam, "sdof": _beam, "ball": _ball, "replay": _replay}
+EXPERIMENTS: Final = {
+    "shaker": _shaker,
+    "beam": _beam,
+    "sdof": _beam,
+    "ball": _ball,
+    "rom": _rom,
+    "study": _study,
+    "replay": _replay,
+}
 
 
 if __name__ == "__main__":

@@ -5,21 +5,35 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
+from typing import Final, Protocol
+
+_REMEMBERED_S: Final = 3600.0
+"""Steps that take minutes still tell how long the rest takes."""
+
+
+class Advance(Protocol):
+    """Takes what is done, what there is to do, and a word on where things stand."""
+
+    def __call__(self, done: float, everything: float, note: str = "") -> None:
+        """Show it."""
+        ...
 
 
 @contextlib.contextmanager
-def amounts(description: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield a function that takes what is done and what there is to do; silent in a pipe."""
+def amounts(description: str) -> Iterator[Advance]:
+    """Yield a function that shows what is done of what there is to do; silent in a pipe."""
     if not sys.stderr.isatty():
-        yield lambda done, everything: None
+        yield lambda done, everything, note="": None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(description, total=None)
-        yield lambda done, everything: bar.update(task, completed=done, total=everything)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(),
+               TextColumn("{task.fields[note]}"))  # fmt: skip
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, speed_estimate_period=_REMEMBERED_S) as bar:
+        task = bar.add_task(description, total=None, note="")
+        yield lambda done, everything, note="": bar.update(task, completed=done, total=everything, note=note)
 
 
 @contextlib.contextmanager

@@ -11,22 +11,23 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
-from multiprocessing import get_context
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from acquisition.virtual_laboratory.worker_processes import Outcome, work_through
 from sloshlab import atomic_file
 from sloshlab._version import __version__
 from sloshlab.errors import AnalysisError, InputError, SloshlabError
 from sloshlab.reduced_order_model.regressors import Delays, Run
 from sloshlab.reduced_order_model.storage import save_model
-from sloshlab.reduced_order_model.training import TrainingSettings, fit
+from sloshlab.reduced_order_model.training import Epoch, TrainingSettings, fit
 
 RESULT_NAME: Final = "case.json"
 MODEL_NAME: Final = "model.nc"
+NEARLY_THE_SAME: Final = 1.02
+"""RMS errors that differ by less than this factor are not worth more parameters."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +60,28 @@ class StudyCase:
         kind = "" if self.network == "normalised_rbf" else f"_{self.network}"
         return f"{self.structure}_{middle}_{self.neurons}{kind}"
 
+    @property
+    def cost(self) -> float:
+        """About how long an epoch takes, in no unit; for the order of the cases and the time left."""
+        size = self.neurons * (self.delays + self.output_delays)
+        if self.output_delays:
+            return 20.0 * size**2  # sample by sample, first one step ahead and then free
+        return float(size**2) if self.network != "multilayer" else 5.0 * size**2
+
 
 SOURCE_CASES: Final = (
     *(StudyCase("nfir", delays, 0, neurons) for delays in (50, 60, 70) for neurons in range(5, 45, 5)),
     *(StudyCase("noe", 2, 2, neurons) for neurons in (10, 15, 20)),
 )
 """24 NFIR and 3 NOE, as in the source."""
+FURTHER_CASES: Final = (
+    StudyCase("nfir", 30, 0, 20),
+    StudyCase("nfir", 100, 0, 35),
+    StudyCase("nfir", 70, 0, 35, "rbf"),
+    StudyCase("nfir", 70, 0, 20, "multilayer"),
+    StudyCase("noe", 8, 2, 15),
+)
+"""Shorter and longer delay lines, the other networks, and an NOE with more delays of the velocity."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +109,11 @@ class CaseResult:
     ended: str
 
     @property
+    def is_trained(self) -> bool:
+        """Whether there is a model."""
+        return math.isfinite(self.validation_mse)
+
+    @property
     def mean_mse(self) -> float:
         """Mean of both, which is what the source shows."""
         return 0.5 * (self.training_mse + self.validation_mse)
@@ -106,6 +128,7 @@ class _Task:
     validation: tuple[Run, ...]
     sampling_rate_hz: float
     settings: TrainingSettings
+    facts: dict[str, Any] = field(default_factory=dict)
 
 
 def sensitivity_study(
@@ -117,7 +140,9 @@ def sensitivity_study(
     *,
     cases: Sequence[StudyCase] = SOURCE_CASES,
     n_workers: int = 2,
+    facts: Mapping[str, Any] | None = None,
     told: Callable[[CaseResult, int, int], None] | None = None,
+    watch: Callable[[float], None] | None = None,
 ) -> list[CaseResult]:
     """Train every case that has not been trained yet; return all results, the best by validation error first.
 
@@ -131,16 +156,22 @@ def sensitivity_study(
     cases : sequence of StudyCase
     n_workers : int
         Processes; each computes on one core.
+    facts : mapping, optional
+        Kept with every model.
     told : callable, optional
         Takes a result, how many are done, and how many there are.
+    watch : callable, optional
+        Takes the share of the whole study that is done, by the time it takes.
 
     Raises
     ------
     InputError
-        If there are no cases or no workers.
+        If there are no cases, or workers are none or too many.
+    KeyboardInterrupt
+        At Ctrl-C; cases that were done stay.
     """
-    if not cases or not 1 <= n_workers <= 256:
-        raise InputError("study", got=f"{len(cases)} cases, {n_workers} workers", allowed="at least one of each")
+    if not cases:
+        raise InputError("study", got="no cases", allowed="at least one")
     signals = _hash_of(training, validation, sampling_rate_hz, settings)
     tasks = [
         _Task(
@@ -151,62 +182,138 @@ def sensitivity_study(
             tuple(validation),
             sampling_rate_hz,
             settings,
+            dict(facts or {}),
         )
         for case in cases
     ]
     results = {task.case: known for task in tasks if (known := _known(task)) is not None}
-    missing = sorted((task for task in tasks if task.case not in results), key=_cost, reverse=True)
-    with _one_thread_each(), ProcessPoolExecutor(n_workers, mp_context=get_context("spawn")) as pool:
-        running: list[Future[CaseResult]] = [pool.submit(train_case, task) for task in missing]
-        try:
-            for done in as_completed(running):
-                result = done.result()
-                results[result.case] = result
-                if told is not None:
-                    told(result, len(results), len(tasks))
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return sorted(results.values(), key=lambda result: result.validation_mse)
+    missing = sorted((task for task in tasks if task.case not in results), key=lambda task: -task.case.cost)
+    shares = {task.case: 0.0 for task in missing}
+    everything = sum(case.cost for case in cases)
+
+    def progressed(number: int, share: float) -> None:
+        shares[missing[number].case] = share
+        if watch is not None:
+            done = sum(case.cost * shares.get(case, 1.0) for case in cases)
+            watch(done / everything)
+
+    def finished(number: int, outcome: Outcome) -> None:
+        case = missing[number].case
+        results[case] = outcome.result if not outcome.error else _failed(case, outcome.error)
+        progressed(number, 1.0)
+        if told is not None:
+            told(results[case], len(results), len(tasks))
+
+    with _one_thread_each():
+        work_through(train_case, missing, n_workers, progressed=progressed, finished=finished)
+    return sorted(results.values(), key=lambda result: (result.validation_mse, result.n_parameters))
 
 
-def train_case(task: _Task) -> CaseResult:
-    """Train one case and leave model and numbers in its folder; this is what a worker does."""
-    case = task.case
-    delays = Delays.tapped(case.delays, case.output_delays)
-    network: dict[str, Any] = {"n_neurons": case.neurons}
-    if case.network == "multilayer":
-        network = {"layers": str(case.neurons)}
+def train_case(task: _Task, say_share: Callable[[float], None]) -> CaseResult:
+    """Train one case and leave model and numbers in its folder; this is what a worker does.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If it was stopped; nothing is left behind then, so that the case is trained anew.
+    """
+    case, settings = task.case, task.settings
+    n_epochs = settings.n_starts * (settings.n_epochs + 1) * (2 if case.output_delays else 1)
+
+    def told(epoch: Epoch) -> None:
+        say_share(min(1.0, (epoch.start * n_epochs / settings.n_starts + epoch.number + 1) / n_epochs))
+
     try:
         model, record = fit(
             case.network,
-            network,
-            delays,
+            {"layers": str(case.neurons)} if case.network == "multilayer" else {"n_neurons": case.neurons},
+            Delays.tapped(case.delays, case.output_delays),
             task.training,
             task.validation,
             task.sampling_rate_hz,
-            task.settings,
+            settings,
+            told=told,
         )
+    except AnalysisError as error:
+        result = _failed(case, " ".join(str(error).split()))
+    else:
+        if record.interrupted:
+            raise KeyboardInterrupt
+        best = record.best
+        model.facts.update(task.facts)
+        model.facts.update(training_mse_n2=best.training_mse, validation_mse_n2=best.validation_mse)
         save_model(model, task.folder / MODEL_NAME)
         result = CaseResult(
             case,
-            record.best.training_mse,
-            record.best.validation_mse,
+            best.training_mse,
+            best.validation_mse,
             model.network.n_parameters,
             len(record.epochs),
             record.epochs[-1].elapsed_s,
             record.ended,
         )
-    except AnalysisError as error:
-        result = CaseResult(case, math.inf, math.inf, 0, 0, 0.0, " ".join(str(error).split()))
     content = {"made_of": task.made_of, "result": asdict(result)}
     atomic_file.write_bytes(task.folder / RESULT_NAME, (json.dumps(content, indent=1) + "\n").encode())
     return result
 
 
-def _cost(task: _Task) -> int:
-    case = task.case
-    return (case.neurons * (case.delays + case.output_delays)) ** 2
+def _failed(case: StudyCase, why: str) -> CaseResult:
+    return CaseResult(case, math.inf, math.inf, 0, 0, 0.0, why)
+
+
+@dataclass(frozen=True)
+class Pick:
+    """The model that the study recommends.
+
+    Attributes
+    ----------
+    best : CaseResult
+        Smallest validation error.
+    lighter : CaseResult
+        Fewest parameters among those with nearly the same error; may be the best itself.
+    reason : str
+        Why, in one line.
+    """
+
+    best: CaseResult
+    lighter: CaseResult
+    reason: str
+
+
+def picked(results: Sequence[CaseResult]) -> Pick:
+    """Pick by validation error, and say why.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+
+    Raises
+    ------
+    AnalysisError
+        If no case could be trained.
+    """
+    trained = sorted(
+        (one for one in results if one.is_trained),
+        key=lambda one: (one.validation_mse, one.n_parameters),
+    )
+    if not trained:
+        raise AnalysisError("study", got="no case that could be trained", remedy="see the reasons in its table")
+    best = trained[0]
+    near = [one for one in trained if one.validation_mse**0.5 <= NEARLY_THE_SAME * best.validation_mse**0.5]
+    lighter = min(near, key=lambda one: one.n_parameters)
+    error = best.validation_mse**0.5
+    reason = f"{best.case.name} has the smallest error on the validation runs, {error:.4g} N RMS"
+    if len(trained) > 1:
+        behind = 100 * (trained[1].validation_mse ** 0.5 / error - 1)
+        reason += f"; next is {trained[1].case.name}, {behind:.2g} % behind"
+    if lighter is not best:
+        more = 100 * (lighter.validation_mse**0.5 / error - 1)
+        reason += (
+            f"; lightest within {100 * (NEARLY_THE_SAME - 1):.0f} % is {lighter.case.name}, "
+            f"{lighter.n_parameters} "
+            f"instead of {best.n_parameters} parameters, {more:.2g} % behind"
+        )
+    return Pick(best, lighter, reason)
 
 
 def _hash_of(

@@ -20,6 +20,7 @@ from sloshlab.conditioning.combined_channels import (
     mean_acceleration,
     total_force,
 )
+from sloshlab.conditioning.quality import RunQuality
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.quantities import described
@@ -187,7 +188,21 @@ def _dry_recording(run: _Run, rig: Rig) -> xr.Dataset:
 
 def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings) -> RunResult:
     recording = read_recording(run.path)
-    quality = require_usable(recording, run.path)
+    signals, quality = sweep_signals(recording, run.path, rig, dry)
+    return analyse_sweep(recording, run.path, signals, settings, quality=quality, rig=rig, rig_name=run.rig_name)
+
+
+def sweep_signals(
+    recording: xr.Dataset, path: Path, rig: Rig, dry: DryMass | None
+) -> tuple[SweepSignals, RunQuality]:
+    """Force and motion of a run of a tank on the shaker, ready to be evaluated, and how good they are.
+
+    Raises
+    ------
+    AnalysisError
+        If the recording is unusable or has wrong signs.
+    """
+    quality = require_usable(recording, path)
     check_signs(_enough_for_signs(recording), rig)
     forces, accelerations = force_channels(recording), acceleration_channels(recording)
     gain = 1.0 if dry is None else dry.gain_ratio
@@ -201,7 +216,7 @@ def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings
         inertia_kg=mass,
         noise_power=_noise_power(recording, forces, accelerations, mass),
     )
-    return analyse_sweep(recording, run.path, signals, settings, quality=quality, rig=rig, rig_name=run.rig_name)
+    return signals, quality
 
 
 def _enough_for_signs(recording: xr.Dataset) -> xr.Dataset:

@@ -13,10 +13,12 @@ import xarray as xr
 
 from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
+from pipelines.simulated_tank_model import departure_attributes, with_tank_model
 from sloshlab.errors import InputError
 from sloshlab.recording import read_recording, run_attributes, write_recording
 from sloshlab.rig import Rig
 from sloshlab.twin.recorded_run import Drive, drive_of
+from sloshlab.twin.reduced_order_model_domain import departures
 from sloshlab.twin.rig_beam import scale_remarks
 from sloshlab.twin.simulated_channels import SimulatedRun, simulated_run
 from sloshlab.twin.simulation import Simulation
@@ -91,12 +93,14 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
             n_substeps=n_steps,
             watch=watch,
         ).require_done()
-    attributes = _attributes(settings, recording, drive, n_steps)
+    left = departures(simulation)
+    attributes = _attributes(settings, recording, drive, n_steps) | departure_attributes(left)
     simulated = simulated_run(simulation, recording, rig, attributes=attributes, seed=settings.seed)
     write_recording(simulated.recording, settings.output, encoding=_encoding(simulated.recording))
     if settings.save_twin is not None:
         save_twin(twin, settings.save_twin)
-    return _summary(settings, rig, recording, drive, simulation, simulated, n_steps)
+    summary = _summary(settings, rig, recording, drive, simulation, simulated, n_steps)
+    return with_tank_model(summary, simulation, left)
 
 
 def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:

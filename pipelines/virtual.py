@@ -25,6 +25,8 @@ from sloshlab.errors import InputError
 from sloshlab.rig import Rig
 
 LIQUIDS: Final = ("law", "numerical")
+RANDOM_LOWEST_HZ: Final = 8.0
+"""Of random motion of the shaker; lower frequencies would use up the stroke."""
 EXPERIMENTS: Final = (*SHAKER_EXPERIMENTS, *STRUCTURE_EXPERIMENTS)
 
 
@@ -45,6 +47,7 @@ class VirtualRun:
     sampling_rate_hz: float | None
     initial_displacement_m: float | None
     rms_g: float
+    second_frequency_hz: float = 14.7
 
     def settings(self) -> dict[str, Any]:
         """Arguments of the laboratory's own function."""
@@ -60,8 +63,12 @@ class VirtualRun:
             chosen["rms_g"] = self.rms_g
         else:
             chosen |= {"acceleration_g": self.acceleration_g, "direction": self.direction, "law": self.law}
-        if self.experiment == "sudden_start":
+        if self.experiment in ("sudden_start", "shaker_two_tone"):
             chosen["start_hz"] = self.frequency_hz
+        if self.experiment == "shaker_random":
+            chosen["start_hz"] = RANDOM_LOWEST_HZ
+        if self.experiment == "shaker_two_tone":
+            chosen["stop_hz"] = self.second_frequency_hz
         return {name: value for name, value in chosen.items() if value is not None}
 
 

@@ -135,6 +135,32 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "ball_profile_ratio": Quantity("1", "growth of the sum of squares at the ends over the predicted one"),
     "ball_damping_ratio": Quantity("1", "share of critical damping with the ball, at the measured amplitudes"),
     "ball_w_bar": Quantity("1", "W̄ of the ball at the frequency and amplitude of each window"),
+    "start_number": Quantity("1", "which start of the training, from 0"),
+    "epoch_number": Quantity("1", "epoch within a start; 0 is before the first step"),
+    "training_rms_n": Quantity("N", "RMS error of the force on the training runs"),
+    "validation_rms_n": Quantity("N", "RMS error of the force of a free run on the validation runs"),
+    "study_case": Quantity("1", "name of a case: structure, delays, neurons"),
+    "structure": Quantity("1", "nfir, without feedback, or noe"),
+    "network": Quantity("1", "normalised_rbf, rbf or multilayer"),
+    "n_input_delays": Quantity("1", "delays of the velocity"),
+    "n_output_delays": Quantity("1", "delays of the fed-back force"),
+    "n_neurons": Quantity("1", "neurons of the hidden layer"),
+    "n_parameters": Quantity("1", "parameters of the network"),
+    "n_epochs": Quantity("1", "epochs of the training, the one before the first step included"),
+    "training_s": Quantity("s", "time of the training"),
+    "ended": Quantity("1", "why the training ended, or failed"),
+    "is_kept": Quantity("1", "1 at the epoch whose model was kept"),
+    "predicted_w_bar": Quantity("1", "W̄ of the force that a model predicts for the same motion", "W̄"),
+    "predicted_beta": Quantity("1", "β of the force that a model predicts for the same motion", "β"),
+    "w_bar_difference": Quantity("1", "W̄ predicted − measured"),
+    "beta_difference": Quantity("1", "β predicted − measured"),
+    "residual_test": Quantity(
+        "1", "what the residual is correlated with: its own past, or powers of the velocity"
+    ),
+    "lag_s": Quantity("s", "time by which the other signal comes earlier"),
+    "residual_correlation": Quantity("1", "correlation of the residual with another signal, −1 … 1"),
+    "residual_band": Quantity("1", "half-width of the 95 % band of a correlation around zero"),
+    "residual_explained": Quantity("1", "share of the residual's variance that a linear filter would give"),
 }
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from acquisition.numerical_tank.computed_force import ComputedForce, computed_force
 from acquisition.numerical_tank.tank import Box, Liquid, TankSetup, filled_tank
-from acquisition.virtual_laboratory.shaker import Motion
+from acquisition.virtual_laboratory.tone_motion import TankMotion
 from sloshlab._version import __version__
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
@@ -97,14 +97,14 @@ class NumericalLiquid:
     finished: Callable[[ComputedForce], None] | None = None
 
     def force_n(
-        self, rig: Rig, motion: Motion, configuration: str, *, sampling_rate_hz: float, seed: int
+        self, rig: Rig, motion: TankMotion, configuration: str, *, sampling_rate_hz: float, seed: int
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Force of the liquid on the shaken tank, and what the recording says about it.
 
         Parameters
         ----------
         rig : Rig
-        motion : Motion
+        motion : TankMotion
             Of the tank.
         configuration : {'sloshing', 'frozen', 'empty'}
             Only a sloshing liquid is computed; a frozen one moves with the tank, F_S = −m_l ü.

@@ -11,6 +11,17 @@ from acquisition.virtual_laboratory.campaign import rig_name, rig_text
 HALF_FULL: Final = 0.50
 OTHER_FILLS: Final = (0.25, 0.75)
 HALF_FULL_ACCELERATIONS_G: Final = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)
+TRANSIENTS: Final = "transients"
+SUDDEN_STARTS: Final = (
+    (9.0, (2.0, 4.0)),
+    (10.0, (1.5, 3.0, 5.0)),
+    (11.0, (2.0, 4.0, 6.0)),
+    (12.0, (3.0, 5.0, 7.0)),
+    (13.0, (4.0, 6.0, 8.0)),
+)
+"""Frequency in Hz and levels in g, up to what the stroke allows."""
+SUDDEN_STARTS_BETWEEN: Final = ((9.5, (3.0,)), (10.5, (2.5, 4.5)), (11.5, (3.5, 6.0)), (12.5, (5.0,)))
+"""Between those, for the validation of what was trained on them."""
 OTHER_ACCELERATIONS_G: Final = (0.5, 1.5, 3.0, 4.0, 6.0)
 """From below the threshold over the rise and the maximum to the decline, within what the source shows."""
 
@@ -71,6 +82,8 @@ tank_model = "frozen"
 
 BEAM_RIG: Final = "beam/rig_beam.toml"
 SDOF_RIG: Final = "sdof/rig_sdof.toml"
+TRANSIENTS_RIG: Final = f"{TRANSIENTS}/{rig_name(HALF_FULL)}"
+SMALLER_DECAYS_RIG: Final = f"{TRANSIENTS}/rig_beam.toml"
 
 
 def _shaker_rig(fill_level: float) -> str:
@@ -79,6 +92,8 @@ def _shaker_rig(fill_level: float) -> str:
 
 RIG_TEXTS: Final[Mapping[str, str]] = {
     **{_shaker_rig(fill): rig_text(fill) for fill in (OTHER_FILLS[0], HALF_FULL, OTHER_FILLS[1])},
+    TRANSIENTS_RIG: rig_text(HALF_FULL),
+    SMALLER_DECAYS_RIG: _BEAM_TEXT,
     BEAM_RIG: _BEAM_TEXT,
     SDOF_RIG: _SDOF_TEXT,
 }
@@ -120,6 +135,7 @@ class NumericalRun:
 def numerical_runs() -> list[NumericalRun]:
     """All runs of the campaign."""
     listed = [*_half_full_runs(), *_other_fill_runs(), *_beam_runs(), *_sdof_runs()]
+    listed += [*_sudden_starts(), *_smaller_decays()]  # new ones at the end: seeds follow from the place
     return [NumericalRun(name, rig, number, settings) for number, (name, rig, settings) in enumerate(listed)]
 
 
@@ -190,3 +206,38 @@ def _sdof_runs() -> list[_Listed]:
         (f"sdof/decay_{configuration}", SDOF_RIG, {**decay, "configuration": configuration})
         for configuration in ("frozen", "sloshing")
     ]
+
+
+def _sudden_starts() -> list[_Listed]:
+    """From rest at once to one frequency and level, each twice."""
+    return [
+        _transient(
+            f"sudden_start_{frequency_hz:.1f}hz_{level_g:.2f}g_repeat_{repeat}",
+            experiment="sudden_start",
+            acceleration_g=level_g,
+            start_hz=frequency_hz,
+            duration_s=5.0,
+            repeat=repeat,
+        )
+        for frequency_hz, levels_g in (*SUDDEN_STARTS, *SUDDEN_STARTS_BETWEEN)
+        for level_g in levels_g
+        for repeat in (1, 2)
+    ]
+
+
+def _smaller_decays() -> list[_Listed]:
+    """Decays of the beam from smaller deflections than those of `_beam_runs`."""
+    decay = {"experiment": "beam_free", "configuration": "sloshing", "duration_s": 5.0}
+    return [
+        (
+            f"{TRANSIENTS}/beam_decay_{1e3 * deflection_m:.1f}mm_repeat_{repeat}",
+            SMALLER_DECAYS_RIG,
+            {**decay, "initial_displacement_m": -deflection_m, "repeat": repeat},
+        )
+        for deflection_m in (0.0065, 0.0100)
+        for repeat in (1, 2, 3)
+    ]
+
+
+def _transient(name: str, **settings: Any) -> _Listed:
+    return f"{TRANSIENTS}/fill_{HALF_FULL:.2f}_{name}", TRANSIENTS_RIG, {**settings, "configuration": "sloshing"}

@@ -30,18 +30,21 @@ from acquisition.virtual_laboratory.shaker import (
     SweepPlan,
     shaken,
 )
+from acquisition.virtual_laboratory.tone_motion import Accelerated, TankMotion, random_motion, two_tone_motion
 from sloshlab.errors import InputError
 from sloshlab.recording import CLIPPED, LOST, write_recording
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
-Experiment = Literal["shaker_sweep", "shaker_vfa", "sudden_start"]
+Experiment = Literal["shaker_sweep", "shaker_vfa", "sudden_start", "shaker_random", "shaker_two_tone"]
 Configuration = Literal["sloshing", "frozen", "empty"]
 
-EXPERIMENTS: Final = ("shaker_sweep", "shaker_vfa", "sudden_start")
+EXPERIMENTS: Final = ("shaker_sweep", "shaker_vfa", "sudden_start", "shaker_random", "shaker_two_tone")
+TONES: Final = {"shaker_random": random_motion, "shaker_two_tone": two_tone_motion}
 CONFIGURATIONS: Final = ("sloshing", "frozen", "empty")
 SWEEP_LAWS: Final = ("octave", "linear", "stepped")
 _LAW_OF_EXPERIMENT: Final[dict[str, Law]] = {"shaker_vfa": "vfa", "sudden_start": "constant"}
+_OTHER_EXPERIMENTS: Final = ("sudden_start", *TONES)
 START_TIME_UTC = "2026-01-12T09:00:00Z"
 _LARGEST_SAMPLES = 50_000_000
 
@@ -123,9 +126,11 @@ def virtual_shaker_run(
     ----------
     rig : Rig
         Tank and liquid as believed; the fill level chooses the liquid's law.
-    experiment : {'shaker_sweep', 'shaker_vfa', 'sudden_start'}
+    experiment : {'shaker_sweep', 'shaker_vfa', 'sudden_start', 'shaker_random', 'shaker_two_tone'}
         A VFA run (frequency and amplitude both vary) ignores `law` and `direction`; a sudden start, from
-        rest to `acceleration_g` at `start_hz` at once, also ignores `stop_hz`.
+        rest to `acceleration_g` at `start_hz` at once, also ignores `stop_hz`. Random motion has its band
+        between `start_hz` and `stop_hz` and an RMS of `acceleration_g`; two tones have these frequencies,
+        each with this amplitude. Both need a computed liquid.
     configuration : {'sloshing', 'frozen', 'empty'}
         What the tank holds.
     acceleration_g : float
@@ -180,6 +185,8 @@ def virtual_shaker_run(
         raise InputError("seed", got=str(seed), allowed="≥ 0")
     if not 0 <= n_clipped <= 1000:
         raise InputError("n_clipped", got=str(n_clipped), allowed="0 … 1000")
+    if experiment in TONES and numerical is None:
+        raise InputError("experiment", got=experiment, remedy="its liquid has no law; take a computed one")
     if experiment == "sudden_start":
         stop_hz = start_hz
     first, last = (start_hz, stop_hz) if direction == "up" else (stop_hz, start_hz)
@@ -198,11 +205,11 @@ def virtual_shaker_run(
         shaker = virtual_shaker(
             rig, plan, configuration=configuration, seed=seed, imperfect=imperfect, laboratory=laboratory
         )
-        moved, method = shaker.motion.at(time_s), dict[str, Any]()
-        external_force_n = shaker.external_force_n(time_s, moved)
+        along, method = shaker.motion.at(time_s), dict[str, Any]()
+        external_force_n = shaker.external_force_n(time_s, along)
+        moved: Accelerated = along
     else:
-        generator = np.random.default_rng([seed, 1])
-        motion = shaken(plan, Imperfections.drawn(generator, impact_phase_rad=None) if imperfect else None)
+        motion = _numerical_motion(experiment, plan, seed, imperfect)
         liquid_force_n, method = numerical.force_n(
             rig, motion, configuration, sampling_rate_hz=sampling_rate_hz, seed=seed
         )
@@ -217,14 +224,14 @@ def virtual_shaker_run(
     attributes = {
         "sloshlab_format": "1",
         "run_id": run_id or f"virtual_{experiment}_{configuration}_{acceleration_g:.2f}g_seed{seed}",
-        "experiment": "other" if experiment == "sudden_start" else experiment,
+        "experiment": "other" if experiment in _OTHER_EXPERIMENTS else experiment,
         "configuration": configuration,
         "rig": rig_name,
         "sampling_rate_hz": float(sampling_rate_hz),
         "start_time_utc": start_time_utc,
         "acceleration_g": float(acceleration_g),
         "repeat": int(repeat),
-        **_plan_attributes(plan),
+        **_plan_attributes(plan, experiment),
         **method,
     }
     return _dataset(time_s, readings, flags, attributes)
@@ -260,13 +267,23 @@ def _check_choice(what: str, got: str, allowed: tuple[str, ...]) -> None:
         raise InputError(what, got=repr(got), allowed=", ".join(allowed))
 
 
-def _plan_attributes(plan: SweepPlan) -> dict[str, Any]:
+def _numerical_motion(experiment: str, plan: SweepPlan, seed: int, imperfect: bool) -> TankMotion:
+    if experiment in TONES:
+        make = TONES[experiment]
+        return make(plan.acceleration_g, plan.start_hz, plan.stop_hz, plan.duration_s, seed=seed)
+    generator = np.random.default_rng([seed, 1])
+    return shaken(plan, Imperfections.drawn(generator, impact_phase_rad=None) if imperfect else None)
+
+
+def _plan_attributes(plan: SweepPlan, experiment: str) -> dict[str, Any]:
     attributes: dict[str, Any] = {
         "sweep_start_hz": float(plan.start_hz),
         "sweep_stop_hz": float(plan.stop_hz),
         "sweep_law": plan.law,
         "sweep_duration_s": float(plan.duration_s),
     }
+    if experiment in TONES:
+        return {**attributes, "sweep_law": experiment.removeprefix("shaker_")}
     if plan.law == "octave":
         attributes["sweep_rate_octave_per_s"] = plan.rate_octave_per_s
     if plan.law == "linear":
@@ -290,7 +307,7 @@ def _sample_times(duration_s: float, sampling_rate_hz: float, highest_hz: float)
 
 def _readings(
     external_force_n: FloatArray,
-    moved: Kinematics,
+    moved: Accelerated,
     time_s: FloatArray,
     laboratory: Laboratory,
     *,

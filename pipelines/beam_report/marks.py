@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from pipelines.beam_results import BeamExperiment
 
 _CONFIGURATION_COLOURS: Final = {"frozen": "#3b5b7a", "sloshing": "#d55e00", "empty": "#009e73"}
-_TWIN_COLOURS: Final = ("#000000", "#0072b2", "#cc79a7", "#8a6d00", "#56b4e9", "#7a3b5b")
+_TWIN_COLOURS: Final = (
+    "#000000", "#0072b2", "#cc79a7", "#8a6d00", "#56b4e9", "#7a3b5b", "#00a06b", "#5b4bd0", "#9a9a9a", "#c2a500",
+)  # fmt: skip
 METHOD_MARKS: Final = {
     "log decrement": (DISTINCT_COLOURS[0], "o"),
     "envelope": (DISTINCT_COLOURS[2], "s"),

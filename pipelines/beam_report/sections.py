@@ -6,7 +6,14 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from pipelines.beam_report import figures_decay, figures_signals, figures_spectra, figures_twin, tables
+from pipelines.beam_report import (
+    figures_decay,
+    figures_signals,
+    figures_spectra,
+    figures_twin,
+    tables,
+    twin_damping,
+)
 from pipelines.beam_report.summary import sentences
 from pipelines.beam_results import BeamExperiment
 from pipelines.progress import progress
@@ -109,7 +116,10 @@ def _twin_section(experiment: BeamExperiment) -> SectionPlan:
     if any(run.is_simulated for run in experiment.random_runs):
         plans["random_against_twins"] = figures_twin.random_against_twins
     drawn = tuple(FigurePlan(name, partial(draw, experiment=experiment)) for name, draw in plans.items())
-    return SectionPlan("Twins", drawn, _present(tables.twin_table(experiment)))
+    shown = _present(
+        tables.twin_table(experiment), twin_damping.decay_table(experiment), twin_damping.random_table(experiment)
+    )
+    return SectionPlan("Twins", drawn, shown)
 
 
 def _random_section(experiment: BeamExperiment) -> SectionPlan:

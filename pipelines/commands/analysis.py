@@ -91,6 +91,14 @@ def beam(
         float | None,
         typer.Option(help="Segments of random runs in s; a sixth of the run if not given.", show_default=False),
     ] = None,
+    rom: Annotated[
+        list[Path] | None,
+        typer.Option("--rom", metavar="ROM.nc", help="Model to simulate the runs with.", show_default=False),
+    ] = None,
+    ball_table: Annotated[
+        list[Path] | None,
+        typer.Option("--ball", metavar="ball.toml", help="Ball to simulate the runs with.", show_default=False),
+    ] = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write modal.nc and spectra.nc only.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -99,6 +107,11 @@ def beam(
     from pipelines.beam_outputs import write_beam
 
     settings = checked_settings(modes=modes, n_cycles=cycles, segment_s=segment_s)
+    if rom or ball_table:
+        from pipelines.beam_twins import tank_models, twins_of_runs
+
+        twins = output / "twins"
+        runs = [*twins_of_runs(runs, rig, twins, tank_models(rom or [], ball_table or [], twins)), *runs]
     experiment = analyse_beam(runs, rig, settings)
     finish(write_beam(experiment, output, command=command_as_given(), report=not no_report), as_json)
 

@@ -21,8 +21,8 @@ def virtual(
     experiment: Annotated[
         str,
         typer.Argument(
-            help="shaker_sweep, shaker_vfa, sudden_start, beam_free, beam_random, sdof_free, "
-            "or campaign for a whole folder of raw_data."
+            help="shaker_sweep, shaker_vfa, sudden_start, shaker_random, shaker_two_tone, beam_free, "
+            "beam_random, sdof_free, or campaign for a whole folder of raw_data."
         ),
     ],
     output: OutputFile,
@@ -31,7 +31,8 @@ def virtual(
     acceleration_g: Annotated[float, typer.Option(help="Level of the sweep in g.")] = 3.0,
     direction: Annotated[str, typer.Option(help="up or down.")] = "up",
     law: Annotated[str, typer.Option(help="octave, linear or stepped.")] = "octave",
-    frequency_hz: Annotated[float, typer.Option(help="Of a sudden start, in Hz.")] = 11.4,
+    frequency_hz: Annotated[float, typer.Option(help="Of a sudden start or the first tone, in Hz.")] = 11.4,
+    second_frequency_hz: Annotated[float, typer.Option(help="Of the second tone, in Hz.")] = 14.7,
     initial_displacement_m: Annotated[
         float | None, typer.Option(help="Deflection from which a free run starts, in m.", show_default=False)
     ] = None,
@@ -81,6 +82,7 @@ def virtual(
         sampling_rate_hz=sampling_rate_hz,
         initial_displacement_m=initial_displacement_m,
         rms_g=rms_g,
+        second_frequency_hz=second_frequency_hz,
     )
     finish(laboratory.make_virtual_run(run, rig, output, checkpoint), as_json)
 

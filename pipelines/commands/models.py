@@ -7,60 +7,127 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import (
-    Json,
-    OutputFile,
-    app,
-    finish,
-)
+from pipelines.commands.application import Json, OutputFile, OutputFolder, app, command_as_given, finish
+
+Runs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="TRAIN.nc... VALID.nc",
+        help="Training runs, and one for validation at the end.",
+        show_default=False,
+    ),
+]
+ModelRig = Annotated[
+    Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
+]
+Still = Annotated[
+    list[Path] | None,
+    typer.Option("--still", metavar="RUN.nc", help="Empty or frozen run, for the dry mass.", show_default=False),
+]
+Test = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--test",
+        metavar="RUN.nc",
+        help="Further run for the report only; repeats set the ceiling, sweeps make the maps.",
+        show_default=False,
+    ),
+]
+Rate = Annotated[
+    float | None,
+    typer.Option("--rate-hz", help="Rate of the model; chosen from the runs if not given.", show_default=False),
+]
+Starts = Annotated[int, typer.Option(min=1, help="Trainings from different starts; the best is kept.")]
+StartSeed = Annotated[int, typer.Option("--seed", min=0, help="Of the starts.")]
 
 
 @app.command()
 def train(
-    runs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="TRAIN.nc... VALID.nc",
-            help="Training runs, and one for validation at the end.",
-            show_default=False,
-        ),
-    ],
-    rig: Annotated[
-        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
-    ],
+    runs: Runs,
+    rig: ModelRig,
     output: OutputFile,
-    still: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--still", metavar="RUN.nc", help="Empty or frozen run, for the dry mass.", show_default=False
-        ),
-    ] = None,
+    still: Still = None,
+    test: Test = None,
     model: Annotated[str, typer.Option(help="nfir (no feedback) or noe.")] = "nfir",
     delays: Annotated[int, typer.Option(min=1, help="Past velocities that the model sees.")] = 70,
     output_delays: Annotated[int, typer.Option(min=1, help="Past forces fed back, with noe.")] = 2,
     neurons: Annotated[int, typer.Option(min=1, help="Neurons of the hidden layer.")] = 35,
     network: Annotated[str, typer.Option(help="normalised_rbf, rbf or multilayer.")] = "normalised_rbf",
-    rate_hz: Annotated[
-        float | None,
-        typer.Option(help="Rate of the model; chosen from the runs if not given.", show_default=False),
-    ] = None,
+    rate_hz: Rate = None,
     epochs: Annotated[int, typer.Option(min=1, help="At most so many.")] = 60,
-    starts: Annotated[int, typer.Option(min=1, help="Trainings from different starts; the best is kept.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Of the starts.")] = 0,
+    starts: Starts = 1,
+    seed: StartSeed = 0,
+    memory_s: Annotated[
+        float | None,
+        typer.Option(help="Time constant of a slow state that the network sees, too.", show_default=False),
+    ] = None,
+    sudden_start: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="RUN.nc", help="Run from rest, for the break-up of the liquid.", show_default=False),
+    ] = None,
+    ensemble: Annotated[int, typer.Option(min=0, help="Members of an ensemble for intervals.")] = 0,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write the model only.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Reduced-order model of the liquid from runs on the shaker."""
-    from pipelines.train import ModelSettings, trained_model, write_model
-    from sloshlab.errors import InputError
+    """Reduced-order model of the liquid from runs on the shaker, and its validation report."""
+    from pipelines.train import ModelSettings, train_and_report
+    from pipelines.training_runs import RunFiles
     from sloshlab.reduced_order_model.training import TrainingSettings
 
-    if len(runs) < 2:
-        raise InputError(
-            "runs", got="one", allowed="TRAIN.nc... VALID.nc", remedy="give another run for validation"
-        )
-    wanted = ModelSettings(model, delays, output_delays, neurons, network, rate_hz)
+    files = RunFiles.of(runs, still or [], rig)
+    wanted = ModelSettings(
+        model, delays, output_delays, neurons, network, rate_hz, memory_s, tuple(sudden_start or ()), ensemble
+    )
     settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed)
-    finish(write_model(trained_model(runs[:-1], runs[-1:], still or [], rig, wanted, settings), output), as_json)
+    command = None if no_report else command_as_given()
+    finish(train_and_report(files, test or [], wanted, settings, output, command), as_json)
+
+
+@app.command()
+def validate(
+    rom: Annotated[Path, typer.Argument(metavar="ROM.nc", help="Model.", show_default=False)],
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN.nc...", help="Runs that it was not trained on.", show_default=False),
+    ],
+    rig: ModelRig,
+    output: OutputFolder,
+    still: Still = None,
+    test: Test = None,
+    as_json: Json = False,
+) -> None:
+    """Validation report of a model that is there already, on runs that it was not trained on."""
+    from pipelines.train import validate_model
+    from pipelines.training_runs import RunFiles
+
+    files = RunFiles((), tuple(runs), tuple(still or []), rig)
+    finish(validate_model(rom, files, test or [], output, command_as_given()), as_json)
+
+
+@app.command()
+def study(
+    runs: Runs,
+    rig: ModelRig,
+    output: OutputFolder,
+    still: Still = None,
+    cases: Annotated[str, typer.Option(help="'source': its 24 NFIR and 3 NOE, or 'all': more.")] = "all",
+    rate_hz: Rate = None,
+    epochs: Annotated[int, typer.Option(min=1, help="Of each case, at most so many.")] = 20,
+    starts: Starts = 1,
+    seed: StartSeed = 0,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="Processes, one case each.")] = 2,
+    as_json: Json = False,
+) -> None:
+    """Sensitivity study: many models, picked by validation error; goes on where it was stopped."""
+    from pipelines.study import StudySettings
+    from pipelines.study import study as carried_out
+    from pipelines.training_runs import RunFiles
+    from sloshlab.reduced_order_model.training import TrainingSettings
+
+    files = RunFiles.of(runs, still or [], rig)
+    settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed)
+    wanted = StudySettings(cases, rate_hz, workers)
+    finish(carried_out(files, output, wanted, settings, command=command_as_given()), as_json)
 
 
 @app.command()

@@ -7,18 +7,24 @@ the others is then that of the reduced problem, because the gradient of the line
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend
 from sloshlab.reduced_order_model.networks.network import Network, NormalSums
 
 FIRST_DAMPING: Final = 1e-3
 LARGEST_DAMPING: Final = 1e10
-_SMALLEST_DAMPING: Final = 1e-12
+_SMALLEST_DAMPING: Final = 1e-6
 _RIDGE: Final = 1e-10
 _FLOOR: Final = 1e-9
+_RATIO: Final = 4.0
+_MARKEDLY: Final = 1.01
 
 
 class LeastSquaresProblem(Protocol):
@@ -43,15 +49,18 @@ class OneStepProblem:
     network : Network
     blocks : callable
         Returns an iterator over (regressors, outputs), the same at every call.
+    is_delay_line : bool
+        Whether the regressors are past values of one signal, in order.
     """
 
     backend: ArrayBackend
     network: Network
     blocks: Callable[[], Iterator[tuple[Any, Any]]]
+    is_delay_line: bool = False
 
     def normal_sums(self, theta: Array) -> NormalSums:
         """Return Σ J Jᵀ, Σ J e, Σ e²."""
-        sums = self.network.normal_sums(self.backend.xp, theta)
+        sums = self.network.normal_sums(self.backend.xp, theta, is_delay_line=self.is_delay_line)
         for phi, target in self.blocks():
             sums.add(self.backend.asarray(phi), self.backend.asarray(target))
         return sums.sums()
@@ -105,26 +114,50 @@ def next_step(problem: LeastSquaresProblem, at: Step, xp: Any) -> Step | None:
 
     Notes
     -----
-    (H + λ diag H) Δθ = g; λ falls to a tenth after a step and grows tenfold until there is one (Marquardt 1963).
+    (H + λ diag H) Δθ = g (Marquardt 1963). H costs far more than a trial of λ, so the λ of least error is sought:
+    downwards from the last one if that lowers the error at all, else, or if smaller ones are worse, upwards.
     """
     sums = problem.normal_sums(at.theta)
     diagonal = xp.linalg.diagonal(sums.matrix)
     scale = xp.maximum(diagonal, _FLOOR * xp.max(diagonal))
-    damping = at.damping
-    while damping <= LARGEST_DAMPING:
-        damped = sums.matrix + xp.eye(scale.shape[0], dtype=scale.dtype, device=xp_device(scale)) * (
-            damping * scale[None, :]
-        )
-        change = xp.linalg.solve(damped, sums.gradient[:, None])[:, 0]
-        theta, squares = problem.improved(at.theta + change)
-        if squares < at.squares:
-            return Step(theta, squares, max(damping / 10, _SMALLEST_DAMPING))
-        damping *= 10
-    return None
+
+    def attempt(damping: float) -> Step:
+        change = _solved(xp, sums.matrix, damping * scale, sums.gradient)
+        if change is None:
+            return Step(at.theta, math.inf, damping)
+        return Step(*problem.improved(at.theta + change), damping)
+
+    found = attempt(at.damping)
+    if found.squares < at.squares:
+        lower = _best_along(attempt, found, at.squares, 1 / _RATIO)
+        return lower if lower is not found else _best_along(attempt, found, at.squares, _RATIO)
+    while not found.squares < at.squares:
+        if found.damping > LARGEST_DAMPING:
+            return None
+        found = attempt(found.damping * _RATIO)
+    return _best_along(attempt, found, at.squares, _RATIO)
 
 
-def xp_device(array: Array) -> Any:
-    """Return the device of an array."""
-    from array_api_compat import device
+def _best_along(attempt: Callable[[float], Step], best: Step, before: float, factor: float) -> Step:
+    """Change the damping by a factor as long as that gains markedly more."""
+    while _SMALLEST_DAMPING <= best.damping * factor <= LARGEST_DAMPING:
+        other = attempt(best.damping * factor)
+        if not before - other.squares > _MARKEDLY * (before - best.squares):
+            return best
+        best = other
+    return best
 
-    return device(array)
+
+def _solved(xp: Any, matrix: Array, added: Array, right: Array) -> Array | None:
+    """Solution of (matrix + diag added) x = right; None if rounding leaves that not positive definite."""
+    n = right.shape[0]
+    flat = xp.reshape(matrix, (-1,), copy=True)
+    flat[:: n + 1] = flat[:: n + 1] + added
+    damped = xp.reshape(flat, (n, n))
+    if not isinstance(damped, np.ndarray):
+        return xp.linalg.solve(damped, right[:, None])[:, 0]
+    try:
+        factor = cho_factor(damped, overwrite_a=True, check_finite=False)
+    except LinAlgError:
+        return None
+    return cho_solve(factor, right, check_finite=False)

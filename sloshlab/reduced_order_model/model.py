@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
+from sloshlab.reduced_order_model.break_up import BreakUp
 from sloshlab.reduced_order_model.networks.network import Network
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
 from sloshlab.reduced_order_model.regressors import Delays, Run, regressors, segments
@@ -48,6 +50,13 @@ class Scaling:
         return values * self.output_scale + self.output_offset
 
 
+def scaled_run(run: Run, scaling: Scaling, agitation: Agitation | None, sampling_rate_hz: float) -> Run:
+    """Return a run in the network's values, with the states of the liquid if the model has a memory of them."""
+    if agitation is None:
+        return scaling.scaled(run)
+    return replace(scaling.scaled(run), states=agitation.regressors(run.x, sampling_rate_hz))
+
+
 @dataclass(frozen=True)
 class ReducedOrderModel:
     """NFIR (no output delays) or NARX/NOE model of one input and one output.
@@ -62,6 +71,10 @@ class ReducedOrderModel:
         Of the samples that the delays count.
     facts : dict
         What it was trained on, and how; kept with it.
+    agitation : Agitation, optional
+        Memory of the liquid's state: slow states seen beside the delay line. A run then begins at rest.
+    break_up : BreakUp, optional
+        Memory of the liquid's state: a gain on the output. A run then begins at rest.
     """
 
     network: Network
@@ -70,8 +83,16 @@ class ReducedOrderModel:
     scaling: Scaling
     sampling_rate_hz: float
     facts: dict[str, Any] = field(default_factory=dict)
+    agitation: Agitation | None = None
+    break_up: BreakUp | None = None
 
     def __post_init__(self) -> None:
+        n_states = 0 if self.agitation is None else self.agitation.n_states
+        if self.delays.n_states != n_states or (self.agitation and len(self.agitation.scales) != n_states):
+            allowed = f"{self.delays.n_states} scaled states, as many as among the regressors"
+            raise InputError("memory of the model", got=f"{n_states} states", allowed=allowed)
+        if self.break_up is not None and self.delays.outputs:
+            raise InputError("memory of the model", got="a break-up and feedback", allowed="one of them")
         if self.theta.shape != (self.network.n_parameters,) or not np.isfinite(self.theta).all():
             raise InputError(
                 "parameters of the model",
@@ -103,15 +124,18 @@ class ReducedOrderModel:
             NaN where a regressor is not known.
         """
         chosen = backend or array_backend()
-        run = self.scaling.scaled(Run.of(x, y))
-        known = Run(run.x, np.nan_to_num(run.y) if not self.has_feedback else run.y)
+        run = scaled_run(Run.of(x, y), self.scaling, self.agitation, self.sampling_rate_hz)
+        known = run if self.has_feedback else replace(run, y=np.nan_to_num(run.y))
         theta, predicted = chosen.asarray(self.theta), np.full(run.x.size, np.nan)
         for first, last in segments(known, self.delays):
             for start in range(first, last, _BLOCK):
                 stop = min(start + _BLOCK, last)
                 phi = chosen.asarray(regressors(known, self.delays, start, stop))
                 predicted[start:stop] = chosen.to_numpy(self.network.output(chosen.xp, theta, phi))
-        return self.scaling.output_of(predicted)
+        outputs = self.scaling.output_of(predicted)
+        if self.break_up is not None:
+            outputs *= self.break_up.share(np.asarray(x, np.float64), self.sampling_rate_hz)
+        return outputs
 
     def simulate(self, x: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
         """Return ŷ of a free run: the model sees the input and its own outputs.
@@ -138,7 +162,7 @@ class ReducedOrderModel:
             return self.predict(values, np.zeros_like(values))
         outputs = np.zeros_like(values) if start is None else np.nan_to_num(np.asarray(start, np.float64))
         run = self.scaling.scaled(Run.of(values, outputs))
-        theta, n_neurons, kind = self._compiled()
+        theta, n_neurons, kind = self.compiled()
         simulated, delays = np.full(values.size, np.nan), self.delays
         for first, last in segments(run, delays):
             own = run.y.copy()
@@ -154,7 +178,14 @@ class ReducedOrderModel:
             simulated[first:last] = own[first:last]
         return self.scaling.output_of(simulated)
 
-    def _compiled(self) -> tuple[FloatArray, int, int]:
+    def compiled(self) -> tuple[FloatArray, int, int]:
+        """Parameters, neurons and number of the network for the compiled loops of a free run.
+
+        Raises
+        ------
+        AnalysisError
+            If the network has none.
+        """
         if not isinstance(self.network, NormalisedRadialBasis | RadialBasis):
             raise AnalysisError(
                 "model with feedback", got=self.network.kind, allowed="normalised_rbf, rbf", remedy="use NFIR"

@@ -27,10 +27,13 @@ class Delays:
         x(k − d) for each d ≥ 0.
     outputs : tuple of int
         y(k − d) for each d ≥ 1; empty for a model without feedback.
+    n_states : int
+        Slow states of the run that are seen beside them, without delay; only without feedback.
     """
 
     inputs: tuple[int, ...]
     outputs: tuple[int, ...] = ()
+    n_states: int = 0
 
     def __post_init__(self) -> None:
         for what, delays, least in (("input delays", self.inputs, 0), ("output delays", self.outputs, 1)):
@@ -40,6 +43,9 @@ class Delays:
                 raise InputError(what, got=got, allowed=f"different whole numbers {least} … {MOST_DELAYS}")
         if not self.inputs:
             raise InputError("input delays", got="none", allowed="at least one")
+        if not 0 <= self.n_states <= MOST_DELAYS or (self.n_states and self.outputs):
+            got = f"{self.n_states} states, {len(self.outputs)} output delays"
+            raise InputError("delays", got=got, allowed="states without output delays")
 
     @classmethod
     def tapped(cls, n_inputs: int, n_outputs: int = 0, *, with_present: bool = False) -> Delays:
@@ -54,7 +60,7 @@ class Delays:
         Examples
         --------
         >>> Delays.tapped(2, 1)
-        Delays(inputs=(1, 2), outputs=(1,))
+        Delays(inputs=(1, 2), outputs=(1,), n_states=0)
         """
         first = 0 if with_present else 1
         return cls(tuple(range(first, n_inputs + 1)), tuple(range(1, n_outputs + 1)))
@@ -62,7 +68,14 @@ class Delays:
     @property
     def n_regressors(self) -> int:
         """Length of φ."""
-        return len(self.inputs) + len(self.outputs)
+        return len(self.inputs) + len(self.outputs) + self.n_states
+
+    @property
+    def is_one_line(self) -> bool:
+        """Whether φ is a stretch of past inputs without holes, and nothing else."""
+        first = self.inputs[0]
+        only_inputs = not self.outputs and not self.n_states
+        return only_inputs and self.inputs == tuple(range(first, first + len(self.inputs)))
 
     @property
     def longest(self) -> int:
@@ -80,11 +93,14 @@ class Run:
         Input and output; NaN where nothing is known.
     name : str
         For messages.
+    states : ndarray, shape (n_states, n), optional
+        Slow states for the regressors; NaN where nothing is known.
     """
 
     x: FloatArray
     y: FloatArray
     name: str = "run"
+    states: FloatArray | None = None
 
     @classmethod
     def of(cls, x: ArrayLike, y: ArrayLike, name: str = "run") -> Run:
@@ -121,11 +137,13 @@ def segments(run: Run, delays: Delays) -> list[tuple[int, int]]:
     """
     n = run.x.size
     known = np.isfinite(run.y)
+    if delays.n_states:
+        known &= np.isfinite(states_of(run, delays)).all(axis=0)
     x_known, y_known = np.isfinite(run.x), np.isfinite(run.y)
     for of, ds in ((x_known, delays.inputs), (y_known, delays.outputs)):
         for delay in ds:
             known[:delay] = False
-            known[delay:] &= of[: n - delay]
+            known[delay:] &= of[: max(n - delay, 0)]  # none where the run is shorter
     edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
 
@@ -168,4 +186,21 @@ def regressors(run: Run, delays: Delays, start: int, stop: int) -> FloatArray:
     """
     rows = [run.x[start - delay : stop - delay] for delay in delays.inputs]
     rows += [run.y[start - delay : stop - delay] for delay in delays.outputs]
+    if delays.n_states:
+        rows += list(states_of(run, delays)[:, start:stop])
     return np.stack(rows)
+
+
+def states_of(run: Run, delays: Delays) -> FloatArray:
+    """Return the slow states of a run.
+
+    Raises
+    ------
+    InputError
+        If it has others than the delays speak of.
+    """
+    shape = (delays.n_states, run.x.size)
+    if run.states is None or run.states.shape != shape:
+        got = "none" if run.states is None else f"{run.states.shape}"
+        raise InputError(f"{run.name}: states", got=got, allowed=f"{shape}")
+    return run.states

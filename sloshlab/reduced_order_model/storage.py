@@ -8,20 +8,24 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from scipy.io import netcdf_file
 
 from sloshlab.atomic_file import replaced
 from sloshlab.errors import InputError
+from sloshlab.reduced_order_model.agitation import Agitation
+from sloshlab.reduced_order_model.break_up import BreakUp
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.regressors import Delays
 
 FORMAT: Final = 1
 LARGEST_BYTES: Final = 50_000_000
+Made = TypeVar("Made")
 SCALING: Final = ("input_offset", "input_scale", "output_offset", "output_scale")
 
 
@@ -38,6 +42,10 @@ def save_model(model: ReducedOrderModel, path: str | os.PathLike[str]) -> None:
         file.network = model.network.kind
         file.network_settings = json.dumps(model.network.settings(), sort_keys=True)
         file.facts = json.dumps(model.facts, sort_keys=True, ensure_ascii=True)
+        if model.agitation is not None:
+            file.agitation = json.dumps(model.agitation.facts(), sort_keys=True)
+        if model.break_up is not None:
+            file.break_up = json.dumps(model.break_up.facts(), sort_keys=True)
         scaling = [getattr(model.scaling, name) for name in SCALING]
         for name, values, kind in (
             ("theta", model.theta, "f8"),
@@ -59,24 +67,43 @@ def load_model(path: str | os.PathLike[str]) -> ReducedOrderModel:
     InputError
         If the file is missing, too large, damaged, or no model.
     """
+    return read_classic(path, "model", _model)
+
+
+def read_classic(path: str | os.PathLike[str], what: str, made_of: Callable[[Any], Made]) -> Made:
+    """Make something of a netCDF classic file whose contents may be anything.
+
+    Parameters
+    ----------
+    path : path
+    what : str
+        For messages, such as ``"model"``.
+    made_of : callable
+        (open file) → what is in it; may fail in any way that bad contents make it fail.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, too large, damaged, or not what it should be.
+    """
     file = Path(path)
     try:
         size = file.stat().st_size
         if size > LARGEST_BYTES:
-            raise InputError(f"model {file}", got=f"{size} bytes", allowed=f"at most {LARGEST_BYTES}")
+            raise InputError(f"{what} {file}", got=f"{size} bytes", allowed=f"at most {LARGEST_BYTES}")
         with netcdf_file(file, "r", mmap=False) as source:
-            return _model(source)
+            return made_of(source)
     except InputError as error:
-        raise error if str(file) in str(error) else _damaged(file, error) from error
+        raise error if str(file) in str(error) else _damaged(what, file, error) from error
     except OSError as error:
-        raise InputError(f"model {file}", got=error.strerror or str(error), allowed="a readable file") from error
+        raise InputError(f"{what} {file}", got=error.strerror or str(error), allowed="a readable file") from error
     except (TypeError, ValueError, KeyError, IndexError, AttributeError, AssertionError, MemoryError) as error:
-        raise _damaged(file, error) from error
+        raise _damaged(what, file, error) from error
 
 
-def _damaged(file: Path, error: Exception) -> InputError:
+def _damaged(what: str, file: Path, error: Exception) -> InputError:
     reason = " ".join(str(error).split())[:160]
-    return InputError(f"model {file}", got=f"contents that are no model ({reason})", remedy="train it again")
+    return InputError(f"{what} {file}", got=f"contents that are no {what} ({reason})", remedy="train it again")
 
 
 def _model(source: Any) -> ReducedOrderModel:
@@ -87,9 +114,11 @@ def _model(source: Any) -> ReducedOrderModel:
     facts = json.loads(source.facts)
     if not isinstance(settings, dict) or not isinstance(facts, dict):
         raise ValueError("attributes")
-    delays = Delays(
-        *(tuple(int(d) for d in variables.get(name, ())) for name in ("input_delays", "output_delays"))
+    agitation = Agitation.from_facts(json.loads(source.agitation)) if hasattr(source, "agitation") else None
+    inputs, outputs = (
+        tuple(int(d) for d in variables.get(name, ())) for name in ("input_delays", "output_delays")
     )
+    delays = Delays(inputs, outputs, 0 if agitation is None else agitation.n_states)
     return ReducedOrderModel(
         network_of(source.network.decode(), settings),
         variables["theta"].astype(np.float64),
@@ -97,4 +126,6 @@ def _model(source: Any) -> ReducedOrderModel:
         Scaling(*(float(value) for value in variables["scaling"])),
         float(variables["sampling_rate_hz"][0]),
         facts,
+        agitation,
+        BreakUp(**json.loads(source.break_up)) if hasattr(source, "break_up") else None,
     )

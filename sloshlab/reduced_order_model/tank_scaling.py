@@ -6,8 +6,9 @@ It works in similarity of ω̄ = Ω/√(g/h) and of the Froude number v̄ = v/�
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
@@ -20,6 +21,9 @@ HYPOTHESES: Final = (
     "both tanks are boxes",
 )
 _SAME_FILL: Final = 0.01
+_SAME: Final = 1e-9
+_NEEDED: Final = ("fill_level", "tank_height_m", "liquid_mass_kg")
+_LIQUID: Final = ("kinematic_viscosity_m2_per_s", "surface_tension_n_per_m", "density_kg_per_m3")
 
 
 @dataclass(frozen=True)
@@ -53,32 +57,75 @@ class TankScaling:
         InputError
             If the fill levels differ.
         """
-        levels = trained.liquid.fill_level, other.liquid.fill_level
-        if abs(levels[0] - levels[1]) > _SAME_FILL:
+        return cls.of_facts(tank_facts(trained), other)
+
+    @classmethod
+    def of_facts(cls, facts: Mapping[str, Any], other: Rig) -> TankScaling:
+        """Return the factors from the tank that a model remembers to another one.
+
+        Parameters
+        ----------
+        facts : mapping
+            As `tank_facts` gives them; fill level, height and mass must be there.
+        other : Rig
+
+        Raises
+        ------
+        InputError
+            If the facts do not tell the tank, or the fill levels differ.
+        """
+        level, height_m, mass_kg = (_stated(facts, name) for name in _NEEDED)
+        if abs(level - other.liquid.fill_level) > _SAME_FILL:
             raise InputError(
                 "fill level of the other tank",
-                got=f"{levels[1]:g}",
-                allowed=f"{levels[0]:g}, that of the tank the model was trained on",
+                got=f"{other.liquid.fill_level:g}",
+                allowed=f"{level:g}, that of the tank the model was trained on",
                 remedy="train a model at that fill level",
             )
-        height = other.tank.height_m / trained.tank.height_m
-        root = math.sqrt(height)
+        height = other.tank.height_m / height_m
+        root, now = math.sqrt(height), tank_facts(other)
+        viscosity, tension, density = (_ratio(facts.get(name), now[name]) for name in _LIQUID)
         return cls(
-            root,
-            root,
-            other.liquid_mass_kg / trained.liquid_mass_kg,
-            _ratio(trained.liquid.kinematic_viscosity_m2_per_s, other.liquid.kinematic_viscosity_m2_per_s)
-            * root
-            * height,
-            _ratio(trained.liquid.surface_tension_n_per_m, other.liquid.surface_tension_n_per_m)
-            * height**2
-            * other.liquid.density_kg_per_m3
-            / trained.liquid.density_kg_per_m3,
+            root, root, other.liquid_mass_kg / mass_kg, viscosity * root * height, tension * height**2 / density
         )
 
+    @property
+    def is_same(self) -> bool:
+        """Whether nothing has to be scaled."""
+        return max(abs(factor - 1) for factor in (self.time, self.velocity, self.force)) < _SAME
 
-def _ratio(before: float | None, after: float | None) -> float:
-    return before / after if before and after else math.nan
+
+def tank_facts(rig: Rig) -> dict[str, float | None]:
+    """Return what a model must remember of the tank that it is trained on.
+
+    Parameters
+    ----------
+    rig : Rig
+    """
+    return {
+        "fill_level": rig.liquid.fill_level,
+        "tank_height_m": rig.tank.height_m,
+        "liquid_mass_kg": rig.liquid_mass_kg,
+        **{name: getattr(rig.liquid, name) for name in _LIQUID},
+    }
+
+
+def _stated(facts: Mapping[str, Any], name: str) -> float:
+    value = facts.get(name)
+    if not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise InputError(
+            f"model: {name} of its training",
+            got=repr(value)[:40],
+            allowed="a positive number",
+            remedy="train it again",
+        )
+    return float(value)
+
+
+def _ratio(before: object, after: object) -> float:
+    if isinstance(before, int | float) and isinstance(after, int | float) and before and after:
+        return before / after
+    return math.nan
 
 
 def scaled_to(model: ReducedOrderModel, factors: TankScaling) -> ReducedOrderModel:
@@ -100,4 +147,12 @@ def scaled_to(model: ReducedOrderModel, factors: TankScaling) -> ReducedOrderMod
         old.output_scale * factors.force,
     )
     facts = {**model.facts, "scaled": {**vars(factors), "hypotheses": list(HYPOTHESES)}}
-    return replace(model, scaling=scaling, sampling_rate_hz=model.sampling_rate_hz / factors.time, facts=facts)
+    memory = model.agitation and model.agitation.scaled(time=factors.time, velocity=factors.velocity)
+    return replace(
+        model,
+        scaling=scaling,
+        sampling_rate_hz=model.sampling_rate_hz / factors.time,
+        facts=facts,
+        agitation=memory,
+        break_up=model.break_up and model.break_up.scaled(factors.time),
+    )

@@ -13,15 +13,19 @@ from numpy.typing import NDArray
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend, array_backend
+from sloshlab.reduced_order_model.early_stop import EarlyStop
 from sloshlab.reduced_order_model.least_squares import LeastSquaresProblem, OneStepProblem, Step, next_step
-from sloshlab.reduced_order_model.model import RUNAWAY, ReducedOrderModel, Scaling, delay_arrays
+from sloshlab.reduced_order_model.model import RUNAWAY, ReducedOrderModel, Scaling, delay_arrays, scaled_run
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.networks.network import Network, NormalSums
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
 
 FloatArray = NDArray[np.float64]
 BLOCK: Final = 1024
+_LINE_BLOCK: Final = 8192
+"""Samples at once where sums are correlations: enough stretches for quick products."""
 _LARGEST_INITIAL: Final = 20_000
 
 
@@ -34,7 +38,7 @@ class TrainingSettings:
     n_epochs : int
         At most.
     patience : int
-        Rises of the validation error one after another after which training stops.
+        Rises of the validation error one after another after which training stops (`EarlyStop`).
     n_starts : int
         Trainings from different random starts; the best by validation error is kept.
     seed : int
@@ -130,6 +134,7 @@ def fit(
     sampling_rate_hz: float,
     settings: TrainingSettings | None = None,
     *,
+    agitation: Agitation | None = None,
     backend: ArrayBackend | None = None,
     told: Callable[[Epoch], None] | None = None,
 ) -> tuple[ReducedOrderModel, TrainingRecord]:
@@ -146,6 +151,8 @@ def fit(
         Each run stays apart from the others.
     sampling_rate_hz : float
     settings : TrainingSettings, optional
+    agitation : Agitation, optional
+        Memory of the liquid's state; its scales are those of the training runs.
     backend : ArrayBackend, optional
         NumPy by default.
     told : callable, optional
@@ -164,13 +171,16 @@ def fit(
         If input or output is constant, or no start gave a stable model.
     """
     chosen = settings or TrainingSettings()
-    network = network_of(kind, {**settings_of_network, "n_inputs": delays.n_regressors})
     scaling = _scaling(training, validation, delays, chosen)
+    if agitation is not None:
+        agitation = agitation.fitted([run.x for run in training], sampling_rate_hz)
+        delays = replace(delays, n_states=agitation.n_states)
+    network = network_of(kind, {**settings_of_network, "n_inputs": delays.n_regressors})
     task = _Task(
         network,
         delays,
-        [scaling.scaled(run) for run in training],
-        [scaling.scaled(run) for run in validation],
+        [scaled_run(run, scaling, agitation, sampling_rate_hz) for run in training],
+        [scaled_run(run, scaling, agitation, sampling_rate_hz) for run in validation],
         scaling.output_scale,
         backend or array_backend(),
     )
@@ -185,7 +195,7 @@ def fit(
     if best.theta is None or best.epoch is None:
         raise AnalysisError("training", got="no stable model from any start", remedy="fewer output delays")
     ended = "interrupted" if interrupted else best.ended
-    model = ReducedOrderModel(network, best.theta, delays, scaling, sampling_rate_hz)
+    model = ReducedOrderModel(network, best.theta, delays, scaling, sampling_rate_hz, agitation=agitation)
     return model, TrainingRecord(best.epochs, best.epoch, ended, interrupted)
 
 
@@ -200,16 +210,28 @@ def _train_once(
     """One start: one step ahead, then free if there is feedback."""
     rng = np.random.default_rng([settings.seed, start])
     theta = task.backend.asarray(task.network.initial(*_initial_samples(task, rng), rng))
-    one_step = OneStepProblem(task.backend, task.network, lambda: blocks(task.training, task.delays, BLOCK))
-    problems: list[LeastSquaresProblem] = [one_step]
-    if task.delays.outputs:
-        problems.append(_FreeRunProblem(task.network, task.delays, task.training))
+    is_line = task.delays.is_one_line
+    size = _LINE_BLOCK if is_line else BLOCK
+    one_step = OneStepProblem(
+        task.backend, task.network, lambda: blocks(task.training, task.delays, size), is_line
+    )
+    stages: list[tuple[LeastSquaresProblem, ArrayBackend]] = [(one_step, task.backend)]
+    if task.delays.outputs:  # sample by sample, compiled: on the host
+        stages.append((_FreeRunProblem(task.network, task.delays, task.training), array_backend()))
     number = 0
-    for problem in problems:
-        is_last = problem is problems[-1]
+    for problem, backend in stages:
+        is_last = problem is stages[-1][0]
         own = best if is_last else _Best()
         own_settings = settings if is_last else replace(settings, patience=settings.n_epochs)
-        theta, number = _descend(task, problem, theta, own_settings, own, (start, number, started), told)
+        theta, number = _descend(
+            replace(task, backend=backend),
+            problem,
+            backend.asarray(theta),
+            own_settings,
+            own,
+            (start, number, started),
+            told,
+        )
 
 
 def _descend(
@@ -220,13 +242,13 @@ def _descend(
     best: _Best,
     place: tuple[int, int, float],
     told: Callable[[Epoch], None],
-) -> tuple[Array, int]:
+) -> tuple[FloatArray, int]:
     """Epoch after epoch until the validation error keeps rising, nothing improves, or the epochs are used up."""
     start, number, started = place
     n_training, n_validation = n_samples(task.training, task.delays), n_samples(task.validation, task.delays)
     unit = task.output_scale**2
     step: Step | None = Step(*problem.improved(theta))
-    rises, before, ended = 0, math.inf, "epochs used up"
+    stop, ended = EarlyStop(settings.patience), "epochs used up"
     for done in range(settings.n_epochs + 1):
         assert step is not None
         theta = step.theta
@@ -242,10 +264,8 @@ def _descend(
         best.take(epoch, parameters)
         told(epoch)
         number += 1
-        rises = rises + 1 if validation > before else 0
-        before = validation
-        if rises >= settings.patience:
-            ended = f"validation error rose {rises} times"
+        if reason := stop.reason(validation):
+            ended = reason
             break
         if done == settings.n_epochs:
             break
@@ -255,7 +275,7 @@ def _descend(
             break
     if best.epoch is not None and best.epoch.start == start:
         best.ended = ended
-    return theta, number
+    return task.backend.to_numpy(theta), number
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from sloshlab.errors import AnalysisError
 
 FloatArray = NDArray[np.float64]
 BINS_PER_OCTAVE: Final = 6
-_MARGIN: Final = 1.1
+MARGIN: Final = 1.1
 """A cycle may be a tenth weaker or stronger than those of the training."""
 _QUIET: Final = 1e-3
 """Crossings count where the velocity has been beyond this share of its largest value in between."""
@@ -188,8 +188,8 @@ class ValidityDomain:
         place = np.clip(place, 0, n - 1)
         weakest, strongest = (np.array(v)[place] for v in (self.weakest_m_per_s, self.strongest_m_per_s))
         seen &= np.isfinite(weakest)
-        above = cycles.speed_m_per_s / (strongest * _MARGIN)
-        below = weakest / np.maximum(cycles.speed_m_per_s * _MARGIN, 1e-300)
+        above = cycles.speed_m_per_s / (strongest * MARGIN)
+        below = weakest / np.maximum(cycles.speed_m_per_s * MARGIN, 1e-300)
         reasons = np.where(above > 1, "too strong", np.where(below > 1, "too weak", ""))
         reasons = np.where(seen, reasons, "frequency")
         return reasons, np.where(seen, np.maximum(above, below), cycles.speed_m_per_s)

@@ -28,6 +28,8 @@ DONE, UNSTABLE, FAULT, CHATTER, NO_ACCELERATION = (int(status) for status in Sta
 _SWITCH_TOLERANCE = 1e-13
 _EVENT_TIME_TOLERANCE_S = 1e-12
 _MOST_EVENTS_PER_STEP = 50
+_SHARE_TOLERANCE = 1e-6
+"""Of a step: an instant so close to its end is its end."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -155,6 +157,7 @@ def _fault_of(y: FloatArray, largest: FloatArray) -> int:
 def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
     """Set the switches and the friction of the start and record it; the term that is beyond its limit, or −1."""
     rates_once(m, excited, 0.0, 0.0, s.state, s.slopes[0], s.powers[0], s)
+    _update_due(m, excited, 0.0, 0.0, 0.0, s)
     for i in range(m.law.size):
         if m.events[i]:
             _events(m, i, s.state, s)
@@ -176,12 +179,43 @@ def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def _update(m: Model, excited: Excited, time: float, position: float, s: Scratch) -> None:
-    """Let models in discrete time take their step."""
+    """Let models in discrete time that follow the output take their step."""
+    updated = False
     for i in range(m.law.size):
-        if m.update[i]:
-            motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
-            call_law(m.update[i], s.motion, motion, m.parameters, m.parameters_at[i], s.state, at, s.slopes[4], at)
-    rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+        if m.update[i] and m.update_period[i] == 0.0:
+            _update_one(m, i, s)
+            updated = True
+    if updated:
+        rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _update_one(m: Model, i: int, s: Scratch) -> None:
+    motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
+    call_law(m.update[i], s.motion, motion, m.parameters, m.parameters_at[i], s.state, at, s.slopes[4], at)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _update_due(m: Model, excited: Excited, time: float, position: float, tolerance_s: float, s: Scratch) -> None:
+    """Let models in discrete time whose own instant this is take their step."""
+    updated = False
+    for i in range(m.law.size):
+        if m.update_period[i] > 0.0 and s.updates[i] * m.update_period[i] <= time + tolerance_s:
+            _update_one(m, i, s)
+            s.updates[i] += 1.0
+            updated = True
+    if updated:
+        rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _next_update(m: Model, s: Scratch) -> float:
+    """When [s] a model in discrete time takes its next step; infinite without any."""
+    due = np.inf
+    for i in range(m.law.size):
+        if m.update_period[i] > 0.0:
+            due = min(due, s.updates[i] * m.update_period[i])
+    return due
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
@@ -204,12 +238,16 @@ def integrate(
     tuple of int
         Status, rows filled, term or state that ended the simulation, number of events so far.
     """
+    due = _next_update(m, s)
     for row in range(first_row, last_row):
         for substep in range(n_substeps):
             index = (row - 1) * n_substeps + substep
             done, n_switched = 0.0, 0
             while done < 1.0:
                 time, position, share = (index + done) * step, 2.0 * (index + done), 1.0 - done
+                is_last = not (due - time) / step < share - _SHARE_TOLERANCE
+                if not is_last:
+                    share = max((due - time) / step, 0.0)
                 good = advance(m, excited, time, position, share * step, 2.0 * share, s)
                 gap = _margin(m, s.trial, s)
                 if not good:
@@ -217,7 +255,12 @@ def integrate(
                     return (NO_ACCELERATION if where < 0 else UNSTABLE), row, where, n_logged
                 if not gap < -_SWITCH_TOLERANCE:
                     _accept(s)
-                    break
+                    done = 1.0 if is_last else done + share
+                    time = (index + done) * step
+                    if due <= time + _SHARE_TOLERANCE * step:
+                        _update_due(m, excited, time, 2.0 * (index + done), _SHARE_TOLERANCE * step, s)
+                        due = _next_update(m, s)
+                    continue
                 done += _to_event(m, excited, time, position, step, share, gap, s)
                 _accept(s)
                 time, position = (index + done) * step, 2.0 * (index + done)

@@ -48,7 +48,8 @@ class Model(NamedTuple):
     inverse_inertia: float  # 1/(1 + m_a s)
     law: IntArray  # (n_terms,) addresses
     events: IntArray  # (n_terms,) addresses, 0 without events
-    update: IntArray  # (n_terms,) addresses, 0 without an update after each output step
+    update: IntArray  # (n_terms,) addresses, 0 without an update
+    update_period: FloatArray  # (n_terms,) 0: after each output step
     kind: IntArray  # (n_terms,)
     frame: IntArray  # (n_terms,)
     mass: FloatArray  # (n_terms,)
@@ -64,10 +65,11 @@ class Model(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Working memory of one simulation; `state`, `works` and `friction` go on from call to call."""
+    """Working memory of one simulation; `state`, `works`, `updates` and `friction` go on from call to call."""
 
     state: FloatArray  # (n_states,) q, q̇, memory of the terms
     works: FloatArray  # (2 n_terms + N_OTHER_WORKS,)
+    updates: FloatArray  # (n_terms,) how many of those with a period are done
     friction: FloatArray  # (4,) direction, holding force, smallest, largest it can be
     motion: FloatArray  # (2 N_MOTION,) one row per frame
     force: FloatArray  # (n_terms,)
@@ -116,7 +118,8 @@ def scratch(model: Model, state: FloatArray, n_event_functions: int) -> Scratch:
     friction = np.zeros(4)
     friction[0] = NO_FRICTION if model.friction_frame < 0 else 1.0
     return Scratch(
-        state, np.zeros(n_works), friction, np.zeros(2 * N_MOTION), np.zeros(n_terms), np.zeros(n_modes),
+        state, np.zeros(n_works), np.zeros(n_terms), friction,
+        np.zeros(2 * N_MOTION), np.zeros(n_terms), np.zeros(n_modes),
         np.zeros(len(INPUTS)), np.zeros(max(n_event_functions, 1)), np.zeros((5, state.size)),
         np.zeros((5, n_works)), np.zeros(state.size), np.zeros(n_works),
     )  # fmt: skip

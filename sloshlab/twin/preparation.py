@@ -71,7 +71,7 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
     masses = np.array([term.mass_kg for term in terms])
     memories = [np.array(term.kind.memory(term.values, term.table)) for term in terms]
     blocks = [np.concatenate([m, np.ones(t.kind.n_switches)]) for m, t in zip(memories, terms, strict=True)]
-    numbers = [term.numbers for term in terms]
+    numbers = [np.concatenate([t.numbers, np.zeros(t.kind.workspace(t.values, t.table))]) for t in terms]
     empty = np.empty(0)
     mobility = 0.0 if structure is None else float((structure.mode_shape**2 / structure.masses_kg).sum())
     model = Model(
@@ -86,6 +86,7 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
         law=_integers([term.kind.law.address for term in terms]),
         events=_integers([term.kind.events.address if term.kind.events else 0 for term in terms]),
         update=_integers([term.kind.update.address if term.kind.update else 0 for term in terms]),
+        update_period=np.array([_update_period(term) for term in terms]),
         kind=_integers([_bits(term) for term in terms]),
         frame=_integers([PLACES.index(term.place) for term in terms]),
         mass=masses,
@@ -112,6 +113,10 @@ def _offsets(arrays: Sequence[FloatArray]) -> npt.NDArray[np.int64]:
 
 def _bits(term: Term) -> int:
     return USES_ACCELERATION * term.kind.uses_acceleration + DRY_FRICTION * term.kind.dry_friction
+
+
+def _update_period(term: Term) -> float:
+    return 0.0 if term.kind.update_rate is None else 1.0 / term.kind.update_rate(term.values)
 
 
 def _checked_mass(added_kg: float, mobility_per_kg: float) -> float:

@@ -19,7 +19,12 @@ from scipy.io import netcdf_file
 
 from sloshlab.atomic_file import replaced, write_bytes
 from sloshlab.errors import InputError
-from sloshlab.twin import rate_independent_forces, structure_forces, tank_forces  # noqa: F401  they register forces
+from sloshlab.twin import (  # noqa: F401  they register forces
+    rate_independent_forces,
+    reduced_order_model_force,
+    structure_forces,
+    tank_forces,
+)
 from sloshlab.twin.sensors import Sensor
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import Term, kind_named

@@ -6,7 +6,7 @@ Another model is one function and one line::
     def half_a_ball(rig, parameters, folder):
         return (BOUNCING_BALL(liquid_mass_kg=0.5 * rig.liquid_mass_kg, height_m=rig.tank.height_m, **parameters),)
 
-The data-driven model takes the name ``rom``; until a module registers it, rig files that ask for it are refused.
+The data-driven model ``rom`` is registered by `sloshlab.twin.reduced_order_model_force`.
 """
 
 from __future__ import annotations

@@ -59,6 +59,11 @@ def _no_memory(parameters: Mapping[str, float], table: FloatArray) -> tuple[floa
     return ()
 
 
+def _no_workspace(parameters: Mapping[str, float], table: FloatArray) -> int:
+    """Writes nothing."""
+    return 0
+
+
 @dataclass(frozen=True)
 class ForceKind:
     """A kind of force; calling it with numbers gives a `Term`.
@@ -78,7 +83,13 @@ class ForceKind:
     limits : tuple of str
         What has happened when a limit function turns negative, which ends the simulation.
     update : Law or None
-        Called after every output step; may change `memory`. For models in discrete time.
+        May change `memory` and its workspace, for models in discrete time. Called after every output step, or
+        at its own rate.
+    update_rate : callable or None
+        Parameters → rate [Hz] at whose instants k/rate, k = 0, 1 …, steps end and `update` is called.
+    workspace : callable
+        (parameters, table) → how many numbers, zero at the start, follow the table in ``parameters`` for
+        `update` to write and the law to read. Unlike `memory` they are no states, and cost no integration.
     memory : callable
         (parameters, table) → states at the start.
     mass : callable
@@ -107,6 +118,8 @@ class ForceKind:
     n_switches: int = 0
     limits: tuple[str, ...] = ()
     update: Law | None = None
+    update_rate: Callable[[Mapping[str, float]], float] | None = None
+    workspace: Callable[[Mapping[str, float], FloatArray], int] = _no_workspace
     memory: Callable[[Mapping[str, float], FloatArray], tuple[float, ...]] = _no_memory
     mass: Callable[[Mapping[str, float]], float] = _no_mass
     uses_acceleration: bool = False

@@ -158,10 +158,11 @@ def blas() -> dict[str, float]:
 
 
 def twin() -> dict[str, float]:
-    """Speed of the twin, alone and against `solve_ivp`."""
+    """Speed of the twin, alone and against `solve_ivp`, and with a trained model in its tank."""
+    from tests.benchmarks.reduced_order_model_in_the_twin import loop_figures
     from tests.benchmarks.twin import twin_figures
 
-    return twin_figures()
+    return twin_figures() | loop_figures()
 
 
 if __name__ == "__main__":

@@ -262,7 +262,7 @@ def test_a_stated_deflection_that_the_measured_one_contradicts_is_flagged(
         ("bouncing_ball", BALL.replace("0.0244", "0.04"), ("radius_m", "less than half the tank's height")),
         ("bouncing_ball", BALL.replace("74.04", "0.0").replace("1103.0", "120.0").replace("13.04", "0.1"),
          ("ball", "of its tank", "at t =")),
-        ("rom", 'rom = "model.nc"', ("twin.tank_model", "rom")),
+        ("rom", 'rom = "model.nc"', ("twin.parameters", "model.nc")),
     ],
 )  # fmt: skip
 def test_twins_that_cannot_run_are_refused_in_one_line(

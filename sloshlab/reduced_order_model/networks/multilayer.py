@@ -132,6 +132,6 @@ class Multilayer:
         first, _ = self._weights(xp, theta)[0]
         return first.T @ self._sensitivities(xp, theta, slopes)[0]
 
-    def normal_sums(self, xp: Any, theta: Array) -> NormalSumsSoFar:
+    def normal_sums(self, xp: Any, theta: Array, *, is_delay_line: bool = False) -> NormalSumsSoFar:
         """Return an empty sum."""
         return SumsOfJacobian(xp, self, theta)

@@ -88,8 +88,11 @@ class Network(Protocol):
         """Return the derivatives of the outputs by the regressors, shape (n_inputs, m)."""
         ...
 
-    def normal_sums(self, xp: Any, theta: Array) -> NormalSumsSoFar:
-        """Return an empty sum for these parameters."""
+    def normal_sums(self, xp: Any, theta: Array, *, is_delay_line: bool = False) -> NormalSumsSoFar:
+        """Return an empty sum for these parameters.
+
+        `is_delay_line` promises that within a block φ_a(k) = φ_0(k − a): past values of one signal, in order.
+        """
         ...
 
     def settings(self) -> dict[str, int | str]:

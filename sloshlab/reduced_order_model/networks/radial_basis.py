@@ -1,9 +1,7 @@
 """Networks of Gaussian radial basis functions (B.5–B.7): plain, and normalised.
 
 Σ⁻¹ = I throughout. Of both the derivative by the centre of neuron i is a number times (φ − c_i), and the
-outputs are linear in the weights. The matrix Σ J Jᵀ is then made of Σ G_i G_j φ̃ φ̃ᵀ with φ̃ = (φ, 1), one
-product of two matrices whose rows are products of pairs: half the work of the symmetric product of the
-Jacobian, a quarter of the full one.
+outputs are linear in the weights.
 """
 
 from __future__ import annotations
@@ -13,11 +11,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from array_api_compat import device
 from numpy.typing import NDArray
 
 from sloshlab.reduced_order_model.array_backend import Array
-from sloshlab.reduced_order_model.networks.network import NormalSums, NormalSumsSoFar
+from sloshlab.reduced_order_model.networks.delay_line_sums import SHORTEST_LINE, DelayLineSums
+from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar
+from sloshlab.reduced_order_model.networks.pair_sums import PairSums
 
 FloatArray = NDArray[np.float64]
 
@@ -95,9 +94,11 @@ class _RadialBasisNetwork:
         _, _, factors = self.evaluated(xp, theta, phi)
         return centres.T @ factors - phi * xp.sum(factors, axis=0)[None, :]
 
-    def normal_sums(self, xp: Any, theta: Array) -> NormalSumsSoFar:
+    def normal_sums(self, xp: Any, theta: Array, *, is_delay_line: bool = False) -> NormalSumsSoFar:
         """Return an empty sum; it needs no Jacobian."""
-        return _PairSums(xp, self, theta)
+        if is_delay_line and self.n_inputs >= SHORTEST_LINE:
+            return DelayLineSums(xp, self, theta)
+        return PairSums(xp, self, theta)
 
 
 class NormalisedRadialBasis(_RadialBasisNetwork):
@@ -150,87 +151,6 @@ class RadialBasis(_RadialBasisNetwork):
 
     def _centre_factors(self, xp: Any, linear: Array, features: Array, output: Array) -> Array:
         return 2 * features[1:, :] * linear[1:, None]
-
-
-class _PairSums:
-    """Σ J Jᵀ from products of pairs; the samples are gone through once, the matrix is made at the end.
-
-    Parameters
-    ----------
-    xp : module
-    network : NormalisedRadialBasis or RadialBasis
-    theta : array
-    """
-
-    def __init__(self, xp: Any, network: _RadialBasisNetwork, theta: Array) -> None:
-        self._xp, self._network, self._theta = xp, network, theta
-        self._neurons = [xp.asarray(part, device=device(theta)) for part in np.triu_indices(network.n_neurons)]
-        self._inputs = [xp.asarray(part, device=device(theta)) for part in np.triu_indices(network.n_inputs + 1)]
-        self._second: Array = 0.0  # Σ G_i G_j φ̃_a φ̃_b
-        self._mixed: Array = 0.0  # Σ Φ_i G_j φ̃_a
-        self._weights: Array = 0.0  # Σ Φ_i Φ_j
-        self._by_centre: Array = 0.0  # Σ e G_i φ̃_a
-        self._by_weight: Array = 0.0  # Σ e Φ_i
-        self._squares = 0.0
-
-    def add(self, phi: Array, target: Array) -> None:
-        """Take some samples."""
-        xp = self._xp
-        features, output, factors = self._network.evaluated(xp, self._theta, phi)
-        error = target - output
-        extended = xp.concat([phi, xp.ones_like(phi[:1, :])], axis=0)
-        self._second = self._second + _pair_products(xp, factors, self._neurons) @ (
-            _pair_products(xp, extended, self._inputs).T
-        )
-        crossed = xp.reshape(features[:, None, :] * factors[None, :, :], (-1, phi.shape[1]))
-        self._mixed = self._mixed + crossed @ extended.T
-        self._weights = self._weights + features @ features.T
-        self._by_centre = self._by_centre + (factors * error[None, :]) @ extended.T
-        self._by_weight = self._by_weight + features @ error
-        self._squares += float(xp.sum(error * error))
-
-    def sums(self) -> NormalSums:
-        """Return the sums."""
-        xp = self._xp
-        centres, _ = self._network.parts(xp, self._theta)
-        mixed = self._mixed_block(centres)
-        upper = xp.concat([self._centre_block(centres), mixed.T], axis=1)
-        matrix = xp.concat([upper, xp.concat([mixed, self._weights], axis=1)], axis=0)
-        by_centre = self._by_centre[:, :-1] - centres * self._by_centre[:, -1:]
-        gradient = xp.concat([xp.reshape(by_centre, (-1,)), self._by_weight])
-        return NormalSums(matrix, gradient, self._squares)
-
-    def _centre_block(self, centres: Array) -> Array:
-        """Σ G_i G_j (φ − c_i)(φ − c_j)ᵀ for all pairs of neurons."""
-        xp, (m, p) = self._xp, centres.shape
-        moments = xp.take(self._second, xp.asarray(_places(m), device=device(centres)), axis=0)
-        moments = xp.take(moments, xp.asarray(_places(p + 1), device=device(centres)), axis=1)
-        moments = xp.reshape(moments, (m, m, p + 1, p + 1))
-        second, first, zeroth = moments[:, :, :-1, :-1], moments[:, :, :-1, -1], moments[:, :, -1, -1]
-        block = (
-            second
-            - first[:, :, :, None] * centres[None, :, None, :]
-            - centres[:, None, :, None] * first[:, :, None, :]
-            + zeroth[:, :, None, None] * centres[:, None, :, None] * centres[None, :, None, :]
-        )
-        return xp.reshape(xp.permute_dims(block, (0, 2, 1, 3)), (m * p, m * p))
-
-    def _mixed_block(self, centres: Array) -> Array:
-        """Σ Φ_i G_j (φ − c_j); rows are linear parameters, columns coordinates of the centres."""
-        xp, (m, p) = self._xp, centres.shape
-        moments = xp.reshape(self._mixed, (-1, m, p + 1))
-        return xp.reshape(moments[:, :, :-1] - moments[:, :, -1:] * centres[None, :, :], (-1, m * p))
-
-
-def _pair_products(xp: Any, rows: Array, pairs: list[Array]) -> Array:
-    return xp.take(rows, pairs[0], axis=0) * xp.take(rows, pairs[1], axis=0)
-
-
-def _places(n: int) -> NDArray[np.int64]:
-    """Where element (i, j) of a symmetric matrix, row by row, stands among its upper triangle."""
-    places = np.zeros((n, n), np.int64)
-    places[np.triu_indices(n)] = np.arange(n * (n + 1) // 2)
-    return np.maximum(places, places.T).ravel()
 
 
 def _scattered(regressors: FloatArray, n: int, rng: np.random.Generator) -> NDArray[np.intp]:

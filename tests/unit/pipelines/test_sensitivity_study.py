@@ -3,8 +3,18 @@
 import numpy as np
 import pytest
 
-from pipelines.sensitivity_study import MODEL_NAME, RESULT_NAME, SOURCE_CASES, StudyCase, sensitivity_study
-from sloshlab.errors import InputError
+from pipelines.sensitivity_study import (
+    MODEL_NAME,
+    RESULT_NAME,
+    SOURCE_CASES,
+    CaseResult,
+    StudyCase,
+    _Task,
+    picked,
+    sensitivity_study,
+    train_case,
+)
+from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model.regressors import Run
 from sloshlab.reduced_order_model.storage import load_model
 from sloshlab.reduced_order_model.training import TrainingSettings
@@ -75,3 +85,63 @@ def test_the_cases_of_the_source():
 def test_a_study_of_nothing_is_refused(tmp_path):
     with pytest.raises(InputError, match="study"):
         sensitivity_study([run(1)], [run(2)], 100.0, tmp_path, SETTINGS, cases=[])
+
+
+def result(name: tuple[str, int, int, int], rms: float, n_parameters: int) -> CaseResult:
+    return CaseResult(StudyCase(*name), rms**2, rms**2, n_parameters, 3, 1.0, "epochs used up")
+
+
+def test_the_smallest_validation_error_is_picked_and_a_lighter_one_named():
+    results = [
+        result(("nfir", 70, 0, 35), 1.000, 2485),
+        result(("nfir", 60, 0, 20), 1.019, 1220),
+        result(("nfir", 50, 0, 5), 1.021, 255),
+        CaseResult(StudyCase("noe", 2, 2, 10), np.inf, np.inf, 0, 0, 0.0, "no stable model"),
+    ]
+    pick = picked(results[::-1])
+    assert (pick.best, pick.lighter) == (results[0], results[1])
+    assert "nfir_70_35 has the smallest error" in pick.reason
+    assert "next is nfir_60_20, 1.9 % behind" in pick.reason
+    assert "1220 instead of 2485" in pick.reason
+    assert picked(results[:1]).lighter == results[0]
+
+
+def test_nothing_that_could_be_trained_is_told():
+    with pytest.raises(AnalysisError, match="no case that could be trained"):
+        picked([CaseResult(CASES[0], np.inf, np.inf, 0, 0, 0.0, "constant")])
+
+
+def test_an_interrupted_case_leaves_nothing_behind(tmp_path):
+    def stop(share):
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    task = _Task(CASES[0], tmp_path / "case", "", (run(1),), (run(3),), 100.0, SETTINGS)
+    with pytest.raises(KeyboardInterrupt):
+        train_case(task, stop)
+    assert not list(tmp_path.iterdir())
+
+
+def test_facts_and_progress_arrive(tmp_path):
+    shares = []
+    sensitivity_study(
+        [run(1)], [run(3)], 100.0, tmp_path, SETTINGS, cases=CASES[:2], n_workers=1, facts={"fill_level": 0.5},
+        watch=shares.append,
+    )  # fmt: skip
+    assert load_model(tmp_path / CASES[0].name / MODEL_NAME).facts["fill_level"] == 0.5
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    assert shares[0] == pytest.approx(CASES[1].cost / (CASES[0].cost + CASES[1].cost) / (SETTINGS.n_epochs + 1))
+
+
+def test_a_case_that_cannot_be_trained_does_not_stop_the_others(tmp_path):
+    still = Run(np.zeros(300), run(1).y)
+    results = sensitivity_study([still], [run(3)], 100.0, tmp_path, SETTINGS, cases=CASES[:2], n_workers=1)
+    assert [one.is_trained for one in results] == [False, False]
+    assert "input of the training runs: got a constant" in results[0].ended
+
+
+@pytest.mark.parametrize("n_workers", [0, 257])
+def test_an_impossible_number_of_workers_is_refused(tmp_path, n_workers):
+    with pytest.raises(InputError, match="--workers"):
+        sensitivity_study([run(1)], [run(2)], 100.0, tmp_path, SETTINGS, cases=CASES, n_workers=n_workers)

@@ -1,5 +1,7 @@
 """Networks: Jacobians against central differences, sums against the Jacobian, libraries against each other."""
 
+import importlib.util
+
 import array_api_strict
 import numpy as np
 import pytest
@@ -8,9 +10,11 @@ from array_api_compat import numpy as xp
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
 from sloshlab.reduced_order_model.network_list import network_of
+from sloshlab.reduced_order_model.networks.delay_line_sums import DelayLineSums
 from sloshlab.reduced_order_model.networks.multilayer import Multilayer
 from sloshlab.reduced_order_model.networks.network import SumsOfJacobian
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
+from sloshlab.reduced_order_model.regressors import Delays, Run, blocks
 
 NETWORKS = [
     NormalisedRadialBasis(6, 4),
@@ -20,6 +24,9 @@ NETWORKS = [
 ]
 IDS = ["normalised", "plain", "tanh", "radial layers"]
 STEP = 1e-6
+BACKENDS = [array_backend(), ArrayBackend(array_api_strict)]
+if importlib.util.find_spec("torch"):
+    BACKENDS.append(array_backend("torch"))
 
 
 @pytest.fixture(params=NETWORKS, ids=IDS)
@@ -71,16 +78,45 @@ def test_sums_are_those_of_the_jacobian_however_the_samples_are_cut(case):
 
 
 def test_another_library_of_the_standard_gives_the_same_numbers(case):
-    """A strict one, which has nothing but the standard; whatever passes there runs on a GPU."""
+    """A strict one, which has nothing but the standard; what passes there runs on a GPU. PyTorch if installed."""
     network, theta, phi, target = case
     found = []
-    for backend in (array_backend(), ArrayBackend(array_api_strict)):
+    for backend in BACKENDS:
         sums = network.normal_sums(backend.xp, backend.asarray(theta))
         sums.add(backend.asarray(phi), backend.asarray(target))
         found.append(sums.sums())
-    first, second = ([np.asarray(one.matrix), np.asarray(one.gradient), one.squares] for one in found)
-    for ours, theirs in zip(first, second, strict=True):
-        assert theirs == pytest.approx(ours, rel=1e-8)
+    for other in found[1:]:
+        assert max(scaled_differences(found[0], other)) < 1e-8
+        assert other.squares == pytest.approx(found[0].squares, rel=1e-8)
+
+
+def scaled_differences(ours, theirs):
+    """Of the matrices in units of √(H_aa H_bb), and of the gradients in units of √(H_aa Σ e²)."""
+    sizes = np.sqrt(np.diag(np.asarray(ours.matrix)))
+    matrices = (np.asarray(theirs.matrix) - np.asarray(ours.matrix)) / np.outer(sizes, sizes)
+    gradients = (np.asarray(theirs.gradient) - np.asarray(ours.gradient)) / (sizes * np.sqrt(ours.squares))
+    return np.abs(matrices).max(), np.abs(gradients).max()
+
+
+@pytest.mark.parametrize(
+    "network", [NormalisedRadialBasis(30, 3), RadialBasis(30, 3)], ids=["normalised", "plain"]
+)
+def test_sums_over_a_delay_line_are_those_of_the_jacobian(network):
+    """By correlations: blocks longer than a transform, borders between them, a signal with an offset."""
+    rng = np.random.default_rng(4)
+    run = Run(0.3 * rng.normal(size=1500) + 0.2, rng.normal(size=1500))
+    theta = 0.3 * rng.normal(size=network.n_parameters)
+    plain = SumsOfJacobian(xp, network, theta)
+    found = [network.normal_sums(backend.xp, backend.asarray(theta), is_delay_line=True) for backend in BACKENDS]
+    assert all(isinstance(one, DelayLineSums) for one in found)
+    for phi, target in blocks([run], Delays.tapped(30), 613):
+        plain.add(phi, target)
+        for one, backend in zip(found, BACKENDS, strict=True):
+            one.add(backend.asarray(phi), backend.asarray(target))
+    for one in found:
+        sums = one.sums()
+        assert max(scaled_differences(plain.sums(), sums)) < 1e-12
+        assert sums.squares == pytest.approx(plain.sums().squares)
 
 
 def test_normalised_neurons_share_everywhere():

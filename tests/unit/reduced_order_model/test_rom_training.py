@@ -1,12 +1,17 @@
 """Training on systems whose answer is known; gaps, borders of runs, bad input, files."""
 
+import array_api_strict
 import numpy as np
 import pytest
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
+from sloshlab.reduced_order_model.early_stop import EarlyStop
 from sloshlab.reduced_order_model.fit_quality import fit_quality
+from sloshlab.reduced_order_model.least_squares import OneStepProblem, Step, next_step
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
+from sloshlab.reduced_order_model.networks.network import NormalSums
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
 from sloshlab.reduced_order_model.storage import load_model, save_model
@@ -36,9 +41,9 @@ def feedback_run(n: int, seed: int) -> Run:
     return Run(x, y)
 
 
-def trained(training, validation, delays=Delays.tapped(2), neurons=3, **settings):
+def trained(training, validation, delays=Delays.tapped(2), neurons=3, told=None, **settings):
     chosen = TrainingSettings(**{"n_epochs": 60, "n_starts": 3, **settings})
-    return fit("normalised_rbf", {"n_neurons": neurons}, delays, training, validation, RATE_HZ, chosen)
+    return fit("normalised_rbf", {"n_neurons": neurons}, delays, training, validation, RATE_HZ, chosen, told=told)
 
 
 def test_a_known_network_is_recovered():
@@ -61,13 +66,128 @@ def test_a_model_with_feedback_learns_to_run_free():
     assert any(epoch.number > 30 for epoch in record.epochs)  # one step ahead first, then free
 
 
-def test_training_ends_after_rises_of_the_validation_error():
+@pytest.mark.parametrize("delays", [Delays.tapped(2), Delays.tapped(1, 2)], ids=["nfir", "noe"])
+@pytest.mark.parametrize("library", ["strict", "torch"])
+def test_a_training_gives_the_same_model_whatever_the_library(delays, library):
+    """With one that has nothing but the standard, and with PyTorch where it is installed."""
+    if library == "torch":
+        pytest.importorskip("torch")
+    other = array_backend("torch") if library == "torch" else ArrayBackend(array_api_strict)
+    runs = [feedback_run(200, 1)], [feedback_run(100, 2)]
+    models = [
+        fit("normalised_rbf", {"n_neurons": 4}, delays, *runs, RATE_HZ, TrainingSettings(n_epochs=4), backend=one)[
+            0
+        ]
+        for one in (array_backend(), other)
+    ]
+    unseen = feedback_run(100, 3)
+    first, second = (model.simulate(unseen.x, unseen.y) for model in models)
+    known = np.isfinite(first)
+    assert np.abs(second - first)[known].max() < 1e-8 * np.abs(first[known]).max()
+    predicted = models[0].predict(unseen.x, unseen.y, other)
+    assert predicted[known] == pytest.approx(models[0].predict(unseen.x, unseen.y)[known], rel=1e-8)
+
+
+@pytest.mark.parametrize("network", [NormalisedRadialBasis(2, 4), RadialBasis(2, 4)], ids=["normalised", "plain"])
+def test_linear_parameters_are_solved_for(network):
+    """At the least error the gradient of the linear ones vanishes, and the error told is that of the result."""
+    run = network_run(300, 5, noise=0.3)
+    theta = np.random.default_rng(2).normal(size=network.n_parameters)
+    problem = OneStepProblem(array_backend(), network, lambda: blocks([run], Delays.tapped(2), 77))
+    better, squares = problem.improved(theta)
+    sums = problem.normal_sums(better)
+    assert better[: -network.n_linear] == pytest.approx(theta[: -network.n_linear])
+    assert sums.squares == pytest.approx(squares)
+    assert np.abs(sums.gradient[-network.n_linear :]).max() < 1e-6 * np.sqrt(squares)
+    assert squares < problem.normal_sums(theta).squares
+
+
+class Parabola:
+    """Σ e² = (1 − θ)²·10 with a matrix that is `factor` times too small: plain steps go `factor` times too far."""
+
+    def __init__(self, factor):
+        self.factor, self.trials = factor, 0
+
+    def normal_sums(self, theta):
+        return NormalSums(np.array([[10 / self.factor]]), 10 * (1 - theta), float(10 * (1 - theta[0]) ** 2))
+
+    def improved(self, theta):
+        self.trials += 1
+        return theta, float(10 * (1 - theta[0]) ** 2)
+
+
+@pytest.mark.parametrize(("factor", "first"), [(1.0, 1e-3), (1.0, 50.0), (5.0, 1e-3), (5.0, 1e3), (1.9, 0.05)])
+def test_a_step_takes_the_damping_that_lowers_the_error_most(factor, first):
+    """Over steps a ratio of 4 apart: the best 1 + λ is `factor`, and the error left is that of the nearest."""
+    problem = Parabola(factor)
+    step = next_step(problem, Step(np.zeros(1), 10.0, first), np)
+    dampings = first * 4.0 ** np.arange(-40, 41)
+    gains = 10 - 10 * (1 - factor / (1 + dampings[(dampings >= 1e-6) & (dampings <= 1e10)])) ** 2
+    assert 10 - step.squares > gains.max() / 1.02
+    assert problem.trials < 25
+
+
+def test_no_step_is_taken_where_none_helps():
+    """Uphill everywhere: the gradient has the wrong sign."""
+
+    class Uphill(Parabola):
+        def improved(self, theta):
+            return theta, float(10 * (1 + abs(theta[0])))
+
+    assert next_step(Uphill(1.0), Step(np.zeros(1), 10.0, 1e-3), np) is None
+
+
+def test_errors_are_told_in_the_unit_of_the_output_and_regressors_have_the_wanted_spread():
+    run = network_run(300, 5, noise=0.3)
+    large = Run(10 * run.x + 3, 50 * run.y - 20)
+    model, record = trained([large], [large], n_starts=1, n_epochs=5, input_spread=1.5)
+    error = model.simulate(large.x) - large.y
+    assert record.best.training_mse == pytest.approx(np.nanmean(error**2))
+    assert record.best.validation_mse == pytest.approx(np.nanmean(error**2))
+    (phi, _), = blocks([model.scaling.scaled(large)], Delays.tapped(2), 300)  # fmt: skip
+    assert np.sqrt(phi.var(axis=1).sum()) == pytest.approx(1.5, rel=0.02)
+
+
+@pytest.mark.parametrize("delays", [Delays.tapped(2), Delays.tapped(1, 1)], ids=["nfir", "noe"])
+def test_no_epoch_raises_the_training_error(delays):
+    errors = {}
+
+    def told(epoch):
+        errors.setdefault(epoch.start, []).append(epoch.training_mse)
+
+    trained([feedback_run(300, 1)], [feedback_run(100, 2)], delays, n_epochs=8, n_starts=2, told=told)
+    assert len(errors) == 2
+    for one in errors.values():
+        stages = [one[:9], one[9:]] if delays.outputs else [one]
+        assert all(np.all(np.diff(stage) < 0) for stage in stages)
+
+
+def test_a_training_that_overfits_ends_and_the_best_model_is_kept():
     noisy = [network_run(60, 1, noise=0.5)]
-    _, record = trained(noisy, [network_run(60, 2, noise=0.5)], neurons=10, n_starts=1, patience=3)
+    model, record = trained(noisy, [network_run(60, 2, noise=0.5)], neurons=10, n_starts=1, patience=3)
     errors = [epoch.validation_mse for epoch in record.epochs]
-    assert record.ended == "validation error rose 3 times"
-    assert errors[-4] < errors[-3] < errors[-2] < errors[-1]
+    assert record.ended == "validation error no lower for 6 epochs"
+    assert record.best.number == len(errors) - 1 - 6
     assert record.best.validation_mse == min(errors)
+    run = network_run(60, 2, noise=0.5)
+    assert np.nanmean((model.simulate(run.x) - run.y) ** 2) == pytest.approx(min(errors))
+
+
+@pytest.mark.parametrize(
+    ("errors", "n_taken", "reason"),
+    [
+        ([5, 4, 3, 4, 5, 6, 7], 6, "validation error rose 3 times"),
+        ([5, 4, 4, 4, 4, 4, 4, 4, 4], 8, "validation error no lower for 6 epochs"),
+        ([5, 3, 4, 3.5, 4, 3.5, 4, 3.5, 4], 8, "validation error no lower for 6 epochs"),
+        ([5, 4, 5, 6, 3, 4, 5, 2, 3, 4], None, ""),  # two rises each time, then a new lowest
+    ],
+)
+def test_the_validation_error_ends_a_training_when_it_rises_or_wavers(errors, n_taken, reason):
+    stop = EarlyStop(3)
+    reasons = [stop.reason(float(error)) for error in errors]
+    first = next((k + 1 for k, one in enumerate(reasons) if one), None)
+    assert first == n_taken
+    assert reason in reasons
 
 
 def test_an_interrupt_keeps_the_best_model_so_far():

@@ -88,6 +88,25 @@ def test_the_runs_are_those_that_were_asked_for() -> None:
     assert random == [(0.1, 90), (0.2, 90), (0.4, 90)]
     sdof = [run.settings for run in runs if run.rig.startswith("sdof")]
     assert {one["initial_displacement_m"] for one in sdof} == {0.064}
+    transients = [run.settings for run in runs if run.name.startswith("transients")]
+    kinds = [one["experiment"] for one in transients]
+    assert {kind: kinds.count(kind) for kind in kinds} == {
+        "sudden_start": 40,
+        "beam_free": 6,
+    }
+    sudden = [one for one in transients if one["experiment"] == "sudden_start"]
+    starts = [(one["start_hz"], one["acceleration_g"]) for one in sudden]
+    assert len(set(starts)) == 20
+    assert sum(frequency_hz % 1 == 0.5 for frequency_hz, _ in starts) == 12  # for validation, between the others
+
+
+def test_runs_that_were_there_before_keep_their_seeds() -> None:
+    """Seeds follow from the place in the list; as in the manifest of the first campaign."""
+    runs = {run.name: run.number for run in numerical_runs()}
+    assert runs["shaker/fill_0.50_vfa_480s"] == 14
+    assert runs["beam/decay_sloshing_repeat_1"] == 31
+    assert runs["sdof/decay_sloshing"] == 38
+    assert min(number for name, number in runs.items() if name.startswith("transients")) == 39
 
 
 def test_repeats_share_everything_but_seed_and_repeat() -> None:
@@ -100,7 +119,7 @@ def test_repeats_share_everything_but_seed_and_repeat() -> None:
 def test_every_rig_is_one() -> None:
     for name, text in RIG_TEXTS.items():
         rig = Rig.from_toml_text(text)
-        assert (rig.structure is None) == name.startswith("shaker/")
+        assert (rig.structure is None) == ("rig_fill_" in name)
 
 
 def test_the_manifest_tells_what_each_file_is(campaign) -> None:
