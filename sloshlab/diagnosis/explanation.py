@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -51,11 +51,14 @@ class Explanation:
         Sum of squares of the weighted residuals of the held-out runs, large ones counted less.
     held_out_rms : float
         Root mean square of the weighted residuals where the recording stands out of the noise.
+    by_channel : dict
+        Mean square of the same per channel, large residuals counted less.
     """
 
     fit: FreeRunFit
     held_out: float
     held_out_rms: float
+    by_channel: dict[str, float] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -244,10 +247,11 @@ class _Search:
         residual = problem.residual(theta)
         if not np.isfinite(residual).all():
             return Explanation(fit, np.inf, np.inf)
-        informative = np.concatenate([one.informative.ravel() for run in problem.runs for one in run])
+        observed = [one for run in problem.runs for one in run]
+        informative = np.concatenate([one.informative.ravel() for one in observed])
         chosen = residual[informative] if informative.any() else residual
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
-        return Explanation(fit, huber_cost(residual), rms)
+        return Explanation(fit, huber_cost(residual), rms, _by_channel(observed, residual))
 
     def _one_more(
         self, base: FreeRunFit, jacobian: FloatArray, pool: Sequence[Candidate], what: str
@@ -395,6 +399,20 @@ def _resized(candidate: Candidate, start: dict[str, float], factor: float) -> di
     first = next(iter(start))
     factor = min(max(factor, 0.1), 10.0)
     return {**start, first: start[first] * factor} if len(start) == 1 else start
+
+
+def _by_channel(observed: Sequence[Observation], residual: FloatArray) -> dict[str, float]:
+    """Mean square of the informative residuals of each channel over all runs."""
+    sums: dict[str, list[float]] = {}
+    first = 0
+    for one in observed:
+        own = residual[first : first + one.spectra.size]
+        first += one.spectra.size
+        chosen = own[one.informative.ravel()]
+        total = sums.setdefault(one.channel, [0.0, 0.0])
+        total[0] += huber_cost(chosen)
+        total[1] += chosen.size
+    return {name: squares / n for name, (squares, n) in sums.items() if n}
 
 
 def _belongs_to_a_run(name: str, case: Case) -> bool:

@@ -22,6 +22,8 @@ LEAST_MORE: Final = 12.0
 """The same, by which a further effect must improve on fewer."""
 LEAST_SEPARATION: Final = 6.0
 """The same, by which an explanation must beat another to be the only one."""
+LEAST_STRENGTH: Final = 0.5
+"""What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of."""
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LEVEL: Final = 0.90
@@ -74,7 +76,7 @@ def verdict_of(found: Findings) -> Verdict:
         found.retuned.fit.cost - min(one.fit.cost for one in [*found.explanations, *found.ceilings, found.retuned])
     ) / (2.0 * max(1.0, ceiling.fit.misfit / max(found.n_fitting, 1)))
     probabilities = _probabilities(found, unit)
-    if best_gain < LEAST_GAIN or fit_gain < LEAST_GAIN:
+    if best_gain < LEAST_GAIN or fit_gain < LEAST_GAIN or strength(found.retuned, ceiling) < LEAST_STRENGTH:
         return Verdict(
             "nothing_missing", None, [], best_gain, 1.0, _nothing(found), "", _certain(probabilities, "none")
         )
@@ -111,7 +113,24 @@ def _shortest_sufficient(found: Findings, unit: float) -> Explanation | None:
     pair = min(pairs, key=lambda one: one.fit.cost + one.held_out)
     better_held_out = (single.held_out - pair.held_out) / unit
     better_fit = (single.fit.cost - pair.fit.cost) / (2 * max(1.0, pair.fit.misfit / max(found.n_fitting, 1)))
-    return pair if better_held_out > LEAST_MORE and better_fit > LEAST_MORE else single
+    is_better = better_held_out > LEAST_MORE and better_fit > LEAST_MORE
+    return pair if is_better and strength(single, pair) >= LEAST_STRENGTH else single
+
+
+def strength(before: Explanation, after: Explanation) -> float:
+    """What an explanation removes from the channel that shows it most, in noise floors.
+
+    Parameters
+    ----------
+    before, after : Explanation
+        With fewer and with more effects.
+    """
+    removed = [
+        (before.by_channel[name] - left) / max(1.0, left)
+        for name, left in after.by_channel.items()
+        if name in before.by_channel
+    ]
+    return float(np.sqrt(max([0.0, *removed])))
 
 
 def _alternatives(found: Findings, best: Explanation, unit: float) -> list[Explanation]:
