@@ -18,8 +18,8 @@ class EarlyStop:
     patience : int
         Rises one after another after which it ends.
     least_gain : float
-        Share by which the lowest error must fall within twice as many epochs, or it ends, too: an error that wavers
-        rises and falls for ever, and one that creeps falls for ever.
+        Share by which the lowest error must fall within twice as many epochs, or it ends, too: an error that
+        wavers rises and falls for ever, and one that creeps falls for ever.
 
     Examples
     --------
