@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from sloshlab.diagnosis.extension import Extension
@@ -150,7 +150,7 @@ class Candidate:
         """What it adds, with these numbers."""
         added = self.effect.extension(numbers, self.surroundings, self.channel)
         key = ((self.key, *sorted(numbers.items())),)
-        return Extension(added.terms, added.liquid, added.faults, key)
+        return replace(added, key=key)
 
 
 _EFFECTS: dict[str, Effect] = {}

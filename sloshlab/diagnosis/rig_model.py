@@ -202,6 +202,8 @@ class RigModel:
         structure = twin.structure
         if structure is not None:
             structure = _varied_structure(structure, values)
+            if extension.structure is not None:
+                structure = extension.structure(structure)
         terms = tuple(
             _varied_term(term, values) for term in twin.terms if structure is not None or term.place == "tank"
         )
