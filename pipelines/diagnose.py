@@ -9,11 +9,11 @@ from typing import Any
 from pipelines.diagnosis_report.results import Diagnosis
 from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
+from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
+
 from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.explanation import explained_extension, findings_of
-from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
-from sloshlab.twin.storage import save_twin
 
 
 def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bool = True) -> dict[str, Any]:
@@ -39,9 +39,7 @@ def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bo
     with atomic_file.filled_folder(target) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned
-        save_twin(
-            found.model.extended_twin(best.fit.values, explained_extension(best)), complete / "extended_twin.toml"
-        )
+        found.model.save_extended(best.fit.values, explained_extension(best), complete / "extended_twin.toml")
         if report:
             from pipelines.diagnosis_report import page_of
             from pipelines.report.writing import write_page

@@ -35,6 +35,8 @@ class Surroundings:
         Channels that drive the simulation.
     sampling_rate_hz : float
     longest_run_s : float
+    blocks : tuple of str
+        That the twin has; effects of others are not offered.
     """
 
     rig: Rig
@@ -48,6 +50,7 @@ class Surroundings:
     driving: tuple[str, ...]
     sampling_rate_hz: float
     longest_run_s: float
+    blocks: tuple[str, ...] = BLOCKS
 
     @property
     def moving_mass_kg(self) -> float:
@@ -185,7 +188,7 @@ def candidates(surroundings: Surroundings) -> list[Candidate]:
     """
     found = []
     for effect in known_effects():
-        if not effect.needs(surroundings):
+        if effect.block not in surroundings.blocks or not effect.needs(surroundings):
             continue
         places = effect.places(surroundings)
         found += [Candidate(effect, surroundings, place) for place in places]

@@ -13,9 +13,8 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-
-from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.extension import Extension, SensorFault
+from sloshlab.diagnosis.baseline_parameter import BaselineParameter
+from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
 from sloshlab.errors import AnalysisError
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
@@ -23,37 +22,19 @@ from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.recorded_run import Drive, drive_of
 from sloshlab.twin.simulated_channels import true_channel
 from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.storage import save_twin
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.structure_forces import MASS_ERROR
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
+from sloshlab.diagnosis.candidate import BLOCKS
+from sloshlab.diagnosis.case import CaseRun
+
 FloatArray = NDArray[np.float64]
 STEPS_PER_PERIOD: Final = 12.0
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _MOST_KEPT_RUNS: Final = 400
-
-
-@dataclass(frozen=True)
-class BaselineParameter:
-    """One number of the baseline that a laboratory knows only so well.
-
-    Attributes
-    ----------
-    name : str
-    believed : float
-    tolerance : float
-        Standard deviation of what it may be, in its own unit.
-    units : str
-    is_reading : bool
-        Whether it changes only what a channel reads, not the motion.
-    """
-
-    name: str
-    believed: float
-    tolerance: float
-    units: str = "1"
-    is_reading: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +65,7 @@ class RigModel:
 
     def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun]) -> None:
         self.rig = rig
+        self.blocks = BLOCKS
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}
@@ -96,6 +78,22 @@ class RigModel:
     def believed(self) -> dict[str, float]:
         """Values of all parameters as the laboratory believes them."""
         return {parameter.name: parameter.believed for parameter in self.parameters}
+
+    @property
+    def moving_mass_kg(self) -> float:
+        """Modal mass at the tank, or what the shaker moves."""
+        structure = self.twin.structure
+        if structure is None:
+            return self.twin.carried_mass_kg
+        return 1.0 / float((structure.mode_shape**2 / structure.masses_kg)[0])
+
+    def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
+        """Displacement, velocity, acceleration of the tank, absolute, shape (n, 3)."""
+        return np.asarray(self._simulation(run, values, NOTHING, ()).places[:, 1])
+
+    def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
+        """Write `extended_twin` as a twin."""
+        save_twin(self.extended_twin(values, extension), path)
 
     def compared(self, run: CaseRun) -> list[str]:
         """Channels of a run that the twin has a counterpart for and that do not alone drive it."""
