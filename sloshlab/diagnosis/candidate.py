@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from sloshlab.diagnosis.extension import Extension
@@ -37,6 +37,10 @@ class Surroundings:
     longest_run_s : float
     blocks : tuple of str
         That the twin has; effects of others are not offered.
+    peaks : mapping of str to float
+        The same channels with their largest reading.
+    channel : str
+        Where an effect of a sensor acts, while its starts are asked for.
     """
 
     rig: Rig
@@ -51,6 +55,13 @@ class Surroundings:
     sampling_rate_hz: float
     longest_run_s: float
     blocks: tuple[str, ...] = BLOCKS
+    peaks: Mapping[str, float] = field(default_factory=dict)
+    channel: str = ""
+
+    @property
+    def reading(self) -> float:
+        """RMS of the channel on which an effect acts, in its unit."""
+        return max(self.channels.get(self.channel, 0.0), 1e-300)
 
     @property
     def moving_mass_kg(self) -> float:
@@ -141,7 +152,7 @@ class Candidate:
         """Sets of numbers to start from, named as in a fit."""
         return [
             {f"{self.key}.{name}": value for name, value in numbers.items()}
-            for numbers in self.effect.starts(self.surroundings)
+            for numbers in self.effect.starts(replace(self.surroundings, channel=self.channel))
         ]
 
     def scale(self, parameter: str) -> float:
