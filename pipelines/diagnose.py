@@ -9,11 +9,10 @@ from typing import Any
 from pipelines.diagnosis_report.results import Diagnosis
 from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
-from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
-
 from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.explanation import explained_extension, findings_of
+from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 
 
 def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bool = True) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 import xarray as xr
+
 from sloshlab.errors import InputError
 from sloshlab.recording import RunAttributes, read_recording, run_attributes
 from sloshlab.rig import Rig

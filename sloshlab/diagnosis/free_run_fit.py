@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.extension import NOTHING, Extension
-from sloshlab.errors import SloshlabError
 
 from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
 _STEP: Final = 0.005

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
-from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times_s, lapped_spectra
 
 from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times_s, lapped_spectra
 
 FloatArray = NDArray[np.float64]
 BLOCK_S: Final = 0.5
