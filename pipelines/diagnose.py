@@ -12,10 +12,13 @@ from pipelines.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.explanation import explained_extension, findings_of
+from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 
 
-def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bool = True) -> dict[str, Any]:
+def diagnose_case(
+    folder: Path, output: Path | None, *, command: str, report: bool = True, twin: Path | None = None
+) -> dict[str, Any]:
     """Diagnose a case; write ``verdict.json`` and the report; return what is to be said.
 
     Parameters
@@ -27,14 +30,17 @@ def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bo
         What the user typed, for the report.
     report : bool
         False leaves the report and its figures out.
+    twin : Path, optional
+        Python module of a user's own twin; its code is run.
     """
-    case = read_case(folder)
+    case = read_case(folder, with_rig=twin is None)
+    model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
-        found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)))
+        found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
     verdict = verdict_of(found)
     facts = verdict_facts(found, verdict)
     target = output or folder / "diagnosis"
-    diagnosis = Diagnosis(found, verdict, _provenance(case, command))
+    diagnosis = Diagnosis(found, verdict, _provenance(case, command, twin))
     with atomic_file.filled_folder(target) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned
@@ -50,8 +56,8 @@ def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bo
     return {"lines": lines, "flags": list(found.split.limits), **facts}
 
 
-def _provenance(case: Case, command: str) -> dict[str, Any]:
-    files = [case.folder / "rig.toml", *sorted((case.folder / "recordings").glob("*.nc"))]
+def _provenance(case: Case, command: str, twin: Path | None) -> dict[str, Any]:
+    files = [twin or case.folder / "rig.toml", *sorted((case.folder / "recordings").glob("*.nc"))]
     return {
         "command": command,
         "inputs": {file.name: sha256_of(file) for file in files},
