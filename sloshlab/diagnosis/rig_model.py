@@ -224,8 +224,8 @@ class RigModel:
             if key in self._drives:
                 return self._drives[key]
         driving = self._drives[(run.name,)].channels if undone else ()
-        drive = drive_of(_corrected(run, undone, driving), self.twin)
-        drive = replace(drive, excitation=_remembered(drive.excitation))
+        drive = drive_of(corrected(run, undone, driving), self.twin)
+        drive = replace(drive, excitation=remembered(drive.excitation))
         with self._lock:
             if len(self._drives) > 20 * max(1, len(self.runs)):
                 self._drives = {known: self._drives[known] for known in self._drives if len(known) == 1}
@@ -332,8 +332,21 @@ def _varied_term(term: Term, values: Mapping[str, float]) -> Term:
     return term.changed(**changed) if changed else term
 
 
-def _corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:
-    """The recording with faults of driving channels undone; one of several is left out instead."""
+def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:
+    """The recording with faults of driving channels undone; one of several is left out instead.
+
+    Parameters
+    ----------
+    run : CaseRun
+    undone : sequence of SensorFault
+    driving : sequence of str
+        Channels that drive together and of which one can be spared.
+
+    Raises
+    ------
+    AnalysisError
+        If a fault cannot be undone.
+    """
     recording = run.recording
     for fault in undone:
         redundant = [name for name in driving if name != fault.channel and name in recording.data_vars]
@@ -355,7 +368,7 @@ def _corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[st
     return recording
 
 
-def _remembered(excitation: Excitation) -> Excitation:
+def remembered(excitation: Excitation) -> Excitation:
     """The excitation with the interpolated values of earlier simulations kept."""
     inputs = excitation.inputs
     if inputs is None:
