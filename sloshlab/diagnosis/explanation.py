@@ -8,17 +8,13 @@ from typing import Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.extension import NOTHING, Extension
-from sloshlab.diagnosis.force_surface import surface_effect
-from sloshlab.diagnosis.split import Split, split
-from sloshlab.errors import InputError, SloshlabError
-from sloshlab.recording import channels
-from sloshlab.rig import Rig
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
 from sloshlab.diagnosis.case import Case, CaseRun
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.extension import NOTHING, Extension
+from sloshlab.diagnosis.force_surface import surface_effect
 from sloshlab.diagnosis.free_run_fit import (
     FreeRunFit,
     FreeRunProblem,
@@ -31,6 +27,10 @@ from sloshlab.diagnosis.free_run_fit import (
 )
 from sloshlab.diagnosis.observations import Observation, observations, with_scatter, with_typical_scatter
 from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.split import Split, split
+from sloshlab.errors import InputError, SloshlabError
+from sloshlab.recording import channels
+from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
@@ -379,6 +379,7 @@ class _Search:
             sampling_rate_hz=self.fitting[0][0].run.attributes.sampling_rate_hz,
             longest_run_s=max(observed[0].run.duration_s for observed in self.fitting),
             blocks=self.model.blocks,
+            peaks=_sizes(self.fitting, self.model, lambda values: np.nanmax(np.abs(values))),
         )
 
 
@@ -408,14 +409,18 @@ def _belongs_to_a_run(name: str, case: Case) -> bool:
     return any(name.endswith((f"release of {run.name}", f" in {run.name}")) for run in case.runs)
 
 
-def _sizes(fitting: Sequence[Sequence[Observation]], model: DiagnosedModel) -> dict[str, float]:
-    """Channels, compared and driving, with their RMS."""
+def _sizes(
+    fitting: Sequence[Sequence[Observation]],
+    model: DiagnosedModel,
+    size: Callable[[FloatArray], float] = np.nanstd,
+) -> dict[str, float]:
+    """Channels, compared and driving, with their size, the RMS by default."""
     found: dict[str, float] = {}
     for observed in fitting:
         run = observed[0].run
         for name in (*[one.channel for one in observed], *model.driving(run)):
             if name in channels(run.recording):
-                found[name] = max(found.get(name, 0.0), float(np.nanstd(run.recording[name].values)))
+                found[name] = max(found.get(name, 0.0), float(size(run.recording[name].values)))
     return found
 
 
