@@ -1,4 +1,4 @@
-"""What every force adds to a decay, from its readings alone: M a + C v + K x must be the force that EFFECTS writes.
+"""What every force adds to a decay, by its readings alone: M a + C v + K x is the force that EFFECTS writes.
 
 Displacement and acceleration are read, the velocity is the derivative of a spline through the displacement; forces
 with a memory are integrated along this motion by scipy. Nothing of the twin's laws is used for what is expected.
