@@ -225,7 +225,7 @@ def _doubted(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
 def _demand_n2(model: RigModel, forces: RunForces) -> float:
     """Mean square of what the blocks lack beyond noise and their own parameters; never zero."""
     sizes = [
-        max(float(np.mean(own.force_n**2)), own.standard_error_n**2)
+        max(own.power_n2, _RESOLVED * own.standard_error_n**2)
         for own in (beyond_own_parameters(model, forces, one) for one in forces.forces)
     ]
     return float(sum(sizes))
@@ -345,13 +345,13 @@ def _shares(parts: Sequence[Mapping[str, FloatArray]], seed: int) -> dict[str, t
         [np.stack([part.get(name, np.zeros(_N_PARTS)) for name in names]) for part in parts], axis=1
     )
 
-    def share(columns: NDArray[np.integer[Any]]) -> FloatArray:
+    def share(columns: NDArray[Any]) -> FloatArray:
         size = np.maximum(table[:, columns].sum(axis=1), 0.0)
         return size / size.sum() if size.sum() > 0 else np.full(len(names), np.nan)
 
-    best = share(np.arange(table.shape[1], dtype=np.int64))
+    best = share(np.arange(table.shape[1]))
     generator = np.random.default_rng(seed)
-    draws = [share(generator.integers(0, table.shape[1], table.shape[1])) for _ in range(_N_DRAWS)]
+    draws = [share(np.asarray(generator.integers(0, table.shape[1], table.shape[1]))) for _ in range(_N_DRAWS)]
     low, high = np.nanquantile(np.array(draws), (0.05, 0.95), axis=0) if np.isfinite(best).all() else (best, best)
     return {
         name: (float(one), min(float(a), float(one)), max(float(b), float(one)))

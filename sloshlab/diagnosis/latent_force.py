@@ -1,14 +1,8 @@
 """The force that would make a simulation follow its recording, at structure and tank.
 
-The modes are linear, so what every motion channel misses is the response to one force at the tank's place,
-whatever made it: the motion of the tank asks for
-
-    F̂(ω) = Σ_c H̄_c W_c ΔY_c / (Σ_c |H_c|² W_c + 1/S(ω))
-
-with the receptances H_c of the channels, the inverse W_c of their noise, and the power S of the force itself,
-taken from its neighbourhood in frequency (a local Wiener filter). A force measured between structure and tank
-tells how much of it is the liquid's: Δf = M ü − F. What is left acts on the structure. Without that force the
-place stays open.
+What every motion channel misses is the response to one force at the tank's place (`force_inversion`), whatever
+made it. A force measured between structure and tank tells how much of it is the liquid's: Δf = M ü − F. What is
+left acts on the structure. Without that force the place stays open.
 """
 
 from __future__ import annotations
@@ -19,29 +13,36 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.force_inversion import (
+    ORDERS,
+    AskedForce,
+    asked_force,
+    frequencies_hz,
+    in_frequency,
+    in_time,
+    modal_weights,
+    own_share,
+    response,
+    sample_variance,
+)
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.rig import Rig
 from sloshlab.twin.excitation import recorded
-from sloshlab.twin.rig_beam import shapes_at
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Found = tuple[tuple["LatentForce", ...], dict[str, FloatArray]]
 STRUCTURE, TANK, EITHER = "structure", "tank", "structure or tank"
-_ORDERS: Final = {"displacement": 0, "velocity": 1, "acceleration": 2}
-_TANK_PLACES: Final = ("tank", "tip", "roof", "control", "mean")
-_SMOOTHING_HZ: Final = 0.6
 _END_SHARE: Final = 0.04
-_LARGEST_SHARE_OF_RATE: Final = 0.4
+_SLOW_HZ: Final = 1.5
+"""Below, offsets and drift of accelerometers hide the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +155,8 @@ def shown_by(
     first = round((force.time_s[0] - float(run.recording["time"].values[0])) * rate)
     series = np.zeros(n)
     series[first : first + force.force_n.size] = force.force_n
-    frequency = _frequencies_hz(2 * n, 1 / rate)
-    spectrum = np.fft.rfft(series, 2 * n)
+    frequency = frequencies_hz(n, rate)
+    spectrum = in_frequency(series)
     structure = forces.structure
     n_cells = max(1, sum(one.channel.startswith("force_cell") for one in observed))
     moved = np.zeros(frequency.size, complex)
@@ -172,51 +173,8 @@ def shown_by(
             weights = modal_weights(structure, rig, one.channel, attributes.get("x_m"))
             if weights is not None:
                 transfer = response(structure, weights, _order(one.channel), frequency)
-        shown[one.channel] = np.asarray(np.fft.irfft(transfer * spectrum, 2 * n)[:n])
+        shown[one.channel] = in_time(transfer * spectrum, n)
     return shown
-
-
-def response(structure: Structure, weights: FloatArray, order: int, frequency_hz: FloatArray) -> ComplexArray:
-    """Motion of a place with these modal deflections per force at the tank, shape (n,).
-
-    Parameters
-    ----------
-    structure : Structure
-    weights : ndarray, shape (n_modes,)
-    order : int
-        0 displacement, 1 velocity, 2 acceleration.
-    frequency_hz : ndarray, shape (n,)
-
-    Examples
-    --------
-    >>> from sloshlab.twin.structure import single_degree_of_freedom
-    >>> float(abs(response(single_degree_of_freedom(2.0, 800.0), np.ones(1), 0, np.zeros(1))[0]))
-    0.00125
-    """
-    s = 2j * np.pi * frequency_hz
-    stiffness = (
-        structure.stiffnesses_n_per_m[:, None]
-        + structure.masses_kg[:, None] * s**2
-        + structure.dampings_kg_per_s[:, None] * s
-    )
-    return np.asarray(s**order * ((weights * structure.mode_shape)[:, None] / stiffness).sum(axis=0))
-
-
-def modal_weights(structure: Structure, rig: Rig, name: str, along_m: float | None) -> FloatArray | None:
-    """Deflection of each mode where a motion channel measures; None where it sees no mode."""
-    quantity, _, place = name.partition("_")
-    if quantity not in _ORDERS or along_m == 0.0:
-        return None
-    if place.startswith("beam"):
-        described = rig.structure
-        if along_m is None or described is None or described.kind != "beam":
-            return None
-        return np.asarray(shapes_at(described, [along_m])[0], np.float64)
-    return structure.mode_shape if place.startswith(_TANK_PLACES) and not place.startswith("control") else None
-
-
-def _frequencies_hz(n_fft: int, step_s: float) -> FloatArray:
-    return np.asarray(np.fft.rfftfreq(n_fft, step_s), np.float64)
 
 
 def _missed(one: Observation, reading: FloatArray, values: Mapping[str, float], is_free: bool) -> FloatArray:
@@ -247,20 +205,12 @@ def _kept(n: int, is_free: bool) -> slice:
     return slice(0 if is_free else m, n - m)
 
 
-def _noise_power(one: Observation, frequency_hz: FloatArray, gain: float = 1.0) -> FloatArray:
-    """E|FFT|² of the noise of a channel in true units, by its variance per coefficient."""
+def _noise_power(one: Observation, frequency_hz: FloatArray) -> FloatArray:
+    """E|FFT|² of the noise of a channel, by its variance per coefficient; slow motion is no accelerometer's."""
     variance = np.interp(frequency_hz, one.frequencies_hz, np.median(one.variance, axis=0))
-    return np.asarray(variance * one.known.size / gain**2)
-
-
-def _own_power(power: FloatArray, noise: FloatArray, width: int) -> FloatArray:
-    """Power beyond noise in the neighbourhood of each frequency, not below zero."""
-    return np.asarray(np.maximum(uniform_filter1d(power - noise, width, mode="nearest"), 0.0))
-
-
-def _time_variance(power: FloatArray, n_fft: int, n: int) -> float:
-    """Variance of a sample whose one-sided FFT has this expected power."""
-    return float((2 * power[1:-1].sum() + power[0] + power[-1]) / (n_fft * n))
+    if _order(one.channel) == 2:
+        variance = variance * (1 + (_SLOW_HZ / np.maximum(frequency_hz, 1e-3 * _SLOW_HZ)) ** 4)
+    return np.asarray(variance * one.known.size)
 
 
 def _on_structure(
@@ -270,66 +220,91 @@ def _on_structure(
     believed: Sequence[Observation],
     missed: Mapping[str, FloatArray],
 ) -> Found:
+    asked, left = _asked_for(simulation, rig, observed, believed, missed)
     run, structure = observed[0].run, simulation.twin.structure
     assert structure is not None
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
-    n_fft = 2 * n
-    frequency = _frequencies_hz(n_fft, 1 / rate)
-    receptances = {}
-    for one in observed:
-        weights = modal_weights(structure, rig, one.channel, run.recording[one.channel].attrs.get("x_m"))
-        if weights is not None:
-            receptances[one.channel] = response(structure, weights, _order(one.channel), frequency)
-    spectra = {name: np.fft.rfft(missed[name], n_fft) for name in receptances}
-    above, below = np.zeros(frequency.size, complex), np.zeros(frequency.size)
-    for one in believed:
-        if one.channel in receptances:
-            weight = 1 / _noise_power(one, frequency)
-            above += receptances[one.channel].conj() * weight * spectra[one.channel]
-            below += np.abs(receptances[one.channel]) ** 2 * weight
-    heard = (below > 0) & (frequency < _LARGEST_SHARE_OF_RATE * rate)
-    below = np.where(heard, below, 1.0)
-    width = max(3, round(_SMOOTHING_HZ * n_fft / rate))
-    power = _own_power(np.where(heard, np.abs(above / below) ** 2, 0.0), np.where(heard, 1 / below, 0.0), width)
-    share = power * below / (1 + power * below)
-    total = np.where(heard, share * above / below, 0.0)
-    left = {name: np.fft.irfft(spectra[name] - receptances[name] * total, n_fft)[:n] for name in receptances}
-    at_tank = [
-        np.fft.irfft(response(structure, structure.mode_shape, order, frequency) * total, n_fft)[:n]
-        for order in range(3)
-    ]
+    frequency = asked.frequency_hz
     sampled = min(n, simulation.places.shape[0])
-    moved = np.stack(at_tank, axis=-1)[:sampled]
+    orders = [response(structure, structure.mode_shape, order, frequency) for order in range(3)]
+    moved = np.stack([in_time(transfer * asked.spectrum, n) for transfer in orders], axis=-1)[:sampled]
     relative, absolute = simulation.places[:sampled, 0] + moved, simulation.places[:sampled, 1] + moved
-    force = np.fft.irfft(total, n_fft)[:sampled]
-    on_structure = _changed(simulation, simulation.twin, "structure", relative, rate)
-    in_tank = _changed(simulation, simulation.twin, "tank", absolute, rate)
-    noise = np.where(heard, share / below, 0.0)
+    force = in_time(asked.spectrum, n)[:sampled]
+    on_structure = _changed(simulation, simulation.twin, STRUCTURE, relative, rate)
+    in_tank = _changed(simulation, simulation.twin, TANK, absolute, rate)
     kept = _kept(n, run.is_free)
     kept = slice(kept.start, min(kept.stop, sampled))
     time = np.asarray(run.recording["time"].values, np.float64)
 
     def latent(place: str, series: FloatArray, expected: FloatArray, motion: FloatArray) -> LatentForce:
-        error = float(np.sqrt(_time_variance(expected, n_fft, n)))
+        error = float(np.sqrt(sample_variance(expected, n)))
         return LatentForce(run, place, series[kept], error, time[kept], motion[kept])
 
     measured = _measured(observed, believed, missed)
     if measured is None:
-        return (latent(EITHER, force - on_structure - in_tank, noise, relative),), left
+        return (latent(EITHER, force - on_structure - in_tank, asked.noise, relative),), left
     missed_force, force_noise = measured
-    carried = simulation.twin.carried_mass_kg
-    inertia = carried * response(structure, structure.mode_shape, 2, frequency)
-    liquid = inertia * total - np.fft.rfft(missed_force, n_fft)
-    of_model = np.fft.rfft(in_tank, n_fft)
-    of_noise = np.abs(inertia) ** 2 * noise + np.interp(frequency, *force_noise)
-    own = _own_power(np.abs(liquid - of_model) ** 2, of_noise, width)
-    tank_share = np.where(frequency < _LARGEST_SHARE_OF_RATE * rate, own / (own + of_noise), 0.0)
-    in_liquid = np.fft.irfft(tank_share * (liquid - of_model), n_fft)[:sampled]
+    inertia = simulation.twin.carried_mass_kg * orders[2]
+    liquid = inertia * asked.spectrum - in_frequency(missed_force) - in_frequency(_padded(in_tank, n))
+    noise = np.abs(inertia) ** 2 * asked.noise + np.interp(frequency, *force_noise)
+    kept_share = own_share(np.abs(liquid) ** 2, noise, frequency, rate)
+    in_liquid = in_time(kept_share * liquid, n)[:sampled]
     of_structure = force - in_tank - in_liquid - on_structure
     return (
-        latent(STRUCTURE, of_structure, noise + tank_share * of_noise, relative),
-        latent(TANK, in_liquid, tank_share * of_noise, absolute),
+        latent(STRUCTURE, of_structure, asked.noise + kept_share * noise, relative),
+        latent(TANK, in_liquid, kept_share * noise, absolute),
     ), left
+
+
+def _asked_for(
+    simulation: Simulation,
+    rig: Rig,
+    observed: Sequence[Observation],
+    believed: Sequence[Observation],
+    missed: Mapping[str, FloatArray],
+) -> tuple[AskedForce, dict[str, FloatArray]]:
+    """The force at the tank's place that the believed motion channels ask for, and what every one has left."""
+    run, structure = observed[0].run, simulation.twin.structure
+    assert structure is not None
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    frequency = frequencies_hz(n, rate)
+    receptances, released = {}, {}
+    for one in observed:
+        weights = modal_weights(structure, rig, one.channel, run.recording[one.channel].attrs.get("x_m"))
+        if weights is not None:
+            receptances[one.channel] = response(structure, weights, _order(one.channel), frequency)
+            if run.is_free:
+                released[one.channel] = in_frequency(
+                    _release(structure, weights, _order(one.channel), n, rate) * _fade(n, True)
+                )
+    spectra = {name: in_frequency(missed[name]) for name in receptances}
+    seen = {
+        one.channel: (receptances[one.channel], _noise_power(one, frequency))
+        for one in believed
+        if one.channel in receptances
+    }
+    asked, at_release = asked_force(seen, spectra, frequency, rate, released or None)
+    left = {}
+    for name, spectrum in spectra.items():
+        start = at_release * released[name] if released else 0.0
+        left[name] = in_time(spectrum - receptances[name] * asked.spectrum - start, n)
+    return asked, left
+
+
+def _release(structure: Structure, weights: FloatArray, order: int, n: int, rate_hz: float) -> FloatArray:
+    """Free decay of a channel after a release of the tank from one metre."""
+    omega = np.sqrt(structure.stiffnesses_n_per_m / structure.masses_kg)
+    decay = 0.5 * structure.dampings_kg_per_s / structure.masses_kg
+    pole = -decay + 1j * np.sqrt(np.maximum(omega**2 - decay**2, 0.0))
+    start = structure.static_deflection(1.0)
+    turning = np.where(pole.imag > 0, pole.imag, np.inf)
+    factor = start * (1 - 1j * decay / turning) * weights
+    time = np.arange(n) / rate_hz
+    return np.asarray((np.exp(np.outer(time, pole)) * pole**order @ factor).real)
+
+
+def _padded(series: FloatArray, n: int) -> FloatArray:
+    return np.concatenate([series, np.zeros(n - series.size)])
 
 
 def _on_shaker(
@@ -340,8 +315,7 @@ def _on_shaker(
     missed: Mapping[str, FloatArray],
 ) -> Found:
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
-    n_fft = 2 * n
-    frequency = _frequencies_hz(n_fft, 1 / rate)
+    frequency = frequencies_hz(n, rate)
     sampled = min(n, simulation.places.shape[0])
     motions = [one for one in observed if _order(one.channel) == 2]
     good = [one for one in motions if one in believed] or motions
@@ -355,22 +329,20 @@ def _on_shaker(
     of_noise = np.interp(frequency, *force_noise)
     for one in good:
         of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(one, frequency)
-    wanted = np.fft.rfft(carried * mean - missed_force, n_fft)
-    width = max(3, round(_SMOOTHING_HZ * n_fft / rate))
-    own = _own_power(np.abs(wanted) ** 2, of_noise, width)
-    share = np.where(frequency < _LARGEST_SHARE_OF_RATE * rate, own / (own + of_noise), 0.0)
-    force = np.fft.irfft(share * wanted, n_fft)[:sampled]
+    wanted = in_frequency(carried * mean - missed_force)
+    share = own_share(np.abs(wanted) ** 2, of_noise, frequency, rate)
+    force = in_time(share * wanted, n)[:sampled]
     motion = simulation.places[:sampled, 1].copy()
     motion[:, 2] += mean[:sampled]
     kept = _kept(n, run.is_free)
     kept = slice(kept.start, min(kept.stop, sampled))
     time = np.asarray(run.recording["time"].values, np.float64)
-    error = float(np.sqrt(_time_variance(share * of_noise, n_fft, n)))
+    error = float(np.sqrt(sample_variance(share * of_noise, n)))
     return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept]),), left
 
 
 def _order(name: str) -> int:
-    return _ORDERS.get(name.partition("_")[0], -1)
+    return ORDERS.get(name.partition("_")[0], -1)
 
 
 def _measured(
