@@ -14,6 +14,7 @@ from sloshlab.diagnosis.user_twin.description import (
     Response,
     TwinRun,
 )
+from sloshlab.diagnosis.user_twin.extended import load_extended
 from sloshlab.diagnosis.user_twin.loading import load_user_twin
 from sloshlab.diagnosis.user_twin.mechanism import Mechanism, Reading
 from sloshlab.diagnosis.user_twin.model import UserTwinModel
@@ -29,5 +30,6 @@ __all__ = [
     "Response",
     "TwinRun",
     "UserTwinModel",
+    "load_extended",
     "load_user_twin",
 ]

@@ -136,11 +136,11 @@ class TwinRun:
         """Times of the samples."""
         return np.arange(self.n_samples) / self.sampling_rate_hz
 
-    def start(self, channel: str, n_samples: int = 10) -> tuple[float, float]:
-        """Value and slope per second at the first sample, by a straight line through the first ones."""
+    def start(self, channel: str, n_samples: int = 6) -> tuple[float, float]:
+        """Value and slope per second at the first sample, by a cubic through the first ones."""
         first = self.channels[channel][:n_samples]
-        slope, value = np.polyfit(np.arange(first.size) / self.sampling_rate_hz, first, 1)
-        return float(value), float(slope)
+        *_, slope, value = np.polyfit(np.arange(first.size), first, min(3, first.size - 1))
+        return float(value), float(slope) * self.sampling_rate_hz
 
 
 @dataclass(frozen=True, eq=False)

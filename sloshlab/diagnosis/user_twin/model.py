@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
@@ -13,14 +12,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sloshlab import atomic_file
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
 from sloshlab.diagnosis.rig_model import corrected, remembered, steps_per_sample
+from sloshlab.diagnosis.user_module import one_line
 from sloshlab.diagnosis.user_twin.added_force import AddedForce
 from sloshlab.diagnosis.user_twin.description import Compared, FreeTwin, Parameter, Response, TwinRun, UserTwin
-from sloshlab.diagnosis.user_twin.loading import one_line
+from sloshlab.diagnosis.user_twin.extended import save_extended
 from sloshlab.diagnosis.user_twin.mechanism import EngineTwin, Mechanism, engine_twin, reading_of
 from sloshlab.errors import AnalysisError, InputError, SloshlabError
 from sloshlab.recording import channels
@@ -123,12 +122,8 @@ class UserTwinModel:
 
     def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
         """Write parameters and added forces as TOML; the module itself stays where it is."""
-        lines = ["sloshlab_user_twin = 1", f"module = {json.dumps(self.name)}", "", "[parameters]"]
-        lines += [f"{json.dumps(one.name)} = {values.get(one.name, one.believed)!r}" for one in self.parameters]
-        for term in extension.terms:
-            lines += ["", "[[terms]]", f"name = {json.dumps(term.name)}"]
-            lines += [f"{name} = {float(value)!r}" for name, value in term.values.items()]
-        atomic_file.write_bytes(path, ("\n".join(lines) + "\n").encode())
+        known = {one.name: values.get(one.name, one.believed) for one in self.parameters}
+        save_extended(self.name, known, extension, path)
 
     def _truth(
         self, run: CaseRun, values: Mapping[str, float], extension: Extension
