@@ -12,6 +12,7 @@ from pipelines.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.explanation import explained_extension, findings_of
+from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 
@@ -45,6 +46,7 @@ def diagnose_case(
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned
         found.model.save_extended(best.fit.values, explained_extension(best), complete / "extended_twin.toml")
+        found.model.save_extended(found.retuned.fit.values, NOTHING, complete / "retuned_twin.toml")
         if report:
             from pipelines.diagnosis_report import page_of
             from pipelines.report.writing import write_page
