@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,19 @@ from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.explanation import explained_extension, findings_of
 from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.user_effects import load_user_effects
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 
 
 def diagnose_case(
-    folder: Path, output: Path | None, *, command: str, report: bool = True, twin: Path | None = None
+    folder: Path,
+    output: Path | None,
+    *,
+    command: str,
+    report: bool = True,
+    twin: Path | None = None,
+    effects: Sequence[Path] = (),
 ) -> dict[str, Any]:
     """Diagnose a case; write ``verdict.json`` and the report; return what is to be said.
 
@@ -33,7 +41,10 @@ def diagnose_case(
         False leaves the report and its figures out.
     twin : Path, optional
         Python module of a user's own twin; its code is run.
+    effects : sequence of Path
+        Python modules with effects of a user's own; their code is run.
     """
+    own = [effect for file in effects for effect in load_user_effects(file)]
     case = read_case(folder, with_rig=twin is None)
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
@@ -41,7 +52,7 @@ def diagnose_case(
     verdict = verdict_of(found)
     facts = verdict_facts(found, verdict)
     target = output or folder / "diagnosis"
-    diagnosis = Diagnosis(found, verdict, _provenance(case, command, twin))
+    diagnosis = Diagnosis(found, verdict, _provenance(case, command, twin, effects))
     with atomic_file.filled_folder(target) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned
@@ -53,13 +64,15 @@ def diagnose_case(
 
             write_page(page_of(diagnosis), complete)
     lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
+    if own:
+        lines.append("effects of your own: " + ", ".join(f"{one.block}.{one.name}" for one in own))
     if report:
         lines.append(f"report: {target / 'report.html'}")
     return {"lines": lines, "flags": list(found.split.limits), **facts}
 
 
-def _provenance(case: Case, command: str, twin: Path | None) -> dict[str, Any]:
-    files = [twin or case.folder / "rig.toml", *sorted((case.folder / "recordings").glob("*.nc"))]
+def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:
+    files = [twin or case.folder / "rig.toml", *effects, *sorted((case.folder / "recordings").glob("*.nc"))]
     return {
         "command": command,
         "inputs": {file.name: sha256_of(file) for file in files},

@@ -30,10 +30,24 @@ def diagnose(
             show_default=False,
         ),
     ] = None,
+    effects: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--effects",
+            metavar="MODULE.py",
+            help="Effects of your own beside the known ones; its code is run. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write verdict.json only.")] = False,
     as_json: Json = False,
 ) -> None:
     """What physics the simulation of a case left out, or that nothing is missing."""
     from pipelines.diagnose import diagnose_case
 
-    finish(diagnose_case(case, output, command=command_as_given(), report=not no_report, twin=twin), as_json)
+    finish(
+        diagnose_case(
+            case, output, command=command_as_given(), report=not no_report, twin=twin, effects=effects or ()
+        ),
+        as_json,
+    )

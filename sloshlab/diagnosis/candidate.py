@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from sloshlab.diagnosis.extension import Extension
-from sloshlab.errors import InputError
+from sloshlab.errors import InputError, SloshlabError
 from sloshlab.rig import Rig
 from sloshlab.twin.twin import Twin
 
@@ -185,6 +186,12 @@ def register(effect: Effect) -> Effect:
     return effect
 
 
+def withdraw(effect: Effect) -> None:
+    """Make an effect unknown again; nothing happens where it is not known."""
+    if _EFFECTS.get(f"{effect.block}.{effect.name}") is effect:
+        del _EFFECTS[f"{effect.block}.{effect.name}"]
+
+
 def known_effects() -> list[Effect]:
     """All effects, in the order in which they were registered."""
     return list(_EFFECTS.values())
@@ -196,11 +203,44 @@ def candidates(surroundings: Surroundings) -> list[Candidate]:
     Parameters
     ----------
     surroundings : Surroundings
+
+    Raises
+    ------
+    InputError
+        If an effect cannot say where it starts, or what it adds there.
     """
-    found = []
+    found: list[Candidate] = []
     for effect in known_effects():
-        if effect.block not in surroundings.blocks or not effect.needs(surroundings):
+        if effect.block not in surroundings.blocks:
             continue
-        places = effect.places(surroundings)
-        found += [Candidate(effect, surroundings, place) for place in places]
+        try:
+            if not effect.needs(surroundings):
+                continue
+            made = [Candidate(effect, surroundings, place) for place in effect.places(surroundings)]
+            for candidate in made:
+                _require_sound(candidate)
+        except Exception as error:
+            raise InputError(
+                f"effect {effect.block}.{effect.name}",
+                got=f"{type(error).__name__}: {error}"[:300],
+                remedy="correct its starts and extension",
+            ) from error
+        found += made
     return found
+
+
+def _require_sound(candidate: Candidate) -> None:
+    """Starts that name every parameter, within its bounds, and an extension for each."""
+    names = {parameter.name for parameter in candidate.effect.parameters}
+    starts = [
+        dict(one) for one in candidate.effect.starts(replace(candidate.surroundings, channel=candidate.channel))
+    ]
+    if not names or not starts:
+        raise InputError(
+            "parameters and starts", got=f"{len(names)} and {len(starts)}", allowed="one or more of both"
+        )
+    for numbers in starts:
+        if set(numbers) != names:
+            raise InputError("a start", got=", ".join(sorted(numbers)), allowed=", ".join(sorted(names)))
+        with suppress(SloshlabError):  # numbers that cannot be simulated here; its fit will fail and say so
+            candidate.extension(numbers)

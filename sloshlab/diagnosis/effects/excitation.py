@@ -8,8 +8,8 @@ from sloshlab.twin.base_rocking import BaseRocking
 
 
 def _has_root_moment(at: Surroundings) -> bool:
-    """Only a beam with dimensions bends at a root."""
-    described = at.rig.structure
+    """Only a beam with dimensions bends at a root; a twin of the user's own has no rig."""
+    described = getattr(at.rig, "structure", None)
     return described is not None and described.kind == "beam" and described.length_m is not None
 
 
