@@ -40,7 +40,7 @@ def trained(x, y, neurons=20, delays=2, spread=1.0, epochs=150):
         [training],
         [validation],
         RATE_HZ,
-        TrainingSettings(n_epochs=epochs, input_spread=spread),
+        TrainingSettings(n_epochs=epochs, input_spread=spread, least_gain=0.0),
     )
 
 

@@ -124,6 +124,7 @@ def _excerpt(axes: Axes, run: ComparedRun, at: int, n_cycles: int) -> None:
     axes.plot(time_s, run.free[shown], color=REFERENCE_COLOUR, lw=1.0, label="predicted, free run")
     axes.set_xlim(time_s[0], time_s[-1])
     axes.locator_params(axis="x", nbins=4)
+    axes.ticklabel_format(axis="x", useOffset=False)
 
 
 def _envelope(

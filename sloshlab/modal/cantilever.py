@@ -7,6 +7,7 @@ Clamped at x = 0; at x = L the shear force is that of the tip mass M. With μ = 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -134,7 +135,7 @@ def cantilever_modes(beam: Cantilever, *, n_modes: int, x_m: FloatArray | None =
     roots = np.array([_root(n, ratio) for n in range(1, n_modes + 1)])
     speed = np.sqrt(beam.bending_stiffness_n_m2 / beam.mass_per_length_kg_per_m)
     omega = (roots / beam.length_m) ** 2 * speed
-    nodes, weights = np.polynomial.legendre.leggauss(40 + 4 * n_modes)
+    nodes, weights = _nodes_and_weights(40 + 4 * n_modes)
     along = 0.5 * (nodes + 1)
     inner = _shapes(roots, along)
     line_mass = 0.5 * weights * beam.mass_per_length_kg_per_m * beam.length_m
@@ -153,6 +154,14 @@ def _characteristic(root: float, ratio: float) -> float:
     return float(1 / np.cosh(root) + np.cos(root) + ratio * root * (tangent * np.cos(root) - np.sin(root)))
 
 
+@lru_cache(maxsize=64)
+def _nodes_and_weights(n: int) -> tuple[FloatArray, FloatArray]:
+    nodes, weights = np.polynomial.legendre.leggauss(n)
+    nodes.flags.writeable = weights.flags.writeable = False
+    return nodes, weights
+
+
+@lru_cache(maxsize=1024)
 def _root(n: int, ratio: float) -> float:
     """The n-th wave number: between the clamped–pinned root before it and the clamped–free root."""
     low = max((n - 1) * np.pi, 1e-3 / (1 + ratio))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 EPOCHS_PER_RISE: Final = 2
@@ -16,8 +16,10 @@ class EarlyStop:
     Attributes
     ----------
     patience : int
-        Rises one after another after which it ends. It also ends after twice as many epochs without an error
-        below the lowest so far: an error that wavers rises and falls for ever.
+        Rises one after another after which it ends.
+    least_gain : float
+        Share by which the lowest error must fall within twice as many epochs, or it ends, too: an error that
+        wavers rises and falls for ever, and one that creeps falls for ever.
 
     Examples
     --------
@@ -27,10 +29,10 @@ class EarlyStop:
     """
 
     patience: int
-    _lowest: float = math.inf
+    least_gain: float = 0.0
     _before: float = math.inf
     _rises: int = 0
-    _epochs_since: int = 0
+    _lowest: list[float] = field(default_factory=list)
 
     def reason(self, validation: float) -> str:
         """Take the error of an epoch; return why training ends, or nothing.
@@ -40,10 +42,17 @@ class EarlyStop:
         validation : float
         """
         self._rises = self._rises + 1 if validation > self._before else 0
-        self._epochs_since = 0 if validation < self._lowest else self._epochs_since + 1
-        self._before, self._lowest = validation, min(self._lowest, validation)
+        self._before = validation
+        self._lowest.append(min(validation, self._lowest[-1] if self._lowest else math.inf))
         if self._rises >= self.patience:
             return f"validation error rose {self._rises} times"
-        if self._epochs_since >= EPOCHS_PER_RISE * self.patience:
-            return f"validation error no lower for {self._epochs_since} epochs"
+        n_epochs = EPOCHS_PER_RISE * self.patience
+        if len(self._lowest) <= n_epochs:
+            return ""
+        before, now = self._lowest[-1 - n_epochs], self._lowest[-1]
+        if now == before:
+            return f"validation error no lower for {n_epochs} epochs"
+        gain = 1.0 - now / before if math.isfinite(before) else 1.0
+        if gain < self.least_gain:
+            return f"validation error only {100 * gain:.2g} % lower after {n_epochs} epochs"
         return ""

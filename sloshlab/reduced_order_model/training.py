@@ -39,6 +39,9 @@ class TrainingSettings:
         At most.
     patience : int
         Rises of the validation error one after another after which training stops (`EarlyStop`).
+    least_gain : float
+        Share by which the mean square of the validation error must fall within twice as many epochs, or training
+        stops.
     n_starts : int
         Trainings from different random starts; the best by validation error is kept.
     seed : int
@@ -49,6 +52,7 @@ class TrainingSettings:
 
     n_epochs: int = 100
     patience: int = 6
+    least_gain: float = 0.01
     n_starts: int = 1
     seed: int = 0
     input_spread: float = 2.0
@@ -248,7 +252,7 @@ def _descend(
     n_training, n_validation = n_samples(task.training, task.delays), n_samples(task.validation, task.delays)
     unit = task.output_scale**2
     step: Step | None = Step(*problem.improved(theta))
-    stop, ended = EarlyStop(settings.patience), "epochs used up"
+    stop, ended = EarlyStop(settings.patience, settings.least_gain), "epochs used up"
     for done in range(settings.n_epochs + 1):
         assert step is not None
         theta = step.theta

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -29,6 +30,7 @@ _LARGEST_MASS_RATIO = 100.0
 _MASSES_AGREE = 0.25
 
 
+@lru_cache(maxsize=64)
 def beam_of_rig(described: Structure) -> Cantilever | None:
     """The uniform beam with the tip mass of the module's text; None where the file has no dimensions.
 
@@ -116,6 +118,7 @@ class Rotation:
     residual_base_kg_m: float
 
 
+@lru_cache(maxsize=64)
 def rotation_of_beam(described: Structure) -> Rotation | None:
     """A rotation about the root in the file's modes; None where the file has no dimensions."""
     beam = beam_of_rig(described)

@@ -190,6 +190,25 @@ def test_the_validation_error_ends_a_training_when_it_rises_or_wavers(errors, n_
     assert reason in reasons
 
 
+@pytest.mark.parametrize(
+    ("fall", "n_taken"),
+    [(0.999, 7), (0.9980, None), (0.99, None)],  # over six epochs 0.6, 1.2 and 5.9 %
+)
+def test_a_training_that_creeps_ends_when_it_gains_less_than_wanted(fall, n_taken):
+    stop = EarlyStop(3, least_gain=0.01)
+    reasons = [stop.reason(fall**k) for k in range(30)]
+    first = next((k + 1 for k, one in enumerate(reasons) if one), None)
+    assert first == n_taken
+    if n_taken:
+        assert reasons[n_taken - 1] == "validation error only 0.6 % lower after 6 epochs"
+
+
+@pytest.mark.parametrize("errors", [[np.inf] * 7, [np.inf, 3, 3, 3, 3, 3, 3]])
+def test_a_training_without_a_stable_model_ends_and_one_that_found_one_goes_on(errors):
+    stop = EarlyStop(3, least_gain=0.01)
+    assert bool([stop.reason(float(error)) for error in errors][-1]) == (errors[-1] == np.inf)
+
+
 def test_an_interrupt_keeps_the_best_model_so_far():
     def stop(epoch):
         if epoch.number == 2:
@@ -224,12 +243,13 @@ def test_free_run_sensitivities_are_difference_quotients(network):
 
     matrix, gradient = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
     squares = free_run.free_run_sums(kind, theta, 3, run.x, run.y, 2, 60, *arguments, 1e3, matrix, gradient)
-    steps = 1e-6 * np.eye(theta.size)
-    slopes = np.array([(outputs(theta + d) - outputs(theta - d)) / 2e-6 for d in steps])
+    steps = 1e-3 * np.eye(theta.size)
+    near, far = ([outputs(theta + k * d) - outputs(theta - k * d) for d in steps] for k in (1, 2))
+    slopes = (8 * np.array(near) - np.array(far)) / 12e-3  # of fourth order
     error = run.y - outputs(theta)
     assert squares == pytest.approx(error @ error)
-    assert gradient == pytest.approx(slopes @ error, rel=1e-5, abs=1e-6)
-    assert np.tril(matrix) == pytest.approx(np.tril(slopes @ slopes.T), rel=1e-5, abs=1e-6)
+    assert gradient == pytest.approx(slopes @ error, rel=1e-6, abs=1e-8)
+    assert np.tril(matrix) == pytest.approx(np.tril(slopes @ slopes.T), rel=1e-6, abs=1e-8)
 
 
 def test_simulation_without_feedback_is_prediction():
