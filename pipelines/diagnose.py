@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.diagnosis_report.results import Diagnosis
+from pipelines.free_place import require_free_folder
 from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
 from sloshlab import atomic_file
@@ -44,14 +45,15 @@ def diagnose_case(
     effects : sequence of Path
         Python modules with effects of a user's own; their code is run.
     """
-    own = [effect for file in effects for effect in load_user_effects(file)]
+    target = output or folder / "diagnosis"
     case = read_case(folder, with_rig=twin is None)
+    require_free_folder(target, "diagnosis")
+    own = [effect for file in effects for effect in load_user_effects(file)]
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
         found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
     verdict = verdict_of(found)
     facts = verdict_facts(found, verdict)
-    target = output or folder / "diagnosis"
     diagnosis = Diagnosis(found, verdict, _provenance(case, command, twin, effects))
     with atomic_file.filled_folder(target) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())

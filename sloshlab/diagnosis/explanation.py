@@ -26,6 +26,7 @@ from sloshlab.diagnosis.free_run_fit import (
     scanned,
 )
 from sloshlab.diagnosis.observations import Observation, observations, with_scatter, with_typical_scatter
+from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.split import Split, split
 from sloshlab.errors import InputError, SloshlabError
@@ -135,10 +136,12 @@ def findings_of(
     model : DiagnosedModel, optional
         A user's own twin of the same runs; that of the rig file by default.
     """
+    require_one_rig(case)
     if model is None:
         if case.rig is None:
             raise InputError(f"case {case.name}", got="neither a rig nor a twin", allowed="one of them")
         model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs))
+    require_comparable(case, model)
     parts = split(case)
     told("retuning the baseline", 0, 1)
     weighted = _weighted_observations(case, model, parts)
