@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pipelines.diagnosis_report.results import Diagnosis
+from pipelines.free_place import require_free_folder
 from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.explanation import explained_extension, findings_of
+from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.user_effects import load_user_effects
+from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
-from sloshlab.twin.storage import save_twin
 
 
-def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bool = True) -> dict[str, Any]:
+def diagnose_case(
+    folder: Path,
+    output: Path | None,
+    *,
+    command: str,
+    report: bool = True,
+    twin: Path | None = None,
+    effects: Sequence[Path] = (),
+) -> dict[str, Any]:
     """Diagnose a case; write ``verdict.json`` and the report; return what is to be said.
 
     Parameters
@@ -28,33 +40,41 @@ def diagnose_case(folder: Path, output: Path | None, *, command: str, report: bo
         What the user typed, for the report.
     report : bool
         False leaves the report and its figures out.
+    twin : Path, optional
+        Python module of a user's own twin; its code is run.
+    effects : sequence of Path
+        Python modules with effects of a user's own; their code is run.
     """
-    case = read_case(folder)
+    target = output or folder / "diagnosis"
+    case = read_case(folder, with_rig=twin is None)
+    require_free_folder(target, "diagnosis")
+    own = [effect for file in effects for effect in load_user_effects(file)]
+    model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
-        found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)))
+        found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
     verdict = verdict_of(found)
     facts = verdict_facts(found, verdict)
-    target = output or folder / "diagnosis"
-    diagnosis = Diagnosis(found, verdict, _provenance(case, command))
+    diagnosis = Diagnosis(found, verdict, _provenance(case, command, twin, effects))
     with atomic_file.filled_folder(target) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned
-        save_twin(
-            found.model.extended_twin(best.fit.values, explained_extension(best)), complete / "extended_twin.toml"
-        )
+        found.model.save_extended(best.fit.values, explained_extension(best), complete / "extended_twin.toml")
+        found.model.save_extended(found.retuned.fit.values, NOTHING, complete / "retuned_twin.toml")
         if report:
             from pipelines.diagnosis_report import page_of
             from pipelines.report.writing import write_page
 
             write_page(page_of(diagnosis), complete)
     lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
+    if own:
+        lines.append("effects of your own: " + ", ".join(f"{one.block}.{one.name}" for one in own))
     if report:
         lines.append(f"report: {target / 'report.html'}")
     return {"lines": lines, "flags": list(found.split.limits), **facts}
 
 
-def _provenance(case: Case, command: str) -> dict[str, Any]:
-    files = [case.folder / "rig.toml", *sorted((case.folder / "recordings").glob("*.nc"))]
+def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:
+    files = [twin or case.folder / "rig.toml", *effects, *sorted((case.folder / "recordings").glob("*.nc"))]
     return {
         "command": command,
         "inputs": {file.name: sha256_of(file) for file in files},

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from sloshlab.diagnosis.extension import Extension
-from sloshlab.errors import InputError
+from sloshlab.errors import InputError, SloshlabError
 from sloshlab.rig import Rig
 from sloshlab.twin.twin import Twin
 
@@ -35,6 +36,12 @@ class Surroundings:
         Channels that drive the simulation.
     sampling_rate_hz : float
     longest_run_s : float
+    blocks : tuple of str
+        That the twin has; effects of others are not offered.
+    peaks : mapping of str to float
+        The same channels with their largest reading.
+    channel : str
+        Where an effect of a sensor acts, while its starts are asked for.
     """
 
     rig: Rig
@@ -48,6 +55,14 @@ class Surroundings:
     driving: tuple[str, ...]
     sampling_rate_hz: float
     longest_run_s: float
+    blocks: tuple[str, ...] = BLOCKS
+    peaks: Mapping[str, float] = field(default_factory=dict)
+    channel: str = ""
+
+    @property
+    def reading(self) -> float:
+        """RMS of the channel on which an effect acts, in its unit."""
+        return max(self.channels.get(self.channel, 0.0), 1e-300)
 
     @property
     def moving_mass_kg(self) -> float:
@@ -138,7 +153,7 @@ class Candidate:
         """Sets of numbers to start from, named as in a fit."""
         return [
             {f"{self.key}.{name}": value for name, value in numbers.items()}
-            for numbers in self.effect.starts(self.surroundings)
+            for numbers in self.effect.starts(replace(self.surroundings, channel=self.channel))
         ]
 
     def scale(self, parameter: str) -> float:
@@ -150,7 +165,7 @@ class Candidate:
         """What it adds, with these numbers."""
         added = self.effect.extension(numbers, self.surroundings, self.channel)
         key = ((self.key, *sorted(numbers.items())),)
-        return Extension(added.terms, added.liquid, added.faults, key)
+        return replace(added, key=key)
 
 
 _EFFECTS: dict[str, Effect] = {}
@@ -171,6 +186,12 @@ def register(effect: Effect) -> Effect:
     return effect
 
 
+def withdraw(effect: Effect) -> None:
+    """Make an effect unknown again; nothing happens where it is not known."""
+    if _EFFECTS.get(f"{effect.block}.{effect.name}") is effect:
+        del _EFFECTS[f"{effect.block}.{effect.name}"]
+
+
 def known_effects() -> list[Effect]:
     """All effects, in the order in which they were registered."""
     return list(_EFFECTS.values())
@@ -182,11 +203,44 @@ def candidates(surroundings: Surroundings) -> list[Candidate]:
     Parameters
     ----------
     surroundings : Surroundings
+
+    Raises
+    ------
+    InputError
+        If an effect cannot say where it starts, or what it adds there.
     """
-    found = []
+    found: list[Candidate] = []
     for effect in known_effects():
-        if not effect.needs(surroundings):
+        if effect.block not in surroundings.blocks:
             continue
-        places = effect.places(surroundings)
-        found += [Candidate(effect, surroundings, place) for place in places]
+        try:
+            if not effect.needs(surroundings):
+                continue
+            made = [Candidate(effect, surroundings, place) for place in effect.places(surroundings)]
+            for candidate in made:
+                _require_sound(candidate)
+        except Exception as error:
+            raise InputError(
+                f"effect {effect.block}.{effect.name}",
+                got=f"{type(error).__name__}: {error}"[:300],
+                remedy="correct its starts and extension",
+            ) from error
+        found += made
     return found
+
+
+def _require_sound(candidate: Candidate) -> None:
+    """Starts that name every parameter, within its bounds, and an extension for each."""
+    names = {parameter.name for parameter in candidate.effect.parameters}
+    starts = [
+        dict(one) for one in candidate.effect.starts(replace(candidate.surroundings, channel=candidate.channel))
+    ]
+    if not names or not starts:
+        raise InputError(
+            "parameters and starts", got=f"{len(names)} and {len(starts)}", allowed="one or more of both"
+        )
+    for numbers in starts:
+        if set(numbers) != names:
+            raise InputError("a start", got=", ".join(sorted(numbers)), allowed=", ".join(sorted(names)))
+        with suppress(SloshlabError):  # numbers that cannot be simulated here; its fit will fail and say so
+            candidate.extension(numbers)

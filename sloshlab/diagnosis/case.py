@@ -23,6 +23,8 @@ _SAME_TEST: Final = (
     "sweep_start_hz",
     "sweep_rate_octave_per_s",
 )
+_NAME_OF_TEST: Final = "test"
+"""Optional attribute: runs that differ in it are different tests, for example realisations of a random signal."""
 _LEVELS_AGREE: Final = 0.1
 _LARGEST_CASE_BYTES: Final = 2 * 2**30
 
@@ -63,14 +65,15 @@ class Case:
     ----------
     name : str
     folder : Path
-    rig : Rig
+    rig : Rig or None
+        None where a twin of the user's own stands for it.
     runs : tuple of CaseRun
         In the order of their names.
     """
 
     name: str
     folder: Path
-    rig: Rig
+    rig: Rig | None
     runs: tuple[CaseRun, ...]
 
     def tests(self) -> list[tuple[CaseRun, ...]]:
@@ -86,12 +89,14 @@ class Case:
         return [tuple(group) for group in groups]
 
 
-def read_case(folder: str | Path) -> Case:
+def read_case(folder: str | Path, *, with_rig: bool = True) -> Case:
     """Read ``rig.toml`` and ``recordings/*.nc`` of a case folder.
 
     Parameters
     ----------
     folder : path
+    with_rig : bool
+        False where a twin of the user's own is simulated; ``rig.toml`` may then be absent and is not read.
 
     Raises
     ------
@@ -100,14 +105,14 @@ def read_case(folder: str | Path) -> Case:
     """
     path = Path(folder)
     rig_file = path / "rig.toml"
-    if not rig_file.is_file():
+    if with_rig and not rig_file.is_file():
         raise InputError(
             f"case {path}", got="no rig.toml", allowed="rig.toml and recordings/*.nc", remedy="name a case folder"
         )
     files = sorted((path / "recordings").glob("*.nc"))
     if not 1 <= len(files) <= MOST_RUNS:
         raise InputError(f"case {path}", got=f"{len(files)} recordings", allowed=f"1 … {MOST_RUNS}")
-    rig = Rig.from_toml(rig_file)
+    rig = Rig.from_toml(rig_file) if with_rig else None
     runs, n_bytes = [], 0
     for file in files:
         recording = read_recording(file)
@@ -123,9 +128,15 @@ def read_case(folder: str | Path) -> Case:
 def _same_test(one: CaseRun, other: CaseRun) -> bool:
     if any(getattr(one.attributes, name) != getattr(other.attributes, name) for name in _SAME_TEST):
         return False
+    if _name_of_test(one) != _name_of_test(other):
+        return False
     if one.recording.sizes["time"] != other.recording.sizes["time"]:
         return False
     return bool(abs(np.log(max(level(one), 1e-300) / max(level(other), 1e-300))) < _LEVELS_AGREE)
+
+
+def _name_of_test(run: CaseRun) -> str:
+    return str(run.recording.attrs.get(_NAME_OF_TEST, ""))
 
 
 def level(run: CaseRun) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
 from sloshlab.diagnosis.case import Case, CaseRun
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.force_surface import surface_effect
 from sloshlab.diagnosis.free_run_fit import (
@@ -25,10 +26,12 @@ from sloshlab.diagnosis.free_run_fit import (
     scanned,
 )
 from sloshlab.diagnosis.observations import Observation, observations, with_scatter, with_typical_scatter
+from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.split import Split, split
-from sloshlab.errors import SloshlabError
+from sloshlab.errors import InputError, SloshlabError
 from sloshlab.recording import channels
+from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
@@ -78,7 +81,7 @@ class Findings:
     Attributes
     ----------
     case : Case
-    model : RigModel
+    model : DiagnosedModel
     split : Split
     surroundings : Surroundings
     fitting, held_out : list of list of Observation
@@ -93,7 +96,7 @@ class Findings:
     """
 
     case: Case
-    model: RigModel
+    model: DiagnosedModel
     split: Split
     surroundings: Surroundings
     fitting: list[list[Observation]]
@@ -123,7 +126,9 @@ class Findings:
         return sum(one.spectra.size for run in self.held_out for one in run)
 
 
-def findings_of(case: Case, told: Told = lambda what, done, of: None) -> Findings:
+def findings_of(
+    case: Case, told: Told = lambda what, done, of: None, model: DiagnosedModel | None = None
+) -> Findings:
     """Retune, fit every candidate, add greedily, and find the ceiling.
 
     Parameters
@@ -131,8 +136,15 @@ def findings_of(case: Case, told: Told = lambda what, done, of: None) -> Finding
     case : Case
     told : callable, optional
         Takes what is being done, how much of it is done, and how much there is.
+    model : DiagnosedModel, optional
+        A user's own twin of the same runs; that of the rig file by default.
     """
-    model = RigModel(case.rig, case.folder, case.runs)
+    require_one_rig(case)
+    if model is None:
+        if case.rig is None:
+            raise InputError(f"case {case.name}", got="neither a rig nor a twin", allowed="one of them")
+        model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs))
+    require_comparable(case, model)
     parts = split(case)
     told("retuning the baseline", 0, 1)
     weighted = _weighted_observations(case, model, parts)
@@ -142,7 +154,7 @@ def findings_of(case: Case, told: Told = lambda what, done, of: None) -> Finding
     return search.run()
 
 
-def _weighted_observations(case: Case, model: RigModel, parts: Split) -> dict[str, list[Observation]]:
+def _weighted_observations(case: Case, model: DiagnosedModel, parts: Split) -> dict[str, list[Observation]]:
     """Observations of all runs, weighted by the scatter of repeats about a retuned baseline."""
     plain = {run.name: observations(run, model.compared(run)) for run in case.runs}
     fit, _ = fitted(
@@ -180,7 +192,9 @@ def _loosened(observed: Sequence[Observation]) -> list[Observation]:
     ]
 
 
-def _raw_residual(model: RigModel, observed: Sequence[Observation], fit: FreeRunFit) -> dict[str, FloatArray]:
+def _raw_residual(
+    model: DiagnosedModel, observed: Sequence[Observation], fit: FreeRunFit
+) -> dict[str, FloatArray]:
     if not observed:
         return {}
     try:
@@ -196,7 +210,7 @@ class _Search:
     def __init__(
         self,
         case: Case,
-        model: RigModel,
+        model: DiagnosedModel,
         parts: Split,
         fitting: list[list[Observation]],
         held_out: list[list[Observation]],
@@ -339,7 +353,7 @@ class _Search:
         found = []
         for i, block in enumerate(("structure", "tank")):
             effect = surface_effect(block)
-            if not effect.needs(self.surroundings):
+            if block not in self.surroundings.blocks or not effect.needs(self.surroundings):
                 continue
             self.told("finding what any force could explain", i, 2)
             candidate = Candidate(effect, self.surroundings)
@@ -355,27 +369,24 @@ class _Search:
         frequencies = []
         for observed in self.fitting:
             run = observed[0].run
-            simulation = self.model._simulation(run, fit.values, NOTHING, ())
-            place = simulation.places[:, 1]
+            place = self.model.motion(run, fit.values)
             largest = np.maximum(largest, np.abs(place).max(axis=0))
             rms = place.std(axis=0)
             frequencies.append(rms[2] / max(rms[1], 1e-12) / (2 * np.pi))
-        twin = self.model.twin
-        mass = twin.carried_mass_kg
-        if twin.structure is not None:
-            mass = 1.0 / float((twin.structure.mode_shape**2 / twin.structure.masses_kg)[0])
         return Surroundings(
-            rig=self.case.rig,
-            twin=twin,
+            rig=cast(Rig, self.case.rig),  # None where the twin is a user's own: effects that ask are not offered
+            twin=self.model.twin,
             displacement_m=float(largest[0]),
             velocity_m_per_s=float(largest[1]),
             acceleration_m_per_s2=float(largest[2]),
             frequency_hz=float(np.median(frequencies)),
-            force_n=float(mass * largest[2]),
+            force_n=float(self.model.moving_mass_kg * largest[2]),
             channels=_sizes(self.fitting, self.model),
             driving=tuple(sorted({name for run in self.parts.fitting for name in self.model.driving(run)})),
             sampling_rate_hz=self.fitting[0][0].run.attributes.sampling_rate_hz,
             longest_run_s=max(observed[0].run.duration_s for observed in self.fitting),
+            blocks=self.model.blocks,
+            peaks=_sizes(self.fitting, self.model, lambda values: np.nanmax(np.abs(values))),
         )
 
 
@@ -384,7 +395,7 @@ class _WithEffects(FreeRunProblem):
 
     def __init__(
         self,
-        model: RigModel,
+        model: DiagnosedModel,
         runs: Sequence[Sequence[Observation]],
         effects_: Sequence[Candidate],
         fixed: dict[str, float],
@@ -419,14 +430,18 @@ def _belongs_to_a_run(name: str, case: Case) -> bool:
     return any(name.endswith((f"release of {run.name}", f" in {run.name}")) for run in case.runs)
 
 
-def _sizes(fitting: Sequence[Sequence[Observation]], model: RigModel) -> dict[str, float]:
-    """Channels, compared and driving, with their RMS."""
+def _sizes(
+    fitting: Sequence[Sequence[Observation]],
+    model: DiagnosedModel,
+    size: Callable[[FloatArray], float] = np.nanstd,
+) -> dict[str, float]:
+    """Channels, compared and driving, with their size, the RMS by default."""
     found: dict[str, float] = {}
     for observed in fitting:
         run = observed[0].run
         for name in (*[one.channel for one in observed], *model.driving(run)):
             if name in channels(run.recording):
-                found[name] = max(found.get(name, 0.0), float(np.nanstd(run.recording[name].values)))
+                found[name] = max(found.get(name, 0.0), float(size(run.recording[name].values)))
     return found
 
 

@@ -1,14 +1,15 @@
-"""What an effect adds to a simulation: forces, changed forces of the liquid, faults of sensors."""
+"""What an effect adds to a simulation: forces, changed liquid, changed structure, faults of sensors."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import Term
 
 FloatArray = NDArray[np.float64]
@@ -50,23 +51,36 @@ class Extension:
     faults : tuple of SensorFault
     key : tuple
         Tells two extensions apart; names and numbers of all effects.
+    structure : callable or None
+        Changes the baseline's structure, after its own numbers were retuned.
     """
 
     terms: tuple[Term, ...] = ()
     liquid: Callable[[tuple[Term, ...]], tuple[Term, ...]] | None = None
     faults: tuple[SensorFault, ...] = ()
     key: tuple[Any, ...] = field(default=())
+    structure: Callable[[Structure], Structure] | None = None
 
     def __add__(self, other: Extension) -> Extension:
-        """Both together; the other's change of the liquid comes after this one's."""
-        liquid = self.liquid or other.liquid
-        if self.liquid is not None and other.liquid is not None:
-            first, second = self.liquid, other.liquid
+        """Both together; the other's changes of liquid and structure come after this one's."""
+        return Extension(
+            self.terms + other.terms,
+            _one_after_another(self.liquid, other.liquid),
+            self.faults + other.faults,
+            self.key + other.key,
+            _one_after_another(self.structure, other.structure),
+        )
 
-            def liquid(terms: tuple[Term, ...]) -> tuple[Term, ...]:
-                return second(first(terms))
 
-        return Extension(self.terms + other.terms, liquid, self.faults + other.faults, self.key + other.key)
+_Changed = TypeVar("_Changed")
+
+
+def _one_after_another(
+    first: Callable[[_Changed], _Changed] | None, second: Callable[[_Changed], _Changed] | None
+) -> Callable[[_Changed], _Changed] | None:
+    if first is None or second is None:
+        return first or second
+    return lambda one: second(first(one))
 
 
 NOTHING = Extension()

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
@@ -75,7 +75,7 @@ class FreeRunProblem:
 
     Parameters
     ----------
-    model : RigModel
+    model : DiagnosedModel
     runs : sequence of sequences of Observation
         Per run.
     candidates : sequence of Candidate
@@ -85,7 +85,7 @@ class FreeRunProblem:
 
     def __init__(
         self,
-        model: RigModel,
+        model: DiagnosedModel,
         runs: Sequence[Sequence[Observation]],
         candidates: Sequence[Candidate] = (),
         fixed: Mapping[str, float] | None = None,
@@ -351,7 +351,7 @@ def _within(problem: FreeRunProblem, theta: FloatArray) -> FloatArray:
     return np.asarray(np.clip(theta, low, high))
 
 
-def _belongs(name: str, present: set[str], model: RigModel) -> bool:
+def _belongs(name: str, present: set[str], model: DiagnosedModel) -> bool:
     """Whether a parameter matters to the runs that are fitted."""
     for run in model.runs:
         if name.endswith((f"release of {run.name}", f" in {run.name}")):

@@ -15,6 +15,8 @@ from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times
 
 FloatArray = NDArray[np.float64]
 BLOCK_S: Final = 0.5
+ZERO_IS_KNOWN: Final = "zero_is_known"
+"""Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
 _LEAST_SHARE: Final = 1e-4
 """No channel is believed to better than this share of its RMS per coefficient; quantisation and rounding."""
@@ -97,7 +99,7 @@ def observations(run: CaseRun, names: Sequence[str]) -> list[Observation]:
         known = np.isfinite(values) & ~_at_limits(values, variable.attrs)
         if known.sum() < 2 * n_bands:
             continue
-        keeps_mean = variable.attrs["quantity"] == "displacement"
+        keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
         spectra = _spectra(values, known, keeps_mean, n_bands)
         stated = float(variable.attrs.get("noise_std", 0.0)) ** 2
         white = _white_level(spectra)

@@ -13,9 +13,8 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-
-from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.extension import Extension, SensorFault
+from sloshlab.diagnosis.baseline_parameter import BaselineParameter
+from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
 from sloshlab.errors import AnalysisError
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
@@ -23,37 +22,19 @@ from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.recorded_run import Drive, drive_of
 from sloshlab.twin.simulated_channels import true_channel
 from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.storage import save_twin
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.structure_forces import MASS_ERROR
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
+from sloshlab.diagnosis.candidate import BLOCKS
+from sloshlab.diagnosis.case import CaseRun
+
 FloatArray = NDArray[np.float64]
 STEPS_PER_PERIOD: Final = 12.0
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _MOST_KEPT_RUNS: Final = 400
-
-
-@dataclass(frozen=True)
-class BaselineParameter:
-    """One number of the baseline that a laboratory knows only so well.
-
-    Attributes
-    ----------
-    name : str
-    believed : float
-    tolerance : float
-        Standard deviation of what it may be, in its own unit.
-    units : str
-    is_reading : bool
-        Whether it changes only what a channel reads, not the motion.
-    """
-
-    name: str
-    believed: float
-    tolerance: float
-    units: str = "1"
-    is_reading: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +65,7 @@ class RigModel:
 
     def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun]) -> None:
         self.rig = rig
+        self.blocks = BLOCKS
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}
@@ -96,6 +78,22 @@ class RigModel:
     def believed(self) -> dict[str, float]:
         """Values of all parameters as the laboratory believes them."""
         return {parameter.name: parameter.believed for parameter in self.parameters}
+
+    @property
+    def moving_mass_kg(self) -> float:
+        """Modal mass at the tank, or what the shaker moves."""
+        structure = self.twin.structure
+        if structure is None:
+            return self.twin.carried_mass_kg
+        return 1.0 / float((structure.mode_shape**2 / structure.masses_kg)[0])
+
+    def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
+        """Displacement, velocity, acceleration of the tank, absolute, shape (n, 3)."""
+        return np.asarray(self._simulation(run, values, NOTHING, ()).places[:, 1])
+
+    def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
+        """Write `extended_twin` as a twin."""
+        save_twin(self.extended_twin(values, extension), path)
 
     def compared(self, run: CaseRun) -> list[str]:
         """Channels of a run that the twin has a counterpart for and that do not alone drive it."""
@@ -202,6 +200,8 @@ class RigModel:
         structure = twin.structure
         if structure is not None:
             structure = _varied_structure(structure, values)
+            if extension.structure is not None:
+                structure = extension.structure(structure)
         terms = tuple(
             _varied_term(term, values) for term in twin.terms if structure is not None or term.place == "tank"
         )
@@ -224,8 +224,8 @@ class RigModel:
             if key in self._drives:
                 return self._drives[key]
         driving = self._drives[(run.name,)].channels if undone else ()
-        drive = drive_of(_corrected(run, undone, driving), self.twin)
-        drive = replace(drive, excitation=_remembered(drive.excitation))
+        drive = drive_of(corrected(run, undone, driving), self.twin)
+        drive = replace(drive, excitation=remembered(drive.excitation))
         with self._lock:
             if len(self._drives) > 20 * max(1, len(self.runs)):
                 self._drives = {known: self._drives[known] for known in self._drives if len(known) == 1}
@@ -332,8 +332,21 @@ def _varied_term(term: Term, values: Mapping[str, float]) -> Term:
     return term.changed(**changed) if changed else term
 
 
-def _corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:
-    """The recording with faults of driving channels undone; one of several is left out instead."""
+def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:
+    """The recording with faults of driving channels undone; one of several is left out instead.
+
+    Parameters
+    ----------
+    run : CaseRun
+    undone : sequence of SensorFault
+    driving : sequence of str
+        Channels that drive together and of which one can be spared.
+
+    Raises
+    ------
+    AnalysisError
+        If a fault cannot be undone.
+    """
     recording = run.recording
     for fault in undone:
         redundant = [name for name in driving if name != fault.channel and name in recording.data_vars]
@@ -355,7 +368,7 @@ def _corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[st
     return recording
 
 
-def _remembered(excitation: Excitation) -> Excitation:
+def remembered(excitation: Excitation) -> Excitation:
     """The excitation with the interpolated values of earlier simulations kept."""
     inputs = excitation.inputs
     if inputs is None:

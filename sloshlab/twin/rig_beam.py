@@ -8,7 +8,7 @@ and participation are those of this beam, scaled to the tip values of the file.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
@@ -95,6 +95,44 @@ def base_participation_kg(described: Structure) -> FloatArray | None:
     if beam is None:
         return None
     return np.asarray(_modes(described, beam, [beam.length_m]).base_factor_kg * described.tip_mode_shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Rotation:
+    """A rotation of the whole beam about its root, as modes and a remainder that they do not hold.
+
+    Attributes
+    ----------
+    length_m : float
+    of_modes_per_m : ndarray, shape (n_modes,)
+        r_i of x ≈ Σ r_i ψ_i: (∫ µ ψ x dx + m_tip l ψ(l)) over the modal mass, both of the beam.
+    residual_inertia_kg_m2 : float
+        Moment of inertia about the root less Σ r_i² m_i.
+    residual_base_kg_m : float
+        ∫ µ x dx + m_tip l less Σ r_i Γ_i.
+    """
+
+    length_m: float
+    of_modes_per_m: FloatArray
+    residual_inertia_kg_m2: float
+    residual_base_kg_m: float
+
+
+@lru_cache(maxsize=64)
+def rotation_of_beam(described: Structure) -> Rotation | None:
+    """A rotation about the root in the file's modes; None where the file has no dimensions."""
+    beam = beam_of_rig(described)
+    if beam is None:
+        return None
+    line, length, tip = beam.mass_per_length_kg_per_m, beam.length_m, beam.tip_mass_kg
+    nodes, weights = np.polynomial.legendre.leggauss(40 + 4 * len(described.frequencies_hz))
+    x = 0.5 * length * (nodes + 1)
+    modes = _modes(described, beam, x)
+    coupling = 0.5 * length * line * (weights * x) @ modes.mode_shape + tip * length
+    of_modes = coupling / modes.modal_mass_kg
+    inertia = line * length**3 / 3 + tip * length**2 - float(of_modes**2 @ modes.modal_mass_kg)
+    base = line * length**2 / 2 + tip * length - float(of_modes @ modes.base_factor_kg)
+    return Rotation(length, np.asarray(of_modes / described.tip_mode_shape), inertia, base)
 
 
 def scale_remarks(described: Structure) -> list[str]:

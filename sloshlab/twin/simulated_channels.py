@@ -123,10 +123,10 @@ def _force(simulation: Simulation, place: str, attributes: Mapping[str, Any], n_
 
 
 def _along_beam(simulation: Simulation, along: float | None, order: int, rig: Rig) -> FloatArray | None:
-    structure = rig.structure
-    if along is None or simulation.twin.structure is None or structure is None or structure.kind != "beam":
+    described, structure = rig.structure, simulation.twin.structure
+    if along is None or structure is None or described is None or described.kind != "beam":
         return None
-    shape = shapes_at(structure, [along])[0]
+    shape = structure.shapes(shapes_at(described, [along]), [along])[0]
     return np.asarray(simulation.base_motion[:, order] + simulation.modes[:, order] @ shape)
 
 

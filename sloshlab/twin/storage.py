@@ -20,13 +20,14 @@ from scipy.io import netcdf_file
 from sloshlab.atomic_file import replaced, write_bytes
 from sloshlab.errors import InputError
 from sloshlab.twin import (  # noqa: F401  they register forces
+    liquid_effects,
     rate_independent_forces,
     reduced_order_model_force,
     structure_forces,
     tank_forces,
 )
 from sloshlab.twin.sensors import Sensor
-from sloshlab.twin.structure import Structure
+from sloshlab.twin.structure import RockedModes, Structure
 from sloshlab.twin.terms import Term, kind_named
 from sloshlab.twin.twin import Twin
 
@@ -41,6 +42,7 @@ _STRUCTURE_ARRAYS = (
     "mode_shape",
     "base_participation_kg",
 )
+_ROCKED_SHARES, _ROCKED_ROTATION = "rocked_shares_of_clamped_modes", "rocked_rotation_rad_per_m"
 _SENSOR_NUMBERS = (
     "gain",
     "delay_s",
@@ -95,6 +97,10 @@ def _number(value: float) -> str:
     return "nan" if math.isnan(value) else repr(float(value))
 
 
+def _list(name: str, values: FloatArray) -> str:
+    return f"{name} = [{', '.join(_number(value) for value in values)}]"
+
+
 def _text(twin: Twin) -> str:
     lines = [
         f"sloshlab_twin = {FORMAT}",
@@ -103,8 +109,13 @@ def _text(twin: Twin) -> str:
     ]
     if twin.structure is not None:
         lines += ["", "[structure]"]
-        for name in _STRUCTURE_ARRAYS:
-            lines.append(f"{name} = [{', '.join(_number(x) for x in getattr(twin.structure, name))}]")
+        lines += [_list(name, getattr(twin.structure, name)) for name in _STRUCTURE_ARRAYS]
+        rocked = twin.structure.rocked
+        if rocked is not None:
+            lines += [
+                _list(_ROCKED_SHARES, rocked.of_clamped.ravel()),
+                _list(_ROCKED_ROTATION, rocked.rotation_rad_per_m),
+            ]
     for term in twin.terms:
         lines += ["", "[[terms]]", f"name = {json.dumps(term.name)}", f"place = {json.dumps(term.place)}"]
         lines += [f"{name} = {_number(value)}" for name, value in term.values.items()]
@@ -143,7 +154,17 @@ def _structure(document: dict[str, Any]) -> Structure | None:
         raise ValueError("structure: lists of different lengths")
     if not all(np.isfinite(array).all() for array in arrays[:4]) or arrays[0].min() <= 0 or arrays[1].min() <= 0:
         raise ValueError("structure: masses and stiffnesses must be positive numbers")
-    return Structure(*arrays)
+    mass, stiffness, damping, shape, base = arrays
+    return Structure(mass, stiffness, damping, shape, base, _rocked(described, mass.size))
+
+
+def _rocked(described: dict[str, Any], n: int) -> RockedModes | None:
+    if _ROCKED_SHARES not in described and _ROCKED_ROTATION not in described:
+        return None
+    shares, rotation = (np.array(described[name], dtype=np.float64) for name in (_ROCKED_SHARES, _ROCKED_ROTATION))
+    if shares.shape != (n * n,) or rotation.shape != (n,) or not np.isfinite([*shares, *rotation]).all():
+        raise ValueError(f"structure: {_ROCKED_SHARES} and {_ROCKED_ROTATION} must be {n * n} and {n} numbers")
+    return RockedModes(shares.reshape(n, n), rotation)
 
 
 def _term(i: int, entry: dict[str, Any], tables: dict[str, FloatArray]) -> Term:

@@ -20,6 +20,22 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class RockedModes:
+    """Modes of a beam whose base turns, out of those of the clamped beam.
+
+    Attributes
+    ----------
+    of_clamped : ndarray, shape (n_modes, n_modes)
+        Share of each clamped mode (row) in each mode (column).
+    rotation_rad_per_m : ndarray, shape (n_modes,)
+        Of the base, per unit of each mode.
+    """
+
+    of_clamped: FloatArray
+    rotation_rad_per_m: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Structure:
     """Modes with the liquid frozen.
 
@@ -31,6 +47,8 @@ class Structure:
         At the tank, which is where the structure's own forces act too.
     base_participation_kg : ndarray, shape (n_modes,)
         ∫ µ ψ dx with the tip mass, Γ of f = −Γ a_s (2.31).
+    rocked : RockedModes or None
+        Of a beam whose base turns; None where the root is clamped.
     """
 
     masses_kg: FloatArray
@@ -38,6 +56,7 @@ class Structure:
     dampings_kg_per_s: FloatArray
     mode_shape: FloatArray
     base_participation_kg: FloatArray
+    rocked: RockedModes | None = None
 
     @property
     def frequencies_hz(self) -> FloatArray:
@@ -48,6 +67,21 @@ class Structure:
     def static_stiffness_n_per_m(self) -> float:
         """Static force at the tank over its deflection."""
         return float(1.0 / (self.mode_shape**2 / self.stiffnesses_n_per_m).sum())
+
+    def shapes(self, clamped: npt.ArrayLike, x_m: npt.ArrayLike) -> FloatArray:
+        """Deflection of places along the beam per mode, shape (n_places, n_modes).
+
+        Parameters
+        ----------
+        clamped : array_like, shape (n_places, n_modes)
+            That of the clamped beam's modes.
+        x_m : array_like, shape (n_places,)
+            Distance from the root.
+        """
+        shape = np.asarray(clamped, dtype=np.float64)
+        if self.rocked is None:
+            return shape
+        return shape @ self.rocked.of_clamped + np.outer(np.asarray(x_m), self.rocked.rotation_rad_per_m)
 
     def static_deflection(self, deflection_m: float) -> FloatArray:
         """Modal coordinates under a static force at the tank that deflects it by `deflection_m`."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import lfilter, zoom_fft
 
 from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
 from sloshlab.diagnosis.extension import Extension, Reading, SensorFault
 
 FloatArray = NDArray[np.float64]
 Others = Mapping[str, FloatArray]
+_MAINS_HZ: Final = 0.2
+_MOST_PAIRS: Final = 20
 
 
 def _all_channels(at: Surroundings) -> list[str]:
@@ -114,10 +117,15 @@ DELAY = _sensor_effect(
 
 def _high_passed(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-        del others, recorded
+        """The charge at the first sample is free in every run: what had not leaked away before."""
+        del others
         two = 2 * numbers["time_constant_s"] * rate
         a, b = (two - 1) / (two + 1), two / (two + 1)
-        return np.asarray(lfilter([b, -b], [1.0, -a], values))
+        passed = np.asarray(lfilter([b, -b], [1.0, -a], values))
+        leaking = a ** np.arange(values.size)
+        known = np.isfinite(recorded)
+        charge = float((recorded - passed)[known] @ leaking[known]) / float(leaking[known] @ leaking[known])
+        return np.asarray(passed + charge * leaking)
 
     return reading
 
@@ -143,18 +151,17 @@ HIGH_PASS = _sensor_effect(
 
 def _clipped(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-        del rate, others
-        limit = numbers["limit"] * float(np.nanmax(np.abs(recorded)))
-        return np.asarray(np.clip(values, -limit, limit))
+        del rate, others, recorded
+        return np.asarray(np.clip(values, -numbers["limit"], numbers["limit"]))
 
     return reading
 
 
 CLIPPING = _sensor_effect(
     "sensor_clipping",
-    "y → min(max(y, −limit), limit), limit as a share of the largest reading",
-    (EffectParameter("limit", 0.1, 1.5),),
-    lambda at: [{"limit": 1.0}],
+    "y → min(max(y, −limit), limit), limit in the unit of the channel",
+    (EffectParameter("limit", 1e-9, 1e9),),
+    lambda at: [{"limit": at.peaks.get(at.channel, 2.0 * at.reading)}],
     _clipped,
     None,
 )
@@ -162,51 +169,62 @@ CLIPPING = _sensor_effect(
 
 def _drifted(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-        del others
+        del others, recorded
         time = np.arange(values.size) / rate
-        return np.asarray(values + numbers["rate"] * float(np.nanstd(recorded)) * (time - time.mean()))
+        return np.asarray(values + numbers["rate"] * (time - time.mean()))
 
     return reading
 
 
 DRIFT = _sensor_effect(
     "sensor_drift",
-    "y → y + rate · t, in RMS of the channel per second",
-    (EffectParameter("rate", -10.0, 10.0),),
-    lambda at: [{"rate": sign * 0.3 / at.longest_run_s} for sign in (1, -1)],
+    "y → y + rate · t, in the unit of the channel per second",
+    (EffectParameter("rate", -1e6, 1e6),),
+    lambda at: [{"rate": sign * 0.3 * at.reading / at.longest_run_s} for sign in (1, -1)],
     _drifted,
     None,
     look_alikes=("liquid_loss",),
 )
 
 
-def _humming(line_hz: float) -> Callable[[Numbers], Reading]:
+def _humming(line_hz: float, sign: float) -> Callable[[Numbers], Reading]:
     def of(numbers: Numbers) -> Reading:
         def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-            """Its phase is free in every run: that of the line within what is left."""
+            """Its phase and the mains' frequency are free in every run: those of what is left."""
             del others
-            time = np.arange(values.size) / rate
-            left = np.nan_to_num(recorded - values)
-            line = np.exp(2j * np.pi * line_hz * time)
-            amplitude = complex(2 * np.mean(left * line.conj()))
-            size = abs(amplitude)
-            turned = amplitude / size if size > 0 else 1.0
-            scale = numbers["amplitude"] * float(np.nanstd(recorded))
-            return np.asarray(values + scale * (line * turned).real)
+            left = recorded - values if sign > 0 else recorded
+            return np.asarray(values + sign * numbers["amplitude"] * _line(np.nan_to_num(left), rate, line_hz))
 
         return reading
 
     return of
 
 
+def _line(values: FloatArray, rate: float, line_hz: float) -> FloatArray:
+    """Unit cosine of the strongest line within ±0.2 Hz of a frequency."""
+    within = np.array([line_hz - _MAINS_HZ, line_hz + _MAINS_HZ])
+    n = max(9, int(8 * _MAINS_HZ * values.size / rate)) if within[1] < 0.5 * rate else 0
+    if not n:
+        return np.zeros(values.size)
+    power = np.abs(zoom_fft(values, within, n, fs=rate, endpoint=True))
+    k = min(max(int(np.argmax(power)), 1), n - 2)
+    before, at, after = power[k - 1 : k + 2]
+    curvature = before - 2 * at + after
+    shift = 0.5 * (before - after) / curvature if curvature < 0 else 0.0
+    frequency = within[0] + (k + min(max(shift, -1.0), 1.0)) * (within[1] - within[0]) / (n - 1)
+    line = np.exp(2j * np.pi * frequency * np.arange(values.size) / rate)
+    amplitude = complex(np.mean(values * line.conj()))
+    return np.asarray((line * amplitude).real / max(abs(amplitude), 1e-300))
+
+
 HUM = [
     _sensor_effect(
         name,
-        f"y → y + A cos(2π {line:g} t + φ), A in RMS of the channel",
-        (EffectParameter("amplitude", 0.0, 10.0),),
-        lambda at: [{"amplitude": 0.02}],
-        _humming(line),
-        None,
+        f"y → y + A cos(2π f t + φ), f about {line:g} Hz, A in the unit of the channel",
+        (EffectParameter("amplitude", 0.0, 1e9),),
+        lambda at: [{"amplitude": 0.02 * at.reading}],
+        _humming(line, 1.0),
+        _humming(line, -1.0),
         separated_by="the channel with nothing moving",
     )
     for name, line in (("mains_hum", 50.0), ("mains_hum_60", 60.0))
@@ -237,28 +255,42 @@ CLOCK = _sensor_effect(
 
 
 def _pairs(at: Surroundings) -> list[str]:
-    names = list(at.channels)
-    return [f"{to}<{source}" for to in _compared_channels(at) for source in names if source != to][:12]
+    """Channel and source, sources of the same quantity first."""
+    pairs = [(to, source) for to in at.channels for source in at.channels if source != to]
+    pairs.sort(key=lambda pair: pair[0].partition("_")[0] != pair[1].partition("_")[0])
+    return [f"{to}<{source}" for to, source in pairs[:_MOST_PAIRS]]
 
 
 def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
+    del at
     to, _, source = channel.partition("<")
-    factor = numbers["ratio"] * at.channels[to] / max(at.channels[source], 1e-300)
 
-    def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-        del rate, recorded
-        return values + factor * others[source] if source in others else values
+    def leaked(sign: float) -> Reading:
+        def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
+            del rate, recorded
+            if source not in others:
+                return values
+            return np.asarray(values + sign * numbers["ratio"] * np.nan_to_num(others[source]))
 
-    return Extension(faults=(SensorFault(to, reading, None, (f"sensor.cross_talk.{channel}", numbers["ratio"])),))
+        return reading
+
+    key = (f"sensor.cross_talk.{channel}", numbers["ratio"])
+    return Extension(faults=(SensorFault(to, leaked(1.0), leaked(-1.0), key),))
+
+
+def _leaks(at: Surroundings) -> list[Numbers]:
+    to, _, source = at.channel.partition("<")
+    size = at.channels.get(to, 1.0) / max(at.channels.get(source, 1.0), 1e-300)
+    return [{"ratio": sign * 0.03 * size} for sign in (1, -1)]
 
 
 CROSS_TALK = register(
     Effect(
         "cross_talk",
         "sensor",
-        "y₁ → y₁ + r y₂, r in RMS over RMS",
-        (EffectParameter("ratio", -1.0, 1.0),),
-        lambda at: [{"ratio": sign * 0.03} for sign in (1, -1)],
+        "y₁ → y₁ + r y₂, r in the unit of the one channel over that of the other",
+        (EffectParameter("ratio", -1e6, 1e6),),
+        _leaks,
         _cross_talk,
         ("mass_error", "sensor_gain"),
         "the second channel disconnected",

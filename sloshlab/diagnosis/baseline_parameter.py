@@ -1,0 +1,27 @@
+"""A number of the baseline that retuning may change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class BaselineParameter:
+    """One number of the baseline that a laboratory knows only so well.
+
+    Attributes
+    ----------
+    name : str
+    believed : float
+    tolerance : float
+        Standard deviation of what it may be, in its own unit.
+    units : str
+    is_reading : bool
+        Whether it changes only what a channel reads, not the motion.
+    """
+
+    name: str
+    believed: float
+    tolerance: float
+    units: str = "1"
+    is_reading: bool = False

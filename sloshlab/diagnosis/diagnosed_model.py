@@ -1,0 +1,61 @@
+"""What a search needs of a simulation: the twin of a rig file is one, a user's own twin another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.baseline_parameter import BaselineParameter
+from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.extension import Extension
+from sloshlab.twin.twin import Twin
+
+FloatArray = NDArray[np.float64]
+
+
+class DiagnosedModel(Protocol):
+    """A simulation that can be retuned and extended.
+
+    Attributes
+    ----------
+    runs : tuple of CaseRun
+    parameters : tuple of BaselineParameter
+        Those whose names end with ``release of RUN`` or ``in RUN`` belong to that run alone.
+    blocks : tuple of str
+        Of `sloshlab.diagnosis.candidate.BLOCKS`, those in which something may be missing.
+    """
+
+    runs: tuple[CaseRun, ...]
+    parameters: tuple[BaselineParameter, ...]
+    blocks: tuple[str, ...]
+
+    @property
+    def twin(self) -> Twin:
+        """The baseline, or what stands for it where effects ask for masses and stiffnesses."""
+
+    @property
+    def moving_mass_kg(self) -> float:
+        """What the forces of effects accelerate, about."""
+
+    @property
+    def believed(self) -> dict[str, float]:
+        """Values of all parameters as the laboratory believes them."""
+
+    def compared(self, run: CaseRun) -> list[str]:
+        """Channels of a run that the simulation shows too."""
+
+    def driving(self, run: CaseRun) -> tuple[str, ...]:
+        """Channels that drive the simulation of a run."""
+
+    def simulate(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> dict[str, FloatArray]:
+        """What the compared channels of a run read; raises `AnalysisError` where it does not reach its end."""
+
+    def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
+        """Displacement, velocity, acceleration of the place where effects act, shape (n, 3)."""
+
+    def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
+        """Write the simulation with retuned numbers and added forces."""

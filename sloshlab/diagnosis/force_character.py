@@ -1,0 +1,465 @@
+"""Physical questions to a latent force: energy, symmetry, state or history, rate, onset.
+
+Every answer is a number with a 90 % interval, by drawing stretches of the runs with replacement, and "cannot tell"
+where the interval leaves it open. What the block's own stiffness, damping and mass may be off within their
+tolerances is taken off, or makes the interval wider.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.force_levels import Windows, constant_part, onset, orders, windows, work_exponents
+from sloshlab.diagnosis.force_regression import (
+    PARITIES,
+    Sizes,
+    Stretch,
+    Sums,
+    explained,
+    memory_features,
+    solved,
+    state_features,
+    stretches,
+    sums,
+    time_features,
+)
+from sloshlab.diagnosis.latent_force import LatentForce
+
+FloatArray = NDArray[np.float64]
+LEVEL: Final = 0.90
+_N_DRAWS: Final = 120
+_NORMAL_90: Final = 1.6449
+_RESOLVED: Final = 0.25
+_OF_STATE: Final = 0.6
+_BLOWS: Final = 5.0
+_FEW: Final = 0.08
+"""Share of the variance below which a part counts for nothing, and twice which makes it count."""
+CANNOT_TELL: Final = "cannot tell"
+
+TAKES, GIVES, NO_WORK = "takes energy", "gives energy", "does no work"
+SPRING, FRICTION = "odd in displacement", "odd in velocity"
+EVEN, SKEW = "even", "odd in both"
+STATE, MEMORY, AGES = "function of the state", "memory", "changes along the run"
+RATE_FREE, RATE = "rate-independent", "grows with rate"
+WORK_1, WORK_2, WORK_3 = "work ∝ amplitude", "work ∝ amplitude²", "work ∝ amplitude³"
+ONSET, NO_ONSET = "onset", "no onset"
+CONSTANT = "constant part"
+HALF_ORDER, SECOND_ORDER, THIRD_ORDER = "half order", "second order", "third order"
+IMPULSIVE = "impulsive"
+TERMS: Final = {
+    TAKES: "the force takes energy out of the motion",
+    GIVES: "the force gives energy to the motion",
+    NO_WORK: "the force does no work over a cycle",
+    SPRING: "its largest part is odd in the displacement (acceleration of a tank) and even in the velocity",
+    FRICTION: "its largest part is odd in the velocity and even in the displacement",
+    EVEN: "a part is even in both",
+    SKEW: "a part is odd in both",
+    STATE: "it is a function of the present motion",
+    MEMORY: "it depends on the history of the motion",
+    AGES: "it changes along a run",
+    RATE_FREE: "its work per cycle does not depend on the frequency",
+    RATE: "its work per cycle grows with the frequency",
+    WORK_1: "its work per cycle grows as the amplitude",
+    WORK_2: "its work per cycle grows as the square of the amplitude",
+    WORK_3: "its work per cycle grows as the cube of the amplitude",
+    ONSET: "below some level it is nothing",
+    NO_ONSET: "it is there at the smallest level",
+    CONSTANT: "it has a part that never changes",
+    HALF_ORDER: "it has a part at half the frequency of the motion",
+    SECOND_ORDER: "it has a part at twice the frequency of the motion",
+    THIRD_ORDER: "it has a part at three times the frequency of the motion",
+    IMPULSIVE: "it comes in blows",
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one test says.
+
+    Attributes
+    ----------
+    question, finding : str
+        The finding is `CANNOT_TELL` where the interval leaves it open.
+    quantity, units : str
+        Of the number.
+    value, low, high : float
+        With its 90 % interval; NaN where there is none.
+    says : dict of str to bool
+        Terms of `TERMS` that hold, and that do not; those that are absent are open.
+    remark : str
+        Why it cannot be told.
+    """
+
+    question: str
+    finding: str
+    quantity: str
+    units: str
+    value: float
+    low: float
+    high: float
+    says: dict[str, bool]
+    remark: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceCharacter:
+    """All answers on the force at one place.
+
+    Attributes
+    ----------
+    place : str
+    size_n, noise_n : float
+        RMS of the force beyond the block's own parameters, and of its noise.
+    answers : tuple of Answer
+    windows : Windows
+        Work, force and amplitude per window of some cycles.
+    """
+
+    place: str
+    size_n: float
+    noise_n: float
+    answers: tuple[Answer, ...]
+    windows: Windows
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the force stands out of its noise."""
+        return self.size_n**2 > (1 + _RESOLVED) * self.noise_n**2
+
+    @property
+    def says(self) -> dict[str, bool]:
+        """Terms that hold, and that do not."""
+        return {term: holds for answer in self.answers for term, holds in answer.says.items()}
+
+
+def force_character(
+    forces: Sequence[LatentForce],
+    own_tolerances: FloatArray,
+    *,
+    damping_shift: float = 0.0,
+    seed: int = 0,
+) -> ForceCharacter:
+    """Ask all questions.
+
+    Parameters
+    ----------
+    forces : sequence of LatentForce
+        Of all runs, at one place, not empty.
+    own_tolerances : ndarray, shape (3,)
+        Standard deviations of the block's own stiffness, damping and mass, in N per m, m/s, m/s².
+    damping_shift : float
+        How much more damping the baseline has than is believed [N s/m]: retuning may have hidden the force there.
+    seed : int
+        Of the draws for intervals.
+    """
+    shifted = [_with_damping(one, damping_shift) for one in forces]
+    parts = stretches(shifted)
+    noise = float(np.sqrt(np.mean([one.standard_error_n**2 for one in forces])))
+    fit = _Regression(parts, own_tolerances, np.random.default_rng(seed))
+    size = float(np.sqrt(np.mean(fit.beyond_own**2)))
+    found = windows(parts, fit.beyond_spring_of_parts, float(own_tolerances[1]))
+    if size**2 <= (1 + _RESOLVED) * noise**2:
+        nothing = Answer(
+            "is there a force", "none beyond noise", "RMS over noise", "1", size / max(noise, 1e-300),
+            float("nan"), float("nan"), {}, "nothing can be asked of a force that does not stand out of its noise",
+        )  # fmt: skip
+        return ForceCharacter(forces[0].place, size, noise, (nothing,), found)
+    generator = np.random.default_rng(seed + 1)
+    answers = (
+        _energy(found, own_tolerances[1], generator),
+        *_symmetry(fit),
+        *_history(fit, noise),
+        *work_exponent_answers(found, generator),
+        onset_answer(found, parts, own_tolerances, noise, generator),
+        *_order_answers(shifted, fit, generator),
+        _constant(fit, generator),
+        _blows(fit, noise),
+    )
+    return ForceCharacter(forces[0].place, size, noise, answers, found)
+
+
+def _with_damping(one: LatentForce, shift: float) -> LatentForce:
+    force = one.force_n - shift * one.motion[:, 1]
+    return LatentForce(one.run, one.place, force, one.standard_error_n, one.time_s, one.motion)
+
+
+class _Regression:
+    """Regressions of the force on its own parameters, the state, its history and time, with draws."""
+
+    def __init__(self, parts: Sequence[Stretch], own: FloatArray, generator: np.random.Generator) -> None:
+        self.parts, self.generator = parts, generator
+        sizes = Sizes.of(parts)
+        rows, self.sums = [], []
+        parity = np.zeros(0, np.int64)
+        for one in parts:
+            state, parity = state_features(one, sizes)
+            columns = (one.own * own, state, memory_features(one, sizes), time_features(one, sizes))
+            features = np.concatenate(columns, axis=1)
+            rows.append(features)
+            self.sums.append(sums(features, one.force_n))
+        widths = np.cumsum([0, *[part.shape[1] for part in columns]])
+        own_, state_, memory_, time_ = (np.arange(a, b) for a, b in pairwise(widths))
+        state_ = state_[parity >= 0]
+        self.parity = parity
+        self.sets = {
+            "own": own_,
+            "state": np.concatenate([own_, state_]),
+            "memory": np.concatenate([own_, state_, memory_]),
+            "time": np.concatenate([own_, state_, time_]),
+        }
+        self.state_columns = state_
+        spread = float(np.median([part.a.std() / max(part.v.std(), 1e-300) for part in parts]))
+        duration = sum(float(part.time_s[-1] - part.time_s[0]) for part in parts)
+        n = sum(part.force_n.size for part in parts)
+        per_sample = np.sqrt(max(4.0, duration * spread) / n)
+        self.prior = np.full(widths[-1], 3.0 / per_sample)
+        self.prior[own_] = np.where(own > 0, 1.0 / (sizes.force / per_sample), 1e-9)
+        self.rows = rows
+        alone = solved(self.sums, self.prior, own_)
+        self.beyond_own_of_parts = [part.force_n - row @ alone for part, row in zip(parts, rows, strict=True)]
+        self.beyond_own = np.concatenate(self.beyond_own_of_parts)
+        spring = alone.copy()
+        spring[own_[1]] = 0.0
+        self.beyond_spring_of_parts = [part.force_n - row @ spring for part, row in zip(parts, rows, strict=True)]
+
+    def draw(self) -> list[int]:
+        """Stretches drawn with replacement."""
+        return [int(i) for i in self.generator.integers(0, len(self.parts), len(self.parts))]
+
+    def parity_shares(self, chosen: Sequence[int]) -> FloatArray:
+        """Share of the variance of the state's part per parity, shape (4,)."""
+        picked = [self.sums[i] for i in chosen]
+        numbers = solved(picked, self.prior, self.sets["state"])
+        xx = np.sum([one.xx for one in picked], axis=0)
+        powers = np.zeros(4)
+        for which in range(4):
+            part = np.zeros(numbers.size)
+            columns = self.state_columns[self.parity == which]
+            part[columns] = numbers[columns]
+            powers[which] = float(part @ xx @ part)
+        return np.asarray(powers / max(float(powers.sum()), 1e-300), np.float64)
+
+    def explained_shares(self, order: NDArray[np.int64], noise_n: float) -> dict[str, float]:
+        """Shares explained of stretches that were not fitted, halves taken in turn."""
+        halves = order[::2], order[1::2]
+        found: dict[str, list[float]] = {name: [] for name in self.sets}
+        for one, other in (halves, halves[::-1]):
+            fitted, judged = ([self.sums[i] for i in half] for half in (one, other))
+            for name, share in explained(fitted, judged, self.prior, self.sets, "own", noise_n).items():
+                found[name].append(share)
+        return {name: float(np.mean(shares)) for name, shares in found.items()}
+
+
+def _quantiles(draws: Sequence[float] | FloatArray) -> tuple[float, float]:
+    low, high = np.quantile(np.asarray(draws), (0.05, 0.95))
+    return float(low), float(high)
+
+
+def _energy(found: Windows, own_damping: float, generator: np.random.Generator) -> Answer:
+    """Dissipated work per cycle over force times path: −1 gives all, 1 takes all."""
+    scale = found.force_rms_n * found.velocity_m_per_s
+    dissipated = -found.power_w
+    doubt = own_damping * found.velocity_m_per_s**2
+    keep = scale > 0
+    if keep.sum() < 4:
+        return _open("energy", "work over force times path", "1", "too few cycles")
+
+    def share(index: NDArray[np.int64]) -> float:
+        return float(dissipated[keep][index].sum() / scale[keep][index].sum())
+
+    n = int(keep.sum())
+    value = share(np.arange(n))
+    low, high = _quantiles([share(generator.integers(0, n, n)) for _ in range(_N_DRAWS)])
+    margin = _NORMAL_90 * float(doubt[keep].sum() / scale[keep].sum())
+    low = max(value - float(np.hypot(value - low, margin)), -1.0)
+    high = min(value + float(np.hypot(high - value, margin)), 1.0)
+    if low > 0.03:
+        finding, says = TAKES, {TAKES: True, GIVES: False, NO_WORK: False}
+    elif high < -0.03:
+        finding, says = GIVES, {TAKES: False, GIVES: True, NO_WORK: False}
+    elif low > -0.15 and high < 0.15:
+        finding, says = NO_WORK, {TAKES: False, GIVES: False, NO_WORK: True}
+    else:
+        return Answer(
+            "energy", CANNOT_TELL, "work over force times path", "1", value, low, high, {},
+            "its sign is within the interval, which holds what the block's own damping may be off",
+        )  # fmt: skip
+    return Answer("energy", finding, "work over force times path", "1", value, low, high, says)
+
+
+def _symmetry(fit: _Regression) -> list[Answer]:
+    everything = range(len(fit.parts))
+    shares = fit.parity_shares(everything)
+    draws = np.array([fit.parity_shares(fit.draw()) for _ in range(_N_DRAWS)])
+    low, high = np.quantile(draws, (0.05, 0.95), axis=0)
+    answers = []
+    terms = (EVEN, SPRING, FRICTION, SKEW)
+    for which, (parity, term) in enumerate(zip(PARITIES, terms, strict=True)):
+        largest = which == int(np.argmax(shares))
+        says: dict[str, bool] = {}
+        if high[which] < 2 * _FEW:
+            says[term] = False
+        elif low[which] > 2 * _FEW and (which in (0, 3) or largest):
+            says[term] = True
+        finding = term if says.get(term) else f"not {term}" if term in says else CANNOT_TELL
+        answers.append(
+            Answer(
+                f"symmetry: {parity}",
+                finding,
+                "share of the variance",
+                "1",
+                float(shares[which]),
+                min(float(low[which]), float(shares[which])),
+                max(float(high[which]), float(shares[which])),
+                says,
+            )  # fmt: skip
+        )
+    return answers
+
+
+def _history(fit: _Regression, noise_n: float) -> list[Answer]:
+    n = len(fit.parts)
+    draws: dict[str, list[float]] = {name: [] for name in fit.sets}
+    for _ in range(_N_DRAWS // 4):
+        for name, share in fit.explained_shares(fit.generator.permutation(n), noise_n).items():
+            draws[name].append(share)
+    state, memory, time = (np.array(draws[name]) for name in ("state", "memory", "time"))
+    answers = [
+        _gain("history", "more by its history", memory - state, MEMORY),
+        _gain("along the run", "more by time", time - state, AGES),
+    ]
+    value, (low, high) = float(np.median(state)), _quantiles(state)
+    says: dict[str, bool] = {}
+    if any(answer.says.get(term) for answer, term in zip(answers, (MEMORY, AGES), strict=True)) or high < 0.4:
+        says[STATE] = False
+    elif low > _OF_STATE:
+        says[STATE] = True
+    finding = STATE if says.get(STATE) else f"not: {STATE}" if says else CANNOT_TELL
+    quantity = "share of the variance by the present motion"
+    return [Answer("state", finding, quantity, "1", value, low, high, says), *answers]
+
+
+def _gain(question: str, quantity: str, draws: FloatArray, term: str) -> Answer:
+    value = float(np.median(draws))
+    low, high = _quantiles(draws)
+    says = {term: True} if low > _FEW else {term: False} if high < _FEW else {}
+    finding = term if says.get(term) else f"not: {term}" if term in says else CANNOT_TELL
+    return Answer(question, finding, f"share of the variance, {quantity}", "1", value, low, high, says)
+
+
+def _open(question: str, quantity: str, units: str, why: str) -> Answer:
+    nan = float("nan")
+    return Answer(question, CANNOT_TELL, quantity, units, nan, nan, nan, {}, why)
+
+
+def work_exponent_answers(found: Windows, generator: np.random.Generator) -> list[Answer]:
+    """How the work per cycle grows with amplitude and frequency."""
+    result = work_exponents(found, generator)
+    answers = []
+    for name, one in (("amplitude", result.amplitude), ("frequency", result.frequency)):
+        question = "work over amplitude" if name == "amplitude" else "work over frequency"
+        if one is None:
+            answers.append(_open(question, f"exponent of the {name}", "1", result.why[name]))
+            continue
+        value, low, high = one
+        says: dict[str, bool] = {}
+        if name == "amplitude":
+            for term, exponent in ((WORK_1, 1.0), (WORK_2, 2.0), (WORK_3, 3.0)):
+                if not low - 0.15 < exponent < high + 0.15:
+                    says[term] = False
+                elif high - low < 0.9:
+                    says[term] = True
+            if sum(says.values()) > 1:
+                says = {term: holds for term, holds in says.items() if not holds}
+        elif low > 0.35:
+            says = {RATE: True, RATE_FREE: False}
+        elif high < 0.5 and low > -0.5:
+            says = {RATE: False, RATE_FREE: True}
+        held = [term for term, holds in says.items() if holds]
+        answers.append(
+            Answer(
+                question, held[0] if held else CANNOT_TELL, f"exponent of the {name}", "1", value, low, high, says
+            )
+        )
+    return answers
+
+
+def onset_answer(
+    found: Windows, parts: Sequence[Stretch], own: FloatArray, noise_n: float, generator: np.random.Generator
+) -> Answer:
+    """The level below which the block's own parameters describe the force."""
+    result = onset(parts, own, noise_n, generator)
+    quantity = "acceleration below which it is nothing"
+    if result is None:
+        levels = f"{found.level_g.min():.2g} to {found.level_g.max():.2g} g"
+        return _open("onset", quantity, "g", f"levels reach from {levels} only")
+    value, low, high, at_lowest = result
+    if at_lowest:
+        return Answer("onset", NO_ONSET, quantity, "g", value, low, high, {ONSET: False, NO_ONSET: True})
+    if high > found.level_g.max():
+        return Answer("onset", CANNOT_TELL, quantity, "g", value, low, high, {}, "seen at the largest level alone")
+    return Answer("onset", ONSET, quantity, "g", value, low, high, {ONSET: True, NO_ONSET: False})
+
+
+def _order_answers(
+    forces: Sequence[LatentForce], fit: _Regression, generator: np.random.Generator
+) -> list[Answer]:
+    answers = []
+    result = orders(forces, fit.beyond_own_of_parts, generator)
+    for term, order in ((HALF_ORDER, 0.5), (SECOND_ORDER, 2.0), (THIRD_ORDER, 3.0)):
+        quantity = f"share of the variance at order {order:g}"
+        if result is None:
+            answers.append(_open(f"order {order:g}", quantity, "1", "the motion has no single frequency"))
+            continue
+        value, low, high = result[order]
+        says = {term: True} if low > _FEW else {term: False} if high < _FEW else {}
+        finding = term if says.get(term) else f"no {term}" if term in says else CANNOT_TELL
+        answers.append(Answer(f"order {order:g}", finding, quantity, "1", value, low, high, says))
+    return answers
+
+
+def _constant(fit: _Regression, generator: np.random.Generator) -> Answer:
+    value, low, high, rms = constant_part(fit.beyond_own_of_parts, generator)
+    says: dict[str, bool] = {}
+    if low > 0.1 * rms or high < -0.1 * rms:
+        says[CONSTANT] = True
+    elif max(abs(low), abs(high)) < 0.2 * rms:
+        says[CONSTANT] = False
+    finding = CONSTANT if says.get(CONSTANT) else "no constant part" if says else CANNOT_TELL
+    return Answer("mean", finding, "mean force", "N", value, low, high, says)
+
+
+def _blows(fit: _Regression, noise_n: float) -> Answer:
+    """Kurtosis within some cycles: 1.5 for a sine; blows are rare and large."""
+    found = []
+    for one, force in zip(fit.parts, fit.beyond_own_of_parts, strict=True):
+        size = float(np.sqrt(np.mean(force**2)))
+        if size > 2 * noise_n and force.size > 8:
+            found.append((_kurtosis(force), size))
+    if len(found) < 4:
+        return _open("blows", "kurtosis within some cycles", "1", "too few cycles stand out of the noise")
+    table = np.array(found)
+
+    def mean(rows: NDArray[np.int64]) -> float:
+        return float(np.average(table[rows, 0], weights=table[rows, 1]))
+
+    n = len(found)
+    value = mean(np.arange(n))
+    low, high = _quantiles([mean(fit.generator.integers(0, n, n)) for _ in range(_N_DRAWS)])
+    says = {IMPULSIVE: True} if low > _BLOWS else {IMPULSIVE: False} if high < _BLOWS else {}
+    finding = IMPULSIVE if says.get(IMPULSIVE) else f"not {IMPULSIVE}" if says else CANNOT_TELL
+    return Answer("blows", finding, "kurtosis within some cycles", "1", value, low, high, says)
+
+
+def _kurtosis(series: FloatArray) -> float:
+    centred = series - series.mean()
+    return float(np.mean(centred**4) / max(float(np.mean(centred**2)) ** 2, 1e-300))
+
+
+__all__ = ["TERMS", "Answer", "ForceCharacter", "Sums", "force_character"]

@@ -1,0 +1,237 @@
+"""Of what a force is a function: linear regressions on its motion, judged on stretches that were not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.diagnosis.latent_force import STRUCTURE, LatentForce
+
+FloatArray = NDArray[np.float64]
+DEGREE: Final = 5
+_SHARP: Final = (0.05, 0.008)
+_N_STRETCHES: Final = 24
+_PLAYS: Final = (0.1, 0.3)
+_FORGETTING_CYCLES: Final = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A part of a run.
+
+    Attributes
+    ----------
+    run : int
+    time_s, force_n, x, v, a : ndarray, shape (n,)
+        Displacement, velocity and acceleration of the place in SI units.
+    first : ndarray, shape (n,)
+        What the force is a function of beside the velocity: x of a structure, a of a tank.
+    level_g, omega : ndarray, shape (n,)
+        Amplitude of the acceleration and frequency [rad/s] over the cycle about each sample.
+    played : ndarray, shape (n, n_plays)
+        Of x, by play operators: what a force without rate but with memory follows.
+    lately : ndarray, shape (n,)
+        Mean square of the acceleration over the last cycles, over that of now.
+    """
+
+    run: int
+    time_s: FloatArray
+    force_n: FloatArray
+    x: FloatArray
+    v: FloatArray
+    a: FloatArray
+    first: FloatArray
+    level_g: FloatArray
+    omega: FloatArray
+    played: FloatArray
+    lately: FloatArray
+
+    @property
+    def own(self) -> FloatArray:
+        """Motions that a block's own stiffness, damping and mass act on, shape (n, 3)."""
+        return np.stack([self.x, self.v, self.a], axis=1)
+
+
+def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
+    """Cut runs into parts that are drawn as one for intervals.
+
+    Parameters
+    ----------
+    forces : sequence of LatentForce
+        Of one place.
+    """
+    largest = max((float(np.abs(one.motion[:, 0]).max()) for one in forces), default=1.0)
+    found = []
+    for number, one in enumerate(forces):
+        x, v, a = one.motion.T
+        rate = one.run.attributes.sampling_rate_hz
+        omega = float(a.std() / max(v.std(), 1e-300))
+        cycle = max(4, round(2 * np.pi / omega * rate))
+        power_a, power_v = (uniform_filter1d(part**2, cycle, mode="nearest") for part in (a, v))
+        level = np.sqrt(2 * power_a) / GRAVITY_M_PER_S2
+        local = np.sqrt(power_a / np.maximum(power_v, 1e-300))
+        played = np.stack([_play(x, share * largest) for share in _PLAYS], axis=1)
+        lately = _lately(power_a, _FORGETTING_CYCLES * cycle)
+        first = x if one.place == STRUCTURE else a
+        columns = (one.time_s, one.force_n, x, v, a, first, level, local, played, lately)
+        for part in np.array_split(np.arange(x.size), _N_STRETCHES):
+            found.append(Stretch(number, *(column[part] for column in columns)))
+    return found
+
+
+def _play(x: FloatArray, radius: float) -> FloatArray:
+    """x less what a play of this radius keeps: bounded by the radius, it remembers the last reversal."""
+    out, place = np.empty_like(x), x[0]
+    low, high = x - radius, x + radius
+    for i in range(x.size):
+        place = min(max(place, low[i]), high[i])
+        out[i] = x[i] - place
+    return out
+
+
+def _lately(power: FloatArray, samples: float) -> FloatArray:
+    from scipy.signal import lfilter
+
+    keep = np.exp(-1 / samples)
+    before, _ = lfilter([1 - keep], [1.0, -keep], power, zi=[keep * power[0]])
+    return np.asarray(before / np.maximum(before + power, 1e-300))
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Largest values that make a regression free of units."""
+
+    first: float
+    velocity: float
+    force: float
+    time_s: float
+
+    @classmethod
+    def of(cls, parts: Sequence[Stretch]) -> Sizes:
+        """Of all stretches."""
+        return cls(
+            max(float(np.abs(one.first).max()) for one in parts) or 1.0,
+            max(float(np.abs(one.v).max()) for one in parts) or 1.0,
+            float(np.sqrt(np.mean(np.concatenate([one.force_n for one in parts]) ** 2))) or 1.0,
+            max(float(one.time_s[-1]) for one in parts) or 1.0,
+        )
+
+
+PARITIES: Final = ("even in both", "odd in the first", "odd in the velocity", "odd in both")
+
+
+def state_features(one: Stretch, sizes: Sizes) -> tuple[FloatArray, NDArray[np.int64]]:
+    """T_i(p) T_j(q) with i + j ≤ 5, tanh(q/0.05), tanh(q/0.008), and the parity of each: an index into `PARITIES`.
+
+    T_1(p) alone is left to the block's own stiffness and mass.
+    """
+    p, q = one.first / sizes.first, one.v / sizes.velocity
+    first, second = (_chebyshev(part) for part in (p, q))
+    columns = [np.tanh(q / width) for width in _SHARP]
+    parity = [2] * len(columns)
+    for i in range(DEGREE + 1):
+        for j in range(DEGREE + 1 - i):
+            if (i, j) == (1, 0):
+                continue
+            columns.append(first[i] * second[j])
+            parity.append(i % 2 + 2 * (j % 2))
+    return np.stack(columns, axis=1), np.array(parity, np.int64)
+
+
+def _chebyshev(values: FloatArray) -> list[FloatArray]:
+    found = [np.ones_like(values), values]
+    for _ in range(DEGREE - 1):
+        found.append(2 * values * found[-1] - found[-2])
+    return found
+
+
+def memory_features(one: Stretch, sizes: Sizes) -> FloatArray:
+    """Plays of x, and friction and damping that follow how violent the last cycles were."""
+    q = one.v / sizes.velocity
+    sharp = np.tanh(q / _SHARP[0])
+    plays = one.played / np.maximum(np.abs(one.played).max(axis=0), 1e-300)
+    late = one.lately[:, None] * np.stack([q, sharp, one.first / sizes.first], axis=1)
+    return np.concatenate([plays, late], axis=1)
+
+
+def time_features(one: Stretch, sizes: Sizes) -> FloatArray:
+    """The linear ones, growing along the run."""
+    t = one.time_s / sizes.time_s
+    linear = np.stack([one.first / sizes.first, one.v / sizes.velocity, np.ones_like(t)], axis=1)
+    return np.asarray(t[:, None] * linear)
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """What a regression needs of a stretch: sums of products."""
+
+    xx: FloatArray
+    xy: FloatArray
+    yy: float
+    n: int
+
+
+def sums(features: FloatArray, force: FloatArray) -> Sums:
+    """Sums of products of features and force."""
+    return Sums(features.T @ features, features.T @ force, float(force @ force), force.size)
+
+
+def solved(
+    parts: Sequence[Sums], prior: FloatArray, columns: NDArray[np.int64] | slice = slice(None)
+) -> FloatArray:
+    """Coefficients by ridge regression.
+
+    Parameters
+    ----------
+    parts : sequence of Sums
+    prior : ndarray, shape (n_features,)
+        Standard deviations of the coefficients over that of what is not explained.
+    columns : optional
+        Those that are used; the others are zero.
+    """
+    xx = np.sum([one.xx for one in parts], axis=0)
+    xy = np.sum([one.xy for one in parts], axis=0)
+    chosen = np.arange(xy.size)[columns]
+    found = np.zeros(xy.size)
+    lift = np.diag(1 / prior[chosen] ** 2)
+    found[chosen] = np.linalg.solve(xx[np.ix_(chosen, chosen)] + lift, xy[chosen])
+    return found
+
+
+def left_over(parts: Sequence[Sums], numbers: FloatArray) -> float:
+    """Sum of squares that a regression leaves."""
+    total = 0.0
+    for one in parts:
+        total += one.yy - 2 * float(numbers @ one.xy) + float(numbers @ one.xx @ numbers)
+    return max(total, 0.0)
+
+
+def explained(
+    fitted: Sequence[Sums],
+    judged: Sequence[Sums],
+    prior: FloatArray,
+    sets: Mapping[str, NDArray[np.int64]],
+    base: str,
+) -> dict[str, float]:
+    """Share of what the base set leaves in the judged stretches that larger sets explain there.
+
+    Parameters
+    ----------
+    fitted, judged : sequence of Sums
+    prior : ndarray, shape (n_features,)
+    sets : mapping of name to columns
+    base : str
+        Name of the set that explains nothing by definition.
+    noise : float
+        Standard deviation of the noise of a sample, which nothing can explain.
+    """
+    rest = {name: left_over(judged, solved(fitted, prior, columns)) for name, columns in sets.items()}
+    expected = noise**2 * sum(one.n for one in judged)
+    whole = max(rest[base] - expected, 0.1 * rest[base], 1e-300)
+    return {name: (rest[base] - value) / whole for name, value in rest.items()}

@@ -1,0 +1,394 @@
+"""The force that would make a simulation follow its recording, at structure and tank.
+
+What every motion channel misses is the response to one force at the tank's place (`force_inversion`), whatever
+made it. A force measured between structure and tank tells how much of it is the liquid's: Δf = M ü − F. What is
+left acts on the structure. Without that force the place stays open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.force_inversion import (
+    ORDERS,
+    AskedForce,
+    asked_force,
+    frequencies_hz,
+    in_frequency,
+    in_time,
+    modal_weights,
+    own_share,
+    response,
+    sample_variance,
+)
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.rig import Rig
+from sloshlab.twin.excitation import recorded
+from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.structure import Structure
+from sloshlab.twin.terms import Term
+from sloshlab.twin.twin import Twin
+
+FloatArray = NDArray[np.float64]
+Found = tuple[tuple["LatentForce", ...], dict[str, FloatArray]]
+STRUCTURE, TANK, EITHER = "structure", "tank", "structure or tank"
+_END_SHARE: Final = 0.04
+_SLOW_HZ: Final = 1.5
+"""Below, offsets and drift of accelerometers hide the motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class LatentForce:
+    """A force that the baseline lacks in one run, at one place.
+
+    Attributes
+    ----------
+    run : CaseRun
+    place : {"structure", "tank", "structure or tank"}
+    force_n : ndarray, shape (n,)
+        Upward positive, away from the ends of the run.
+    standard_error_n : float
+        Of one sample, by the noise of the sensors.
+    time_s : ndarray, shape (n,)
+    motion : ndarray, shape (n, 3)
+        Displacement, velocity, acceleration there: relative to the base for the structure, absolute for the tank.
+    """
+
+    run: CaseRun
+    place: str
+    force_n: FloatArray
+    standard_error_n: float
+    time_s: FloatArray
+    motion: FloatArray
+
+    @property
+    def power_n2(self) -> float:
+        """Mean square beyond noise, not below zero [N²]."""
+        return max(float(np.mean(self.force_n**2)) - self.standard_error_n**2, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class RunForces:
+    """Everything that one run says about forces and sensors.
+
+    Attributes
+    ----------
+    forces : tuple of LatentForce
+        At structure and tank, or at either of them; at the tank alone on a shaker.
+    missed : dict of str to ndarray, shape (n,)
+        What the simulation misses each channel by, in true units, faded out at the ends.
+    left : dict of str to ndarray, shape (n,)
+        What each motion channel shows beyond the motion that all believed ones agree on, in true units; of
+        force cells the difference from an equal share of their sum.
+    structure : Structure or None
+        As retuned.
+    carried_mass_kg : float
+    """
+
+    forces: tuple[LatentForce, ...]
+    missed: dict[str, FloatArray]
+    left: dict[str, FloatArray]
+    structure: Structure | None
+    carried_mass_kg: float
+
+    def at(self, place: str) -> LatentForce | None:
+        """The force at a place, if it can be told there."""
+        return next((one for one in self.forces if one.place == place), None)
+
+
+def run_forces(
+    model: RigModel, observed: Sequence[Observation], values: Mapping[str, float], without: Collection[str] = ()
+) -> RunForces:
+    """Latent forces of one run.
+
+    Parameters
+    ----------
+    model : RigModel
+    observed : sequence of Observation
+        Of one run.
+    values : mapping
+        Of the baseline's parameters.
+    without : collection of str
+        Channels that are not to be believed.
+
+    Raises
+    ------
+    AnalysisError
+        If the baseline does not reach the end of the run.
+    """
+    run = observed[0].run
+    simulation = model._simulation(run, values, NOTHING, ())
+    readings = model.simulate(run, values, NOTHING)
+    missed = {one.channel: _missed(one, readings[one.channel], values, run.is_free) for one in observed}
+    believed = [one for one in observed if one.channel not in without]
+    if simulation.twin.structure is None:
+        forces, left = _on_shaker(simulation, run, observed, believed, missed)
+    else:
+        forces, left = _on_structure(simulation, model.rig, observed, believed, missed)
+    left |= _unequal_cells(observed, believed, missed)
+    return RunForces(forces, missed, left, simulation.twin.structure, simulation.twin.carried_mass_kg)
+
+
+def shown_by(
+    forces: RunForces, observed: Sequence[Observation], rig: Rig, force: LatentForce
+) -> dict[str, FloatArray]:
+    """What a force at its place adds to every channel of the run, in true units, shape (n,) each.
+
+    Parameters
+    ----------
+    forces : RunForces
+    observed : sequence of Observation
+        Of the same run.
+    rig : Rig
+    force : LatentForce
+    """
+    run = force.run
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    first = round((force.time_s[0] - float(run.recording["time"].values[0])) * rate)
+    series = np.zeros(n)
+    series[first : first + force.force_n.size] = force.force_n
+    frequency = frequencies_hz(n, rate)
+    spectrum = in_frequency(series)
+    structure = forces.structure
+    n_cells = max(1, sum(one.channel.startswith("force_cell") for one in observed))
+    moved = np.zeros(frequency.size, complex)
+    if structure is not None:
+        moved = forces.carried_mass_kg * response(structure, structure.mode_shape, 2, frequency)
+    of_force = moved - (1.0 if force.place == TANK else 0.0)
+    shown = {}
+    for one in observed:
+        attributes = run.recording[one.channel].attrs
+        transfer = np.zeros(frequency.size, complex)
+        if one.channel.startswith("force"):
+            transfer = _sign(one) * of_force / (n_cells if one.channel.startswith("force_cell") else 1)
+        elif structure is not None:
+            weights = modal_weights(structure, rig, one.channel, attributes.get("x_m"))
+            if weights is not None:
+                transfer = response(structure, weights, _order(one.channel), frequency)
+        shown[one.channel] = in_time(transfer * spectrum, n)
+    return shown
+
+
+def _missed(one: Observation, reading: FloatArray, values: Mapping[str, float], is_free: bool) -> FloatArray:
+    """Recorded minus simulated in true units, zero where lost, faded out at the ends."""
+    recorded_ = np.asarray(one.run.recording[one.channel].values, np.float64)
+    n = min(recorded_.size, reading.size)
+    difference = np.zeros(recorded_.size)
+    known = one.known[:n]
+    difference[:n][known] = (recorded_[:n] - reading[:n])[known]
+    if not one.keeps_mean:
+        difference[:n][known] -= difference[:n][known].mean()
+    return difference * _fade(recorded_.size, is_free) / values.get(f"gain of {one.channel}", 1.0)
+
+
+def _fade(n: int, is_free: bool) -> FloatArray:
+    """Ones with a smooth way to zero at the end, and at the start of a run that was not released."""
+    m = max(2, int(_END_SHARE * n))
+    ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(m) + 0.5) / m)
+    window = np.ones(n)
+    window[n - m :] = ramp[::-1]
+    if not is_free:
+        window[:m] = ramp
+    return window
+
+
+def _kept(n: int, is_free: bool) -> slice:
+    m = max(2, int(_END_SHARE * n))
+    return slice(0 if is_free else m, n - m)
+
+
+def _noise_power(one: Observation, frequency_hz: FloatArray) -> FloatArray:
+    """E|FFT|² of the noise of a channel, by its variance per coefficient; slow motion is no accelerometer's."""
+    variance = np.interp(frequency_hz, one.frequencies_hz, np.median(one.variance, axis=0))
+    if _order(one.channel) == 2:
+        variance = variance * (1 + (_SLOW_HZ / np.maximum(frequency_hz, 1e-3 * _SLOW_HZ)) ** 4)
+    return np.asarray(variance * one.known.size)
+
+
+def _on_structure(
+    simulation: Simulation,
+    rig: Rig,
+    observed: Sequence[Observation],
+    believed: Sequence[Observation],
+    missed: Mapping[str, FloatArray],
+) -> Found:
+    asked, left = _asked_for(simulation, rig, observed, believed, missed)
+    run, structure = observed[0].run, simulation.twin.structure
+    assert structure is not None
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    frequency = asked.frequency_hz
+    sampled = min(n, simulation.places.shape[0])
+    orders = [response(structure, structure.mode_shape, order, frequency) for order in range(3)]
+    moved = np.stack([in_time(transfer * asked.spectrum, n) for transfer in orders], axis=-1)[:sampled]
+    relative, absolute = simulation.places[:sampled, 0] + moved, simulation.places[:sampled, 1] + moved
+    force = in_time(asked.spectrum, n)[:sampled]
+    on_structure = _changed(simulation, simulation.twin, STRUCTURE, relative, rate)
+    in_tank = _changed(simulation, simulation.twin, TANK, absolute, rate)
+    kept = _kept(n, run.is_free)
+    kept = slice(kept.start, min(kept.stop, sampled))
+    time = np.asarray(run.recording["time"].values, np.float64)
+
+    def latent(place: str, series: FloatArray, expected: FloatArray, motion: FloatArray) -> LatentForce:
+        error = float(np.sqrt(sample_variance(expected, n)))
+        return LatentForce(run, place, series[kept], error, time[kept], motion[kept])
+
+    measured = _measured(observed, believed, missed)
+    if measured is None:
+        return (latent(EITHER, force - on_structure - in_tank, asked.noise, relative),), left
+    missed_force, force_noise = measured
+    inertia = simulation.twin.carried_mass_kg * orders[2]
+    liquid = inertia * asked.spectrum - in_frequency(missed_force) - in_frequency(_padded(in_tank, n))
+    noise = np.abs(inertia) ** 2 * asked.noise + np.interp(frequency, *force_noise)
+    kept_share = own_share(np.abs(liquid) ** 2, noise, frequency, rate)
+    in_liquid = in_time(kept_share * liquid, n)[:sampled]
+    of_structure = force - in_tank - in_liquid - on_structure
+    return (
+        latent(STRUCTURE, of_structure, asked.noise + kept_share * noise, relative),
+        latent(TANK, in_liquid, kept_share * noise, absolute),
+    ), left
+
+
+def _asked_for(
+    simulation: Simulation,
+    rig: Rig,
+    observed: Sequence[Observation],
+    believed: Sequence[Observation],
+    missed: Mapping[str, FloatArray],
+) -> tuple[AskedForce, dict[str, FloatArray]]:
+    """The force at the tank's place that the believed motion channels ask for, and what every one has left."""
+    run, structure = observed[0].run, simulation.twin.structure
+    assert structure is not None
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    frequency = frequencies_hz(n, rate)
+    receptances, released = {}, {}
+    for one in observed:
+        weights = modal_weights(structure, rig, one.channel, run.recording[one.channel].attrs.get("x_m"))
+        if weights is not None:
+            receptances[one.channel] = response(structure, weights, _order(one.channel), frequency)
+            if run.is_free:
+                released[one.channel] = in_frequency(
+                    _release(structure, weights, _order(one.channel), n, rate) * _fade(n, True)
+                )
+    spectra = {name: in_frequency(missed[name]) for name in receptances}
+    seen = {
+        one.channel: (receptances[one.channel], _noise_power(one, frequency))
+        for one in believed
+        if one.channel in receptances
+    }
+    asked, at_release = asked_force(seen, spectra, frequency, rate, released or None)
+    left = {}
+    for name, spectrum in spectra.items():
+        start = at_release * released[name] if released else 0.0
+        left[name] = in_time(spectrum - receptances[name] * asked.spectrum - start, n)
+    return asked, left
+
+
+def _release(structure: Structure, weights: FloatArray, order: int, n: int, rate_hz: float) -> FloatArray:
+    """Free decay of a channel after a release of the tank from one metre."""
+    omega = np.sqrt(structure.stiffnesses_n_per_m / structure.masses_kg)
+    decay = 0.5 * structure.dampings_kg_per_s / structure.masses_kg
+    pole = -decay + 1j * np.sqrt(np.maximum(omega**2 - decay**2, 0.0))
+    start = structure.static_deflection(1.0)
+    turning = np.where(pole.imag > 0, pole.imag, np.inf)
+    factor = start * (1 - 1j * decay / turning) * weights
+    time = np.arange(n) / rate_hz
+    return np.asarray((np.exp(np.outer(time, pole)) * pole**order @ factor).real)
+
+
+def _padded(series: FloatArray, n: int) -> FloatArray:
+    return np.concatenate([series, np.zeros(n - series.size)])
+
+
+def _on_shaker(
+    simulation: Simulation,
+    run: CaseRun,
+    observed: Sequence[Observation],
+    believed: Sequence[Observation],
+    missed: Mapping[str, FloatArray],
+) -> Found:
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    frequency = frequencies_hz(n, rate)
+    sampled = min(n, simulation.places.shape[0])
+    motions = [one for one in observed if _order(one.channel) == 2]
+    good = [one for one in motions if one in believed] or motions
+    mean = np.mean([missed[one.channel] for one in good], axis=0) if good else np.zeros(n)
+    left = {one.channel: missed[one.channel] - mean for one in motions}
+    measured = _measured(observed, believed, missed)
+    if measured is None:
+        return (), left
+    missed_force, force_noise = measured
+    carried = simulation.twin.carried_mass_kg
+    of_noise = np.interp(frequency, *force_noise)
+    for one in good:
+        of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(one, frequency)
+    wanted = in_frequency(carried * mean - missed_force)
+    share = own_share(np.abs(wanted) ** 2, of_noise, frequency, rate)
+    force = in_time(share * wanted, n)[:sampled]
+    motion = simulation.places[:sampled, 1].copy()
+    motion[:, 2] += mean[:sampled]
+    kept = _kept(n, run.is_free)
+    kept = slice(kept.start, min(kept.stop, sampled))
+    time = np.asarray(run.recording["time"].values, np.float64)
+    error = float(np.sqrt(sample_variance(share * of_noise, n)))
+    return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept]),), left
+
+
+def _order(name: str) -> int:
+    return ORDERS.get(name.partition("_")[0], -1)
+
+
+def _measured(
+    observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
+) -> tuple[FloatArray, tuple[FloatArray, FloatArray]] | None:
+    """What the force of the structure on the tank is missed by, and the power of its noise over frequency."""
+    forces = [one for one in believed if one.channel.startswith("force")]
+    cells = [one for one in forces if one.channel.startswith("force_cell")]
+    chosen = cells or forces[:1]
+    if not chosen:
+        return None
+    n_cells = sum(one.channel.startswith("force_cell") for one in observed)
+    scale = n_cells / len(cells) if cells else 1.0
+    total = scale * np.sum([_sign(one) * missed[one.channel] for one in chosen], axis=0)
+    frequency = chosen[0].frequencies_hz
+    noise = scale**2 * np.sum([_noise_power(one, frequency) for one in chosen], axis=0)
+    return total, (frequency, noise)
+
+
+def _sign(one: Observation) -> float:
+    return -1.0 if one.run.recording[one.channel].attrs.get("block_from") == "tank" else 1.0
+
+
+def _unequal_cells(
+    observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    cells = [one.channel for one in observed if one.channel.startswith("force_cell")]
+    good = [one.channel for one in believed if one.channel in cells]
+    if len(cells) < 2 or not good:
+        return {}
+    mean = np.mean([missed[name] for name in good], axis=0)
+    return {name: missed[name] - mean for name in cells}
+
+
+def _changed(simulation: Simulation, twin: Twin, place: str, motion: FloatArray, rate_hz: float) -> FloatArray:
+    """Baseline forces of a place on the motion that was measured, less those of the simulation."""
+    chosen = [i for i, term in enumerate(twin.terms) if term.place == place]
+    if not chosen:
+        return np.zeros(motion.shape[0])
+    simulated = simulation.forces_n[: motion.shape[0], chosen].sum(axis=1)
+    alone = Twin(None, tuple(_moved_to_tank(twin.terms[i]) for i in chosen))
+    drive = recorded(rate_hz, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])
+    forces = alone.simulate(drive).require_done().forces_n.sum(axis=1)
+    return np.asarray(forces - simulated)
+
+
+def _moved_to_tank(term: Term) -> Term:
+    """A force on a motion that is prescribed: where it acts no longer matters."""
+    return replace(term, place="tank")

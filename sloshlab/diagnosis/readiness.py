@@ -1,0 +1,145 @@
+"""Whether a case can be diagnosed at all: before hours are spent, and in words that say what to correct.
+
+A twin that does not run, or reads something else than what was recorded by orders of magnitude, has no missing
+physics: the rig, the units or the folder is another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.case import Case, CaseRun
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.rig import Rig
+
+FloatArray = NDArray[np.float64]
+LARGEST_RATIO: Final = 30.0
+"""Recorded over simulated RMS of a channel; beyond, its units or its rig are others. g for m/s² is 9.8."""
+_MASSES_AGREE: Final = 0.05
+_FEWEST_SAMPLES: Final = 64
+
+
+def require_one_rig(case: Case) -> None:
+    """Refuse a rig that contradicts itself, and recordings that are of other rigs.
+
+    Parameters
+    ----------
+    case : Case
+
+    Raises
+    ------
+    InputError
+    """
+    named = sorted({run.attributes.rig for run in case.runs})
+    if len(named) > 1:
+        raise InputError(
+            f"case {case.name}: recordings",
+            got=f"of {len(named)} rigs: {', '.join(named)}"[:200],
+            allowed="one rig per case",
+            remedy="make a case of each",
+        )
+    if case.rig is None:
+        return
+    _require_one_moving_mass(case, case.rig)
+    kind = None if case.rig.structure is None else case.rig.structure.kind
+    for run in case.runs:
+        expected = {"beam_free": "beam", "beam_random": "beam", "sdof_free": "sdof"}.get(run.attributes.experiment)
+        if expected is not None and expected != kind:
+            raise InputError(
+                f"recording {run.name}: experiment",
+                got=f"{run.attributes.experiment} on a rig whose structure is {kind or 'absent'}",
+                allowed=f"a rig with structure.kind = {expected!r}",
+                remedy="put the recording beside its own rig.toml",
+            )
+
+
+def _require_one_moving_mass(case: Case, rig: Rig) -> None:
+    structure = rig.structure
+    if structure is None or structure.mass_kg is None or structure.kind != "sdof":
+        return
+    if abs(structure.mass_kg / rig.tank.dry_mass_kg - 1) > _MASSES_AGREE:
+        raise InputError(
+            f"case {case.name}: rig.toml",
+            got=f"structure.mass_kg = {structure.mass_kg:g} and tank.dry_mass_kg = {rig.tank.dry_mass_kg:g}",
+            allowed="the same moving mass without liquid",
+            remedy="correct one of them",
+        )
+
+
+def require_comparable(case: Case, model: DiagnosedModel) -> None:
+    """Refuse a twin that does not run, and recordings that it cannot be compared with.
+
+    Parameters
+    ----------
+    case : Case
+    model : DiagnosedModel
+
+    Raises
+    ------
+    InputError
+        One line: what, got, allowed, remedy.
+    """
+    if not any(model.compared(run) for run in case.runs):
+        raise AnalysisError(
+            f"case {case.name}",
+            got="no channel that the twin shows beside those that drive it",
+            allowed="a motion of the tank or the beam, or its force",
+            remedy="record one more channel",
+        )
+    ratios: dict[str, list[tuple[float, str, float, float]]] = {}
+    for run in case.runs:
+        for channel, values in _simulated(run, model).items():
+            sizes = _sizes(run, channel, values)
+            if sizes is not None:
+                recorded, simulated = sizes
+                ratios.setdefault(channel, []).append((recorded / simulated, run.name, recorded, simulated))
+    _require_alike(ratios)
+
+
+def _simulated(run: CaseRun, model: DiagnosedModel) -> Mapping[str, FloatArray]:
+    try:
+        return model.simulate(run, model.believed, NOTHING)
+    except AnalysisError as error:
+        raise AnalysisError(
+            f"the twin as believed does not run through recording {run.name}",
+            got=error.got or error.what,
+            remedy="correct the rig's or the twin's numbers",
+        ) from error
+
+
+def _sizes(run: CaseRun, channel: str, simulated: FloatArray) -> tuple[float, float] | None:
+    """RMS about the mean of what was recorded and of what is simulated there; None where either says nothing."""
+    values = np.asarray(run.recording[channel].values, np.float64)
+    n = min(values.size, simulated.size)
+    known = np.isfinite(values[:n])
+    if known.sum() < _FEWEST_SAMPLES:
+        return None
+    recorded, shown = float(values[:n][known].std()), float(simulated[:n][known].std())
+    if recorded <= 1e-12 * max(1.0, float(np.abs(values[:n][known]).max())):
+        raise InputError(
+            f"recording {run.name}: {channel}",
+            got=f"one value, {values[:n][known][0]:g}, throughout",
+            allowed="a reading that moves",
+            remedy="leave the channel out",
+        )
+    return (recorded, shown) if shown > 0 else None
+
+
+def _require_alike(ratios: Mapping[str, list[tuple[float, str, float, float]]]) -> None:
+    """A channel that is off in every run; one that moves in some is no matter of units."""
+    for channel, found in ratios.items():
+        off = [one for one in found if not 1 / LARGEST_RATIO < one[0] < LARGEST_RATIO]
+        if off and len(off) == len(found):
+            _, name, recorded, simulated = max(off, key=lambda one: abs(np.log(one[0])))
+            raise InputError(
+                f"recording {name}: {channel}",
+                got=f"RMS {recorded:.3g} where the twin of the rig reads {simulated:.3g}",
+                allowed=f"a factor of {LARGEST_RATIO:g} between them",
+                remedy="check the channel's units, and whether the recording is of this rig",
+            )

@@ -1,0 +1,89 @@
+"""An extended user's twin on disk: parameters and added forces as TOML. Nothing in it is run."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from sloshlab import atomic_file
+from sloshlab.diagnosis.extension import Extension
+from sloshlab.errors import InputError
+from sloshlab.twin.terms import Term, kind_named
+
+FORMAT: Final = 1
+_LARGEST_BYTES: Final = 1_000_000
+_MOST_TERMS: Final = 100
+
+
+def save_extended(module: str, values: Mapping[str, float], extension: Extension, path: Path) -> None:
+    """Write parameters and added forces; the user's module stays where it is.
+
+    Parameters
+    ----------
+    module : str
+        Name of the module, for a person.
+    values : mapping
+        Parameters of the baseline.
+    extension : Extension
+        Faults of sensors stay out: they are no part of what is simulated.
+    path : Path
+    """
+    lines = [f"sloshlab_user_twin = {FORMAT}", f"module = {json.dumps(module)}", "", "[parameters]"]
+    lines += [f"{json.dumps(name)} = {float(value)!r}" for name, value in values.items()]
+    for term in extension.terms:
+        lines += ["", "[[terms]]", f"name = {json.dumps(term.name)}"]
+        lines += [f"{name} = {float(value)!r}" for name, value in term.values.items()]
+    atomic_file.write_bytes(path, ("\n".join(lines) + "\n").encode())
+
+
+def load_extended(path: str | Path) -> tuple[dict[str, float], Extension]:
+    """Parameters and added forces that `save_extended` wrote, as `UserTwinModel.simulate` takes them.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, damaged, or names a force that is not registered.
+    """
+    file = Path(path)
+    document = _document(file)
+    try:
+        values = {str(name): _finite(value) for name, value in document["parameters"].items()}
+        described = document.get("terms", [])
+        if len(described) > _MOST_TERMS:
+            raise ValueError(f"{len(described)} terms")
+        terms = tuple(_term(entry) for entry in described)
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"twin {file}", got=f"contents that are no twin ({error})"[:200]) from error
+    return values, Extension(terms, key=tuple((term.name, *sorted(term.values.items())) for term in terms))
+
+
+def _document(file: Path) -> dict[str, Any]:
+    try:
+        if file.stat().st_size > _LARGEST_BYTES:
+            raise InputError(f"twin {file}", got=f"{file.stat().st_size} bytes", allowed=f"≤ {_LARGEST_BYTES}")
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"twin {file}", got=error.strerror or str(error), allowed="a readable file") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"twin {file}", got="text that is not TOML", allowed="a saved twin") from error
+    if document.get("sloshlab_user_twin") != FORMAT:
+        got = repr(document.get("sloshlab_user_twin"))[:80]
+        raise InputError(f"twin {file}: sloshlab_user_twin", got=got, allowed=str(FORMAT))
+    return document
+
+
+def _finite(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{value!r} is no number"[:80])
+    return float(value)
+
+
+def _term(entry: dict[str, Any]) -> Term:
+    numbers = {name: _finite(value) for name, value in entry.items() if name != "name"}
+    return kind_named(str(entry["name"]))(place="structure", **numbers)

@@ -1,0 +1,101 @@
+"""The registry holds the published vocabulary: names, blocks, parameters, look-alikes, all typed in by hand."""
+
+from __future__ import annotations
+
+import pytest
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import BLOCKS, Effect, known_effects, register
+from sloshlab.errors import InputError
+
+assert effects.__all__
+
+VOCABULARY = [
+    ("viscous_damping", ("structure", "tank"), {"damping_n_s_per_m"}),
+    ("coulomb_friction", ("structure", "tank"), {"force_n"}),
+    ("asymmetric_friction", ("structure",), {"force_up_n", "force_down_n"}),
+    ("stribeck_friction", ("structure",), {"coulomb_n", "static_n", "stribeck_velocity_m_per_s"}),
+    ("quadratic_drag", ("structure", "tank"), {"drag_n_s2_per_m2"}),
+    ("structural_damping", ("structure",), {"loss_factor"}),
+    ("hysteresis", ("structure",), {"stiffness_n_per_m", "beta_gamma", "beta_delta"}),
+    ("cubic_stiffness", ("structure",), {"stiffness_n_per_m3"}),
+    ("quadratic_stiffness", ("structure",), {"stiffness_n_per_m2"}),
+    ("stiffness_change", ("structure",), {"stiffness_n_per_m"}),
+    ("clearance", ("structure",), {"gap_m", "stiffness_n_per_m"}),
+    ("missing_mode", ("structure",), {"frequency_hz", "damping_ratio", "participation"}),
+    ("mass_error", ("structure", "tank"), {"mass_kg"}),
+    ("constant_force", ("structure",), {"force_n"}),
+    ("liquid_sloshing", ("tank",), {"threshold_g", "peak_w_bar"}),
+    ("effective_mass", ("tank",), {"beta"}),
+    ("ceiling_impact", ("tank",), {"stiffness_n_per_m", "damping_kg_per_s", "gap_m"}),
+    ("breakup_delay", ("tank",), {"time_constant_s"}),
+    ("high_g_saturation", ("tank",), {"threshold_g"}),
+    ("faraday_wave", ("tank",), {"frequency_hz", "growth"}),
+    ("lateral_mode", ("tank",), {"frequency_hz", "mass_kg"}),
+    ("liquid_loss", ("tank",), {"rate_kg_per_s"}),
+    ("air_cushion", ("tank",), {"stiffness_n_per_m"}),
+    ("base_rocking", ("excitation",), {"compliance_rad_per_n_m"}),
+    ("sensor_gain", ("sensor",), {"ratio"}),
+    ("sensor_delay", ("sensor",), {"delay_s"}),
+    ("sensor_high_pass", ("sensor",), {"time_constant_s"}),
+    ("sensor_clipping", ("sensor",), {"limit"}),
+    ("sensor_drift", ("sensor",), {"rate"}),
+    ("mains_hum", ("sensor",), {"amplitude"}),
+    ("clock_skew", ("sensor",), {"ratio"}),
+    ("cross_talk", ("sensor",), {"ratio"}),
+]
+LOOK_ALIKES = [
+    ("asymmetric_friction", "coulomb_friction + constant_force"),
+    ("mass_error", "stiffness_change"),
+    ("viscous_damping", "structural_damping"),
+    ("structural_damping", "coulomb_friction"),
+    ("viscous_damping", "coulomb_friction"),
+    ("sensor_delay", "viscous_damping"),
+    ("sensor_gain", "mass_error"),
+    ("cubic_stiffness", "quadratic_stiffness"),
+]
+SAME_UNDER_ANOTHER_NAME = {"mains_hum_60"}
+
+
+def named(name: str) -> list[Effect]:
+    """Effects of a name, one per block."""
+    return [one for one in known_effects() if one.name == name and one.equation]
+
+
+@pytest.mark.parametrize(("name", "blocks", "parameters"), VOCABULARY, ids=lambda value: str(value)[:24])
+def test_an_effect_has_its_blocks_and_parameters(name: str, blocks: tuple[str, ...], parameters: set[str]) -> None:
+    found = named(name)
+    assert sorted(one.block for one in found) == sorted(blocks)
+    for one in found:
+        assert {parameter.name for parameter in one.parameters} == parameters
+        assert all(parameter.low < parameter.high for parameter in one.parameters)
+
+
+def test_no_effect_of_the_program_is_outside_the_vocabulary() -> None:
+    known = {one.name for one in known_effects() if one.extension.__module__.startswith("sloshlab.")}
+    assert known - {name for name, _, _ in VOCABULARY} == SAME_UNDER_ANOTHER_NAME
+
+
+@pytest.mark.parametrize(("one", "other"), LOOK_ALIKES)
+def test_look_alikes_know_each_other_and_what_separates_them(one: str, other: str) -> None:
+    assert any(other in effect.look_alikes for effect in named(one))
+    if " + " not in other:
+        assert any(one in effect.look_alikes for effect in named(other))
+    for name in (one, *other.split(" + ")):
+        assert all(effect.separated_by for effect in named(name))
+
+
+def test_whatever_has_a_look_alike_says_what_separates_it_and_names_known_ones() -> None:
+    names = {one.name for one in known_effects()}
+    for one in known_effects():
+        assert bool(one.separated_by) or not one.look_alikes, one.name
+        assert {part for name in one.look_alikes for part in name.split(" + ")} <= names, one.name
+
+
+def test_blocks_and_names_are_checked() -> None:
+    [friction] = [one for one in named("coulomb_friction") if one.block == "structure"]
+    with pytest.raises(InputError, match=f"block.*'roof'.*{', '.join(BLOCKS)}"):
+        register(Effect("glue", "roof", "", (), friction.starts, friction.extension))
+    with pytest.raises(InputError, match="a name that is taken"):
+        register(Effect("coulomb_friction", "structure", "", (), friction.starts, friction.extension))
+    assert friction in known_effects()

@@ -1,0 +1,266 @@
+"""What every force adds to a decay, by its readings alone: M a + C v + K x is the force that EFFECTS writes.
+
+Displacement and acceleration are read, the velocity is the derivative of a spline through the displacement; forces
+with a memory are integrated along this motion by scipy. Nothing of the twin's laws is used for what is expected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from recorded_oscillators import DAMPING, LIQUID_KG, MASS_KG, OMEGA, RATE_HZ, STIFFNESS, decays, effect, rig
+from recorded_oscillators import surroundings as surroundings_of
+from scipy.interpolate import CubicSpline
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, known_effects
+from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.rig_model import RigModel
+
+assert effects.__all__
+G = 9.80665
+TANK_DAMPING = 1.5
+START_M, DURATION_S = 0.02, 2.0
+Motion = Mapping[str, np.ndarray]
+Series = Callable[[Motion], np.ndarray]
+
+
+def along(m: Motion, rates: Callable[..., Any], start: tuple[float, ...]) -> np.ndarray:
+    """States of a memory that the motion drives, shape (n_states, n): Runge–Kutta, four steps per sample."""
+    n, step = 4, 0.25 / RATE_HZ
+    fine = np.arange(2 * n * (m["t"].size - 1) + 1) * step / 2
+    x, v, a = (CubicSpline(m["t"], m[name])(fine).tolist() for name in "xva")
+    y = np.array(start)
+    states = [y]
+    for k in range(0, fine.size - 1, 2):
+        k1 = np.array(rates(y, x[k], v[k], a[k]))
+        k2 = np.array(rates(y + step / 2 * k1, x[k + 1], v[k + 1], a[k + 1]))
+        k3 = np.array(rates(y + step / 2 * k2, x[k + 1], v[k + 1], a[k + 1]))
+        k4 = np.array(rates(y + step * k3, x[k + 2], v[k + 2], a[k + 2]))
+        y = y + step / 6 * (k1 + 2 * (k2 + k3) + k4)
+        states.append(y)
+    return np.stack(states[::n], axis=1)
+
+
+def missing_mode(m: Motion) -> np.ndarray:
+    omega, zeta, mass = 2 * np.pi * 9.0, 0.02, 0.05
+    y = along(
+        m,
+        lambda y, x, v, a: [y[1], -(omega**2) * (y[0] - x) - 2 * zeta * omega * (y[1] - v)],
+        (m["x"][0], 0.0),
+    )
+    return mass * (omega**2 * (y[0] - m["x"]) + 2 * zeta * omega * (y[1] - m["v"]))
+
+
+def bouc_wen(m: Motion) -> np.ndarray:
+    k, bg, bd = 100.0, 60.0, 60.0
+    [z] = along(m, lambda z, x, v, a: [k * v - bg * abs(v) * z[0] - bd * v * abs(z[0])], (0.0,))
+    return -z
+
+
+def carried_oscillator(frequency_hz: float, mass: float, zeta: float, m: Motion) -> np.ndarray:
+    omega = 2 * np.pi * frequency_hz
+    y = along(
+        m, lambda y, x, v, a: [y[1], -(omega**2) * (y[0] - x) - 2 * zeta * omega * (y[1] - v)], (m["x"][0], 0.0)
+    )
+    return mass * (omega**2 * (y[0] - m["x"]) + 2 * zeta * omega * (y[1] - m["v"]) + m["a"])
+
+
+def cushion(m: Motion) -> np.ndarray:
+    k, gap = 2.0e3, 0.5 * 0.0272
+    omega = np.sqrt(k / LIQUID_KG)
+
+    def push(stretch: Any, closing: Any) -> Any:
+        return omega**2 * stretch / np.maximum(1 - np.abs(stretch) / gap, 0.02) + 0.04 * omega * closing
+
+    y = along(m, lambda y, x, v, a: [y[1], -push(y[0] - x, y[1] - v)], (m["x"][0], 0.0))
+    return LIQUID_KG * (push(y[0] - m["x"], y[1] - m["v"]) + m["a"])
+
+
+def wave(m: Motion) -> np.ndarray:
+    omega, growth = np.pi * OMEGA / (2 * np.pi), 0.4
+    y = along(
+        m,
+        lambda y, x, v, a: [
+            y[1],
+            -0.06 * omega * y[1] - omega**2 * (1 + a / G) * y[0] - omega**2 * y[0] ** 3,
+        ],
+        (1e-3, 0.0),
+    )
+    return growth * LIQUID_KG * G * y[0]
+
+
+MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
+    "structure.viscous_damping": ({"damping_n_s_per_m": 1.3}, lambda m: -1.3 * m["v"]),
+    "structure.coulomb_friction": ({"force_n": 0.4}, lambda m: -0.4 * np.sign(m["v"])),
+    "structure.asymmetric_friction": (
+        {"force_up_n": 0.6, "force_down_n": 0.2},
+        lambda m: np.where(m["v"] > 0, -0.6, 0.2),
+    ),
+    "structure.stribeck_friction": (
+        {"coulomb_n": 0.2, "static_n": 0.5, "stribeck_velocity_m_per_s": 0.1},
+        lambda m: -(0.2 + 0.3 * np.exp(-((m["v"] / 0.1) ** 2))) * np.sign(m["v"]),
+    ),
+    "structure.quadratic_drag": ({"drag_n_s2_per_m2": 0.8}, lambda m: -0.8 * m["v"] * np.abs(m["v"])),
+    "structure.structural_damping": (
+        {"loss_factor": 0.02},
+        lambda m: -0.5 * np.pi * 0.02 * MASS_KG * OMEGA**2 * np.abs(m["x"]) * np.sign(m["v"]),
+    ),
+    "structure.hysteresis": ({"stiffness_n_per_m": 100.0, "beta_gamma": 60.0, "beta_delta": 60.0}, bouc_wen),
+    "structure.cubic_stiffness": ({"stiffness_n_per_m3": 3e5}, lambda m: -3e5 * m["x"] ** 3),
+    "structure.quadratic_stiffness": ({"stiffness_n_per_m2": -9e3}, lambda m: 9e3 * m["x"] ** 2),
+    "structure.stiffness_change": ({"stiffness_n_per_m": -150.0}, lambda m: 150.0 * m["x"]),
+    "structure.clearance": (
+        {"gap_m": 0.008, "stiffness_n_per_m": 500.0},
+        lambda m: -500.0 * np.sign(m["x"]) * np.maximum(np.abs(m["x"]) - 0.008, 0.0),
+    ),
+    "structure.missing_mode": ({"frequency_hz": 9.0, "damping_ratio": 0.02, "participation": 0.05}, missing_mode),
+    "structure.mass_error": ({"mass_kg": 0.11}, lambda m: -0.11 * m["a"]),
+    "structure.constant_force": ({"force_n": -0.7}, lambda m: np.full(m["x"].size, -0.7)),
+    "tank.viscous_damping": ({"damping_n_s_per_m": 1.3}, lambda m: -1.3 * m["v"]),
+    "tank.coulomb_friction": ({"force_n": 0.4}, lambda m: -0.4 * np.sign(m["v"])),
+    "tank.quadratic_drag": ({"drag_n_s2_per_m2": 0.8}, lambda m: -0.8 * m["v"] * np.abs(m["v"])),
+    "tank.mass_error": ({"mass_kg": -0.03}, lambda m: 0.03 * m["a"]),
+    "tank.effective_mass": ({"beta": 0.3}, lambda m: -0.3 * LIQUID_KG * m["a"]),
+    "tank.liquid_loss": ({"rate_kg_per_s": 0.01}, lambda m: 0.01 * m["t"] * m["a"]),
+    "tank.lateral_mode": (
+        {"frequency_hz": 4.5, "mass_kg": 0.03},
+        lambda m: carried_oscillator(4.5, 0.03, 0.01, m),
+    ),
+    "tank.air_cushion": ({"stiffness_n_per_m": 2.0e3}, cushion),
+    "tank.faraday_wave": ({"frequency_hz": 0.5 * OMEGA / (2 * np.pi), "growth": 0.4}, wave),
+}
+
+
+@pytest.fixture(scope="module")
+def frozen(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
+    folder = tmp_path_factory.mktemp("frozen")
+    return RigModel(rig(folder), folder, decays((START_M,), DURATION_S))
+
+
+@pytest.fixture(scope="module")
+def damped(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
+    folder = tmp_path_factory.mktemp("damped")
+    return RigModel(rig(folder, TANK_DAMPING), folder, decays((START_M,), DURATION_S))
+
+
+def moved(model: RigModel, key: str, numbers: Mapping[str, float]) -> dict[str, np.ndarray]:
+    """The readings of a decay with an effect, as a motion."""
+    extension = NOTHING if not key else Candidate(effect(key), surroundings_of(model)).extension(numbers)
+    readings = model.simulate(model.runs[0], model.believed, extension)
+    x, a = readings["displacement_tank"], readings["acceleration_tip"]
+    t = np.arange(x.size) / RATE_HZ
+    return {"t": t, "x": x, "v": CubicSpline(t, x, bc_type=((1, 0.0), "not-a-knot")).derivative()(t), "a": a}
+
+
+def added(m: Motion, tank_damping: float = 0.0) -> np.ndarray:
+    """The force beyond mass, spring and dampers of the rig file."""
+    return MASS_KG * m["a"] + (DAMPING + tank_damping) * m["v"] + STIFFNESS * m["x"]
+
+
+def smooth(m: Motion) -> np.ndarray:
+    """Samples away from the release, the reversals and the rest, where a spline knows the velocity."""
+    fast = np.abs(m["v"]) > 0.1 * np.abs(m["v"]).max()
+    return (
+        fast
+        & np.roll(fast, 2)
+        & np.roll(fast, -2)
+        & (np.arange(fast.size) > 3)
+        & (np.arange(fast.size) < fast.size - 3)
+    )
+
+
+@pytest.mark.parametrize("key", MEMORYLESS)
+def test_a_force_is_the_one_of_the_vocabulary(frozen: RigModel, key: str) -> None:
+    numbers, expected = MEMORYLESS[key]
+    m = moved(frozen, key, numbers)
+    # the wave is chaotic: after a second its phase is that of rounding
+    known = smooth(m) & (m["t"] < (0.95 if key == "tank.faraday_wave" else DURATION_S))
+    force = expected(m)[known]
+    # 2e-4 of the largest force of the spring holds what the spline makes of the velocity
+    error = np.abs(added(m)[known] - force)
+    assert error.max() < 0.03 * np.abs(force).max() + 2e-4 * STIFFNESS * START_M
+    assert np.sqrt(np.mean(error**2)) < 0.02 * np.sqrt(np.mean(force**2))
+
+
+def test_nothing_added_is_no_force(frozen: RigModel) -> None:
+    m = moved(frozen, "", {})
+    assert np.abs(added(m)[smooth(m)]).max() < 2e-4 * STIFFNESS * START_M
+
+
+def tracked_omega(m: Motion, omega: float) -> np.ndarray:
+    """Root of the mean squares of a over v, each forgotten with 0.2 s."""
+    y = along(m, lambda y, x, v, a: [(v**2 - y[0]) / 0.2, (a**2 - y[1]) / 0.2], (1e-6, 1e-6 * omega**2))
+    return np.sqrt(y[1] / y[0])
+
+
+def test_sloshing_dissipates_beyond_its_threshold_alone(frozen: RigModel) -> None:
+    """(m_l/π) Ω W̄ v, W̄ rising from the threshold to its peak at twice the threshold."""
+    m = moved(frozen, "tank.liquid_sloshing", {"threshold_g": 2.2, "peak_w_bar": 2.0})
+    omega = tracked_omega(m, OMEGA)
+    size = np.hypot(omega * m["v"], m["a"]) / G
+    w_bar = 2.0 * np.clip(size / 2.2 - 1, 0.0, 1.0)
+    known = smooth(m)
+    expected = -LIQUID_KG / np.pi * omega * w_bar * m["v"]
+    assert np.abs(added(m) - expected)[known].max() < 0.02 * np.abs(expected).max()
+    below = known & (size < 2.1)
+    assert below.sum() > 50
+    assert np.abs(added(m)[below]).max() < 2e-4 * STIFFNESS * START_M
+
+
+def test_saturation_makes_the_damping_of_the_liquid_fall_with_the_square(damped: RigModel) -> None:
+    m = moved(damped, "tank.high_g_saturation", {"threshold_g": 2.2})
+    size = np.hypot(tracked_omega(m, OMEGA) * m["v"], m["a"]) / G
+    expected = -TANK_DAMPING * np.minimum(1.0, (2.2 / size) ** 2) * m["v"]
+    known = smooth(m)
+    assert np.abs(added(m) - expected)[known].max() < 0.02 * np.abs(expected).max()
+    assert (size[known] > 3.0).any()
+    assert (size[known] < 2.1).any()
+
+
+def test_a_delayed_break_up_builds_the_damping_of_the_liquid_up(damped: RigModel) -> None:
+    """ṡ = (1 − s)/τ while the motion exceeds 1 g, −s/τ below."""
+    m = moved(damped, "tank.breakup_delay", {"time_constant_s": 0.4})
+    size = np.hypot(tracked_omega(m, OMEGA) * m["v"], m["a"]) / G
+    over = (size > 1.0).astype(float)
+    built = np.zeros(size.size)
+    for i in range(1, size.size):
+        built[i] = over[i - 1] + (built[i - 1] - over[i - 1]) * np.exp(-1 / (0.4 * RATE_HZ))
+    known = smooth(m)
+    expected = -TANK_DAMPING * built * m["v"]
+    assert np.abs(added(m) - expected)[known].max() < 0.03 * np.abs(expected).max()
+    assert built.max() > 0.5
+
+
+def test_the_damper_of_the_baseline_is_there_without_an_effect(damped: RigModel) -> None:
+    m = moved(damped, "", {})
+    assert np.abs(added(m, TANK_DAMPING)[smooth(m)]).max() < 2e-4 * STIFFNESS * START_M
+
+
+def test_a_liquid_that_meets_the_ceiling_takes_energy_and_leaves_a_lighter_tank_in_flight(
+    frozen: RigModel,
+) -> None:
+    numbers = {"gap_m": 0.0136, "stiffness_n_per_m": 4e3, "damping_kg_per_s": 6.0}
+    m, before = moved(frozen, "tank.ceiling_impact", numbers), moved(frozen, "", {})
+    force = added(m)
+    # in flight the tank lacks the liquid: Δf = m_l (a + g)
+    flying = smooth(m) & (m["a"] < -1.5 * G)
+    assert np.median(np.abs(force[flying] - LIQUID_KG * (m["a"][flying] + G))) < 0.02 * LIQUID_KG * G
+    assert np.sum(force * m["v"]) < 0
+    late = m["t"] > 1.0
+    assert np.abs(m["x"][late]).max() < 0.9 * np.abs(before["x"][late]).max()
+
+
+def test_every_force_of_the_vocabulary_is_held_to_its_equation() -> None:
+    held = {
+        *MEMORYLESS,
+        "tank.liquid_sloshing",
+        "tank.high_g_saturation",
+        "tank.breakup_delay",
+        "tank.ceiling_impact",
+    }
+    built_in = [one for one in known_effects() if one.extension.__module__.startswith("sloshlab.")]
+    assert {f"{one.block}.{one.name}" for one in built_in if one.block in ("structure", "tank")} == held

@@ -1,0 +1,192 @@
+"""What faults of sensors make of signals whose answer is known in closed form, and whether they can be undone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded_oscillators import decays, driven, effect, rig, surroundings
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, known_effects
+from sloshlab.diagnosis.extension import SensorFault
+from sloshlab.diagnosis.rig_model import RigModel
+
+assert effects.__all__
+RATE, N = 1000.0, 4000
+T = np.arange(N) / RATE
+OMEGA = 2 * np.pi * 7.3
+AMPLITUDE, PHASE = 3.0, 0.4
+SIGNAL = AMPLITUDE * np.cos(OMEGA * T + PHASE)
+CHANNEL = "acceleration_tip"
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
+    folder = tmp_path_factory.mktemp("sensors")
+    return RigModel(rig(folder), folder, driven())
+
+
+def fault(model: RigModel, name: str, numbers: Mapping[str, float], channel: str = CHANNEL) -> SensorFault:
+    [found] = Candidate(effect(f"sensor.{name}"), surroundings(model), channel).extension(numbers).faults
+    return found
+
+
+def read(one: SensorFault, values: np.ndarray, recorded: np.ndarray | None = None) -> np.ndarray:
+    return one.reading(values, RATE, {}, values if recorded is None else recorded)
+
+
+def test_gain_makes_the_reading_larger_by_its_ratio(model: RigModel) -> None:
+    one = fault(model, "sensor_gain", {"ratio": 0.07})
+    np.testing.assert_allclose(read(one, SIGNAL), 1.07 * SIGNAL)
+    assert one.undone is not None
+    np.testing.assert_allclose(one.undone(1.07 * SIGNAL, RATE, {}, SIGNAL), SIGNAL)
+
+
+@pytest.mark.parametrize("delay_s", [0.0043, -0.0021])
+def test_a_delayed_channel_shows_what_was_there_earlier(model: RigModel, delay_s: float) -> None:
+    one = fault(model, "sensor_delay", {"delay_s": delay_s})
+    expected = AMPLITUDE * np.cos(OMEGA * (T - delay_s) + PHASE)
+    np.testing.assert_allclose(read(one, SIGNAL)[200:-200], expected[200:-200], atol=2e-3 * AMPLITUDE)
+    assert one.undone is not None
+    np.testing.assert_allclose(one.undone(expected, RATE, {}, SIGNAL)[200:-200], SIGNAL[200:-200], atol=6e-3)
+
+
+def test_a_discharging_sensor_leads_and_loses_low_frequencies(model: RigModel) -> None:
+    """jωτ/(1 + jωτ) after the charge of the first sample has leaked away."""
+    tau = 0.03
+    one = fault(model, "sensor_high_pass", {"time_constant_s": tau})
+    factor = 1j * OMEGA * tau / (1 + 1j * OMEGA * tau)
+    steady = AMPLITUDE * np.real(factor * np.exp(1j * (OMEGA * T + PHASE)))
+    np.testing.assert_allclose(read(one, SIGNAL, steady)[400:], steady[400:], atol=2e-3 * AMPLITUDE)
+
+
+@pytest.mark.parametrize("charge", [0.0, 2.0, -5.0])
+def test_a_sensor_that_was_charged_before_the_run_is_no_misfit(model: RigModel, charge: float) -> None:
+    tau = 0.2
+    one = fault(model, "sensor_high_pass", {"time_constant_s": tau})
+    factor = 1j * OMEGA * tau / (1 + 1j * OMEGA * tau)
+    steady = AMPLITUDE * np.real(factor * np.exp(1j * (OMEGA * T + PHASE)))
+    recorded = steady + charge * np.exp(-T / tau)
+    np.testing.assert_allclose(read(one, SIGNAL, recorded), recorded, atol=4e-3 * AMPLITUDE)
+
+
+def test_clipping_stops_at_the_limit_of_the_channel(model: RigModel) -> None:
+    one = fault(model, "sensor_clipping", {"limit": 2.5})
+    reading = read(one, SIGNAL)
+    assert reading.max() == 2.5
+    assert reading.min() == -2.5
+    inside = np.abs(SIGNAL) < 2.5
+    np.testing.assert_array_equal(reading[inside], SIGNAL[inside])
+    assert one.undone is None
+
+
+def test_drift_adds_its_rate_every_second(model: RigModel) -> None:
+    reading = read(fault(model, "sensor_drift", {"rate": -0.15}), SIGNAL)
+    np.testing.assert_allclose(np.diff(reading - SIGNAL), -0.15 / RATE)
+    assert abs(np.mean(reading - SIGNAL)) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("name", "line_hz"), [("mains_hum", 50.04), ("mains_hum", 49.93), ("mains_hum_60", 60.02)]
+)
+def test_hum_finds_the_phase_and_the_frequency_of_the_mains(model: RigModel, name: str, line_hz: float) -> None:
+    line = 0.2 * np.cos(2 * np.pi * line_hz * T + 1.9)
+    one = fault(model, name, {"amplitude": 0.2})
+    np.testing.assert_allclose(read(one, SIGNAL, SIGNAL + line) - SIGNAL, line, atol=0.03 * 0.2)
+    half = fault(model, name, {"amplitude": 0.1})
+    np.testing.assert_allclose(read(half, SIGNAL, SIGNAL + line) - SIGNAL, 0.5 * line, atol=0.03 * 0.1)
+    assert one.undone is not None
+    np.testing.assert_allclose(one.undone(SIGNAL + line, RATE, {}, SIGNAL + line), SIGNAL, atol=0.06)
+
+
+def test_no_hum_where_the_recording_is_too_slow_for_it(model: RigModel) -> None:
+    one = fault(model, "mains_hum", {"amplitude": 0.2})
+    np.testing.assert_array_equal(one.reading(SIGNAL, 90.0, {}, SIGNAL), SIGNAL)
+
+
+def test_a_fast_clock_shows_later_instants(model: RigModel) -> None:
+    ratio = 8e-4
+    one = fault(model, "clock_skew", {"ratio": ratio})
+    expected = AMPLITUDE * np.cos(OMEGA * (1 + ratio) * T + PHASE)
+    np.testing.assert_allclose(read(one, SIGNAL)[:-10], expected[:-10], atol=2e-3 * AMPLITUDE)
+    assert one.undone is not None
+    np.testing.assert_allclose(one.undone(expected, RATE, {}, SIGNAL)[:-10], SIGNAL[:-10], atol=4e-3 * AMPLITUDE)
+
+
+def test_cross_talk_adds_a_share_of_the_other_channel(model: RigModel) -> None:
+    other = np.sin(3 * T)
+    one = fault(model, "cross_talk", {"ratio": 0.25}, f"{CHANNEL}<acceleration_root")
+    assert one.channel == CHANNEL
+    np.testing.assert_allclose(
+        one.reading(SIGNAL, RATE, {"acceleration_root": other}, SIGNAL), SIGNAL + 0.25 * other
+    )
+    assert one.undone is not None
+    back = one.undone(SIGNAL + 0.25 * other, RATE, {"acceleration_root": other}, SIGNAL)
+    np.testing.assert_allclose(back, SIGNAL)
+
+
+def test_a_leak_of_the_base_shows_in_the_readings_of_the_tip(model: RigModel) -> None:
+    candidate = Candidate(effect("sensor.cross_talk"), surroundings(model), f"{CHANNEL}<acceleration_root")
+    [run] = model.runs
+    before = model.simulate(run, model.believed, Candidate.extension(candidate, {"ratio": 0.0}))[CHANNEL]
+    after = model.simulate(run, model.believed, candidate.extension({"ratio": 0.1}))[CHANNEL]
+    np.testing.assert_allclose(after - before, 0.1 * run.recording["acceleration_root"].values, atol=1e-12)
+
+
+def test_starts_are_of_the_size_of_their_channel(model: RigModel) -> None:
+    """So that a hum of micrometres and one of volts are both begun with two per cent."""
+    at = surroundings(model)
+    for name in ("acceleration_tip", "acceleration_root"):
+        [start] = Candidate(effect("sensor.mains_hum"), at, name).starts()
+        assert list(start.values()) == [pytest.approx(0.02 * at.channels[name])]
+        [start] = Candidate(effect("sensor.sensor_clipping"), at, name).starts()
+        assert list(start.values()) == [at.peaks[name]]
+
+
+def test_a_channel_that_alone_drives_is_offered_only_faults_that_can_be_undone(model: RigModel) -> None:
+    at = surroundings(model)
+    assert at.driving == ("acceleration_root",)
+    for one in known_effects():
+        if (
+            one.block != "sensor"
+            or one.name == "cross_talk"
+            or not one.extension.__module__.startswith("sloshlab.")
+        ):
+            continue
+        [made] = Candidate(one, at, CHANNEL).extension(dict(one.starts(at)[0])).faults
+        assert ("acceleration_root" in one.places(at)) == (made.undone is not None), one.name
+
+
+def test_a_fault_of_the_base_accelerometer_changes_what_drives(model: RigModel) -> None:
+    """A reading too small by a tenth stands for a base that moves 1/0.9 as much, and so does the tip."""
+    [run] = model.runs
+    candidate = Candidate(effect("sensor.sensor_gain"), surroundings(model), "acceleration_root")
+    before = model.simulate(run, model.believed, candidate.extension({"ratio": 0.0}))[CHANNEL]
+    after = model.simulate(run, model.believed, candidate.extension({"ratio": -0.1}))[CHANNEL]
+    np.testing.assert_allclose(after, before / 0.9, atol=1e-6 * np.abs(before).max())
+
+
+def test_a_fault_changes_its_own_channel_and_no_other(tmp_path: Path) -> None:
+    pair = RigModel(rig(tmp_path), tmp_path, decays((0.01,), 1.0))
+    at = surroundings(pair)
+    [run] = pair.runs
+    before = pair.simulate(
+        run, pair.believed, Candidate(effect("sensor.sensor_gain"), at, CHANNEL).extension({"ratio": 0.0})
+    )
+    for one in known_effects():
+        if (
+            one.block != "sensor"
+            or one.name == "cross_talk"
+            or not one.extension.__module__.startswith("sloshlab.")
+        ):
+            continue
+        candidate = Candidate(one, at, CHANNEL)
+        numbers = {name.rpartition(".")[2]: value for name, value in candidate.starts()[-1].items()}
+        if one.name == "sensor_clipping":
+            numbers = {"limit": 0.5 * at.peaks[CHANNEL]}
+        after = pair.simulate(run, pair.believed, candidate.extension(numbers))
+        assert not np.array_equal(after[CHANNEL], before[CHANNEL]), one.name
+        np.testing.assert_array_equal(after["displacement_tank"], before["displacement_tank"])
