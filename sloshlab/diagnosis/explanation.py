@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, cast
 
 import numpy as np
@@ -25,7 +25,13 @@ from sloshlab.diagnosis.free_run_fit import (
     robust_weights,
     scanned,
 )
-from sloshlab.diagnosis.observations import Observation, observations, with_scatter, with_typical_scatter
+from sloshlab.diagnosis.observations import (
+    Observation,
+    observations,
+    with_scatter,
+    with_typical_scatter,
+    within_band,
+)
 from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.split import Split, split
@@ -38,6 +44,8 @@ _LEAST_PREDICTED: Final = 8.0
 _MOST_FITTED: Final = 10
 _SOFT: Final = 0.1
 _MOST_SCANNED: Final = 3
+_DOWN_TO_NOISE: Final = 1.15
+"""Mean square of the weighted residuals of a channel in which nothing more is to be found."""
 Told = Callable[[str, int, int], None]
 
 assert effects.__all__  # importing the vocabulary makes it known
@@ -174,21 +182,14 @@ def _weighted_observations(case: Case, model: DiagnosedModel, parts: Split) -> d
             repeated += observed
     for run in alone:
         weighted[run.name] = with_typical_scatter(plain[run.name], repeated)
-    return weighted
+    return {name: [within_band(one) for one in observed] for name, observed in weighted.items()}
 
 
 def _loosened(observed: Sequence[Observation]) -> list[Observation]:
     """With five per cent of each channel added to its noise: a first fit must not depend on unknown noise."""
     return [
-        Observation(
-            one.run,
-            one.channel,
-            one.keeps_mean,
-            one.known,
-            one.spectra,
-            one.variance + (0.05**2) * float(np.mean(one.spectra**2)),
-        )
-        for one in observed
+        replace(one, variance=one.variance + (0.05**2) * float(np.mean(one.spectra**2)))
+        for one in map(within_band, observed)
     ]
 
 
@@ -284,6 +285,8 @@ class _Search:
                 continue
             kept.append(self.judged(fit))
         for one in sorted(kept, key=lambda each: each.fit.cost)[:_MOST_SCANNED]:
+            if self._is_down_to_noise(one.fit):
+                continue
             candidate = one.fit.candidates[-1]
             self.told(f"{what}: {candidate.key} from other sizes", 0, 1)
             problem = FreeRunProblem(self.model, self.fitting, one.fit.candidates)
@@ -343,11 +346,20 @@ class _Search:
         if not self.explanations:
             return
         best = min(self.explanations, key=lambda one: one.fit.cost)
+        if self._is_down_to_noise(best.fit):
+            return
         problem = FreeRunProblem(self.model, self.fitting, best.fit.candidates)
         theta = problem.theta_of(best.fit.values)
         at = problem.residual(theta)
         jacobian = problem.jacobian(theta, at, range(theta.size))
         self._one_more(best.fit, jacobian, pool, "fitting a second effect")
+
+    def _is_down_to_noise(self, fit: FreeRunFit) -> bool:
+        """Whether a fit leaves no more than the noise in any channel of the runs that it was made of."""
+        problem = FreeRunProblem(self.model, self.fitting, fit.candidates)
+        residual = problem.residual(problem.theta_of(fit.values))
+        left = _by_channel([one for run in problem.runs for one in run], residual)
+        return max(left.values(), default=0.0) < _DOWN_TO_NOISE
 
     def _ceilings(self, retuned: FreeRunFit) -> list[Explanation]:
         found = []

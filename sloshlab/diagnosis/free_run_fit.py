@@ -25,6 +25,7 @@ _ROBUST: Final = 4.0
 _LARGEST_DAMPING: Final = 1e8
 MOST_TOLERANCES: Final = 4.0
 """How far a baseline's parameter may be from what is believed of it; beyond, something else is the matter."""
+_LEAST_SHARE_OF_PROMISE: Final = 0.3
 STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
 SCANNED: Final = (0.75, 0.9, 1.1, 1.3)
 N_THREADS = 2
@@ -206,7 +207,6 @@ def fitted(
     start: Mapping[str, float],
     *,
     n_iterations: int = 8,
-    known_jacobian: FloatArray | None = None,
     tolerance: float = 1e-3,
     shares: Sequence[float] = STAGES,
 ) -> tuple[FreeRunFit, FloatArray]:
@@ -218,8 +218,6 @@ def fitted(
     start : mapping
     n_iterations : int
         At most, per stage.
-    known_jacobian : ndarray, shape (n_residuals, n_known), optional
-        Of the first parameters at a nearby place; it is then not made again.
     tolerance : float
         Of the relative decrease of the cost at which a stage ends.
     shares : sequence of float
@@ -230,59 +228,97 @@ def fitted(
     -------
     fit : FreeRunFit
     jacobian : ndarray, shape (n_residuals, n)
-        Unweighted, at the last place where it was made.
+        Unweighted, at the place of the fit.
+
+    Notes
+    -----
+    A Jacobian costs as many simulations as there are parameters. It is made when a stage begins, corrected after
+    every step by what the step has shown (Broyden 1965, 10.1090/S0025-5718-1965-0198670-6), and made anew where
+    a step gains less than it promised, and before the last stage may end.
     """
     theta = problem.theta_of(start)
     residual = problem.residual(theta)
-    n = theta.size
-    prior = np.where(np.arange(n) < problem.n_baseline, 1.0, 0.0)
     if not np.isfinite(residual).all():
         empty = FreeRunFit(
             problem.candidates, problem.values(theta), np.inf, np.inf, trouble="does not run from its start"
         )
-        return empty, np.zeros((residual.size, n))
-    jacobian, hessian = np.zeros((residual.size, n)), np.eye(n)
+        return empty, np.zeros((residual.size, theta.size))
+    descent = _Descent(problem, theta, residual)
     for share in shares:
-        softness = problem.softness(share)
-        damping = 1e-3
+        descent.stage(share, n_iterations, tolerance)
+    return descent.fit(), descent.jacobian
+
+
+class _Descent:
+    """Where a fit stands."""
+
+    def __init__(self, problem: FreeRunProblem, theta: FloatArray, residual: FloatArray) -> None:
+        self.problem, self.theta, self.residual = problem, theta, residual
+        n = theta.size
+        self.prior = np.where(np.arange(n) < problem.n_baseline, 1.0, 0.0)
+        self.jacobian, self.hessian = np.zeros((residual.size, n)), np.eye(n)
+
+    def stage(self, share: float, n_iterations: int, tolerance: float) -> None:
+        """Descend with every channel believed to a share of its RMS."""
+        softness, damping, is_fresh = self.problem.softness(share), 1e-3, False
+        is_wanted = True
         for iteration in range(n_iterations):
-            jacobian = _jacobian(problem, theta, residual, known_jacobian, coarse=share > 0)
-            limit = _limit(softness * residual)
-            weights = softness * robust_weights(softness * residual, limit)
-            weighted = jacobian * weights[:, None]
-            hessian = weighted.T @ weighted + np.diag(prior)
-            gradient = weighted.T @ (weights * residual) + prior * theta
-
-            def cost(at: FloatArray, r: FloatArray, soft: FloatArray = softness, far: float = limit) -> float:
-                return huber_cost(soft * r, far) + float((prior * at**2).sum()) if np.isfinite(r).all() else np.inf
-
-            before = after = cost(theta, residual)
-            while damping < _LARGEST_DAMPING:
-                lift = np.diag(damping * np.maximum(np.diag(hessian), 1e-12))
-                tried = _within(problem, theta - np.linalg.solve(hessian + lift, gradient))
-                new = problem.residual(tried)
-                after = cost(tried, new)
-                if after < before:
-                    break
-                damping *= 8
-            if not after < before:
+            if is_wanted:
+                self.jacobian = self.problem.jacobian(
+                    self.theta, self.residual, range(self.theta.size), coarse=share > 0
+                )
+                is_fresh = True
+            gain, promised, damping = self._step(softness, damping)
+            is_done = gain < tolerance and (iteration > 0 or gain <= 0)
+            if is_done and (is_fresh or share > 0):
                 break
-            theta, residual = tried, new
-            damping = max(damping / 10, 1e-9)
-            if (before - after) / before < tolerance and iteration:
-                break
-    misfit = huber_cost(residual)
-    fit = FreeRunFit(
-        problem.candidates,
-        problem.values(theta),
-        misfit + float((prior * theta**2).sum()),
-        misfit,
-        np.asarray(np.linalg.pinv(hessian), np.float64),
-        problem.names,
-        problem.scales,
-        problem.n_simulations,
-    )
-    return fit, jacobian
+            is_wanted = is_done or gain < _LEAST_SHARE_OF_PROMISE * promised
+            is_fresh = is_fresh and gain <= 0
+
+    def _step(self, softness: FloatArray, damping: float) -> tuple[float, float, float]:
+        """One step; relative decrease of the cost, what the Jacobian promised, and the next damping."""
+        theta, residual, prior = self.theta, self.residual, self.prior
+        limit = _limit(softness * residual)
+        weights = softness * robust_weights(softness * residual, limit)
+        weighted = self.jacobian * weights[:, None]
+        self.hessian = weighted.T @ weighted + np.diag(prior)
+        gradient = weighted.T @ (weights * residual) + prior * theta
+
+        def cost(at: FloatArray, r: FloatArray) -> float:
+            if not np.isfinite(r).all():
+                return np.inf
+            return huber_cost(softness * r, limit) + float((prior * at**2).sum())
+
+        before = cost(theta, residual)
+        while damping < _LARGEST_DAMPING:
+            lift = np.diag(damping * np.maximum(np.diag(self.hessian), 1e-12))
+            tried = _within(self.problem, theta - np.linalg.solve(self.hessian + lift, gradient))
+            new = self.problem.residual(tried)
+            after = cost(tried, new)
+            if after < before:
+                step = tried - theta
+                promised = -float(2 * gradient @ step + step @ self.hessian @ step)
+                length = float(step @ step)
+                if length > 0:
+                    self.jacobian += np.outer((new - residual - self.jacobian @ step) / length, step)
+                self.theta, self.residual = tried, new
+                return (before - after) / before, promised / before, max(damping / 10, 1e-9)
+            damping *= 8
+        return 0.0, 0.0, 1e-3
+
+    def fit(self) -> FreeRunFit:
+        """The fit as it is now."""
+        misfit = huber_cost(self.residual)
+        return FreeRunFit(
+            self.problem.candidates,
+            self.problem.values(self.theta),
+            misfit + float((self.prior * self.theta**2).sum()),
+            misfit,
+            np.asarray(np.linalg.pinv(self.hessian), np.float64),
+            self.problem.names,
+            self.problem.scales,
+            self.problem.n_simulations,
+        )
 
 
 def fitted_from(
@@ -334,15 +370,6 @@ def scanned(problem: FreeRunProblem, fit: FreeRunFit, name: str, *, n_iterations
         if not other.trouble and other.cost < best.cost:
             best = other
     return best
-
-
-def _jacobian(
-    problem: FreeRunProblem, theta: FloatArray, residual: FloatArray, known: FloatArray | None, *, coarse: bool
-) -> FloatArray:
-    """Derivatives by all parameters, the first ones as they are known."""
-    n_known = 0 if known is None else known.shape[1]
-    rest = problem.jacobian(theta, residual, range(n_known, theta.size), coarse=coarse)
-    return rest if known is None else np.hstack([known, rest])
 
 
 def _within(problem: FreeRunProblem, theta: FloatArray) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -18,6 +18,7 @@ BLOCK_S: Final = 0.5
 ZERO_IS_KNOWN: Final = "zero_is_known"
 """Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
+_LEAST_SHARE_OF_BLOCKS: Final = 0.01
 _LEAST_SHARE: Final = 1e-4
 """No channel is believed to better than this share of its RMS per coefficient; quantisation and rounding."""
 
@@ -34,10 +35,12 @@ class Observation:
         Whether the static part is compared too; not for channels whose zero means nothing.
     known : ndarray of bool, shape (n,)
         Samples that were neither lost nor clipped.
-    spectra : ndarray, shape (n_blocks, n_bands)
-        Of the recording.
-    variance : ndarray, shape (n_blocks, n_bands)
+    spectra : ndarray, shape (n_blocks, n_kept)
+        Of the recording, in the lowest bands.
+    variance : ndarray, shape (n_blocks, n_kept)
         Of each coefficient, by what does not repeat.
+    n_transformed : int
+        Bands of the transform, if not all of them are kept.
     """
 
     run: CaseRun
@@ -46,16 +49,18 @@ class Observation:
     known: NDArray[np.bool_]
     spectra: FloatArray
     variance: FloatArray
+    n_transformed: int = 0
 
     @property
     def n_bands(self) -> int:
-        """Coefficients per block."""
-        return int(self.spectra.shape[1])
+        """Coefficients per block of the transform."""
+        return self.n_transformed or int(self.spectra.shape[1])
 
     @property
     def frequencies_hz(self) -> FloatArray:
-        """Of the bands."""
-        return band_frequencies_hz(self.n_bands, self.run.attributes.sampling_rate_hz)
+        """Of the bands that are kept."""
+        every = band_frequencies_hz(self.n_bands, self.run.attributes.sampling_rate_hz)
+        return every[: self.spectra.shape[1]]
 
     @property
     def times_s(self) -> FloatArray:
@@ -70,7 +75,7 @@ class Observation:
 
     def of(self, values: FloatArray) -> FloatArray:
         """Spectra of simulated values, treated as the recording was; samples beyond their end are zero."""
-        return _spectra(values, self.known, self.keeps_mean, self.n_bands)
+        return _spectra(values, self.known, self.keeps_mean, self.n_bands)[:, : self.spectra.shape[1]]
 
     def residual(self, values: FloatArray) -> FloatArray:
         """Recorded minus simulated spectra in standard deviations, shape (n_blocks, n_bands)."""
@@ -107,6 +112,25 @@ def observations(run: CaseRun, names: Sequence[str]) -> list[Observation]:
         variance = np.full(spectra.shape, max(stated, white, least, 1e-300))
         found.append(Observation(run, name, keeps_mean, known, spectra, variance))
     return found
+
+
+def within_band(observation: Observation) -> Observation:
+    """The same without the high bands in which the recording never stands out of what does not repeat.
+
+    Parameters
+    ----------
+    observation : Observation
+    """
+    shown = np.flatnonzero(observation.informative.mean(axis=0) > _LEAST_SHARE_OF_BLOCKS)
+    n_bands = observation.n_bands
+    highest = int(shown[-1]) + 1 if shown.size else 0
+    n_kept = min(observation.spectra.shape[1], max(highest + n_bands // 16, n_bands // 8))
+    return replace(
+        observation,
+        spectra=np.ascontiguousarray(observation.spectra[:, :n_kept]),
+        variance=np.ascontiguousarray(observation.variance[:, :n_kept]),
+        n_transformed=n_bands,
+    )
 
 
 def with_scatter(
@@ -179,14 +203,7 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
 
 
 def _weighted(observation: Observation, variance: FloatArray) -> Observation:
-    return Observation(
-        observation.run,
-        observation.channel,
-        observation.keeps_mean,
-        observation.known,
-        observation.spectra,
-        np.maximum(variance, _floor(observation)),
-    )
+    return replace(observation, variance=np.maximum(variance, _floor(observation)))
 
 
 def _floor(observation: Observation) -> FloatArray:
