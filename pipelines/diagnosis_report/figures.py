@@ -157,7 +157,7 @@ def _highest(one: ChannelMismatch) -> int:
     """The band below which nearly all of the misfit lies."""
     cumulative = np.cumsum(one.excess.sum(axis=0))
     index = int(np.searchsorted(cumulative, 0.98 * cumulative[-1]))
-    return min(max(2 * index, 12), one.excess.shape[1] - 1)
+    return int(min(max(2 * index, 12), one.excess.shape[1] - 1))
 
 
 def _size(one: Observation) -> float:
