@@ -21,7 +21,7 @@ TWIN = Path(__file__).with_name("friction_damper_twin.py")
 EFFECTS = Path(__file__).with_name("friction_damper_effects.py")
 NAME = "dataset-2__characterization_datasets__0.5Hz30lbtension{}amplitude.json"
 AMPLITUDES = ("0.5", "1", "1.5")
-EVERY = 16
+EVERY = 32
 M_PER_INCH, N_PER_KIP = 0.0254, 4448.2216152605
 
 

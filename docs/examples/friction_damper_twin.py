@@ -34,6 +34,6 @@ TWIN = FreeTwin(
     driving=("displacement_actuator",),
     compared={"force_damper": Compared("N", gain_tolerance=0.0)},
     simulate=damper,
-    moving_mass_kg=3e3,
-    stiffness_n_per_m=3e4,
+    moving_mass_kg=3e4,  # so that forces are tried that are as large as those of the actuator
+    stiffness_n_per_m=3e5,
 )
