@@ -13,7 +13,7 @@ from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
-from sloshlab.diagnosis.examination import examination_facts, examined, seen_at
+from sloshlab.diagnosis.examination import examination_facts, examined, owning_block, seen_at
 from sloshlab.diagnosis.explanation import explained_extension, findings_of
 from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.user_effects import load_user_effects
@@ -55,7 +55,7 @@ def diagnose_case(
         found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
     verdict = verdict_of(found)
     examination = examined(found)
-    verdict = with_place(verdict, seen_at(examination, verdict.best))
+    verdict = with_place(found, verdict, seen_at(examination, verdict.best), owning_block(examination))
     facts = {**verdict_facts(found, verdict), **examination_facts(examination, found)}
     diagnosis = Diagnosis(found, verdict, examination, _provenance(case, command, twin, effects))
     with atomic_file.filled_folder(target) as complete:

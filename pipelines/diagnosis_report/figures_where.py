@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.diagnosis_report.figures import extended_label, named_channels
 from pipelines.diagnosis_report.results import Diagnosis
+from pipelines.report.axes import power_of_ten
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import (
     NEUTRAL_COLOUR,
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 _TOP = 1.35
 _BOTTOM = 0.1
+_PHASES = ("highest\npoint", "falls", "lowest\npoint", "rises", "highest\npoint")
 
 
 def block_shares(name: str, diagnosis: Diagnosis) -> ReportFigure:
@@ -46,9 +49,8 @@ def block_shares(name: str, diagnosis: Diagnosis) -> ReportFigure:
                 0.015, row, plain(f"cannot tell: {one.remark or 'within noise'}", 88), va="center", fontsize=7.5
             )
     axes.set_yticks(range(len(blocks)), [one.block for one in blocks])
-    axes.invert_yaxis()
-    axes.set(xlim=(0, _TOP), xlabel="share of the mismatch beyond noise")
-    axes.set_xticks(np.linspace(0, 1, 6))
+    axes.set(xlim=(0, _TOP), ylim=(len(blocks) - 0.5, -0.5), xlabel="share of the mismatch beyond noise")
+    axes.set_xticks(np.linspace(0, 1, 6), [f"{share} %" for share in range(0, 101, 20)])
     axes.grid(axis="y", visible=False)
     doubted = f" The channel {plain(cut.doubted)} contradicts the others and is left out." if cut.doubted else ""
     caption = (
@@ -75,12 +77,12 @@ def residual_profiles(name: str, diagnosis: Diagnosis) -> ReportFigure:
         (panels[0, 1], "level", "amplitude of the acceleration [g]"),
         (panels[1, 0], "phase", "phase of the acceleration in its cycle"),
     ):
-        _profiles(axes, getattr(before, attribute), None if after is None else getattr(after, attribute), label)
-    panels[0, 0].set_xticks([0.5, 1, 1.5, 2, 3, 4], ["½", "1", "1½", "2", "3", "4"])
-    panels[1, 0].set_xticks(
-        np.pi * np.array([-1, -0.5, 0, 0.5, 1]),
-        ["highest\npoint", "falls", "lowest\npoint", "rises", "highest\npoint"],
-    )
+        other = None if after is None else getattr(after, attribute)
+        _profiles(axes, getattr(before, attribute), other, label, extended_label(diagnosis))
+    if before.order is not None:
+        panels[0, 0].set_xticks([0.5, 1, 1.5, 2, 3, 4], ["½", "1", "", "2", "3", "4"])
+    if before.phase is not None:
+        panels[1, 0].set_xticks(np.pi * np.array([-1, -0.5, 0, 0.5, 1]), _PHASES)
     _cells(panels[1, 1], before)
     panels[0, 0].set_ylabel("mean excess per coefficient", fontsize=8)
     panels[1, 0].set_ylabel("mean excess per sample", fontsize=8)
@@ -100,26 +102,30 @@ def worst_maps(diagnosis: Diagnosis) -> ResidualMaps:
     maps = diagnosis.examination.maps
     if not maps:
         raise NothingToDrawError("nothing was compared")
-    best = diagnosis.verdict.best
-    named = [one.channel.partition("<")[0] for one in best.fit.candidates if one.channel] if best else []
-    wanted = [*named, *diagnosis.examination.where.get("channels", [])]
+    wanted = [*named_channels(diagnosis), *diagnosis.examination.where.get("channels", [])]
     return next((one for channel in wanted for one in maps if one.channel == channel), maps[0])
 
 
-def _profiles(axes: Axes, before: Profile | None, after: Profile | None, label: str) -> None:
+def _profiles(axes: Axes, before: Profile | None, after: Profile | None, label: str, words: str) -> None:
     axes.set_xlabel(label)
     if before is None or not np.isfinite(before.excess).any():
         axes.text(0.5, 0.5, "no single frequency", ha="center", va="center", transform=axes.transAxes, fontsize=8)
         axes.set_yticks([])
         axes.set_xticks([])
         return
-    axes.plot(before.middles, before.excess, color=NEUTRAL_COLOUR, lw=1.4, label="baseline retuned")
+    shown = [(before, NEUTRAL_COLOUR, "baseline retuned")]
     if after is not None:
-        axes.plot(after.middles, after.excess, color=REFERENCE_COLOUR, lw=1.4, label="with what was left out")
+        shown.append((after, REFERENCE_COLOUR, words))
+    for one, colour, name in shown:
+        known = np.isfinite(one.excess)
+        axes.plot(one.middles[known], one.excess[known], "o-", color=colour, lw=1.2, ms=2.5, label=name)
     axes.axhline(0.0, color="black", lw=0.8)
     axes.set_yscale("symlog", linthresh=_BOTTOM)
     top = float(np.nanmax(before.excess))
     axes.set_ylim(-0.5 if top < 5 else -1.0, 1.5 * max(top, 0.2))
+    ticks = [0.0, *[10.0**power for power in range(-1, 7) if 10.0**power < 1.5 * top]]
+    axes.set_yticks(ticks, ["0", *[power_of_ten(tick) for tick in ticks[1:]]])
+    axes.minorticks_off()
 
 
 def _cells(axes: Axes, one: ResidualMaps) -> None:

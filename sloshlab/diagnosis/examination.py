@@ -21,6 +21,7 @@ from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.sensor_character import SensorAnswer, said, sensor_character
 
 _CLEARLY = 1.5
+_MOST = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +108,14 @@ def _damping_shift(model: RigModel, run: RunForces, place: str, values: Mapping[
             if term.place == "tank" and name in values:
                 shift += values[name] - term.values["damping_n_s_per_m"]
     return shift
+
+
+def owning_block(examination: Examination) -> str:
+    """The block that surely owns most of the mismatch; empty where the cut cannot tell."""
+    if examination.cut is None:
+        return ""
+    sure = [one.block for one in examination.cut.blocks if one.share > _MOST and one.low > 0.5]
+    return sure[0] if len(sure) == 1 and sure[0] != EITHER else ""
 
 
 def seen_at(examination: Examination, best: Explanation | None) -> str:

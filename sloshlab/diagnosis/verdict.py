@@ -64,6 +64,8 @@ class Verdict:
         Held-out error of the best over that of the ceiling.
     statement, separating_experiment : str
     probabilities : dict
+    block : str
+        Of what has no name, where the cut at measured interfaces tells it.
     """
 
     kind: str
@@ -74,6 +76,7 @@ class Verdict:
     statement: str
     separating_experiment: str
     probabilities: dict[str, float]
+    block: str = ""
 
 
 def verdict_of(found: Findings) -> Verdict:
@@ -181,8 +184,8 @@ def _nothing(found: Findings) -> str:
     )
 
 
-def _unknown(found: Findings, named: Explanation | None) -> str:
-    where = where_of(found)
+def _unknown(found: Findings, named: Explanation | None, block: str = "") -> str:
+    where = block or where_of(found)
     closest = f"; the nearest known effect is {' + '.join(named.keys)}" if named else ""
     return f"Something is missing that has no name here, most likely in the {where}{closest}."
 
@@ -212,16 +215,23 @@ def explained_share(found: Findings, best: Explanation) -> float:
     return min(max(gained / possible, 0.0), 1.0) if possible > 0 else 0.0
 
 
-def with_place(verdict: Verdict, seen: str) -> Verdict:
-    """The verdict whose sentence also says where it is seen; for those that say that something is missing.
+def with_place(found: Findings, verdict: Verdict, seen: str = "", block: str = "") -> Verdict:
+    """The verdict with where it is: in its sentence, and the block of what has no name.
 
     Parameters
     ----------
+    found : Findings
     verdict : Verdict
     seen : str
-        Words such as "seen at velocity reversals below 1.5 g"; none change nothing.
+        Words such as "seen at velocity reversals below 1.5 g".
+    block : str
+        The block that owns the mismatch by the cut at measured interfaces; empty where that cannot tell.
     """
-    if not seen or verdict.kind == "nothing_missing":
+    if verdict.kind == "nothing_missing":
+        return verdict
+    if verdict.kind == "unknown" and block:
+        verdict = replace(verdict, block=block, statement=_unknown(found, verdict.best, block))
+    if not seen:
         return verdict
     return replace(verdict, statement=f"{verdict.statement.removesuffix('.')}; {seen}.")
 
@@ -319,7 +329,14 @@ def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
     if verdict.kind == "nothing_missing" or (verdict.best is None and verdict.kind != "unknown"):
         return []
     if verdict.kind == "unknown":
-        return [{"name": "unknown", "block": where_of(found), "parameters": {}, "where": _where(found, ())}]
+        return [
+            {
+                "name": "unknown",
+                "block": verdict.block or where_of(found),
+                "parameters": {},
+                "where": _where(found, ()),
+            }
+        ]
     assert verdict.best is not None
     described = []
     for candidate in verdict.best.fit.candidates:
