@@ -13,11 +13,12 @@ from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
+from sloshlab.diagnosis.examination import examination_facts, examined, owning_block, seen_at
 from sloshlab.diagnosis.explanation import explained_extension, findings_of
 from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.user_effects import load_user_effects
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
-from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
+from sloshlab.diagnosis.verdict import verdict_facts, verdict_of, with_place
 
 
 def diagnose_case(
@@ -53,8 +54,10 @@ def diagnose_case(
     with amounts("diagnosing") as advance:
         found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
     verdict = verdict_of(found)
-    facts = verdict_facts(found, verdict)
-    diagnosis = Diagnosis(found, verdict, _provenance(case, command, twin, effects))
+    examination = examined(found)
+    verdict = with_place(found, verdict, seen_at(examination, verdict.best), owning_block(examination))
+    facts = {**verdict_facts(found, verdict), **examination_facts(examination, found)}
+    diagnosis = Diagnosis(found, verdict, examination, _provenance(case, command, twin, effects))
     with atomic_file.filled_folder(target) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis_report.results import Diagnosis
+from pipelines.report.axes import plain_log_ticks, power_of_ten
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, WORK_COLOURS, new_figure, plain, png_bytes
 from sloshlab.diagnosis.explanation import Explanation
@@ -15,6 +18,7 @@ from sloshlab.diagnosis.observations import Observation
 FloatArray = NDArray[np.float64]
 _MOST_ROWS = 18
 _SHOWN_CYCLES = 12
+_EXCESS_OF_NOISE = 1.0
 
 
 def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
@@ -39,8 +43,12 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
     axes.set(
         xscale="log", xlabel="error on held-out runs / noise floor", xlim=(min(0.5, *values), 1.6 * max(values))
     )
+    plain_ticks_within_decades(axes.xaxis)
     for i, value in enumerate(values):
-        axes.text(value * 1.04, i, f"{value:.2f}", va="center", fontsize=8)
+        label = axes.annotate(
+            f"{value:.2f}", (value, i), (4, 0), textcoords="offset points", va="center", fontsize=8
+        )
+        label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6})
     runs = ", ".join(run.name for run in found.split.held_out)
     caption = (
         "Root mean square of the residuals of short-time spectra over their noise, where the "
@@ -63,11 +71,12 @@ def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
     held = [max(found.retuned.held_out - one.held_out, 0.1) for one in chosen]
     axes.barh(place - 0.18, held, 0.34, color=REFERENCE_COLOUR, label="held-out runs")
     axes.barh(place + 0.18, fit, 0.34, color=NEUTRAL_COLOUR, label="fitted runs")
-    labels = [plain(" + ".join(one.keys).replace("_", " "), 52) for one in chosen]
+    labels = [plain(" + ".join(one.keys).replace(".", " · ").replace("_", " "), 60) for one in chosen]
     axes.set_yticks(place, labels, fontsize=7)
     axes.invert_yaxis()
     axes.set(xscale="log", xlabel="decrease of the sum of squares below that of the retuned baseline")
-    axes.legend(loc="lower right")
+    plain_log_ticks(axes.xaxis)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", ncols=2)
     caption = (
         "What each explanation gains over the retuned baseline; bars that end at 0.1 gain nothing or "
         "lose. The best on "
@@ -80,13 +89,14 @@ def where(name: str, diagnosis: Diagnosis) -> ReportFigure:
     """Misfit over time and frequency, before and after, of the channel that misses most."""
     found = diagnosis.findings
     before = mismatches(found.fitting, found.readings(found.retuned))
-    worst = max(before, key=lambda one: one.total)
+    named = named_channels(diagnosis)
+    worst = max(before, key=lambda one: (one.channel in named, one.total))
     if worst.total <= 0:
         raise NothingToDrawError("the retuned baseline misses nothing")
     both = [("baseline retuned", worst)]
     if diagnosis.verdict.best is not None:
         after = mismatches(found.fitting, found.readings(diagnosis.verdict.best))
-        both.append(("with what was left out", _same(after, worst)))
+        both.append((extended_label(diagnosis), _same(after, worst)))
     top = _highest(worst)
     figure = new_figure(3.0)
     panels = np.atleast_1d(figure.subplots(1, len(both), sharey=True))
@@ -119,8 +129,10 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
     found = diagnosis.findings
     observed = max(found.held_out, key=lambda run: _size(run[0]))
     run = observed[0].run
-    shown = observed[: min(2, len(observed))]
     before = found.readings(found.retuned)[run.name]
+    named = named_channels(diagnosis)
+    missed = {one.channel: float((one.residual(before[one.channel]) ** 2).sum()) for one in observed}
+    shown = sorted(observed, key=lambda one: (one.channel not in named, -missed[one.channel]))[:2]
     after = found.readings(diagnosis.verdict.best)[run.name] if diagnosis.verdict.best is not None else None
     time = np.asarray(run.recording["time"].values, np.float64)
     stretch = _stretch(time, found.surroundings.frequency_hz)
@@ -131,22 +143,31 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
         units = str(run.recording[one.channel].attrs.get("units", ""))
         left.plot(time[stretch], recorded[stretch], color="black", lw=1.4, label="recorded")
         left.plot(time[stretch], before[one.channel][stretch], color=NEUTRAL_COLOUR, lw=0.9, label="retuned")
-        right.plot(time, recorded - before[one.channel], color=NEUTRAL_COLOUR, lw=0.6, label="retuned")
+        right.plot(time, _left(one, recorded - before[one.channel]), color=NEUTRAL_COLOUR, lw=0.6)
         if after is not None:
-            left.plot(time[stretch], after[one.channel][stretch], color=REFERENCE_COLOUR, lw=0.9, label="extended")
-            right.plot(time, recorded - after[one.channel], color=REFERENCE_COLOUR, lw=0.6, label="extended")
+            label = extended_label(diagnosis)
+            left.plot(time[stretch], after[one.channel][stretch], color=REFERENCE_COLOUR, lw=0.9, label=label)
+            right.plot(time, _left(one, recorded - after[one.channel]), color=REFERENCE_COLOUR, lw=0.6)
         left.set_ylabel(f"{plain(one.channel)}\n[{plain(units)}]", fontsize=7)
     grid[0, 0].set_title("recorded and simulated, a stretch")
     grid[0, 1].set_title("recorded − simulated")
     grid[-1, 0].set_xlabel("time [s]")
     grid[-1, 1].set_xlabel("time [s]")
-    grid[0, 0].legend(loc="upper right", fontsize=7)
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     caption = (
-        f"Held-out run {plain(run.name)}; releases and offsets are those of the fit, or believed "
-        "where the run was not "
-        "fitted."
+        f"Held-out run {plain(run.name)}, the channels that are missed most; the mean is taken off where it means "
+        "nothing. Releases and offsets are those of the fit, or believed where the run was not fitted."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def plain_ticks_within_decades(axis: Any) -> None:
+    """Ticks at 1, 2, 5 of every decade, as plain numbers: for axes that cover one or two."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _same(found: list[ChannelMismatch], wanted: ChannelMismatch) -> ChannelMismatch:
@@ -154,10 +175,28 @@ def _same(found: list[ChannelMismatch], wanted: ChannelMismatch) -> ChannelMisma
 
 
 def _highest(one: ChannelMismatch) -> int:
-    """The band below which nearly all of the misfit lies."""
-    cumulative = np.cumsum(one.excess.sum(axis=0))
+    """The band below which nearly all of the misfit lies that is no noise."""
+    beyond = np.maximum(one.excess.mean(axis=0) - _EXCESS_OF_NOISE, 0.0)
+    cumulative = np.cumsum(beyond)
+    if cumulative[-1] <= 0:
+        return int(one.excess.shape[1]) - 1
     index = int(np.searchsorted(cumulative, 0.98 * cumulative[-1]))
-    return min(max(2 * index, 12), one.excess.shape[1] - 1)
+    return int(min(max(2 * index, 12), one.excess.shape[1] - 1))
+
+
+def _left(one: Observation, values: FloatArray) -> FloatArray:
+    return values if one.keeps_mean else values - float(np.nanmean(values))
+
+
+def named_channels(diagnosis: Diagnosis) -> list[str]:
+    """Channels on which the named effects act."""
+    best = diagnosis.verdict.best
+    return [one.channel.partition("<")[0] for one in best.fit.candidates if one.channel] if best else []
+
+
+def extended_label(diagnosis: Diagnosis) -> str:
+    """Words for the best explanation."""
+    return "nearest known effect" if diagnosis.verdict.kind == "unknown" else "with what was left out"
 
 
 def _size(one: Observation) -> float:

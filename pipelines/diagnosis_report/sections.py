@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
-from pipelines.diagnosis_report import figures, tables
+from pipelines.diagnosis_report import figures, figures_force, figures_where, tables
 from pipelines.diagnosis_report.results import Diagnosis
 from pipelines.report.citations import Citation
+from pipelines.report.figure import ReportFigure
 from pipelines.report.sections import FigurePlan, SectionPlan
+from pipelines.report.tables import Table
 from pipelines.report.writing import Page
 from sloshlab import __version__
 
@@ -24,29 +27,49 @@ _ROBUST = Citation(
     "10.1214/aoms/1177703732",
 )
 
+Draw = Callable[..., ReportFigure]
+
 
 def page_of(diagnosis: Diagnosis) -> Page:
     """The page of the report."""
-    drawn = {
-        "Held-out runs": (
+    places = [place for place, one in diagnosis.examination.characters.items()]
+    where_tables = (
+        tables.cut_table(diagnosis),
+        tables.sensor_table(diagnosis),
+        tables.sensor_error_table(diagnosis),
+    )
+    drawn: dict[str, tuple[dict[str, Draw], tuple[Table | None, ...]]] = {
+        "Does it help": (
             {"held_out_errors": figures.held_out_errors, "time_histories": figures.time_histories},
-            (),
+            (tables.parameter_table(diagnosis), tables.baseline_table(diagnosis)),
         ),
-        "Where": ({"where": figures.where}, (tables.parameter_table(diagnosis),)),
-        "Evidence": (
+        "Where": (
+            {
+                "block_shares": figures_where.block_shares,
+                "where": figures.where,
+                "residual_profiles": figures_where.residual_profiles,
+            },
+            where_tables,
+        ),
+        "What kind of force": (
+            {"missing_force": figures_force.missing_force},
+            tuple(tables.answers_table(diagnosis, place) for place in places),
+        ),
+        "For and against": (
             {"evidence": figures.evidence},
             (
+                tables.evidence_table(diagnosis),
                 tables.explanation_table(diagnosis),
-                tables.baseline_table(diagnosis),
                 tables.left_out_table(diagnosis),
             ),
         ),
+        "What remains": ({}, (tables.remains_table(diagnosis), tables.limits_table(diagnosis))),
     }
     plans = tuple(
         SectionPlan(
             title,
             tuple(FigurePlan(name, partial(draw, diagnosis=diagnosis)) for name, draw in them.items()),
-            shown,
+            tuple(table for table in shown if table is not None),
         )
         for title, (them, shown) in drawn.items()
     )

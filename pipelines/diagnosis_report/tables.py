@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import math
+from collections.abc import Collection, Mapping
+from typing import Any, Final
+
+import numpy as np
 
 from pipelines.diagnosis_report.results import Diagnosis
 from pipelines.report.numbers import MISSING, signed, text
 from pipelines.report.tables import Table
+from sloshlab.diagnosis.evidence import ALONE, CANNOT_TELL
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.verdict import interval
+
+_MOST_EXPLANATIONS: Final = 14
 
 
 def parameter_table(diagnosis: Diagnosis) -> Table:
@@ -86,6 +92,200 @@ def left_out_table(diagnosis: Diagnosis) -> Table:
         tuple(rows) or ((MISSING, MISSING),),
         "Each was simulated from every one of its starts.",
     )
+
+
+def cut_table(diagnosis: Diagnosis) -> Table:
+    """Each block on its measured input."""
+    cut = diagnosis.examination.cut
+    header = ("block", "fed with", "compared", "share of the mismatch", "lacks (RMS)", "noise (RMS)", "remark")
+    if cut is None:
+        caption = "A twin of the user's own has no blocks that can be fed one by one."
+        return Table("Cut at the measured interfaces", header, ((MISSING,) * 7,), caption)
+    rows = []
+    for one in cut.blocks:
+        share = f"{100 * one.share:.0f} % ({100 * one.low:.0f} … {100 * one.high:.0f})"
+        unit = " σ" if one.block == "sensor" else " N"
+        rows.append(
+            (
+                one.block,
+                one.input,
+                one.output,
+                share if math.isfinite(one.share) else "cannot tell",
+                text(one.size, 3) + (unit if math.isfinite(one.size) else ""),
+                text(one.noise, 2) + (unit if math.isfinite(one.noise) else ""),
+                one.remark or (MISSING if math.isfinite(one.share) else "within noise"),
+            )
+        )
+    caption = (
+        "Shares with 90 % intervals. A block lacks the force that would make its output follow the recording; "
+        "of sensors, what they contradict each other by in standard deviations. "
+    )
+    return Table("Cut at the measured interfaces", header, tuple(rows), caption + _sentence(cut.remark))
+
+
+def sensor_table(diagnosis: Diagnosis) -> Table | None:
+    """Channels beside what the others of the same motion say."""
+    cut = diagnosis.examination.cut
+    if cut is None or not cut.sensors:
+        return None
+    rows = [
+        (one.channel, text(one.ratio, 3), text(one.disagreement_without, 3), text(one.demand_without_n2**0.5, 3))
+        for one in sorted(cut.sensors, key=lambda one: -one.ratio)
+    ]
+    header = ("channel", "difference from the others / noise", "others among themselves without it / noise",
+              "force that blocks then lack [N]")  # fmt: skip
+    return Table(
+        "Sensors beside each other",
+        header,
+        tuple(rows),
+        "Every motion channel is compared with the motion that all of them agree on, force cells with each other. "
+        "A channel is doubted when the others agree without it.",
+    )
+
+
+def sensor_error_table(diagnosis: Diagnosis) -> Table | None:
+    """What the error of a doubted channel is a function of."""
+    cut, answers = diagnosis.examination.cut, diagnosis.examination.sensor
+    if cut is None or not answers:
+        return None
+    rows = [
+        (one.term, f"{text(one.share, 3)} ({text(one.low, 3)} … {text(one.high, 3)})", _holds(one.holds))
+        for one in answers
+        if one.term != ALONE
+    ]
+    caption = "Share of the variance of its error that each form explains alone, with 90 % intervals."
+    return Table(f"What {cut.doubted} reads wrong", ("form", "share", "holds"), tuple(rows), caption)
+
+
+def answers_table(diagnosis: Diagnosis, place: str) -> Table:
+    """Answers to the physical questions on the force at one place."""
+    character = diagnosis.examination.characters[place]
+    rows = [
+        (
+            one.question,
+            one.finding,
+            one.quantity + (f" [{one.units}]" if one.units != "1" else ""),
+            text(one.value, 3),
+            f"{text(one.low, 3)} … {text(one.high, 3)}" if math.isfinite(one.low) else MISSING,
+            one.remark or MISSING,
+        )
+        for one in character.answers
+    ]
+    return Table(
+        f"Physical questions to the force missing at the {place}",
+        ("question", "finding", "by", "value", "90 % interval", "remark"),
+        tuple(rows),
+        f"The force is {text(character.size_n, 3)} N RMS beyond the block's own parameters, its noise "
+        f"{text(character.noise_n, 2)} N. Intervals are by drawing stretches of the runs; what the block's own "
+        "damping may be off is in that of the energy. “The first” is the displacement of a structure, the "
+        "acceleration of a tank.",
+    )
+
+
+def evidence_table(diagnosis: Diagnosis) -> Table:
+    """For and against each explanation, the best on held-out runs first."""
+    found, examination = diagnosis.findings, diagnosis.examination
+    chosen = sorted(found.explanations, key=lambda one: one.held_out)[:_MOST_EXPLANATIONS]
+    alternatives = {one.keys for one in diagnosis.verdict.alternatives}
+    rows = []
+    for one in chosen:
+        for_: list[str] = []
+        against: list[str] = []
+        open_: list[str] = []
+        for candidate in one.fit.candidates:
+            on = examination.evidence_on(candidate.effect)
+            for_ += on.speaks_for
+            against += on.speaks_against
+            open_ += on.still_open
+            doubted = examination.cut.doubted if examination.cut else ""
+            if candidate.effect.block == "sensor" and doubted:
+                own = candidate.channel.partition("<")[0]
+                (for_ if own == doubted else against).append(f"{doubted} contradicts the others")
+        gain = found.retuned.held_out - one.held_out
+        rows.append(
+            (
+                " + ".join(one.keys),
+                _standing(diagnosis, one, alternatives),
+                text(gain, 3),
+                "; ".join(dict.fromkeys(for_)) or MISSING,
+                "; ".join(dict.fromkeys(against)) or MISSING,
+                "; ".join(dict.fromkeys(open_)) or MISSING,
+            )
+        )
+    return Table(
+        "Evidence for and against",
+        (
+            "explanation",
+            "standing",
+            "gain on held-out runs",
+            "speaks for it",
+            "speaks against it",
+            "cannot be told",
+        ),
+        tuple(rows) or ((MISSING,) * 6,),
+        "The tests on the missing force and on the sensors know of no candidate. Fits decide; a test that "
+        "contradicts the named effect is a reason to doubt it.",
+    )
+
+
+def remains_table(diagnosis: Diagnosis) -> Table:
+    """What is left of every channel on held-out runs."""
+    found = diagnosis.findings
+    steps = [("believed", found.believed), ("retuned", found.retuned)]
+    if diagnosis.verdict.best is not None:
+        steps.append(("with what was left out", diagnosis.verdict.best))
+    readings = [found.readings(step) for _, step in steps]
+    names = dict.fromkeys(one.channel for run in found.held_out for one in run)
+    rows = []
+    for name in names:
+        shown = []
+        for one in readings:
+            squares = [
+                observed.residual(one[observed.run.name][name])[observed.informative] ** 2
+                for run in found.held_out
+                for observed in run
+                if observed.channel == name
+            ]
+            joined = np.concatenate(squares)
+            shown.append(text(float(np.sqrt(joined.mean())), 3) if joined.size else MISSING)
+        rows.append((name, *shown))
+    return Table(
+        "What remains per channel",
+        ("channel", *[label for label, _ in steps]),
+        tuple(rows),
+        "RMS of the weighted residual on held-out runs where the recording stands out of the noise; one is the "
+        "noise floor.",
+    )
+
+
+def limits_table(diagnosis: Diagnosis) -> Table:
+    """What this case cannot decide."""
+    limits = list(diagnosis.findings.split.limits)
+    cut = diagnosis.examination.cut
+    if cut is not None:
+        limits += [f"{one.block}: {one.remark}" for one in cut.blocks if one.remark]
+        limits += [cut.remark] if cut.remark else []
+    for place, character in diagnosis.examination.characters.items():
+        undecided = [one.question for one in character.answers if one.finding == CANNOT_TELL]
+        if undecided:
+            limits.append(f"force at the {place}: no answer on {', '.join(undecided)}")
+    rows = tuple((limit,) for limit in dict.fromkeys(limits)) or ((MISSING,),)
+    return Table("Limits", ("what these recordings cannot tell",), rows)
+
+
+def _standing(diagnosis: Diagnosis, one: Explanation, alternatives: Collection[tuple[str, ...]]) -> str:
+    verdict = diagnosis.verdict
+    if verdict.best is not None and one.keys == verdict.best.keys:
+        return verdict.kind if verdict.kind != "unknown" else "nearest, not adequate"
+    return "as good" if one.keys in alternatives else "worse"
+
+
+def _holds(holds: bool | None) -> str:
+    return CANNOT_TELL if holds is None else "yes" if holds else "no"
+
+
+def _sentence(words: str) -> str:
+    return f"{words[0].upper()}{words[1:]}." if words else ""
 
 
 def provenance_table(diagnosis: Diagnosis) -> Table:

@@ -114,6 +114,8 @@ class Effect:
         (surroundings) → whether it can act there.
     places : callable
         (surroundings) → channels on which it may act; one empty name where it acts on none.
+    spoken_for_by : tuple of str
+        What tests on the missing force or the sensor say where it is missing: terms of `evidence.TERMS`.
     """
 
     name: str
@@ -126,6 +128,7 @@ class Effect:
     separated_by: str = ""
     needs: Callable[[Surroundings], bool] = lambda surroundings: True
     places: Callable[[Surroundings], Sequence[str]] = lambda surroundings: [""]
+    spoken_for_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

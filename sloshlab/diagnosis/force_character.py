@@ -15,13 +15,37 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.diagnosis.evidence import (
+    AGES,
+    CANNOT_TELL,
+    CONSTANT,
+    EVEN,
+    FRICTION,
+    GIVES,
+    HALF_ORDER,
+    IMPULSIVE,
+    MEMORY,
+    NO_ONSET,
+    NO_WORK,
+    ONSET,
+    RATE,
+    RATE_FREE,
+    SECOND_ORDER,
+    SKEW,
+    SPRING,
+    STATE,
+    TAKES,
+    THIRD_ORDER,
+    WORK_1,
+    WORK_2,
+    WORK_3,
+)
 from sloshlab.diagnosis.force_levels import Windows, constant_part, onset, orders, windows, work_exponents
 from sloshlab.diagnosis.force_regression import (
     PARITIES,
     Sizes,
     Stretch,
-    Sums,
-    explained,
+    left_over,
     memory_features,
     solved,
     state_features,
@@ -40,42 +64,6 @@ _OF_STATE: Final = 0.6
 _BLOWS: Final = 5.0
 _FEW: Final = 0.08
 """Share of the variance below which a part counts for nothing, and twice which makes it count."""
-CANNOT_TELL: Final = "cannot tell"
-
-TAKES, GIVES, NO_WORK = "takes energy", "gives energy", "does no work"
-SPRING, FRICTION = "odd in displacement", "odd in velocity"
-EVEN, SKEW = "even", "odd in both"
-STATE, MEMORY, AGES = "function of the state", "memory", "changes along the run"
-RATE_FREE, RATE = "rate-independent", "grows with rate"
-WORK_1, WORK_2, WORK_3 = "work ∝ amplitude", "work ∝ amplitude²", "work ∝ amplitude³"
-ONSET, NO_ONSET = "onset", "no onset"
-CONSTANT = "constant part"
-HALF_ORDER, SECOND_ORDER, THIRD_ORDER = "half order", "second order", "third order"
-IMPULSIVE = "impulsive"
-TERMS: Final = {
-    TAKES: "the force takes energy out of the motion",
-    GIVES: "the force gives energy to the motion",
-    NO_WORK: "the force does no work over a cycle",
-    SPRING: "its largest part is odd in the displacement (acceleration of a tank) and even in the velocity",
-    FRICTION: "its largest part is odd in the velocity and even in the displacement",
-    EVEN: "a part is even in both",
-    SKEW: "a part is odd in both",
-    STATE: "it is a function of the present motion",
-    MEMORY: "it depends on the history of the motion",
-    AGES: "it changes along a run",
-    RATE_FREE: "its work per cycle does not depend on the frequency",
-    RATE: "its work per cycle grows with the frequency",
-    WORK_1: "its work per cycle grows as the amplitude",
-    WORK_2: "its work per cycle grows as the square of the amplitude",
-    WORK_3: "its work per cycle grows as the cube of the amplitude",
-    ONSET: "below some level it is nothing",
-    NO_ONSET: "it is there at the smallest level",
-    CONSTANT: "it has a part that never changes",
-    HALF_ORDER: "it has a part at half the frequency of the motion",
-    SECOND_ORDER: "it has a part at twice the frequency of the motion",
-    THIRD_ORDER: "it has a part at three times the frequency of the motion",
-    IMPULSIVE: "it comes in blows",
-}
 
 
 @dataclass(frozen=True)
@@ -91,7 +79,7 @@ class Answer:
     value, low, high : float
         With its 90 % interval; NaN where there is none.
     says : dict of str to bool
-        Terms of `TERMS` that hold, and that do not; those that are absent are open.
+        Terms of `evidence.TERMS` that hold, and that do not; those that are absent are open.
     remark : str
         Why it cannot be told.
     """
@@ -245,15 +233,27 @@ class _Regression:
             powers[which] = float(part @ xx @ part)
         return np.asarray(powers / max(float(powers.sum()), 1e-300), np.float64)
 
-    def explained_shares(self, order: NDArray[np.int64], noise_n: float) -> dict[str, float]:
-        """Shares explained of stretches that were not fitted, halves taken in turn."""
-        halves = order[::2], order[1::2]
+    def explained_shares(self, noise_n: float, n_draws: int) -> dict[str, FloatArray]:
+        """Shares explained of stretches that were not fitted, every second one in turn; draws after the first.
+
+        Shape (1 + n_draws,) per set of features.
+        """
+        n = len(self.sums)
+        rest = {name: np.zeros(n) for name in self.sets}
+        for first in (0, 1):
+            fitted, judged = self.sums[1 - first :: 2], range(first, n, 2)
+            for name, columns in self.sets.items():
+                numbers = solved(fitted, self.prior, columns)
+                rest[name][list(judged)] = [left_over([self.sums[i]], numbers) for i in judged]
+        expected = noise_n**2 * np.array([one.n for one in self.sums])
+        draws = [np.arange(n), *[self.generator.integers(0, n, n) for _ in range(n_draws)]]
         found: dict[str, list[float]] = {name: [] for name in self.sets}
-        for one, other in (halves, halves[::-1]):
-            fitted, judged = ([self.sums[i] for i in half] for half in (one, other))
-            for name, share in explained(fitted, judged, self.prior, self.sets, "own", noise_n).items():
-                found[name].append(share)
-        return {name: float(np.mean(shares)) for name, shares in found.items()}
+        for drawn in draws:
+            own = float(rest["own"][drawn].sum())
+            whole = max(own - float(expected[drawn].sum()), 0.1 * own, 1e-300)
+            for name, values in rest.items():
+                found[name].append((own - float(values[drawn].sum())) / whole)
+        return {name: np.array(shares) for name, shares in found.items()}
 
 
 def _quantiles(draws: Sequence[float] | FloatArray) -> tuple[float, float]:
@@ -318,23 +318,19 @@ def _symmetry(fit: _Regression) -> list[Answer]:
                 min(float(low[which]), float(shares[which])),
                 max(float(high[which]), float(shares[which])),
                 says,
-            )  # fmt: skip
+            )
         )
     return answers
 
 
 def _history(fit: _Regression, noise_n: float) -> list[Answer]:
-    n = len(fit.parts)
-    draws: dict[str, list[float]] = {name: [] for name in fit.sets}
-    for _ in range(_N_DRAWS // 4):
-        for name, share in fit.explained_shares(fit.generator.permutation(n), noise_n).items():
-            draws[name].append(share)
-    state, memory, time = (np.array(draws[name]) for name in ("state", "memory", "time"))
+    shares = fit.explained_shares(noise_n, _N_DRAWS)
+    state, memory, time = shares["state"], shares["memory"], shares["time"]
     answers = [
         _gain("history", "more by its history", memory - state, MEMORY),
         _gain("along the run", "more by time", time - state, AGES),
     ]
-    value, (low, high) = float(np.median(state)), _quantiles(state)
+    value, (low, high) = float(state[0]), _quantiles(state)
     says: dict[str, bool] = {}
     if any(answer.says.get(term) for answer, term in zip(answers, (MEMORY, AGES), strict=True)) or high < 0.4:
         says[STATE] = False
@@ -346,7 +342,7 @@ def _history(fit: _Regression, noise_n: float) -> list[Answer]:
 
 
 def _gain(question: str, quantity: str, draws: FloatArray, term: str) -> Answer:
-    value = float(np.median(draws))
+    value = float(draws[0])
     low, high = _quantiles(draws)
     says = {term: True} if low > _FEW else {term: False} if high < _FEW else {}
     finding = term if says.get(term) else f"not: {term}" if term in says else CANNOT_TELL
@@ -438,7 +434,7 @@ def _constant(fit: _Regression, generator: np.random.Generator) -> Answer:
 def _blows(fit: _Regression, noise_n: float) -> Answer:
     """Kurtosis within some cycles: 1.5 for a sine; blows are rare and large."""
     found = []
-    for one, force in zip(fit.parts, fit.beyond_own_of_parts, strict=True):
+    for force in fit.beyond_own_of_parts:
         size = float(np.sqrt(np.mean(force**2)))
         if size > 2 * noise_n and force.size > 8:
             found.append((_kurtosis(force), size))
@@ -460,6 +456,3 @@ def _blows(fit: _Regression, noise_n: float) -> Answer:
 def _kurtosis(series: FloatArray) -> float:
     centred = series - series.mean()
     return float(np.mean(centred**4) / max(float(np.mean(centred**2)) ** 2, 1e-300))
-
-
-__all__ = ["TERMS", "Answer", "ForceCharacter", "Sums", "force_character"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -210,28 +210,3 @@ def left_over(parts: Sequence[Sums], numbers: FloatArray) -> float:
     for one in parts:
         total += one.yy - 2 * float(numbers @ one.xy) + float(numbers @ one.xx @ numbers)
     return max(total, 0.0)
-
-
-def explained(
-    fitted: Sequence[Sums],
-    judged: Sequence[Sums],
-    prior: FloatArray,
-    sets: Mapping[str, NDArray[np.int64]],
-    base: str,
-) -> dict[str, float]:
-    """Share of what the base set leaves in the judged stretches that larger sets explain there.
-
-    Parameters
-    ----------
-    fitted, judged : sequence of Sums
-    prior : ndarray, shape (n_features,)
-    sets : mapping of name to columns
-    base : str
-        Name of the set that explains nothing by definition.
-    noise : float
-        Standard deviation of the noise of a sample, which nothing can explain.
-    """
-    rest = {name: left_over(judged, solved(fitted, prior, columns)) for name, columns in sets.items()}
-    expected = noise**2 * sum(one.n for one in judged)
-    whole = max(rest[base] - expected, 0.1 * rest[base], 1e-300)
-    return {name: (rest[base] - value) / whole for name, value in rest.items()}

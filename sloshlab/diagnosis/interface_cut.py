@@ -323,7 +323,7 @@ def _parts(
             for place, shown in series.items():
                 if one.channel != doubted:
                     part[place] += _per_part((missed * _weighted(one, shown[one.channel], {})).sum(axis=1))
-            if one in comparable and (not doubted or one.channel == doubted):
+            if SENSOR in part and one in comparable and (not doubted or one.channel == doubted):
                 left = _weighted(one, forces.left[one.channel], {})
                 power = (left**2).mean(axis=1)
                 beyond = np.where(power.mean() > _CONSISTENT**2, (left**2 - 1.0).sum(axis=1), 0.0)

@@ -7,7 +7,7 @@ twice the mean square that is left there by the best description (never less tha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -28,6 +28,23 @@ ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
+_UNITS: Final = (
+    ("_n_s2_per_m2", "N s²/m²"),
+    ("_n_s_per_m", "N s/m"),
+    ("_n_per_m3", "N/m³"),
+    ("_n_per_m2", "N/m²"),
+    ("_n_per_m", "N/m"),
+    ("_rad_per_n_m", "rad/(N m)"),
+    ("_m_per_s", "m/s"),
+    ("_kg_per_s", "kg/s"),
+    ("_per_m", "1/m"),
+    ("_hz", "Hz"),
+    ("_kg", "kg"),
+    ("_n", "N"),
+    ("_g", "g"),
+    ("_s", "s"),
+    ("_m", "m"),
+)
 _EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force."""
 
@@ -49,6 +66,8 @@ class Verdict:
         Held-out error of the best over that of the ceiling.
     statement, separating_experiment : str
     probabilities : dict
+    block : str
+        Of what has no name, where the cut at measured interfaces tells it.
     """
 
     kind: str
@@ -59,6 +78,7 @@ class Verdict:
     statement: str
     separating_experiment: str
     probabilities: dict[str, float]
+    block: str = ""
 
 
 def verdict_of(found: Findings) -> Verdict:
@@ -183,8 +203,8 @@ def _nothing(found: Findings) -> str:
     )
 
 
-def _unknown(found: Findings, named: Explanation | None) -> str:
-    where = where_of(found)
+def _unknown(found: Findings, named: Explanation | None, block: str = "") -> str:
+    where = block or where_of(found)
     closest = f"; the nearest known effect is {' + '.join(named.keys)}" if named else ""
     return f"Something is missing that has no name here, most likely in the {where}{closest}."
 
@@ -198,19 +218,41 @@ def where_of(found: Findings) -> str:
 
 def _statement(found: Findings, best: Explanation, alternatives: Sequence[Explanation], kind: str) -> str:
     named = " and ".join(_described(best, candidate) for candidate in best.fit.candidates)
-    explained = 1.0
-    excess = found.retuned.held_out_rms**2 - 1.0
-    if excess > 0:
-        explained = (found.retuned.held_out_rms**2 - best.held_out_rms**2) / max(
-            found.retuned.held_out_rms**2 - min(1.0, best.held_out_rms**2), 1e-300
-        )
-    share = 100 * min(max(explained, 0.0), 1.0)
-    text = f"Left out: {named}; explains {share:.0f} % of what the held-out runs can tell"
+    text = f"Left out: {named}; explains {100 * explained_share(found, best):.0f} % of what can be explained"
     if kind == "indistinguishable":
         others = [" + ".join(one.names).replace("_", " ") for one in alternatives[1:]]
         others += [" + ".join(equal).replace("_", " ") for equal in equals_of(best)]
         text += f"; cannot be told from {' or '.join(dict.fromkeys(others))}"
     return text + "."
+
+
+def explained_share(found: Findings, best: Explanation) -> float:
+    """What an explanation gains on held-out runs over the retuned baseline, over what the best of all gains."""
+    ceiling = min([*found.ceilings, *found.explanations, best], key=lambda one: one.held_out)
+    possible = found.retuned.held_out - ceiling.held_out
+    gained = found.retuned.held_out - best.held_out
+    return min(max(gained / possible, 0.0), 1.0) if possible > 0 else 0.0
+
+
+def with_place(found: Findings, verdict: Verdict, seen: str = "", block: str = "") -> Verdict:
+    """The verdict with where it is: in its sentence, and the block of what has no name.
+
+    Parameters
+    ----------
+    found : Findings
+    verdict : Verdict
+    seen : str
+        Words such as "seen at velocity reversals below 1.5 g".
+    block : str
+        The block that owns the mismatch by the cut at measured interfaces; empty where that cannot tell.
+    """
+    if verdict.kind == "nothing_missing":
+        return verdict
+    if verdict.kind == "unknown" and block:
+        verdict = replace(verdict, block=block, statement=_unknown(found, verdict.best, block))
+    if not seen:
+        return verdict
+    return replace(verdict, statement=f"{verdict.statement.removesuffix('.')}; {seen}.")
 
 
 def equals_of(best: Explanation) -> list[tuple[str, ...]]:
@@ -224,11 +266,31 @@ def equals_of(best: Explanation) -> list[tuple[str, ...]]:
 
 
 def _described(best: Explanation, candidate: Candidate) -> str:
-    name = candidate.effect.name.replace("_", " ")
-    first = candidate.effect.parameters[0].name
-    estimate, low, high = interval(best, candidate, first)
+    name = candidate.effect.name.removesuffix("_60").replace("_", " ")
     place = f" of {candidate.channel}" if candidate.channel else f" in the {candidate.effect.block}"
-    return f"{name}{place}, {first} {estimate:.3g} ({low:.3g} to {high:.3g})"
+    numbers = []
+    for parameter in candidate.effect.parameters:
+        words, units = named_and_units(parameter.name)
+        estimate, low, high = (
+            f"{value:.3g}".replace("-", "−") for value in interval(best, candidate, parameter.name)
+        )
+        label = f"{words} " if len(candidate.effect.parameters) > 1 else ""
+        numbers.append(f"{label}{estimate}{units and ' ' + units} ({low} to {high})")
+    return f"{name}{place}, {', '.join(numbers)}"
+
+
+def named_and_units(parameter: str) -> tuple[str, str]:
+    """Words and units of a parameter's name.
+
+    Examples
+    --------
+    >>> named_and_units("stribeck_velocity_m_per_s"), named_and_units("ratio")
+    (('stribeck velocity', 'm/s'), ('ratio', ''))
+    """
+    for ending, units in _UNITS:
+        if parameter.endswith(ending):
+            return parameter.removesuffix(ending).replace("_", " "), units
+    return parameter.replace("_", " "), ""
 
 
 def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[float, float, float]:
@@ -286,7 +348,14 @@ def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
     if verdict.kind == "nothing_missing" or (verdict.best is None and verdict.kind != "unknown"):
         return []
     if verdict.kind == "unknown":
-        return [{"name": "unknown", "block": where_of(found), "parameters": {}, "where": _where(found, ())}]
+        return [
+            {
+                "name": "unknown",
+                "block": verdict.block or where_of(found),
+                "parameters": {},
+                "where": _where(found, ()),
+            }
+        ]
     assert verdict.best is not None
     described = []
     for candidate in verdict.best.fit.candidates:

@@ -40,5 +40,6 @@ ROCKING = register(
         ("stiffness_change", "mass_error"),
         "two accelerometers on the base, one before and one behind the root, in a decay",
         _has_root_moment,
+        spoken_for_by=("does no work", "odd in displacement", "no onset"),
     )
 )

@@ -26,6 +26,7 @@ def force_effect(
     look_alikes: tuple[str, ...] = (),
     separated_by: str = "",
     needs: Callable[[Surroundings], bool] | None = None,
+    spoken_for_by: tuple[str, ...] = (),
 ) -> Effect:
     """Register a force of the twin as an effect.
 
@@ -43,7 +44,7 @@ def force_effect(
         That of the kind by default.
     bounds : mapping, optional
         Narrower ones than those of the kind.
-    look_alikes, separated_by, needs
+    look_alikes, separated_by, needs, spoken_for_by
         As of `Effect`.
 
     Examples
@@ -75,5 +76,6 @@ def force_effect(
             look_alikes,
             separated_by,
             needs or (has_structure if block == "structure" else lambda surroundings: True),
+            spoken_for_by=spoken_for_by,
         )
     )

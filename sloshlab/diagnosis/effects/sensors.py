@@ -39,6 +39,7 @@ def _sensor_effect(
     look_alikes: tuple[str, ...] = (),
     separated_by: str = "the channel beside a second sensor at the same place",
     places: Callable[[Surroundings], list[str]] | None = None,
+    spoken_for_by: tuple[str, ...] = (),
 ) -> Effect:
     def extension(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         del at
@@ -58,6 +59,7 @@ def _sensor_effect(
             look_alikes,
             separated_by,
             places=places or (_compared_channels if undone is None else _all_channels),
+            spoken_for_by=spoken_for_by,
         )
     )
 
@@ -77,6 +79,7 @@ GAIN = _sensor_effect(
     _scaled(lambda numbers: 1 + numbers["ratio"]),
     _scaled(lambda numbers: 1 / (1 + numbers["ratio"])),
     look_alikes=("mass_error",),
+    spoken_for_by=("one channel alone", "proportional to the reading"),
 )
 
 
@@ -112,6 +115,7 @@ DELAY = _sensor_effect(
     _shifted(1.0),
     _shifted(-1.0),
     look_alikes=("viscous_damping", "sensor_high_pass"),
+    spoken_for_by=("one channel alone", "follows its rate"),
 )
 
 
@@ -146,6 +150,7 @@ HIGH_PASS = _sensor_effect(
     _high_passed,
     _integrated_back,
     look_alikes=("sensor_delay",),
+    spoken_for_by=("one channel alone", "follows its integral"),
 )
 
 
@@ -164,6 +169,7 @@ CLIPPING = _sensor_effect(
     lambda at: [{"limit": at.peaks.get(at.channel, 2.0 * at.reading)}],
     _clipped,
     None,
+    spoken_for_by=("one channel alone", "at the largest readings"),
 )
 
 
@@ -184,6 +190,7 @@ DRIFT = _sensor_effect(
     _drifted,
     None,
     look_alikes=("liquid_loss",),
+    spoken_for_by=("one channel alone", "slow trend"),
 )
 
 
@@ -226,6 +233,7 @@ HUM = [
         _humming(line, 1.0),
         _humming(line, -1.0),
         separated_by="the channel with nothing moving",
+        spoken_for_by=("one channel alone", "a line of the mains"),
     )
     for name, line in (("mains_hum", 50.0), ("mains_hum_60", 60.0))
 ]
@@ -251,6 +259,7 @@ CLOCK = _sensor_effect(
     _stretched(1.0),
     _stretched(-1.0),
     look_alikes=("sensor_delay",),
+    spoken_for_by=("one channel alone", "rate growing along the run"),
 )
 
 
@@ -295,5 +304,6 @@ CROSS_TALK = register(
         ("mass_error", "sensor_gain"),
         "the second channel disconnected",
         places=_pairs,
+        spoken_for_by=("one channel alone", "another channel"),
     )
 )

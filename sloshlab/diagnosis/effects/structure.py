@@ -34,6 +34,14 @@ VISCOUS = force_effect(
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
     look_alikes=("structural_damping", "coulomb_friction", "sensor_delay"),
     separated_by=_OTHER_LEVELS + ", and at two frequencies",
+    spoken_for_by=(
+        "takes energy",
+        "odd in velocity",
+        "function of the state",
+        "grows with rate",
+        "work ∝ amplitude²",
+        "no onset",
+    ),
 )
 COULOMB = force_effect(
     COULOMB_FRICTION,
@@ -41,6 +49,15 @@ COULOMB = force_effect(
     lambda at: [{"force_n": share * at.force_n} for share in (0.003, 0.02)],
     look_alikes=("viscous_damping", "structural_damping", "stribeck_friction", "asymmetric_friction"),
     separated_by=_OTHER_LEVELS + ", down to rest",
+    spoken_for_by=(
+        "takes energy",
+        "odd in velocity",
+        "function of the state",
+        "rate-independent",
+        "work ∝ amplitude",
+        "no onset",
+        "third order",
+    ),
 )
 ASYMMETRIC = force_effect(
     ASYMMETRIC_FRICTION,
@@ -51,6 +68,15 @@ ASYMMETRIC = force_effect(
     ],
     look_alikes=("coulomb_friction + constant_force",),
     separated_by="none: the two are the same force; measure the static rest position with the friction taken off",
+    spoken_for_by=(
+        "takes energy",
+        "odd in velocity",
+        "function of the state",
+        "rate-independent",
+        "work ∝ amplitude",
+        "no onset",
+        "constant part",
+    ),
 )
 STRIBECK = force_effect(
     STRIBECK_FRICTION,
@@ -65,6 +91,7 @@ STRIBECK = force_effect(
     ],
     look_alikes=("coulomb_friction",),
     separated_by="slow motion about the Stribeck velocity",
+    spoken_for_by=("takes energy", "odd in velocity", "function of the state", "no onset", "third order"),
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,
@@ -72,6 +99,13 @@ DRAG = force_effect(
     lambda at: [{"drag_n_s2_per_m2": 0.01 * at.force_n / at.velocity_m_per_s**2}],
     look_alikes=("viscous_damping",),
     separated_by=_OTHER_LEVELS,
+    spoken_for_by=(
+        "takes energy",
+        "odd in velocity",
+        "function of the state",
+        "grows with rate",
+        "work ∝ amplitude³",
+    ),
 )
 STRUCTURAL = force_effect(
     STRUCTURAL_DAMPING,
@@ -81,6 +115,7 @@ STRUCTURAL = force_effect(
     fitted=("loss_factor",),
     look_alikes=("viscous_damping", "coulomb_friction"),
     separated_by="the same amplitude at two frequencies",
+    spoken_for_by=("takes energy", "odd in velocity", "rate-independent", "work ∝ amplitude²", "no onset"),
 )
 
 
@@ -103,6 +138,7 @@ BOUC_WEN = force_effect(
     fitted=("stiffness_n_per_m", "beta_gamma", "beta_delta"),
     look_alikes=("coulomb_friction", "structural_damping"),
     separated_by="slow loops of several amplitudes",
+    spoken_for_by=("takes energy", "memory", "rate-independent"),
 )
 CUBIC = force_effect(
     CUBIC_STIFFNESS,
@@ -110,6 +146,7 @@ CUBIC = force_effect(
     lambda at: [{"stiffness_n_per_m3": sign * 0.03 * at.force_n / at.displacement_m**3} for sign in (1, -1)],
     look_alikes=("quadratic_stiffness", "clearance"),
     separated_by="a larger range of amplitudes on both sides of rest",
+    spoken_for_by=("does no work", "odd in displacement", "function of the state", "third order"),
 )
 QUADRATIC = force_effect(
     QUADRATIC_STIFFNESS,
@@ -117,6 +154,7 @@ QUADRATIC = force_effect(
     lambda at: [{"stiffness_n_per_m2": sign * 0.03 * at.force_n / at.displacement_m**2} for sign in (1, -1)],
     look_alikes=("cubic_stiffness",),
     separated_by="a larger range of amplitudes on both sides of rest",
+    spoken_for_by=("does no work", "even", "function of the state", "second order"),
 )
 STIFFNESS = force_effect(
     STIFFNESS_CHANGE,
@@ -124,6 +162,7 @@ STIFFNESS = force_effect(
     lambda at: [{"stiffness_n_per_m": sign * 0.03 * _stiffness(at)} for sign in (1, -1)],
     look_alikes=("mass_error",),
     separated_by="a known mass added to the tank",
+    spoken_for_by=("does no work", "odd in displacement", "function of the state", "no onset"),
 )
 GAP = force_effect(
     CLEARANCE,
@@ -134,6 +173,7 @@ GAP = force_effect(
     ],
     look_alikes=("cubic_stiffness",),
     separated_by="amplitudes just below and above the gap",
+    spoken_for_by=("does no work", "odd in displacement", "function of the state", "onset", "third order"),
 )
 MODE = force_effect(
     MISSING_MODE,
@@ -148,6 +188,7 @@ MODE = force_effect(
     ],
     look_alikes=("mass_error", "stiffness_change"),
     separated_by="a sweep over the missing mode's frequency",
+    spoken_for_by=("memory",),
 )
 MASS = force_effect(
     MASS_ERROR,
@@ -156,6 +197,7 @@ MASS = force_effect(
     bounds={"mass_kg": (-10.0, 10.0)},
     look_alikes=("stiffness_change", "sensor_gain"),
     separated_by="a known mass added to the tank",
+    spoken_for_by=("does no work", "odd in displacement", "function of the state", "no onset"),
 )
 OFFSET = force_effect(
     CONSTANT_FORCE,
@@ -163,4 +205,5 @@ OFFSET = force_effect(
     lambda at: [{"force_n": sign * 0.01 * at.force_n} for sign in (1, -1)],
     look_alikes=("asymmetric_friction", "quadratic_stiffness"),
     separated_by="the static rest position",
+    spoken_for_by=("does no work", "even", "constant part", "no onset"),
 )

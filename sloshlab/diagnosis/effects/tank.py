@@ -31,6 +31,14 @@ VISCOUS = force_effect(
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
     look_alikes=("quadratic_drag", "coulomb_friction", "sensor_delay"),
     separated_by="two or more amplitudes and frequencies",
+    spoken_for_by=(
+        "takes energy",
+        "odd in velocity",
+        "function of the state",
+        "grows with rate",
+        "work ∝ amplitude²",
+        "no onset",
+    ),
 )
 COULOMB = force_effect(
     COULOMB_FRICTION,
@@ -38,6 +46,15 @@ COULOMB = force_effect(
     lambda at: [{"force_n": 0.1 * _liquid_force(at)}],
     look_alikes=("viscous_damping",),
     separated_by="two or more amplitudes",
+    spoken_for_by=(
+        "takes energy",
+        "odd in velocity",
+        "function of the state",
+        "rate-independent",
+        "work ∝ amplitude",
+        "no onset",
+        "third order",
+    ),
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,
@@ -45,6 +62,13 @@ DRAG = force_effect(
     lambda at: [{"drag_n_s2_per_m2": 0.2 * _liquid_force(at) / at.velocity_m_per_s**2}],
     look_alikes=("viscous_damping", "liquid_sloshing"),
     separated_by="two or more amplitudes",
+    spoken_for_by=(
+        "takes energy",
+        "odd in velocity",
+        "function of the state",
+        "grows with rate",
+        "work ∝ amplitude³",
+    ),
 )
 MASS = force_effect(
     MASS_ERROR,
@@ -53,6 +77,7 @@ MASS = force_effect(
     bounds={"mass_kg": (-10.0, 10.0)},
     look_alikes=("effective_mass", "sensor_gain", "stiffness_change"),
     separated_by="a known mass added to the tank, and a run with frozen liquid",
+    spoken_for_by=("does no work", "odd in displacement", "function of the state", "no onset"),
 )
 EFFECTIVE = force_effect(
     EFFECTIVE_MASS,
@@ -62,6 +87,7 @@ EFFECTIVE = force_effect(
     fitted=("beta",),
     look_alikes=("mass_error",),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
+    spoken_for_by=("does no work", "odd in displacement", "function of the state"),
 )
 
 
@@ -86,6 +112,7 @@ SLOSHING = register(
         _damping,
         ("viscous_damping", "quadratic_drag"),
         _LEVELS,
+        spoken_for_by=("takes energy", "odd in velocity", "onset"),
     )
 )
 
@@ -134,6 +161,7 @@ DELAY = register(
         ("high_g_saturation",),
         "a sudden start at constant amplitude",
         _damps,
+        spoken_for_by=("memory", "odd in velocity"),
     )
 )
 SATURATION = register(
@@ -147,6 +175,7 @@ SATURATION = register(
         ("breakup_delay", "liquid_sloshing"),
         _LEVELS,
         _damps,
+        spoken_for_by=("odd in velocity", "onset"),
     )
 )
 
@@ -188,6 +217,7 @@ IMPACT = register(
         _impact,
         ("liquid_sloshing", "clearance"),
         "accelerations below and above 1 g, forces sampled fast",
+        spoken_for_by=("takes energy", "impulsive", "onset", "memory"),
     )
 )
 LATERAL = force_effect(
@@ -200,6 +230,7 @@ LATERAL = force_effect(
     fitted=("frequency_hz", "mass_kg"),
     look_alikes=("missing_mode",),
     separated_by="a slow sweep over its frequency at small amplitude",
+    spoken_for_by=("memory",),
 )
 FARADAY = force_effect(
     FARADAY_WAVE,
@@ -208,6 +239,7 @@ FARADAY = force_effect(
     fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
     fitted=("frequency_hz", "growth"),
     separated_by="spectra at half the frequency below and above the threshold",
+    spoken_for_by=("half order", "memory", "onset"),
 )
 LOSS = force_effect(
     LIQUID_LOSS,
@@ -215,6 +247,7 @@ LOSS = force_effect(
     lambda at: [{"rate_kg_per_s": 0.1 * at.rig.liquid_mass_kg / at.longest_run_s}],
     look_alikes=("mass_error", "sensor_drift"),
     separated_by="the same test at the beginning and at the end of the day",
+    spoken_for_by=("changes along the run", "odd in displacement"),
 )
 CUSHION = force_effect(
     AIR_CUSHION,
@@ -227,4 +260,5 @@ CUSHION = force_effect(
     fitted=("stiffness_n_per_m",),
     look_alikes=("effective_mass", "lateral_mode"),
     separated_by="two pressures of the gas",
+    spoken_for_by=("does no work", "odd in displacement"),
 )

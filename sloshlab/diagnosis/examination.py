@@ -1,0 +1,246 @@
+"""Where and how, before what: the cut at measured interfaces, the maps of the residual, the physical questions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sloshlab.diagnosis.candidate import Effect
+from sloshlab.diagnosis.evidence import CANNOT_TELL, Evidence, evidence
+from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.force_character import Answer, ForceCharacter, force_character
+from sloshlab.diagnosis.interface_cut import InterfaceCut, interface_cut, own_tolerances
+from sloshlab.diagnosis.latent_force import EITHER, RunForces
+from sloshlab.diagnosis.mismatch import mismatches, summary
+from sloshlab.diagnosis.residual_maps import ResidualMaps, residual_maps
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.sensor_character import SensorAnswer, said, sensor_character
+
+_CLEARLY = 1.5
+_MOST = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class Examination:
+    """Everything that is known before a candidate is named.
+
+    Attributes
+    ----------
+    cut : InterfaceCut or None
+        None for a twin that has no measured interfaces.
+    characters : dict of place to ForceCharacter
+    sensor : tuple of SensorAnswer
+        On the doubted channel; empty where none is doubted.
+    maps : list of ResidualMaps
+        Of the retuned baseline, per channel.
+    where : dict
+        Channels, times, frequencies, levels that hold most of the mismatch.
+    """
+
+    cut: InterfaceCut | None
+    characters: dict[str, ForceCharacter]
+    sensor: tuple[SensorAnswer, ...]
+    maps: list[ResidualMaps]
+    where: dict[str, Any]
+
+    def says(self, block: str) -> dict[str, bool]:
+        """Terms that tests on a block found to hold, and not to hold."""
+        if block == "sensor":
+            return said(self.sensor)
+        for place in (block, EITHER) if block != "excitation" else ("structure", EITHER):
+            character = self.characters.get(place)
+            if character is not None:
+                return character.says
+        return {}
+
+    def evidence_on(self, effect: Effect) -> Evidence:
+        """What the tests say for and against an effect."""
+        return evidence(effect.spoken_for_by, self.says(effect.block))
+
+
+def examined(found: Findings, seed: int = 0) -> Examination:
+    """Ask where the retuned baseline misses the fitted runs, and how.
+
+    Parameters
+    ----------
+    found : Findings
+    seed : int
+        Of the draws for intervals.
+    """
+    values = found.retuned.fit.values
+    readings = found.readings(found.retuned)
+    rig = getattr(found.model, "rig", None)
+    maps = residual_maps(found.fitting, readings, rig)
+    where = summary(mismatches(found.fitting, readings))
+    if not isinstance(found.model, RigModel):
+        return Examination(None, {}, (), maps, where)
+    cut = interface_cut(found.model, found.fitting, values, seed)
+    characters = {}
+    for place in cut.places:
+        with_place = next(run for run in cut.runs if run.at(place) is not None)
+        characters[place] = force_character(
+            cut.forces(place),
+            own_tolerances(found.model, with_place, place),
+            damping_shift=_damping_shift(found.model, with_place, place, values),
+            seed=seed,
+        )
+    sensor: tuple[SensorAnswer, ...] = ()
+    if cut.doubted:
+        usable = [run for run in found.fitting if run]
+        sensor = sensor_character(usable, cut.runs, cut.doubted, seed)
+    return Examination(cut, characters, sensor, maps, where)
+
+
+def _damping_shift(model: RigModel, run: RunForces, place: str, values: Mapping[str, float]) -> float:
+    """How much more damping the retuned baseline has at a place than is believed [N s/m]."""
+    shift = 0.0
+    if run.structure is not None and place != "tank":
+        factor = values.get("damping of mode 1", 1.0)
+        retuned = float(run.structure.dampings_kg_per_s[0] / run.structure.mode_shape[0] ** 2)
+        shift += retuned * (1.0 - 1.0 / max(factor, 1e-6))
+    if place != "structure":
+        for term in model.twin.terms:
+            name = f"{term.name}.damping_n_s_per_m"
+            if term.place == "tank" and name in values:
+                shift += values[name] - term.values["damping_n_s_per_m"]
+    return shift
+
+
+def owning_block(examination: Examination) -> str:
+    """The block that surely owns most of the mismatch; empty where the cut cannot tell."""
+    if examination.cut is None:
+        return ""
+    sure = [one.block for one in examination.cut.blocks if one.share > _MOST and one.low > 0.5]
+    return sure[0] if len(sure) == 1 and sure[0] != EITHER else ""
+
+
+def seen_at(examination: Examination, best: Explanation | None) -> str:
+    """Where in the cycle, and at which levels, what is missing shows; empty where it shows everywhere.
+
+    Parameters
+    ----------
+    examination : Examination
+    best : Explanation or None
+        What was named.
+    """
+    channels = [one.channel for one in best.fit.candidates if one.channel] if best is not None else []
+    worst = (channels or examination.where.get("channels") or [""])[0].partition("<")[0]
+    parts = [_in_the_cycle(one) for one in examination.maps if one.channel == worst]
+    parts.append(_levels(examination, worst))
+    words = " ".join(part for part in parts if part)
+    return f"seen {words}" if words else ""
+
+
+def _in_the_cycle(one: ResidualMaps) -> str:
+    """Words for the part of the cycle with most of the residual, if one stands out."""
+    if one.phase is None or not np.isfinite(one.phase.excess).all():
+        return ""
+    excess = np.maximum(one.phase.excess, 0.0)
+    phase = one.phase.middles
+    mean = max(float(excess.mean()), 1e-300)
+    near = {
+        "at velocity reversals": np.abs(np.sin(phase)) < 0.5,
+        "at the largest velocities": np.abs(np.cos(phase)) < 0.5,
+        "about the lowest point": np.cos(phase) > 0.5,
+        "about the highest point": np.cos(phase) < -0.5,
+    }
+    sizes = {words: float(excess[chosen].mean()) / mean for words, chosen in near.items()}
+    best = max(sizes, key=lambda words: sizes[words])
+    if best in ("about the lowest point", "about the highest point"):
+        other = min(sizes["about the lowest point"], sizes["about the highest point"])
+        if sizes[best] < 2 * other:
+            best = "at velocity reversals"
+    return best if sizes[best] > _CLEARLY * min(sizes.values()) and sizes[best] > 1.1 else ""
+
+
+def _levels(examination: Examination, worst: str) -> str:
+    """Levels that hold most of the mismatch, if they are not all."""
+    levels = examination.where.get("acceleration_g")
+    profile = next((one.level for one in examination.maps if one.channel == worst), None)
+    if not levels or profile is None:
+        return ""
+    low, high = levels
+    largest = float(profile.edges[-1])
+    if high < 0.7 * largest:
+        return f"below {high:.2g} g"
+    return f"above {low:.2g} g" if low > 0.3 * largest else f"from {low:.2g} to {high:.2g} g"
+
+
+def examination_facts(examination: Examination, found: Findings) -> dict[str, Any]:
+    """What ``verdict.json`` tells of it.
+
+    Parameters
+    ----------
+    examination : Examination
+    found : Findings
+    """
+    facts: dict[str, Any] = {"interface_cut": None, "characters": {}, "evidence": _evidence(examination, found)}
+    cut = examination.cut
+    if cut is not None:
+        facts["interface_cut"] = {
+            "blocks": [
+                {
+                    "block": one.block,
+                    "input": one.input,
+                    "output": one.output,
+                    "share": _estimate(one.share, one.low, one.high),
+                    "size": _number(one.size),
+                    "noise": _number(one.noise),
+                    "remark": one.remark,
+                }
+                for one in cut.blocks
+            ],
+            "doubted_channel": cut.doubted,
+            "remark": cut.remark,
+        }
+    for place, character in examination.characters.items():
+        facts["characters"][place] = {
+            "force_rms_n": _number(character.size_n),
+            "noise_rms_n": _number(character.noise_n),
+            "answers": [_answer(one) for one in character.answers],
+        }
+    if examination.sensor:
+        facts["characters"]["sensor"] = {
+            "channel": cut.doubted if cut else "",
+            "answers": [
+                {
+                    "question": "share of its error",
+                    "finding": one.term if one.holds else CANNOT_TELL if one.holds is None else f"not: {one.term}",
+                    **(_estimate(one.share, one.low, one.high) or {}),
+                }
+                for one in examination.sensor
+            ],
+        }
+    return facts
+
+
+def _answer(one: Answer) -> dict[str, Any]:
+    told = {"question": one.question, "finding": one.finding, "quantity": one.quantity, "units": one.units}
+    return {**told, **(_estimate(one.value, one.low, one.high) or {}), "remark": one.remark}
+
+
+def _estimate(value: float, low: float, high: float) -> dict[str, float] | None:
+    if not all(math.isfinite(one) for one in (value, low, high)):
+        return None
+    return {"estimate": value, "low": low, "high": high, "level": 0.90}
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _evidence(examination: Examination, found: Findings) -> dict[str, Any]:
+    effects = {one.effect.name: one for explanation in found.explanations for one in explanation.fit.candidates}
+    told = {}
+    for candidate in effects.values():
+        on = examination.evidence_on(candidate.effect)
+        told[f"{candidate.effect.block}.{candidate.effect.name}"] = {
+            "for": list(on.speaks_for),
+            "against": list(on.speaks_against),
+            "open": list(on.still_open),
+        }
+    return told
