@@ -186,6 +186,8 @@ def _missed(one: Observation, reading: FloatArray, values: Mapping[str, float], 
     difference[:n][known] = (recorded_[:n] - reading[:n])[known]
     if not one.keeps_mean:
         difference[:n][known] -= difference[:n][known].mean()
+    if is_free:
+        difference[0] = 2 * difference[1] - difference[2]  # the first sample may still be held
     return difference * _fade(recorded_.size, is_free) / values.get(f"gain of {one.channel}", 1.0)
 
 
@@ -206,9 +208,12 @@ def _kept(n: int, is_free: bool) -> slice:
 
 
 def _noise_power(one: Observation, frequency_hz: FloatArray) -> FloatArray:
-    """E|FFT|² of the noise of a channel, by its variance per coefficient; slow motion is no accelerometer's."""
+    """E|FFT|² of the noise of a channel, by its variance per coefficient.
+
+    Slow motion is no accelerometer's, and that of a base is known by its accelerometer alone.
+    """
     variance = np.interp(frequency_hz, one.frequencies_hz, np.median(one.variance, axis=0))
-    if _order(one.channel) == 2:
+    if _order(one.channel) == 2 or (_order(one.channel) == 0 and not one.run.is_free):
         variance = variance * (1 + (_SLOW_HZ / np.maximum(frequency_hz, 1e-3 * _SLOW_HZ)) ** 4)
     return np.asarray(variance * one.known.size)
 
