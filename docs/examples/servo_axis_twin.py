@@ -1,12 +1,13 @@
 """A twin of one's own: a servo axis in closed loop, without dry friction. For ``sloshlab diagnose CASE --twin``.
 
 A screw moves a carriage of mass M; a motor pulls with τ = g u, and the controller sets u = k_v (k_p (q_g − q) − q̇)
-from the reference q_g, some of a sample late. The loop is a mechanism of springs and dampers:
+from the reference q_g, some of a sample late, with a velocity that is a difference and later still. The loop is a
+mechanism of springs and dampers:
 
     M q̈ + F_v q̇ = τ,    τ = K (q_g − q) − C q̇,    K = g k_v k_p,    C = g k_v
 
-A delay T of the controller is, to first order, M − C T, C − K T and the reference shifted by T. Its gains are
-stated, but what differences of a quantised position and the drive make of these is not: five per cent.
+Delays T of the controller and T_v of its velocity are, to first order, M − C (T + T_v), C − K T and the reference
+shifted by T.
 """
 
 from collections.abc import Mapping
@@ -16,14 +17,16 @@ import numpy as np
 from sloshlab.diagnosis.user_twin import Compared, MechanicalTwin, Mechanism, Parameter, Reading, TwinRun
 
 FORCE_PER_VOLT = 35.150652
+POSITION_GAIN_PER_S = 160.18
+VELOCITY_GAIN_V_S_PER_M = 243.45
 
 
 def axis(run: TwinRun, values: Mapping[str, float]) -> Mechanism:
     """The axis under its controller; the reference pulls it through the spring K."""
-    damper = FORCE_PER_VOLT * values["velocity gain"]
-    spring = damper * values["position gain"]
+    damper = FORCE_PER_VOLT * VELOCITY_GAIN_V_S_PER_M
+    spring = damper * POSITION_GAIN_PER_S
     delay = values["delay of the controller"]
-    inertia = damper * delay
+    inertia = damper * (delay + values["delay of the velocity"])
     late_damper = damper - spring * delay
     pull = spring * np.interp(run.time_s - delay, run.time_s, run.channels["displacement_reference"])
     position, speed = run.start("displacement_axis")
@@ -42,9 +45,8 @@ TWIN = MechanicalTwin(
     parameters=(
         Parameter("mass", 100.0, 20.0, "kg"),
         Parameter("viscous friction", 300.0, 100.0, "N s m-1"),
-        Parameter("position gain", 160.18, 8.0, "s-1"),
-        Parameter("velocity gain", 243.45, 12.0, "V s m-1"),
-        Parameter("delay of the controller", 0.5e-3, 0.2e-3, "s"),  # it works at 1 kHz
+        Parameter("delay of the controller", 0.5e-3, 0.3e-3, "s"),  # it works at 1 kHz
+        Parameter("delay of the velocity", 0.5e-3, 0.3e-3, "s"),
     ),
     driving=("displacement_reference",),
     # the force is g times the controller's own voltage: it has no sensor with a gain to retune

@@ -176,7 +176,8 @@ def _same(found: list[ChannelMismatch], wanted: ChannelMismatch) -> ChannelMisma
 
 def _highest(one: ChannelMismatch) -> int:
     """The band below which nearly all of the misfit lies that is no noise."""
-    beyond = np.maximum(one.excess.mean(axis=0) - _EXCESS_OF_NOISE, 0.0)
+    inner = one.excess[1:-1] if one.excess.shape[0] > 4 else one.excess
+    beyond = np.maximum(inner.mean(axis=0) - _EXCESS_OF_NOISE, 0.0)
     cumulative = np.cumsum(beyond)
     if cumulative[-1] <= 0:
         return int(one.excess.shape[1]) - 1

@@ -203,10 +203,11 @@ def onset(
             inside = rows[moves[rows] & (level[rows] <= edges[upper])]
             if inside.size < 8:
                 return count
-            spread = float(np.std(force[inside])) + 1e-300
+            squares = motion[inside].T @ motion[inside]
             independent = max(4.0, inside.size / 30)
-            lift = inside.size / independent * spread**2 * np.eye(3)
-            numbers = np.linalg.solve(motion[inside].T @ motion[inside] + lift, motion[inside].T @ force[inside])
+            lift = inside.size / independent * float(np.var(force[inside]))
+            lift = max(lift, 1e-9 * float(np.trace(squares)), 1e-30)
+            numbers = np.linalg.solve(squares + lift * np.eye(3), motion[inside].T @ force[inside])
             top = inside[level[inside] > edges[upper - 1]]
             rest = force[top] - motion[top] @ numbers
             if np.sqrt(np.mean(rest**2)) > _NOTHING * noise_n:

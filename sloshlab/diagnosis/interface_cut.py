@@ -408,7 +408,9 @@ def beyond_own_parameters(model: RigModel, forces: RunForces, force: LatentForce
     spread = force.motion[:, 2].std() / max(force.motion[:, 1].std(), 1e-300)
     duration = force.time_s[-1] - force.time_s[0]
     independent = max(4.0, duration * spread)
-    ridge = force.force_n.size / independent * float(np.var(force.force_n)) + 1e-300
-    numbers = np.linalg.solve(scaled.T @ scaled + ridge * np.eye(scaled.shape[1]), scaled.T @ force.force_n)
+    squares = scaled.T @ scaled
+    ridge = force.force_n.size / independent * float(np.var(force.force_n))
+    ridge = max(ridge, 1e-9 * float(np.trace(squares)), 1e-30)
+    numbers = np.linalg.solve(squares + ridge * np.eye(scaled.shape[1]), scaled.T @ force.force_n)
     rest = force.force_n - scaled @ numbers
     return LatentForce(force.run, force.place, rest, force.standard_error_n, force.time_s, force.motion)

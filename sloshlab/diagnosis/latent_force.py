@@ -186,6 +186,8 @@ def _missed(one: Observation, reading: FloatArray, values: Mapping[str, float], 
     difference[:n][known] = (recorded_[:n] - reading[:n])[known]
     if not one.keeps_mean:
         difference[:n][known] -= difference[:n][known].mean()
+    if is_free:
+        difference[0] = 2 * difference[1] - difference[2]  # the first sample may still be held
     return difference * _fade(recorded_.size, is_free) / values.get(f"gain of {one.channel}", 1.0)
 
 
@@ -202,13 +204,16 @@ def _fade(n: int, is_free: bool) -> FloatArray:
 
 def _kept(n: int, is_free: bool) -> slice:
     m = max(2, int(_END_SHARE * n))
-    return slice(0 if is_free else m, n - m)
+    return slice(m // 4 if is_free else m, n - m)
 
 
 def _noise_power(one: Observation, frequency_hz: FloatArray) -> FloatArray:
-    """E|FFT|² of the noise of a channel, by its variance per coefficient; slow motion is no accelerometer's."""
+    """E|FFT|² of the noise of a channel, by its variance per coefficient.
+
+    Slow motion is no accelerometer's, and that of a base is known by its accelerometer alone.
+    """
     variance = np.interp(frequency_hz, one.frequencies_hz, np.median(one.variance, axis=0))
-    if _order(one.channel) == 2:
+    if _order(one.channel) == 2 or (_order(one.channel) == 0 and not one.run.is_free):
         variance = variance * (1 + (_SLOW_HZ / np.maximum(frequency_hz, 1e-3 * _SLOW_HZ)) ** 4)
     return np.asarray(variance * one.known.size)
 
@@ -220,7 +225,7 @@ def _on_structure(
     believed: Sequence[Observation],
     missed: Mapping[str, FloatArray],
 ) -> Found:
-    asked, left = _asked_for(simulation, rig, observed, believed, missed)
+    asked, at_release, left = _asked_for(simulation, rig, observed, believed, missed)
     run, structure = observed[0].run, simulation.twin.structure
     assert structure is not None
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
@@ -228,6 +233,8 @@ def _on_structure(
     sampled = min(n, simulation.places.shape[0])
     orders = [response(structure, structure.mode_shape, order, frequency) for order in range(3)]
     moved = np.stack([in_time(transfer * asked.spectrum, n) for transfer in orders], axis=-1)[:sampled]
+    started = np.stack([_release(structure, structure.mode_shape, order, n, rate) for order in range(3)], axis=-1)
+    moved = moved + at_release * started[:sampled]
     relative, absolute = simulation.places[:sampled, 0] + moved, simulation.places[:sampled, 1] + moved
     force = in_time(asked.spectrum, n)[:sampled]
     on_structure = _changed(simulation, simulation.twin, STRUCTURE, relative, rate)
@@ -245,7 +252,8 @@ def _on_structure(
         return (latent(EITHER, force - on_structure - in_tank, asked.noise, relative),), left
     missed_force, force_noise = measured
     inertia = simulation.twin.carried_mass_kg * orders[2]
-    liquid = inertia * asked.spectrum - in_frequency(missed_force) - in_frequency(_padded(in_tank, n))
+    of_release = at_release * simulation.twin.carried_mass_kg * started[:, 2] * _fade(n, run.is_free)
+    liquid = inertia * asked.spectrum - in_frequency(missed_force - of_release) - in_frequency(_padded(in_tank, n))
     noise = np.abs(inertia) ** 2 * asked.noise + np.interp(frequency, *force_noise)
     kept_share = own_share(np.abs(liquid) ** 2, noise, frequency, rate)
     in_liquid = in_time(kept_share * liquid, n)[:sampled]
@@ -262,8 +270,10 @@ def _asked_for(
     observed: Sequence[Observation],
     believed: Sequence[Observation],
     missed: Mapping[str, FloatArray],
-) -> tuple[AskedForce, dict[str, FloatArray]]:
-    """The force at the tank's place that the believed motion channels ask for, and what every one has left."""
+) -> tuple[AskedForce, float, dict[str, FloatArray]]:
+    """The force at the tank's place that believed motion channels ask for, how far the release was off, and what
+    every channel has left.
+    """
     run, structure = observed[0].run, simulation.twin.structure
     assert structure is not None
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
@@ -288,7 +298,7 @@ def _asked_for(
     for name, spectrum in spectra.items():
         start = at_release * released[name] if released else 0.0
         left[name] = in_time(spectrum - receptances[name] * asked.spectrum - start, n)
-    return asked, left
+    return asked, at_release, left
 
 
 def _release(structure: Structure, weights: FloatArray, order: int, n: int, rate_hz: float) -> FloatArray:

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, hilbert, sosfiltfilt
 
 from sloshlab.constants import GRAVITY_M_PER_S2
@@ -138,12 +139,14 @@ def _motion_per_block(observed: Sequence[Observation]) -> tuple[FloatArray, Floa
         return None
     power = np.mean([one.spectra**2 for one in chosen], axis=0)
     frequency = chosen[0].frequencies_hz
+    amplitude = np.sqrt(2 * power.mean(axis=1))
+    power = uniform_filter1d(power, 3, axis=0, mode="nearest")  # one block's coefficients depend on the phase
     peak = power.argmax(axis=1)
     near = np.abs(np.arange(power.shape[1])[None, :] - peak[:, None]) <= 2
     inside = np.where(near, power, 0.0)
     total = np.maximum(power.sum(axis=1), 1e-300)
     centre = (inside * frequency).sum(axis=1) / np.maximum(inside.sum(axis=1), 1e-300)
-    return np.sqrt(2 * power.mean(axis=1)), centre, inside.sum(axis=1) / total
+    return amplitude, centre, inside.sum(axis=1) / total
 
 
 def _sorted_by(

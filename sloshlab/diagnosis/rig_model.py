@@ -13,7 +13,10 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
+from sloshlab.diagnosis.candidate import BLOCKS
+from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
 from sloshlab.errors import AnalysisError
 from sloshlab.recording import channels
@@ -28,9 +31,6 @@ from sloshlab.twin.structure_forces import MASS_ERROR
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
-from sloshlab.diagnosis.candidate import BLOCKS
-from sloshlab.diagnosis.case import CaseRun
-
 FloatArray = NDArray[np.float64]
 STEPS_PER_PERIOD: Final = 12.0
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
@@ -44,6 +44,7 @@ class _Channels:
     compared: tuple[str, ...]
     attributes: Mapping[str, Mapping[str, Any]]
     recorded: Mapping[str, FloatArray]
+    driving: Mapping[str, FloatArray]
     n_cells: int
 
 
@@ -105,6 +106,11 @@ class RigModel:
             tuple(names),
             {name: dict(run.recording[name].attrs) for name in names},
             {name: np.asarray(run.recording[name].values, np.float64) for name in names},
+            {
+                name: np.asarray(run.recording[name].values, np.float64)
+                for name in self.driving(run)
+                if name not in names
+            },
             max(1, sum(name.startswith("force_cell") for name in channels(run.recording, "force"))),
         )
 
@@ -141,12 +147,12 @@ class RigModel:
         """
         truth = self._truth(run, values, extension)
         rate = run.attributes.sampling_rate_hz
-        readings = {}
+        others, readings = {**self._channels[run.name].driving, **truth}, {}
         for name, true in truth.items():
             reading = true * values.get(f"gain of {name}", 1.0) * _relative_share(name, truth, values)
             for fault in extension.faults:
                 if fault.channel == name:
-                    reading = fault.reading(reading, rate, truth, self._channels[run.name].recorded[name])
+                    reading = fault.reading(reading, rate, others, self._channels[run.name].recorded[name])
             readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
         return readings
 

@@ -169,7 +169,7 @@ def _alternatives(found: Findings, best: Explanation, unit: float) -> list[Expla
 
 
 def _has_equal(best: Explanation) -> bool:
-    return best.names in _EQUALS or best.names in _EQUALS.values()
+    return bool(equals_of(best))
 
 
 def _probabilities(found: Findings, unit: float) -> dict[str, float]:
@@ -256,13 +256,15 @@ def with_place(found: Findings, verdict: Verdict, seen: str = "", block: str = "
 
 
 def equals_of(best: Explanation) -> list[tuple[str, ...]]:
-    """Names of explanations that are the same force."""
-    return [
-        other
-        for one, two in _EQUALS.items()
-        for this, other in ((one, two), (two, one))
-        if tuple(sorted(this)) == best.names
-    ]
+    """Names of explanations that are the same force, alone or beside other effects."""
+    in_structure = [one.effect.name for one in best.fit.candidates if one.effect.block == "structure"]
+    found = []
+    for one, two in _EQUALS.items():
+        for this, other in ((one, two), (two, one)):
+            if set(this) <= set(in_structure):
+                others = [name for name in best.names if name not in this]
+                found.append(tuple(sorted((*others, *other))))
+    return found
 
 
 def _described(best: Explanation, candidate: Candidate) -> str:

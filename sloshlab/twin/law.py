@@ -74,7 +74,7 @@ class Law:
         with _COMPILING:
             try:
                 return compiled(cache=has_module)(self.function)
-            except (RuntimeError, OSError):  # a module in a place that cannot be written
+            except (RuntimeError, OSError, ImportError):  # a place that cannot be written; kept under another name
                 return compiled()(self.function)
 
     @property

@@ -186,6 +186,31 @@ def test_a_force_is_the_one_of_the_vocabulary(frozen: RigModel, key: str) -> Non
     assert np.sqrt(np.mean(error**2)) < 0.02 * np.sqrt(np.mean(force**2))
 
 
+@pytest.fixture(scope="module")
+def with_interface(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
+    folder = tmp_path_factory.mktemp("interface")
+    runs = decays(
+        (START_M,), 1.0, lambda channels: {**channels, "force_interface": MASS_KG * channels["acceleration_tip"]}
+    )
+    return RigModel(rig(folder), folder, runs)
+
+
+@pytest.mark.parametrize("key", MEMORYLESS)
+def test_the_interface_feels_forces_of_the_tank_alone(with_interface: RigModel, key: str) -> None:
+    """F = M a − Δf between structure and tank: a force of the structure acts on its other side."""
+    numbers, expected = MEMORYLESS[key]
+    extension = Candidate(effect(key), surroundings_of(with_interface)).extension(numbers)
+    [run] = with_interface.runs
+    readings = with_interface.simulate(run, with_interface.believed, extension)
+    felt = MASS_KG * readings["acceleration_tip"] - readings["force_interface"]
+    if key.startswith("structure"):
+        assert np.abs(felt).max() < 1e-9
+    else:
+        m = moved(with_interface, key, numbers)
+        known = smooth(m) & (m["t"] < 0.95)
+        assert np.abs(felt - expected(m))[known].max() < 0.03 * np.abs(expected(m)[known]).max()
+
+
 def test_nothing_added_is_no_force(frozen: RigModel) -> None:
     m = moved(frozen, "", {})
     assert np.abs(added(m)[smooth(m)]).max() < 2e-4 * STIFFNESS * START_M

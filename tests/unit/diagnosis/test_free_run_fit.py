@@ -168,7 +168,18 @@ HIDDEN: dict[str, tuple[Callable[[], list[CaseRun]], dict[str, float], tuple[str
 }
 
 
-@pytest.mark.parametrize("key", HIDDEN)
+LIKE_OTHERS = {
+    "structure.asymmetric_friction",
+    "tank.viscous_damping",
+    "tank.mass_error",
+    "tank.effective_mass",
+    "structure.quadratic_stiffness",
+}
+
+
+@pytest.mark.parametrize(
+    "key", [pytest.param(key, marks=[pytest.mark.slow] if key in LIKE_OTHERS else []) for key in HIDDEN]
+)
 def test_hidden_numbers_come_back_within_their_intervals(tmp_path: Path, key: str) -> None:
     """Within 3.3 standard errors, and known to five per cent where the noise allows it."""
     made, truth, free = HIDDEN[key]

@@ -1,0 +1,36 @@
+"""Explanations that are the same force are named together, alone and beside other effects."""
+
+from __future__ import annotations
+
+import pytest
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, known_effects
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.free_run_fit import FreeRunFit
+from sloshlab.diagnosis.verdict import equals_of
+
+assert effects.__all__
+
+
+def explained_by(*keys: str) -> Explanation:
+    pool = {f"{one.block}.{one.name}": one for one in known_effects()}
+    chosen = tuple(Candidate(pool[key], None) for key in keys)  # type: ignore[arg-type]
+    return Explanation(FreeRunFit(chosen, {}, 0.0, 0.0), 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        (("structure.asymmetric_friction",), [("constant_force", "coulomb_friction")]),
+        (("structure.coulomb_friction", "structure.constant_force"), [("asymmetric_friction",)]),
+        (
+            ("structure.asymmetric_friction", "structure.stribeck_friction"),
+            [("constant_force", "coulomb_friction", "stribeck_friction")],
+        ),
+        (("structure.coulomb_friction",), []),
+        (("tank.coulomb_friction", "structure.constant_force"), []),
+    ],
+)
+def test_equals(keys: tuple[str, ...], expected: list[tuple[str, ...]]) -> None:
+    assert equals_of(explained_by(*keys)) == expected
