@@ -182,14 +182,14 @@ def _weighted_observations(case: Case, model: DiagnosedModel, parts: Split) -> d
             repeated += observed
     for run in alone:
         weighted[run.name] = with_typical_scatter(plain[run.name], repeated)
-    return {name: [within_band(one) for one in observed] for name, observed in weighted.items()}
+    return {name: within_band(observed) for name, observed in weighted.items()}
 
 
 def _loosened(observed: Sequence[Observation]) -> list[Observation]:
     """With five per cent of each channel added to its noise: a first fit must not depend on unknown noise."""
     return [
         replace(one, variance=one.variance + (0.05**2) * float(np.mean(one.spectra**2)))
-        for one in map(within_band, observed)
+        for one in within_band(observed)
     ]
 
 

@@ -114,23 +114,30 @@ def observations(run: CaseRun, names: Sequence[str]) -> list[Observation]:
     return found
 
 
-def within_band(observation: Observation) -> Observation:
-    """The same without the high bands in which the recording never stands out of what does not repeat.
+def within_band(observed: Sequence[Observation]) -> list[Observation]:
+    """The channels of a run without the high bands in which none of them stands out of what does not repeat.
 
     Parameters
     ----------
-    observation : Observation
+    observed : sequence of Observation
+        Of one run.
     """
-    shown = np.flatnonzero(observation.informative.mean(axis=0) > _LEAST_SHARE_OF_BLOCKS)
-    n_bands = observation.n_bands
-    highest = int(shown[-1]) + 1 if shown.size else 0
-    n_kept = min(observation.spectra.shape[1], max(highest + n_bands // 16, n_bands // 8))
-    return replace(
-        observation,
-        spectra=np.ascontiguousarray(observation.spectra[:, :n_kept]),
-        variance=np.ascontiguousarray(observation.variance[:, :n_kept]),
-        n_transformed=n_bands,
-    )
+    if len({one.n_bands for one in observed}) != 1:
+        return list(observed)
+    n_bands, highest = observed[0].n_bands, 0
+    for one in observed:
+        shown = np.flatnonzero(one.informative.mean(axis=0) > _LEAST_SHARE_OF_BLOCKS)
+        highest = max(highest, int(shown[-1]) + 1 if shown.size else 0)
+    n_kept = min(n_bands, max(highest + n_bands // 16, n_bands // 8))
+    return [
+        replace(
+            one,
+            spectra=np.ascontiguousarray(one.spectra[:, :n_kept]),
+            variance=np.ascontiguousarray(one.variance[:, :n_kept]),
+            n_transformed=n_bands,
+        )
+        for one in observed
+    ]
 
 
 def with_scatter(
