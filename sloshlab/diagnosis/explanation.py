@@ -20,8 +20,10 @@ from sloshlab.diagnosis.free_run_fit import (
     FreeRunProblem,
     extension_of,
     fitted,
+    fitted_baseline,
     fitted_from,
     huber_cost,
+    mean_squares,
     robust_weights,
     scanned,
 )
@@ -44,8 +46,6 @@ _LEAST_PREDICTED: Final = 8.0
 _MOST_FITTED: Final = 10
 _SOFT: Final = 0.1
 _MOST_SCANNED: Final = 3
-_DOWN_TO_NOISE: Final = 1.15
-"""Mean square of the weighted residuals of a channel in which nothing more is to be found."""
 Told = Callable[[str, int, int], None]
 
 assert effects.__all__  # importing the vocabulary makes it known
@@ -229,7 +229,7 @@ class _Search:
         believed_values = problem.values(problem.theta_of(self.model.believed))
         at_believed = problem.residual(problem.theta_of(believed_values))
         believed = self.judged(FreeRunFit((), believed_values, huber_cost(at_believed), huber_cost(at_believed)))
-        retuned_fit, jacobian = fitted(problem, believed_values, n_iterations=10)
+        retuned_fit, jacobian = fitted_baseline(problem)
         retuned = self.judged(retuned_fit)
         self.surroundings = self._surroundings(retuned_fit)
         everything = candidates(self.surroundings)
@@ -266,7 +266,7 @@ class _Search:
         informative = np.concatenate([one.informative.ravel() for one in observed])
         chosen = residual[informative] if informative.any() else residual
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
-        return Explanation(fit, huber_cost(residual), rms, _by_channel(observed, residual))
+        return Explanation(fit, huber_cost(residual), rms, mean_squares(observed, residual))
 
     def _one_more(
         self, base: FreeRunFit, jacobian: FloatArray, pool: Sequence[Candidate], what: str
@@ -278,14 +278,14 @@ class _Search:
         for i, (candidate, start) in enumerate(promising):
             self.told(f"{what}: {candidate.key}", i, len(promising))
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
-            starts = [{**values, **one} for one in (*candidate.starts(), start)]
+            starts = [{**values, **one} for one in (*candidate.starts(), start)] + [{**base.values, **start}]
             fit = fitted_from(problem, starts)
             if fit.trouble:
                 self.failed[candidate.key] = fit.trouble
                 continue
             kept.append(self.judged(fit))
         for one in sorted(kept, key=lambda each: each.fit.cost)[:_MOST_SCANNED]:
-            if self._is_down_to_noise(one.fit):
+            if self._problem(one.fit).is_down_to_noise(one.fit):
                 continue
             candidate = one.fit.candidates[-1]
             self.told(f"{what}: {candidate.key} from other sizes", 0, 1)
@@ -346,7 +346,7 @@ class _Search:
         if not self.explanations:
             return
         best = min(self.explanations, key=lambda one: one.fit.cost)
-        if self._is_down_to_noise(best.fit):
+        if self._problem(best.fit).is_down_to_noise(best.fit):
             return
         problem = FreeRunProblem(self.model, self.fitting, best.fit.candidates)
         theta = problem.theta_of(best.fit.values)
@@ -354,12 +354,8 @@ class _Search:
         jacobian = problem.jacobian(theta, at, range(theta.size))
         self._one_more(best.fit, jacobian, pool, "fitting a second effect")
 
-    def _is_down_to_noise(self, fit: FreeRunFit) -> bool:
-        """Whether a fit leaves no more than the noise in any channel of the runs that it was made of."""
-        problem = FreeRunProblem(self.model, self.fitting, fit.candidates)
-        residual = problem.residual(problem.theta_of(fit.values))
-        left = _by_channel([one for run in problem.runs for one in run], residual)
-        return max(left.values(), default=0.0) < _DOWN_TO_NOISE
+    def _problem(self, fit: FreeRunFit) -> FreeRunProblem:
+        return FreeRunProblem(self.model, self.fitting, fit.candidates)
 
     def _ceilings(self, retuned: FreeRunFit) -> list[Explanation]:
         found = []
@@ -422,20 +418,6 @@ def _resized(candidate: Candidate, start: dict[str, float], factor: float) -> di
     first = next(iter(start))
     factor = min(max(factor, 0.1), 10.0)
     return {**start, first: start[first] * factor} if len(start) == 1 else start
-
-
-def _by_channel(observed: Sequence[Observation], residual: FloatArray) -> dict[str, float]:
-    """Mean square of the informative residuals of each channel over all runs."""
-    sums: dict[str, list[float]] = {}
-    first = 0
-    for one in observed:
-        own = residual[first : first + one.spectra.size]
-        first += one.spectra.size
-        chosen = own[one.informative.ravel()]
-        total = sums.setdefault(one.channel, [0.0, 0.0])
-        total[0] += huber_cost(chosen)
-        total[1] += chosen.size
-    return {name: squares / n for name, (squares, n) in sums.items() if n}
 
 
 def _belongs_to_a_run(name: str, case: Case) -> bool:

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
@@ -26,6 +27,12 @@ _LARGEST_DAMPING: Final = 1e8
 MOST_TOLERANCES: Final = 4.0
 """How far a baseline's parameter may be from what is believed of it; beyond, something else is the matter."""
 _LEAST_SHARE_OF_PROMISE: Final = 0.3
+_LAST_STAGE: Final = 0.03
+"""Of the tolerance: small steps along a valley add up to more than the gates of a verdict."""
+_N_DRAWN: Final = 32
+_N_REFINED: Final = 2
+DOWN_TO_NOISE: Final = 1.15
+"""Mean square of the weighted residuals of a channel in which nothing more is to be found."""
 STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
 SCANNED: Final = (0.75, 0.9, 1.1, 1.3)
 N_THREADS = 2
@@ -118,6 +125,17 @@ class FreeRunProblem:
         self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
         self.n_simulations = 0
 
+    @property
+    def moves(self) -> NDArray[np.bool_]:
+        """Which of the baseline's parameters change the motion, not only what a channel reads."""
+        return np.array([not parameter.is_reading for parameter in self._baseline])
+
+    def is_down_to_noise(self, fit: FreeRunFit) -> bool:
+        """Whether a fit leaves no more than the noise in any channel."""
+        residual = self.residual(self.theta_of(fit.values))
+        left = mean_squares([one for run in self.runs for one in run], residual)
+        return max(left.values(), default=0.0) < DOWN_TO_NOISE
+
     def values(self, theta: FloatArray) -> dict[str, float]:
         """Parameters by name in their own units."""
         physical = np.clip(self.centres + theta * self.scales, self.low, self.high)
@@ -185,6 +203,27 @@ def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -
     return total
 
 
+def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[str, float]:
+    """Mean square of the informative residuals of each channel over all runs, large ones counted less.
+
+    Parameters
+    ----------
+    observed : sequence of Observation
+    residual : ndarray
+        Of all of them, one after another.
+    """
+    sums: dict[str, list[float]] = {}
+    first = 0
+    for one in observed:
+        own = residual[first : first + one.spectra.size]
+        first += one.spectra.size
+        chosen = own[one.informative.ravel()]
+        total = sums.setdefault(one.channel, [0.0, 0.0])
+        total[0] += huber_cost(chosen)
+        total[1] += chosen.size
+    return {name: squares / n for name, (squares, n) in sums.items() if n}
+
+
 def robust_weights(residual: FloatArray, limit: float = _ROBUST) -> FloatArray:
     """Square roots of Huber's weights: a burst or a lost block counts with its size, not with its square."""
     size = np.abs(residual)
@@ -217,9 +256,9 @@ def fitted(
     problem : FreeRunProblem
     start : mapping
     n_iterations : int
-        At most, per stage.
+        At most, per stage; twice as many in the last one.
     tolerance : float
-        Of the relative decrease of the cost at which a stage ends.
+        Of the relative decrease of the cost at which a stage ends; a thirtieth of it in the last one.
     shares : sequence of float
         Stages. In each, every channel is believed to this share of its RMS only, so that details which jump with
         the parameters, such as where friction stops a decay, do not hide the way; zero is the last one.
@@ -232,7 +271,7 @@ def fitted(
 
     Notes
     -----
-    A Jacobian costs as many simulations as there are parameters. It is made when a stage begins, corrected after
+    A Jacobian costs as many simulations as there are parameters. It is made once, corrected after
     every step by what the step has shown (Broyden 1965, 10.1090/S0025-5718-1965-0198670-6), and made anew where
     a step gains less than it promised, and before the last stage may end.
     """
@@ -261,15 +300,15 @@ class _Descent:
     def stage(self, share: float, n_iterations: int, tolerance: float) -> None:
         """Descend with every channel believed to a share of its RMS."""
         softness, damping, is_fresh = self.problem.softness(share), 1e-3, False
-        is_wanted = True
-        for iteration in range(n_iterations):
+        is_wanted = not self.jacobian.any()
+        for iteration in range(n_iterations if share > 0 else 2 * n_iterations):
             if is_wanted:
                 self.jacobian = self.problem.jacobian(
                     self.theta, self.residual, range(self.theta.size), coarse=share > 0
                 )
                 is_fresh = True
             gain, promised, damping = self._step(softness, damping)
-            is_done = gain < tolerance and (iteration > 0 or gain <= 0)
+            is_done = gain < tolerance * (1.0 if share > 0 else _LAST_STAGE) and (iteration > 0 or gain <= 0)
             if is_done and (is_fresh or share > 0):
                 break
             is_wanted = is_done or gain < _LEAST_SHARE_OF_PROMISE * promised
@@ -349,6 +388,37 @@ def fitted_from(
             problem.candidates, dict(starts[0]), np.inf, np.inf, trouble="does not run from any of its starts"
         )
     return fitted(problem, best[1].values, n_iterations=n_iterations, shares=rest)[0]
+
+
+def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple[FreeRunFit, FloatArray]:
+    """The best fit of the baseline's own parameters from several places that a laboratory would believe.
+
+    Dry friction and stops give the cost side valleys, in which a retuned baseline would look worse than it is.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+        Without candidates.
+    n_iterations : int
+        At most, per stage.
+
+    Returns
+    -------
+    fit : FreeRunFit
+    jacobian : ndarray, shape (n_residuals, n)
+    """
+    best = fitted(problem, problem.model.believed, n_iterations=n_iterations)
+    if problem.is_down_to_noise(best[0]):
+        return best
+    softness = problem.softness(STAGES[1])
+    draws = norm.ppf(qmc.Halton(problem.n_baseline, seed=0).random(_N_DRAWN))
+    draws = np.clip(draws, -2.0, 2.0) * problem.moves
+    costs = [huber_cost(softness * r) if np.isfinite(r).all() else np.inf for r in map(problem.residual, draws)]
+    for place in np.argsort(costs)[:_N_REFINED]:
+        other = fitted(problem, problem.values(draws[place]), n_iterations=n_iterations, shares=STAGES[1:])
+        if not other[0].trouble and other[0].cost < best[0].cost:
+            best = other
+    return best
 
 
 def scanned(problem: FreeRunProblem, fit: FreeRunFit, name: str, *, n_iterations: int = 5) -> FreeRunFit:

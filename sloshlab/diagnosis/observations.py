@@ -75,7 +75,7 @@ class Observation:
 
     def of(self, values: FloatArray) -> FloatArray:
         """Spectra of simulated values, treated as the recording was; samples beyond their end are zero."""
-        return _spectra(values, self.known, self.keeps_mean, self.n_bands)[:, : self.spectra.shape[1]]
+        return _spectra(values, self.known, self.keeps_mean, self.n_bands, self.run)[:, : self.spectra.shape[1]]
 
     def residual(self, values: FloatArray) -> FloatArray:
         """Recorded minus simulated spectra in standard deviations, shape (n_blocks, n_bands)."""
@@ -105,7 +105,7 @@ def observations(run: CaseRun, names: Sequence[str]) -> list[Observation]:
         if known.sum() < 2 * n_bands:
             continue
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
-        spectra = _spectra(values, known, keeps_mean, n_bands)
+        spectra = _spectra(values, known, keeps_mean, n_bands, run)
         stated = float(variable.attrs.get("noise_std", 0.0)) ** 2
         white = _white_level(spectra)
         least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
@@ -228,12 +228,23 @@ def _at_limits(values: FloatArray, attributes: Mapping[str, object]) -> NDArray[
     return clipped
 
 
-def _spectra(values: FloatArray, known: NDArray[np.bool_], keeps_mean: bool, n_bands: int) -> FloatArray:
+def _spectra(
+    values: FloatArray, known: NDArray[np.bool_], keeps_mean: bool, n_bands: int, run: CaseRun
+) -> FloatArray:
+    """Spectra of what is known, faded in and out.
+
+    A run that ends abruptly spreads the scatter of its strong bands over weak ones, where it would count far too
+    much. A release is faded in quickly: its first cycles are what it is made for.
+    """
     masked = np.zeros(known.size)
     n = min(known.size, values.size)
     chosen = known[:n]
     part = values[:n][chosen]
     masked[:n][chosen] = part if keeps_mean or not part.size else part - part.mean()
+    n_in, n_out = max(1, n_bands // (32 if run.is_free else 2)), max(1, n_bands // 2)
+    if n_in + n_out <= masked.size:
+        masked[:n_in] *= np.sin(0.5 * np.pi * np.arange(n_in) / n_in) ** 2
+        masked[-n_out:] *= np.cos(0.5 * np.pi * (np.arange(n_out) + 1) / n_out) ** 2
     return lapped_spectra(masked, n_bands)
 
 
