@@ -10,7 +10,7 @@ from recorded_oscillators import NOISE, RATE_HZ, decays, run_of
 
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.lapped_transform import lapped_spectra
-from sloshlab.diagnosis.observations import observations, with_scatter, with_typical_scatter
+from sloshlab.diagnosis.observations import Observation, observations, with_scatter, with_typical_scatter
 
 N = 3000
 TIME = np.arange(N) / RATE_HZ
@@ -80,7 +80,24 @@ def test_the_end_of_a_shorter_simulation_is_taken_as_zero() -> None:
     short, padded = TONE[:2000], np.where(np.arange(N) < 2000, TONE, 0.0)
     mean_free = padded.copy()
     mean_free[:2000] -= short.mean()
-    np.testing.assert_allclose(one.of(short), lapped_spectra(mean_free, one.n_bands), atol=1e-9)
+    np.testing.assert_allclose(one.of(short), lapped_spectra(faded(mean_free, one), one.n_bands), atol=1e-9)
+
+
+def faded(values: np.ndarray, one: Observation) -> np.ndarray:
+    """Raised cosines: half a block in and out, a release comes in sixteen times faster."""
+    n = one.n_bands // 2
+    n_in = n // 16 if one.run.is_free else n
+    rising = 0.5 - 0.5 * np.cos(np.pi * np.arange(n_in) / n_in)
+    falling = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, n + 1) / n)
+    return values * np.concatenate([rising, np.ones(values.size - n_in - n), falling])
+
+
+def test_an_abrupt_end_does_not_spread_over_all_bands() -> None:
+    """An error of the tone's size, such as a sensor's gain, stays where the tone is."""
+    [one] = observations(run(TONE), ["acceleration_tip"])
+    error = (0.99 * one.spectra - one.of(TONE))[-3:] ** 2
+    near = np.abs(one.frequencies_hz - 6.0) < 8.0
+    assert error[:, ~near].sum() < 1e-3 * error.sum()
 
 
 def repeats(n: int, scatter: float, quiet: float = 0.02) -> list[CaseRun]:
