@@ -27,6 +27,7 @@ from pipelines.rom_report.sections import PAPERS
 from pipelines.rom_report.tables import provenance_table
 from pipelines.sensitivity_study import CaseResult, Pick
 from sloshlab import __version__
+from sloshlab.reduced_order_model.early_stop import EPOCHS_PER_RISE
 from sloshlab.reduced_order_model.training import TrainingSettings
 
 if TYPE_CHECKING:
@@ -189,7 +190,8 @@ def case_table(found: StudiedModels) -> Table:
          "parameters", "epochs", "time [s]", "ended"),
         tuple(rows),
         f"Structure, delays of the velocity (+ of the force), neurons. {found.rate_reason}. At most "
-        f"{found.settings.n_epochs} epochs, training stops after {found.settings.patience} rises of the "
-        "validation "
-        f"error, {found.settings.n_starts} start, seed {found.settings.seed}. NOE errors are those of free runs.",
+        f"{found.settings.n_epochs} epochs; training stops after {found.settings.patience} rises of the "
+        f"validation error, or when {EPOCHS_PER_RISE * found.settings.patience} epochs lower its mean square by "
+        f"less than {100 * found.settings.least_gain:g} %; "
+        f"{found.settings.n_starts} start, seed {found.settings.seed}. NOE errors are those of free runs.",
     )  # fmt: skip
