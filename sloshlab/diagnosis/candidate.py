@@ -41,7 +41,7 @@ class Surroundings:
     peaks : mapping of str to float
         The same channels with their largest reading.
     channel : str
-        Where an effect of a sensor acts, while its starts are asked for.
+        Where an effect of a sensor acts, while its starts are asked for; several of one device are joined by `+`.
     """
 
     rig: Rig
@@ -62,7 +62,7 @@ class Surroundings:
     @property
     def reading(self) -> float:
         """RMS of the channel on which an effect acts, in its unit."""
-        return max(self.channels.get(self.channel, 0.0), 1e-300)
+        return max(*(self.channels.get(name, 0.0) for name in channels_of(self.channel)), 1e-300)
 
     @property
     def moving_mass_kg(self) -> float:
@@ -92,6 +92,30 @@ class EffectParameter:
 
 
 Numbers = Mapping[str, float]
+_TOGETHER: Final = "+"
+_FROM: Final = "<"
+
+
+def together(names: Sequence[str]) -> str:
+    """Name of a place that is several channels of one device.
+
+    Examples
+    --------
+    >>> together(["force_cell_1", "force_cell_2"])
+    'force_cell_1+force_cell_2'
+    """
+    return _TOGETHER.join(names)
+
+
+def channels_of(place: str) -> tuple[str, ...]:
+    """Channels on which an effect acts at a place; a source after `<` is none of them.
+
+    Examples
+    --------
+    >>> channels_of("force_cell_1+force_cell_2"), channels_of("acceleration_tip<displacement_tank")
+    (('force_cell_1', 'force_cell_2'), ('acceleration_tip',))
+    """
+    return tuple(place.partition(_FROM)[0].split(_TOGETHER))
 
 
 @dataclass(frozen=True)
@@ -114,6 +138,8 @@ class Effect:
         (surroundings) → whether it can act there.
     places : callable
         (surroundings) → channels on which it may act; one empty name where it acts on none.
+    includes : tuple of str
+        Effects that are special cases of it, in the same block; it cannot but describe what they do.
     spoken_for_by : tuple of str
         What tests on the missing force or the sensor say where it is missing: terms of `evidence.TERMS`.
     """
@@ -129,6 +155,7 @@ class Effect:
     needs: Callable[[Surroundings], bool] = lambda surroundings: True
     places: Callable[[Surroundings], Sequence[str]] = lambda surroundings: [""]
     spoken_for_by: tuple[str, ...] = ()
+    includes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

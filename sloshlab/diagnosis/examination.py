@@ -127,8 +127,8 @@ def seen_at(examination: Examination, best: Explanation | None) -> str:
     best : Explanation or None
         What was named.
     """
-    channels = [one.channel for one in best.fit.candidates if one.channel] if best is not None else []
-    worst = (channels or examination.where.get("channels") or [""])[0].partition("<")[0]
+    faulty = best.channels if best is not None else ()
+    worst = (faulty or examination.where.get("channels") or [""])[0]
     parts = [_in_the_cycle(one) for one in examination.maps if one.channel == worst]
     parts.append(_levels(examination, worst))
     words = " ".join(part for part in parts if part)

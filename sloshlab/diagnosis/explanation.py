@@ -10,22 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
+from sloshlab.diagnosis.block_jacobian import BlockJacobian
+from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates, channels_of
 from sloshlab.diagnosis.case import Case, CaseRun
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.force_surface import surface_effect
 from sloshlab.diagnosis.free_run_fit import (
+    STAGES,
     FreeRunFit,
     FreeRunProblem,
+    begun,
     extension_of,
+    finished,
     fitted,
     fitted_baseline,
-    fitted_from,
     huber_cost,
     mean_squares,
     robust_weights,
+    run_of,
     scanned,
+    soft_cost,
 )
 from sloshlab.diagnosis.observations import (
     Observation,
@@ -45,7 +50,10 @@ FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
 _MOST_FITTED: Final = 10
 _SOFT: Final = 0.1
-_MOST_SCANNED: Final = 3
+_MOST_SCANNED: Final = 1
+_MOST_STARTS: Final = 2
+_LEAST_SHARE_OF_GAIN: Final = 0.5
+"""Of the best candidate's gain after the first stages; the others do not go on."""
 Told = Callable[[str, int, int], None]
 
 assert effects.__all__  # importing the vocabulary makes it known
@@ -80,6 +88,31 @@ class Explanation:
     def keys(self) -> tuple[str, ...]:
         """Blocks, names and channels of its effects."""
         return tuple(one.key for one in self.fit.candidates)
+
+    @property
+    def named_in_blocks(self) -> tuple[str, ...]:
+        """Blocks and names of its effects, sorted; several channels may have the same."""
+        return tuple(sorted(f"{one.effect.block}.{one.effect.name}" for one in self.fit.candidates))
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels on which its effects act."""
+        return tuple(name for one in self.fit.candidates if one.channel for name in channels_of(one.channel))
+
+    @property
+    def rests_on_a_bound(self) -> bool:
+        """Whether a number is as large or as small as its effect allows: then it is something else."""
+        return any(
+            bound != 0 and abs(self.fit.values[f"{one.key}.{parameter.name}"] - bound) <= 1e-6 * abs(bound)
+            for one in self.fit.candidates
+            for parameter in one.effect.parameters
+            for bound in (parameter.low, parameter.high)
+        )
+
+    @property
+    def n_numbers(self) -> int:
+        """Numbers of its effects."""
+        return sum(len(one.effect.parameters) for one in self.fit.candidates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +286,7 @@ class _Search:
 
     def judged(self, fit: FreeRunFit) -> Explanation:
         """A fit with its held-out residuals; only releases and offsets of those runs are fitted to them."""
-        shared = {name: value for name, value in fit.values.items() if not _belongs_to_a_run(name, self.case)}
+        shared = {name: value for name, value in fit.values.items() if not run_of(name, self.model)}
         problem = _WithEffects(self.model, self.held_out, fit.candidates, shared)
         theta = problem.theta_of(fit.values)
         if theta.size:
@@ -269,76 +302,78 @@ class _Search:
         return Explanation(fit, huber_cost(residual), rms, mean_squares(observed, residual))
 
     def _one_more(
-        self, base: FreeRunFit, jacobian: FloatArray, pool: Sequence[Candidate], what: str
+        self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
         """Fit each of some candidates beside what is in `base` already; the promising ones to the end."""
         promising = self._screen(base, jacobian, pool, what)
-        values = base.values if base.candidates else self.model.believed
-        kept = []
-        for i, (candidate, start) in enumerate(promising):
-            self.told(f"{what}: {candidate.key}", i, len(promising))
+        begun_fits = []
+        for i, (candidate, starts) in enumerate(promising):
+            self.told(f"{what}: {candidate.key}", i, 2 * len(promising))
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
-            starts = [{**values, **one} for one in (*candidate.starts(), start)] + [{**base.values, **start}]
-            fit = fitted_from(problem, starts)
+            cost, fit = begun(problem, starts)
             if fit.trouble:
                 self.failed[candidate.key] = fit.trouble
+            else:
+                begun_fits.append((cost, problem, fit))
+        kept = []
+        lowest = min((cost for cost, _, _ in begun_fits), default=0.0)
+        at_base = soft_cost(self._problem(base), base, STAGES[1])
+        for i, (cost, problem, fit) in enumerate(sorted(begun_fits, key=lambda one: one[0])):
+            key = fit.candidates[-1].key
+            if at_base - cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest):
+                self.screened[key] = max(at_base - cost, 0.0)
                 continue
-            kept.append(self.judged(fit))
-        for one in sorted(kept, key=lambda each: each.fit.cost)[:_MOST_SCANNED]:
-            if self._problem(one.fit).is_down_to_noise(one.fit):
-                continue
-            candidate = one.fit.candidates[-1]
-            self.told(f"{what}: {candidate.key} from other sizes", 0, 1)
-            problem = FreeRunProblem(self.model, self.fitting, one.fit.candidates)
-            better = scanned(problem, one.fit, f"{candidate.key}.{candidate.effect.parameters[0].name}")
-            if better is not one.fit:
-                kept[kept.index(one)] = self.judged(better)
+            self.told(f"{what}: {key}, to the end", len(promising) + i, 2 * len(promising))
+            done = finished(problem, fit)
+            if i < _MOST_SCANNED and not problem.is_down_to_noise(done):
+                done = scanned(problem, done, f"{key}.{fit.candidates[-1].effect.parameters[0].name}")
+            kept.append(self.judged(done))
         self.explanations += kept
         return kept
 
     def _screen(
-        self, base: FreeRunFit, jacobian: FloatArray, pool: Sequence[Candidate], what: str
-    ) -> list[tuple[Candidate, dict[str, float]]]:
-        """Decrease of the cost that one Gauss–Newton step promises, per start of each candidate."""
+        self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
+    ) -> list[tuple[Candidate, list[dict[str, float]]]]:
+        """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from."""
         problem = FreeRunProblem(self.model, self.fitting, base.candidates)
         residual = problem.residual(problem.theta_of(base.values))
         softness = problem.softness(_SOFT)
         weights = softness * robust_weights(softness * residual, 10.0)
-        n = jacobian.shape[1]
-        weighted = jacobian * weights[:, None]
-        prior = np.diag(np.where(np.arange(n) < problem.n_baseline, 1.0, 0.0))
-        inverse = np.linalg.pinv(weighted.T @ weighted + prior)
+        weighted = jacobian.weighted(weights)
+        prior = np.diag(np.where(np.arange(jacobian.n_columns) < problem.n_baseline, 1.0, 0.0))
+        inverse = np.linalg.pinv(weighted.normal() + prior)
         promised = []
         for i, candidate in enumerate(pool):
             self.told(f"{what}: first look", i, len(pool))
             if candidate.key in [one.key for one in base.candidates]:
                 continue
-            best: tuple[float, dict[str, float]] = (-1.0, {})
+            looks = []
             for start in candidate.starts():
                 extended = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
                 moved = extended.residual(extended.theta_of({**base.values, **start}))
                 if not np.isfinite(moved).all():
                     continue
                 direction = weights * (moved - residual)
-                direction = direction - weighted @ (inverse @ (weighted.T @ direction))
+                direction = direction - weighted.times(inverse @ weighted.transposed_times(direction))
                 size = float(direction @ direction)
                 along = float(direction @ (weights * residual))
-                gain = along**2 / size if size > 0 else 0.0
-                if gain > best[0]:
-                    factor = -along / size if size > 0 else 0.0
-                    best = (gain, _resized(candidate, start, factor))
-            if best[0] < 0:
+                factor = -along / size if size > 0 else 0.0
+                looks.append((along**2 / size if size > 0 else 0.0, start, _resized(start, factor)))
+            if not looks:
                 self.failed[candidate.key] = "does not run from any start"
                 continue
-            promised.append((best[0], candidate, best[1]))
+            looks.sort(key=lambda one: -one[0])
+            believed = base.values if base.candidates else self.model.believed
+            starts = [{**believed, **start} for _, start, _ in looks[:_MOST_STARTS]]
+            promised.append((looks[0][0], candidate, [*starts, {**base.values, **looks[0][2]}]))
         promised.sort(key=lambda one: -one[0])
         top = promised[0][0] if promised else 0.0
         chosen = []
-        for rank, (gain, candidate, start) in enumerate(promised):
+        for rank, (gain, candidate, starts) in enumerate(promised):
             if gain < max(_LEAST_PREDICTED, 0.02 * top) or rank >= _MOST_FITTED:
                 self.screened[candidate.key] = gain
             else:
-                chosen.append((candidate, start))
+                chosen.append((candidate, starts))
         return chosen
 
     def _add_greedily(self, pool: Sequence[Candidate]) -> None:
@@ -358,6 +393,15 @@ class _Search:
         return FreeRunProblem(self.model, self.fitting, fit.candidates)
 
     def _ceilings(self, retuned: FreeRunFit) -> list[Explanation]:
+        """What any force could explain, alone and beside the best explanation with a name."""
+        best = min(self.explanations, key=lambda one: one.fit.cost, default=None)
+        if best is None:
+            return self._with_any_force(retuned)
+        if self._problem(best.fit).is_down_to_noise(best.fit):
+            return []
+        return [*self._with_any_force(retuned), *self._with_any_force(best.fit)]
+
+    def _with_any_force(self, base: FreeRunFit) -> list[Explanation]:
         found = []
         for i, block in enumerate(("structure", "tank")):
             effect = surface_effect(block)
@@ -365,8 +409,9 @@ class _Search:
                 continue
             self.told("finding what any force could explain", i, 2)
             candidate = Candidate(effect, self.surroundings)
-            problem = FreeRunProblem(self.model, self.fitting, (candidate,))
-            fit, _ = fitted(problem, {**retuned.values, **candidate.starts()[0]}, n_iterations=5)
+            problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
+            start = {**base.values, **candidate.starts()[0]}
+            fit, _ = fitted(problem, start, n_iterations=5, shares=(STAGES[1], 0.0))
             if not fit.trouble:
                 found.append(self.judged(fit))
         return found
@@ -412,16 +457,11 @@ class _WithEffects(FreeRunProblem):
         self.candidates = tuple(effects_)
 
 
-def _resized(candidate: Candidate, start: dict[str, float], factor: float) -> dict[str, float]:
-    """A start whose first number, the size of the effect, is as large as the first step says."""
-    del candidate
+def _resized(start: dict[str, float], factor: float) -> dict[str, float]:
+    """A start whose only number, the size of the effect, is as large as the first step says."""
     first = next(iter(start))
     factor = min(max(factor, 0.1), 10.0)
     return {**start, first: start[first] * factor} if len(start) == 1 else start
-
-
-def _belongs_to_a_run(name: str, case: Case) -> bool:
-    return any(name.endswith((f"release of {run.name}", f" in {run.name}")) for run in case.runs)
 
 
 def _sizes(

@@ -1,4 +1,7 @@
-"""The best correction without a name: any force of two motions of a place, as a sum of Chebyshev polynomials.
+"""The best correction without a name: any force of two motions of a place and of what they were before.
+
+A sum of Chebyshev polynomials of the motions, a part that changes sign with the velocity, and three dampers behind
+springs, slower than the motion, as fast, and faster, which remember.
 
 It is the ceiling that a named effect is compared with, and the model of what has no name.
 """
@@ -17,15 +20,23 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 
 DEGREE = 5
 _SHARP = 0.05
+_N_REMEMBERED = 3
+_SLOWEST, _RATIO = 0.2, 5.0
 
 
 @law
 def _surface(motion, parameters, memory, rates):
-    """Σ c_ij T_i(p) T_j(q) with i + j ≤ 5, and c tanh(q/0.05); p is x or a, q is v, both over their largest."""
+    """Σ c_ij T_i(p) T_j(q), i + j ≤ 5, c tanh(q/0.05), Σ m_k z_k, ż = r (q − z); p is x or a, q is v, scaled."""
     p = motion[DISPLACEMENT] if parameters[2] == 0.0 else motion[ACCELERATION]
     p = min(max(p / parameters[0], -1.0), 1.0)
     q = min(max(motion[VELOCITY] / parameters[1], -1.0), 1.0)
-    force, at = parameters[3] * tanh(q / _SHARP), 4
+    force, at = parameters[4] * tanh(q / _SHARP), 5
+    rate = _SLOWEST * parameters[3]
+    for k in range(_N_REMEMBERED):
+        force += parameters[at] * memory[k]
+        rates[k] = rate * (q - memory[k])
+        rate *= _RATIO
+        at += 1
     before_p, now_p = 1.0, 1.0
     for i in range(DEGREE + 1):
         before_q, now_q = 1.0, 1.0
@@ -40,7 +51,8 @@ def _surface(motion, parameters, memory, rates):
     return -force
 
 
-NAMES = ("sharp", *(f"c_{i}{j}" for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i) if i + j > 0))
+_POLYNOMIALS = tuple(f"c_{i}{j}" for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i) if i + j > 0)
+NAMES = ("sharp", *(f"remembered_{k + 1}" for k in range(_N_REMEMBERED)), *_POLYNOMIALS)
 
 FORCE_SURFACE = register(
     ForceKind(
@@ -50,11 +62,13 @@ FORCE_SURFACE = register(
             Parameter("largest_first", "1", 1e-12, 1e12),
             Parameter("largest_velocity_m_per_s", "m s-1", 1e-12, 1e6),
             Parameter("first_is_acceleration", "1", 0.0, 1.0),
+            Parameter("rate_rad_per_s", "rad s-1", 1e-3, 1e6),
             *(Parameter(name, "N", -1e6, 1e6) for name in NAMES),
         ),
         _surface,
+        memory=lambda values, table: (0.0,) * _N_REMEMBERED,
         uses_acceleration=True,
-        equation="−Σ c_ij T_i(p) T_j(v), p = x or a",
+        equation="−Σ c_ij T_i(p) T_j(v) − Σ m_k z_k, ż_k = r_k (v − z_k), p = x or a",
     )
 )
 
@@ -73,6 +87,7 @@ def surface_effect(block: str) -> Effect:
                     largest_first=1.1 * first,
                     largest_velocity_m_per_s=1.1 * at.velocity_m_per_s,
                     first_is_acceleration=float(in_tank),
+                    rate_rad_per_s=at.omega,
                     **numbers,
                 ),
             )

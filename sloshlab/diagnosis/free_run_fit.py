@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, qmc
 
+from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
@@ -31,6 +32,8 @@ _LAST_STAGE: Final = 0.03
 """Of the tolerance: small steps along a valley add up to more than the gates of a verdict."""
 _N_DRAWN: Final = 32
 _N_REFINED: Final = 2
+_LEFT_BEHIND: Final = 1.05
+"""Cost after the first stages, over the best one so far, beyond which another start is given up."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel in which nothing more is to be found."""
 STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
@@ -104,7 +107,7 @@ class FreeRunProblem:
         self._baseline = [
             parameter
             for parameter in model.parameters
-            if parameter.name not in self.fixed and _belongs(parameter.name, present, model)
+            if parameter.name not in self.fixed and run_of(parameter.name, model) in ("", *present)
         ]
         self.names = tuple(
             [parameter.name for parameter in self._baseline]
@@ -173,13 +176,13 @@ class FreeRunProblem:
 
     def jacobian(
         self, theta: FloatArray, at: FloatArray, columns: Sequence[int], *, coarse: bool = False
-    ) -> FloatArray:
+    ) -> BlockJacobian:
         """Derivatives of the residuals by some scaled parameters, by differences of simulations.
 
         Coarse ones look further, past the jags that dry friction and contacts give a residual.
         """
-        found = np.empty((at.size, len(columns)))
-        for place, column in enumerate(columns):
+        found = []
+        for column in columns:
             is_effect, is_damping = column >= self.n_baseline, self.names[column].startswith("damping")
             step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
             if is_effect:
@@ -189,9 +192,22 @@ class FreeRunProblem:
             moved = theta.copy()
             physical = self.centres[column] + (theta[column] + step) * self.scales[column]
             moved[column] += step if physical <= self.high[column] else -step
-            difference = (self.residual(moved) - at) / (moved[column] - theta[column])
-            found[:, place] = difference if np.isfinite(difference).all() else 0.0
-        return found
+            difference = (self._residual_moved(moved, column, at) - at) / (moved[column] - theta[column])
+            found.append(difference if np.isfinite(difference).all() else np.zeros(at.size))
+        return BlockJacobian.of_columns(found, [one.spectra.size for run in self.runs for one in run])
+
+    def _residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
+        """Residuals after one parameter was moved; of the other runs unchanged where it belongs to one."""
+        owner = run_of(self.names[column], self.model)
+        if not owner:
+            return self.residual(theta)
+        moved, first, values = at.copy(), 0, self.values(theta)
+        for run in self.runs:
+            size = sum(one.spectra.size for one in run)
+            if run[0].run.name == owner:
+                moved[first : first + size] = self._of_run(run, values)
+            first += size
+        return moved
 
 
 def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:
@@ -248,7 +264,7 @@ def fitted(
     n_iterations: int = 8,
     tolerance: float = 1e-3,
     shares: Sequence[float] = STAGES,
-) -> tuple[FreeRunFit, FloatArray]:
+) -> tuple[FreeRunFit, BlockJacobian]:
     """Levenberg–Marquardt; deviations of the baseline count against what is believed of it.
 
     Parameters
@@ -266,14 +282,14 @@ def fitted(
     Returns
     -------
     fit : FreeRunFit
-    jacobian : ndarray, shape (n_residuals, n)
+    jacobian : BlockJacobian, shape (n_residuals, n)
         Unweighted, at the place of the fit.
 
     Notes
     -----
     A Jacobian costs as many simulations as there are parameters. It is made once, corrected after
-    every step by what the step has shown (Broyden 1965, 10.1090/S0025-5718-1965-0198670-6), and made anew where
-    a step gains less than it promised, and before the last stage may end.
+    every step by what the step has shown (`BlockJacobian.correct`), and made anew where a step gains less than it
+    promised, and before the last stage may end.
     """
     theta = problem.theta_of(start)
     residual = problem.residual(theta)
@@ -281,7 +297,7 @@ def fitted(
         empty = FreeRunFit(
             problem.candidates, problem.values(theta), np.inf, np.inf, trouble="does not run from its start"
         )
-        return empty, np.zeros((residual.size, theta.size))
+        return empty, BlockJacobian(theta.size, ())
     descent = _Descent(problem, theta, residual)
     for share in shares:
         descent.stage(share, n_iterations, tolerance)
@@ -295,12 +311,12 @@ class _Descent:
         self.problem, self.theta, self.residual = problem, theta, residual
         n = theta.size
         self.prior = np.where(np.arange(n) < problem.n_baseline, 1.0, 0.0)
-        self.jacobian, self.hessian = np.zeros((residual.size, n)), np.eye(n)
+        self.jacobian, self.hessian = BlockJacobian(n, ()), np.eye(n)
 
     def stage(self, share: float, n_iterations: int, tolerance: float) -> None:
         """Descend with every channel believed to a share of its RMS."""
         softness, damping, is_fresh = self.problem.softness(share), 1e-3, False
-        is_wanted = not self.jacobian.any()
+        is_wanted = not self.jacobian.blocks
         for iteration in range(n_iterations if share > 0 else 2 * n_iterations):
             if is_wanted:
                 self.jacobian = self.problem.jacobian(
@@ -319,9 +335,9 @@ class _Descent:
         theta, residual, prior = self.theta, self.residual, self.prior
         limit = _limit(softness * residual)
         weights = softness * robust_weights(softness * residual, limit)
-        weighted = self.jacobian * weights[:, None]
-        self.hessian = weighted.T @ weighted + np.diag(prior)
-        gradient = weighted.T @ (weights * residual) + prior * theta
+        weighted = self.jacobian.weighted(weights)
+        self.hessian = weighted.normal() + np.diag(prior)
+        gradient = weighted.transposed_times(weights * residual) + prior * theta
 
         def cost(at: FloatArray, r: FloatArray) -> float:
             if not np.isfinite(r).all():
@@ -337,9 +353,7 @@ class _Descent:
             if after < before:
                 step = tried - theta
                 promised = -float(2 * gradient @ step + step @ self.hessian @ step)
-                length = float(step @ step)
-                if length > 0:
-                    self.jacobian += np.outer((new - residual - self.jacobian @ step) / length, step)
+                self.jacobian.correct(step, new - residual)
                 self.theta, self.residual = tried, new
                 return (before - after) / before, promised / before, max(damping / 10, 1e-9)
             damping *= 8
@@ -360,6 +374,37 @@ class _Descent:
         )
 
 
+def begun(
+    problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], *, n_iterations: int = 6
+) -> tuple[float, FreeRunFit]:
+    """The first stages of a fit from the best of several starts, and its cost with channels believed to a tenth.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    starts : sequence of mappings
+    n_iterations : int
+        At most, per stage.
+    """
+    first, second, *_ = STAGES
+    best: tuple[float, FreeRunFit] | None = None
+    for start in starts:
+        fit, _ = fitted(problem, start, n_iterations=n_iterations, shares=(first,))
+        if not fit.trouble:
+            cost = soft_cost(problem, fit, first)
+            best = (cost, fit) if best is None or cost < best[0] else best
+    if best is None:
+        trouble = "does not run from any of its starts"
+        return np.inf, FreeRunFit(problem.candidates, dict(starts[0]), np.inf, np.inf, trouble=trouble)
+    fit, _ = fitted(problem, best[1].values, n_iterations=n_iterations, shares=(second,))
+    return soft_cost(problem, fit, second), fit
+
+
+def finished(problem: FreeRunProblem, fit: FreeRunFit, *, n_iterations: int = 6) -> FreeRunFit:
+    """The remaining stages of a fit that was begun."""
+    return fitted(problem, fit.values, n_iterations=n_iterations, shares=STAGES[2:])[0]
+
+
 def fitted_from(
     problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], *, n_iterations: int = 6
 ) -> FreeRunFit:
@@ -372,25 +417,17 @@ def fitted_from(
     n_iterations : int
         At most, per stage.
     """
-    first, *rest = STAGES
-    softness = problem.softness(first)
-    best: tuple[float, FreeRunFit] | None = None
-    for start in starts:
-        fit, _ = fitted(problem, start, n_iterations=n_iterations, shares=(first,))
-        if fit.trouble:
-            continue
-        residual = softness * problem.residual(problem.theta_of(fit.values))
-        cost = huber_cost(residual) + fit.cost - fit.misfit
-        if best is None or cost < best[0]:
-            best = (cost, fit)
-    if best is None:
-        return FreeRunFit(
-            problem.candidates, dict(starts[0]), np.inf, np.inf, trouble="does not run from any of its starts"
-        )
-    return fitted(problem, best[1].values, n_iterations=n_iterations, shares=rest)[0]
+    _, fit = begun(problem, starts, n_iterations=n_iterations)
+    return fit if fit.trouble else finished(problem, fit, n_iterations=n_iterations)
 
 
-def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple[FreeRunFit, FloatArray]:
+def soft_cost(problem: FreeRunProblem, fit: FreeRunFit, share: float) -> float:
+    """Cost of a fit if all channels were known only to a share of their RMS."""
+    residual = problem.residual(problem.theta_of(fit.values))
+    return huber_cost(problem.softness(share) * residual) + fit.cost - fit.misfit
+
+
+def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple[FreeRunFit, BlockJacobian]:
     """The best fit of the baseline's own parameters from several places that a laboratory would believe.
 
     Dry friction and stops give the cost side valleys, in which a retuned baseline would look worse than it is.
@@ -405,17 +442,21 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
     Returns
     -------
     fit : FreeRunFit
-    jacobian : ndarray, shape (n_residuals, n)
+    jacobian : BlockJacobian, shape (n_residuals, n)
     """
     best = fitted(problem, problem.model.believed, n_iterations=n_iterations)
     if problem.is_down_to_noise(best[0]):
         return best
-    softness = problem.softness(STAGES[1])
+    share = STAGES[1]
+    softness, reached = problem.softness(share), soft_cost(problem, best[0], share)
     draws = norm.ppf(qmc.Halton(problem.n_baseline, seed=0).random(_N_DRAWN))
     draws = np.clip(draws, -2.0, 2.0) * problem.moves
     costs = [huber_cost(softness * r) if np.isfinite(r).all() else np.inf for r in map(problem.residual, draws)]
     for place in np.argsort(costs)[:_N_REFINED]:
-        other = fitted(problem, problem.values(draws[place]), n_iterations=n_iterations, shares=STAGES[1:])
+        other = fitted(problem, problem.values(draws[place]), n_iterations=n_iterations, shares=(share,))
+        if other[0].trouble or soft_cost(problem, other[0], share) > _LEFT_BEHIND * reached:
+            continue
+        other = fitted(problem, other[0].values, n_iterations=n_iterations, shares=STAGES[2:])
         if not other[0].trouble and other[0].cost < best[0].cost:
             best = other
     return best
@@ -448,9 +489,16 @@ def _within(problem: FreeRunProblem, theta: FloatArray) -> FloatArray:
     return np.asarray(np.clip(theta, low, high))
 
 
-def _belongs(name: str, present: set[str], model: DiagnosedModel) -> bool:
-    """Whether a parameter matters to the runs that are fitted."""
+def run_of(name: str, model: DiagnosedModel) -> str:
+    """The run to which a parameter belongs alone; empty where it belongs to all.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter.
+    model : DiagnosedModel
+    """
     for run in model.runs:
         if name.endswith((f"release of {run.name}", f" in {run.name}")):
-            return run.name in present
-    return True
+            return run.name
+    return ""

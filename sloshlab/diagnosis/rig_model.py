@@ -23,7 +23,7 @@ from sloshlab.recording import channels
 from sloshlab.rig import Rig
 from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.recorded_run import Drive, drive_of
-from sloshlab.twin.simulated_channels import true_channel
+from sloshlab.twin.simulated_channels import ORDER_OF_DERIVATIVE, true_channel
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import save_twin
 from sloshlab.twin.structure import Structure
@@ -35,6 +35,9 @@ FloatArray = NDArray[np.float64]
 STEPS_PER_PERIOD: Final = 12.0
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _MOST_KEPT_RUNS: Final = 400
+_RELEASE: Final = "release of "
+_TOLERANCE_OF_SHAPE: Final = 0.01
+"""Of the value at the tip: where a sensor sits, and that a beam is not quite uniform."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +49,14 @@ class _Channels:
     recorded: Mapping[str, FloatArray]
     driving: Mapping[str, FloatArray]
     n_cells: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Truth:
+    """What perfect sensors show in a run, and motions of the modes, (n, n_modes), for those along a beam."""
+
+    channels: dict[str, FloatArray]
+    modes: dict[str, FloatArray]
 
 
 class RigModel:
@@ -70,9 +81,15 @@ class RigModel:
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}
-        self._truths: OrderedDict[tuple[Any, ...], dict[str, FloatArray]] = OrderedDict()
+        self._truths: OrderedDict[tuple[Any, ...], _Truth] = OrderedDict()
         self._lock = threading.Lock()
         self._channels = {run.name: self._channels_of(run) for run in self.runs}
+        n_modes = 0 if self.twin.structure is None else self.twin.structure.masses_kg.size
+        self._shapes = {
+            name: [f"shape of mode {k + 1} at {name}" for k in range(n_modes)]
+            for name in sorted({name for run in self.runs for name in self._channels[run.name].compared})
+            if name.partition("_")[2].startswith("beam")
+        }
         self.parameters = self._parameters()
 
     @property
@@ -147,20 +164,22 @@ class RigModel:
         """
         truth = self._truth(run, values, extension)
         rate = run.attributes.sampling_rate_hz
-        others, readings = {**self._channels[run.name].driving, **truth}, {}
-        for name, true in truth.items():
-            reading = true * values.get(f"gain of {name}", 1.0) * _relative_share(name, truth, values)
+        others, readings = {**self._channels[run.name].driving, **truth.channels}, {}
+        for name, true in truth.channels.items():
+            reading = true * values.get(f"gain of {name}", 1.0) * _relative_share(name, truth.channels, values)
+            if name in truth.modes:
+                reading = reading + truth.modes[name] @ [values.get(shape, 0.0) for shape in self._shapes[name]]
             for fault in extension.faults:
                 if fault.channel == name:
                     reading = fault.reading(reading, rate, others, self._channels[run.name].recorded[name])
             readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
         return readings
 
-    def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> dict[str, FloatArray]:
+    def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> _Truth:
         physical = tuple(
             values.get(parameter.name, parameter.believed)
             for parameter in self.parameters
-            if not parameter.is_reading
+            if not parameter.is_reading and parameter.name.removeprefix(_RELEASE) in (parameter.name, run.name)
         )
         undone = tuple(fault for fault in extension.faults if fault.channel in self.driving(run))
         others = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
@@ -170,11 +189,16 @@ class RigModel:
                 self._truths.move_to_end(key)
                 return self._truths[key]
         simulation = self._simulation(run, values, extension, undone)
-        known, truth = self._channels[run.name], {}
+        known, truth = self._channels[run.name], _Truth({}, {})
+        moving: dict[int, FloatArray] = {}
         for name in known.compared:
             found = true_channel(simulation, name, known.attributes[name], self.rig, n_cells=known.n_cells)
             if found is not None:
-                truth[name] = found
+                truth.channels[name] = found
+            if name in self._shapes:
+                order = ORDER_OF_DERIVATIVE[known.attributes[name]["quantity"]]
+                moving.setdefault(order, np.ascontiguousarray(simulation.modes[:, order]))
+                truth.modes[name] = moving[order]
         with self._lock:
             self._truths[key] = truth
             while len(self._truths) > _MOST_KEPT_RUNS:
@@ -187,7 +211,7 @@ class RigModel:
         drive = self._drive(run, tuple(undone))
         twin = self._varied(run, values, extension)
         rate = drive.excitation.sampling_rate_hz
-        start = values.get(f"release of {run.name}", drive.initial_displacement_m)
+        start = values.get(f"{_RELEASE}{run.name}", drive.initial_displacement_m)
         simulation = twin.simulate(
             drive.excitation, initial_displacement_m=start, n_substeps=steps_per_sample(twin, rate)
         )
@@ -264,10 +288,15 @@ class RigModel:
             BaselineParameter(f"share of {name}", 1 / len(cells), 0.3 / len(cells), is_reading=True)
             for name in cells[:-1]
         ]
+        found += [
+            BaselineParameter(shape, 0.0, _TOLERANCE_OF_SHAPE, is_reading=True)
+            for shapes in self._shapes.values()
+            for shape in shapes
+        ]
         for run in self.runs:
             if run.is_free:
                 start = self._drive(run, ()).initial_displacement_m
-                found.append(BaselineParameter(f"release of {run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
+                found.append(BaselineParameter(f"{_RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
             for name in self.compared(run):
                 if name.startswith("displacement"):
                     size = float(np.nanmax(np.abs(run.recording[name].values)))

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sloshlab.diagnosis.candidate import Candidate, known_effects
+from sloshlab.diagnosis.candidate import Candidate, channels_of, known_effects
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.mismatch import mismatches, summary
 
@@ -28,6 +28,8 @@ ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
+_NUMBERS_OF_THE_UNKNOWN: Final = 3
+"""What it would have if it had a name."""
 _UNITS: Final = (
     ("_n_s2_per_m2", "N s²/m²"),
     ("_n_s_per_m", "N s/m"),
@@ -88,32 +90,32 @@ def verdict_of(found: Findings) -> Verdict:
     ----------
     found : Findings
     """
-    ceiling = min([*found.ceilings, *found.explanations, found.retuned], key=lambda one: one.held_out)
-    unit = 2.0 * max(1.0, ceiling.held_out / max(found.n_held_out, 1))
-    named = _shortest_sufficient(found, unit)
-    best_gain = (found.retuned.held_out - ceiling.held_out) / unit
-    fit_gain = (
-        found.retuned.fit.cost - min(one.fit.cost for one in [*found.explanations, *found.ceilings, found.retuned])
-    ) / (2.0 * max(1.0, ceiling.fit.misfit / max(found.n_fitting, 1)))
-    probabilities = _probabilities(found, unit)
-    if best_gain < LEAST_GAIN or fit_gain < LEAST_GAIN or strength(found.retuned, ceiling) < LEAST_STRENGTH:
-        return Verdict(
-            "nothing_missing", None, [], best_gain, 1.0, _nothing(found), "", _certain(probabilities, "none")
-        )
-    gain = (found.retuned.held_out - named.held_out) / unit if named else 0.0
+    scale = _Scale.of(found)
+    described = [*found.explanations, *found.ceilings]
+    ceiling = min([*described, found.retuned], key=lambda one: one.held_out)
+    gain = scale.held_out_gain(found.retuned, ceiling)
+    fit_gain = max([scale.fit_gain(found.retuned, one) for one in described], default=0.0)
+    probabilities = _probabilities(found, scale)
+    if gain < LEAST_GAIN or fit_gain < LEAST_GAIN or strength(found.retuned, ceiling) < LEAST_STRENGTH:
+        certain = _certain(probabilities, "none")
+        return Verdict("nothing_missing", None, [], gain, 1.0, _nothing(found), "", certain)
+    named = _shortest_sufficient(found, scale)
     adequacy = named.held_out_rms / max(ceiling.held_out_rms, 1e-300) if named else np.inf
-    if named is None or gain < LEAST_GAIN or adequacy > ADEQUATE:
-        statement = _unknown(found, named)
-        return Verdict(
-            "unknown", named, [], best_gain, adequacy, statement, "", _certain(probabilities, "unknown")
-        )
-    alternatives = _alternatives(found, named, unit)
+    if (
+        named is None
+        or scale.held_out_gain(found.retuned, named) < LEAST_GAIN
+        or adequacy > ADEQUATE
+        or any(_is_clearly_better(one, named, scale) for one in described)
+    ):
+        certain = _certain(probabilities, "unknown")
+        return Verdict("unknown", named, [], gain, adequacy, _unknown(found, named), "", certain)
+    alternatives = _alternatives(found, named, scale)
     kind = "named" if len(alternatives) == 1 and not _has_equal(named) else "indistinguishable"
     return Verdict(
         kind,
         named,
         alternatives,
-        gain,
+        scale.held_out_gain(found.retuned, named),
         adequacy,
         _statement(found, named, alternatives, kind),
         _experiment(alternatives) if kind == "indistinguishable" else "",
@@ -121,20 +123,63 @@ def verdict_of(found: Findings) -> Verdict:
     )
 
 
-def _shortest_sufficient(found: Findings, unit: float) -> Explanation | None:
+@dataclass(frozen=True)
+class _Scale:
+    """Sums of squares as log-likelihoods: over twice the mean square that the best description leaves (≥ 1).
+
+    Attributes
+    ----------
+    fitting, held_out : float
+    per_number : float
+        What a number more must gain (Schwarz 1978, doi:10.1214/aos/1176344136).
+    """
+
+    fitting: float
+    held_out: float
+    per_number: float
+
+    @classmethod
+    def of(cls, found: Findings) -> _Scale:
+        described = [*found.explanations, *found.ceilings, found.retuned]
+        fitting = min(one.fit.misfit for one in described) / max(found.n_fitting, 1)
+        held_out = min(one.held_out for one in described) / max(found.n_held_out, 1)
+        n = max(found.n_fitting + found.n_held_out, 2)
+        return cls(2.0 * max(1.0, fitting), 2.0 * max(1.0, held_out), 0.5 * float(np.log(n)))
+
+    def fit_gain(self, before: Explanation, after: Explanation) -> float:
+        """Of the cost on the runs that are fitted."""
+        return (before.fit.cost - after.fit.cost) / self.fitting
+
+    def held_out_gain(self, before: Explanation, after: Explanation) -> float:
+        """On runs that chose nothing."""
+        return (before.held_out - after.held_out) / self.held_out
+
+    def evidence(self, one: Explanation) -> float:
+        """Log-likelihood of both, less what its numbers cost."""
+        likelihood = -one.fit.cost / self.fitting - one.held_out / self.held_out
+        return likelihood - self.per_number * one.n_numbers
+
+
+def _shortest_sufficient(found: Findings, scale: _Scale) -> Explanation | None:
     """The best single effect, unless two are better by more than chance."""
-    singles = [one for one in found.explanations if len(one.keys) == 1 and np.isfinite(one.held_out)]
-    pairs = [one for one in found.explanations if len(one.keys) == 2 and np.isfinite(one.held_out)]
+    known = [one for one in found.explanations if np.isfinite(one.held_out) and not one.rests_on_a_bound]
+    singles, pairs = ([one for one in known if len(one.keys) == n] for n in (1, 2))
     if not singles:
         return None
-    single = min(singles, key=lambda one: one.fit.cost + one.held_out)
+    single = max(singles, key=scale.evidence)
     if not pairs:
         return single
-    pair = min(pairs, key=lambda one: one.fit.cost + one.held_out)
-    better_held_out = (single.held_out - pair.held_out) / unit
-    better_fit = (single.fit.cost - pair.fit.cost) / (2 * max(1.0, pair.fit.misfit / max(found.n_fitting, 1)))
-    is_better = better_held_out > LEAST_MORE and better_fit > LEAST_MORE
-    return pair if is_better and strength(single, pair) >= LEAST_STRENGTH else single
+    pair = max(pairs, key=scale.evidence)
+    return pair if _is_clearly_better(pair, single, scale) else single
+
+
+def _is_clearly_better(more: Explanation, less: Explanation, scale: _Scale) -> bool:
+    """By more than chance on both kinds of runs, and by a size that is worth speaking of."""
+    return (
+        scale.held_out_gain(less, more) > LEAST_MORE
+        and scale.fit_gain(less, more) > LEAST_MORE
+        and strength(less, more) >= LEAST_STRENGTH
+    )
 
 
 def strength(before: Explanation, after: Explanation) -> float:
@@ -153,36 +198,46 @@ def strength(before: Explanation, after: Explanation) -> float:
     return float(np.sqrt(max([0.0, *removed])))
 
 
-def _alternatives(found: Findings, best: Explanation, unit: float) -> list[Explanation]:
+def _alternatives(found: Findings, best: Explanation, scale: _Scale) -> list[Explanation]:
     """Explanations of at most as many effects that are as good within chance, the best first."""
-    scale_fit = 2.0 * max(1.0, best.fit.misfit / max(found.n_fitting, 1))
     alike = [best]
-    seen = {best.names}
-    for one in sorted(found.explanations, key=lambda one: one.held_out):
-        if len(one.keys) > len(best.keys) or one.names in seen or not np.isfinite(one.held_out):
+    seen = {best.named_in_blocks}
+    for one in sorted(found.explanations, key=lambda one: -scale.evidence(one)):
+        if len(one.keys) > len(best.keys) or one.named_in_blocks in seen or not np.isfinite(one.held_out):
             continue
-        worse = (one.held_out - best.held_out) / unit + (one.fit.cost - best.fit.cost) / scale_fit
-        if worse < LEAST_SEPARATION:
+        if one.rests_on_a_bound or _includes(one, best):
+            continue
+        if scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION:
             alike.append(one)
-            seen.add(one.names)
+            seen.add(one.named_in_blocks)
     return alike
+
+
+def _includes(wider: Explanation, narrower: Explanation) -> bool:
+    """Whether every effect of the narrower is one of the wider, or a special case of one of them."""
+    held = {
+        f"{one.effect.block}.{name}"
+        for one in wider.fit.candidates
+        for name in (one.effect.name, *one.effect.includes)
+    }
+    return held >= set(narrower.named_in_blocks)
 
 
 def _has_equal(best: Explanation) -> bool:
     return bool(equals_of(best))
 
 
-def _probabilities(found: Findings, unit: float) -> dict[str, float]:
-    """Weights of the explanations by their held-out likelihood and their number of parameters."""
-    scores: dict[str, float] = {"none": -found.retuned.held_out / unit}
+def _probabilities(found: Findings, scale: _Scale) -> dict[str, float]:
+    """Weights of the explanations by their likelihood on held-out runs and their number of parameters."""
+    scores: dict[str, float] = {"none": -found.retuned.held_out / scale.held_out}
     for one in found.explanations:
-        if not np.isfinite(one.held_out):
-            continue
-        n = sum(len(candidate.effect.parameters) for candidate in one.fit.candidates)
-        label = " + ".join(one.names)
-        scores[label] = max(scores.get(label, -np.inf), -one.held_out / unit - n)
-    ceiling = min((one.held_out for one in found.ceilings), default=np.inf)
-    scores["unknown"] = -ceiling / unit - 12 if np.isfinite(ceiling) else -np.inf
+        if np.isfinite(one.held_out):
+            label = " + ".join(name.removesuffix("_60") for name in one.names)
+            score = -one.held_out / scale.held_out - scale.per_number * one.n_numbers
+            scores[label] = max(scores.get(label, -np.inf), score)
+    ceiling = min(found.ceilings, key=lambda one: one.held_out, default=None)
+    if ceiling is not None and np.isfinite(ceiling.held_out):
+        scores["unknown"] = -ceiling.held_out / scale.held_out - scale.per_number * _NUMBERS_OF_THE_UNKNOWN
     top = max(scores.values())
     weights = {name: float(np.exp(max(score - top, -700.0))) for name, score in scores.items()}
     total = sum(weights.values())
@@ -211,7 +266,7 @@ def _unknown(found: Findings, named: Explanation | None, block: str = "") -> str
 
 def where_of(found: Findings) -> str:
     """The block whose correction helps most."""
-    options = [*found.ceilings, *[one for one in found.explanations if len(one.keys) == 1]]
+    options = [one for one in (*found.ceilings, *found.explanations) if len(one.keys) == 1]
     best = min(options, key=lambda one: one.held_out, default=None)
     return best.fit.candidates[0].effect.block if best else "structure"
 
@@ -269,7 +324,8 @@ def equals_of(best: Explanation) -> list[tuple[str, ...]]:
 
 def _described(best: Explanation, candidate: Candidate) -> str:
     name = candidate.effect.name.removesuffix("_60").replace("_", " ")
-    place = f" of {candidate.channel}" if candidate.channel else f" in the {candidate.effect.block}"
+    place = candidate.channel.replace("+", " and ").replace("<", " from ")
+    place = f" of {place}" if place else f" in the {candidate.effect.block}"
     numbers = []
     for parameter in candidate.effect.parameters:
         words, units = named_and_units(parameter.name)
@@ -326,8 +382,7 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
         "format": 1,
         "verdict": verdict.kind,
         "effects": _effects(found, verdict),
-        "alternatives": [list(one.names) for one in verdict.alternatives]
-        + [list(names) for one in verdict.alternatives for names in equals_of(one)],
+        "alternatives": _names_of_alternatives(verdict),
         "probabilities": verdict.probabilities,
         "separating_experiment": verdict.separating_experiment,
         "statement": verdict.statement,
@@ -344,6 +399,13 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
         "limits": list(found.split.limits),
         "failed": found.failed,
     }
+
+
+def _names_of_alternatives(verdict: Verdict) -> list[list[str]]:
+    """Every set of names once; an effect may be in it in two blocks, or with two lines of the mains."""
+    sets = [one.names for one in verdict.alternatives]
+    sets += [names for one in verdict.alternatives for names in equals_of(one)]
+    return [list(one) for one in dict.fromkeys(tuple(name.removesuffix("_60") for name in each) for each in sets)]
 
 
 def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
@@ -371,7 +433,7 @@ def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
                 "name": name,
                 "block": candidate.effect.block,
                 "parameters": parameters,
-                "where": _where(found, (candidate.channel,) if candidate.channel else ()),
+                "where": _where(found, channels_of(candidate.channel) if candidate.channel else ()),
             }
         )
     return described

@@ -78,6 +78,11 @@ def shapes_at(described: Structure, x_m: npt.ArrayLike) -> FloatArray:
     RigError
         If the file has no dimensions, or a place is not on the beam.
     """
+    return _shapes_at(described, tuple(np.atleast_1d(np.asarray(x_m, np.float64)).tolist())).copy()
+
+
+@lru_cache(maxsize=256)
+def _shapes_at(described: Structure, x_m: tuple[float, ...]) -> FloatArray:
     beam = beam_of_rig(described)
     if beam is None:
         raise RigError(

@@ -28,7 +28,7 @@ LIQUID_FORCE: Final = "force_liquid"
 
 _TANK_PLACES = ("tank", "tip", "roof", "control", "mean")
 _KEPT = ("block_from", "block_to", "x_m")
-_ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
+ORDER_OF_DERIVATIVE: Final = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +103,9 @@ def true_channel(
     quantity, _, place = name.partition("_")
     if quantity == "force":
         return _force(simulation, place, attributes, n_cells)
-    if quantity not in _ORDER:
+    if quantity not in ORDER_OF_DERIVATIVE:
         return None
-    order = _ORDER[quantity]
+    order = ORDER_OF_DERIVATIVE[quantity]
     along = attributes.get("x_m")
     has_structure = simulation.twin.structure is not None
     if place.startswith("root") or along == 0.0 or (place.startswith("control") and has_structure):

@@ -27,6 +27,7 @@ def force_effect(
     separated_by: str = "",
     needs: Callable[[Surroundings], bool] | None = None,
     spoken_for_by: tuple[str, ...] = (),
+    includes: tuple[str, ...] = (),
 ) -> Effect:
     """Register a force of the twin as an effect.
 
@@ -44,7 +45,7 @@ def force_effect(
         That of the kind by default.
     bounds : mapping, optional
         Narrower ones than those of the kind.
-    look_alikes, separated_by, needs, spoken_for_by
+    look_alikes, separated_by, needs, spoken_for_by, includes
         As of `Effect`.
 
     Examples
@@ -77,5 +78,6 @@ def force_effect(
             separated_by,
             needs or (has_structure if block == "structure" else lambda surroundings: True),
             spoken_for_by=spoken_for_by,
+            includes=includes,
         )
     )

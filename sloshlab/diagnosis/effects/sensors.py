@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter, zoom_fft
 
-from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
+from sloshlab.diagnosis.candidate import (
+    Effect,
+    EffectParameter,
+    Numbers,
+    Surroundings,
+    channels_of,
+    register,
+    together,
+)
 from sloshlab.diagnosis.extension import Extension, Reading, SensorFault
 
 FloatArray = NDArray[np.float64]
@@ -18,8 +26,10 @@ _MAINS_HZ: Final = 0.2
 _MOST_PAIRS: Final = 20
 
 
-def _all_channels(at: Surroundings) -> list[str]:
-    return list(at.channels)
+def _channels_and_devices(at: Surroundings) -> list[str]:
+    """Every channel, and the force cells together: they share an amplifier and a clock."""
+    cells = [name for name in at.channels if name.startswith("force_cell")]
+    return [*at.channels, *([together(cells)] if len(cells) > 1 else [])]
 
 
 def _compared_channels(at: Surroundings) -> list[str]:
@@ -43,9 +53,12 @@ def _sensor_effect(
 ) -> Effect:
     def extension(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         del at
-        key = (f"sensor.{name}.{channel}", *sorted(numbers.items()))
+        read, back = reading(numbers), None if undone is None else undone(numbers)
         return Extension(
-            faults=(SensorFault(channel, reading(numbers), None if undone is None else undone(numbers), key),)
+            faults=tuple(
+                SensorFault(one, read, back, (f"sensor.{name}.{channel}", one, *sorted(numbers.items())))
+                for one in channels_of(channel)
+            )
         )
 
     return register(
@@ -58,7 +71,7 @@ def _sensor_effect(
             extension,
             look_alikes,
             separated_by,
-            places=places or (_compared_channels if undone is None else _all_channels),
+            places=places or (_compared_channels if undone is None else lambda at: list(at.channels)),
             spoken_for_by=spoken_for_by,
         )
     )
@@ -80,6 +93,7 @@ GAIN = _sensor_effect(
     _scaled(lambda numbers: 1 / (1 + numbers["ratio"])),
     look_alikes=("mass_error",),
     spoken_for_by=("one channel alone", "proportional to the reading"),
+    places=_channels_and_devices,
 )
 
 
@@ -116,6 +130,7 @@ DELAY = _sensor_effect(
     _shifted(-1.0),
     look_alikes=("viscous_damping", "sensor_high_pass"),
     spoken_for_by=("one channel alone", "follows its rate"),
+    places=_channels_and_devices,
 )
 
 
@@ -151,6 +166,7 @@ HIGH_PASS = _sensor_effect(
     _integrated_back,
     look_alikes=("sensor_delay",),
     spoken_for_by=("one channel alone", "follows its integral"),
+    places=_channels_and_devices,
 )
 
 
@@ -260,6 +276,7 @@ CLOCK = _sensor_effect(
     _stretched(-1.0),
     look_alikes=("sensor_delay",),
     spoken_for_by=("one channel alone", "rate growing along the run"),
+    places=_channels_and_devices,
 )
 
 

@@ -20,6 +20,8 @@ from sloshlab.twin.structure_forces import (
     VISCOUS_DAMPING,
 )
 
+MOST_DAMPING_OF_A_MODE = 0.2
+"""Ratio to the critical one; what is damped more is no resonance but relaxes, and is no mode."""
 _OTHER_LEVELS = "decays or sweeps at two or more amplitudes"
 
 
@@ -77,6 +79,7 @@ ASYMMETRIC = force_effect(
         "no onset",
         "constant part",
     ),
+    includes=("coulomb_friction", "constant_force"),
 )
 STRIBECK = force_effect(
     STRIBECK_FRICTION,
@@ -92,6 +95,7 @@ STRIBECK = force_effect(
     look_alikes=("coulomb_friction",),
     separated_by="slow motion about the Stribeck velocity",
     spoken_for_by=("takes energy", "odd in velocity", "function of the state", "no onset", "third order"),
+    includes=("coulomb_friction",),
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,
@@ -139,6 +143,7 @@ BOUC_WEN = force_effect(
     look_alikes=("coulomb_friction", "structural_damping"),
     separated_by="slow loops of several amplitudes",
     spoken_for_by=("takes energy", "memory", "rate-independent"),
+    includes=("coulomb_friction", "stiffness_change"),
 )
 CUBIC = force_effect(
     CUBIC_STIFFNESS,
@@ -174,6 +179,7 @@ GAP = force_effect(
     look_alikes=("cubic_stiffness",),
     separated_by="amplitudes just below and above the gap",
     spoken_for_by=("does no work", "odd in displacement", "function of the state", "onset", "third order"),
+    includes=("stiffness_change",),
 )
 MODE = force_effect(
     MISSING_MODE,
@@ -186,9 +192,11 @@ MODE = force_effect(
         }
         for ratio in (0.6, 1.6, 2.5, 4.0)
     ],
+    bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("mass_error", "stiffness_change"),
     separated_by="a sweep over the missing mode's frequency",
     spoken_for_by=("memory",),
+    includes=("mass_error", "stiffness_change", "viscous_damping"),
 )
 MASS = force_effect(
     MASS_ERROR,

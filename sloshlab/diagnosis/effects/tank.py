@@ -231,6 +231,7 @@ LATERAL = force_effect(
     look_alikes=("missing_mode",),
     separated_by="a slow sweep over its frequency at small amplitude",
     spoken_for_by=("memory",),
+    includes=("mass_error", "effective_mass"),
 )
 FARADAY = force_effect(
     FARADAY_WAVE,

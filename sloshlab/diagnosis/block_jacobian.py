@@ -1,0 +1,109 @@
+"""Derivatives of residuals, in blocks of one channel of one run: most numbers touch only a few of them.
+
+A gain is seen by its own channel, a release by its own run; what a block does not see is neither kept nor
+multiplied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    rows: slice
+    columns: NDArray[np.intp]
+    values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class BlockJacobian:
+    """A matrix of derivatives, shape (sum of the sizes of the blocks, n_columns).
+
+    Attributes
+    ----------
+    n_columns : int
+    blocks : tuple
+        With the columns that are not zero throughout.
+    """
+
+    n_columns: int
+    blocks: tuple[_Block, ...]
+
+    @classmethod
+    def of_columns(cls, columns: Sequence[FloatArray], sizes: Sequence[int]) -> BlockJacobian:
+        """From dense columns.
+
+        Parameters
+        ----------
+        columns : sequence of ndarray, shape (sum of sizes,)
+        sizes : sequence of int
+            Rows of each block.
+        """
+        blocks, first = [], 0
+        for size in sizes:
+            rows = slice(first, first + size)
+            seen = [i for i, column in enumerate(columns) if column[rows].any()]
+            values = np.column_stack([columns[i][rows] for i in seen]) if seen else np.zeros((size, 0))
+            blocks.append(_Block(rows, np.array(seen, np.intp), np.ascontiguousarray(values)))
+            first += size
+        return cls(len(columns), tuple(blocks))
+
+    def weighted(self, weights: FloatArray) -> BlockJacobian:
+        """Every row times its weight."""
+        return BlockJacobian(
+            self.n_columns,
+            tuple(replace(one, values=one.values * weights[one.rows, None]) for one in self.blocks),
+        )
+
+    def normal(self) -> FloatArray:
+        """Jᵀ J, shape (n_columns, n_columns)."""
+        found = np.zeros((self.n_columns, self.n_columns))
+        for one in self.blocks:
+            found[np.ix_(one.columns, one.columns)] += one.values.T @ one.values
+        return found
+
+    def transposed_times(self, vector: FloatArray) -> FloatArray:
+        """Jᵀ r, shape (n_columns,)."""
+        found = np.zeros(self.n_columns)
+        for one in self.blocks:
+            found[one.columns] += one.values.T @ vector[one.rows]
+        return found
+
+    def times(self, vector: FloatArray) -> FloatArray:
+        """J s, one value per row."""
+        return np.concatenate([one.values @ vector[one.columns] for one in self.blocks] or [np.zeros(0)])
+
+    def correct(self, step: FloatArray, change: FloatArray) -> None:
+        """The least change after which the matrix says of a step what was seen, zeros kept; in place.
+
+        Parameters
+        ----------
+        step : ndarray, shape (n_columns,)
+        change : ndarray
+            Of the residuals by the step.
+
+        Notes
+        -----
+        Broyden (1965), doi:10.1090/S0025-5718-1965-0198670-6; with a pattern of zeros, Schubert (1970),
+        doi:10.1090/S0025-5718-1970-0258276-9.
+
+        Examples
+        --------
+        >>> found = BlockJacobian.of_columns([np.array([2.0, 0.0]), np.array([1.0, 3.0])], [1, 1])
+        >>> found.correct(np.array([1.0, 1.0]), np.array([5.0, 4.0]))
+        >>> found.times(np.array([1.0, 1.0])).tolist(), found.times(np.array([1.0, 0.0])).tolist()
+        ([5.0, 4.0], [3.0, 0.0])
+        """
+        for one in self.blocks:
+            own = step[one.columns]
+            length = float(own @ own)
+            if length > 0:
+                missed = change[one.rows] - one.values @ own
+                one.values[...] += np.multiply.outer(missed, own / length)
