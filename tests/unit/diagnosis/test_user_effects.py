@@ -25,9 +25,7 @@ from sloshlab.errors import InputError
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "adding_an_effect.md"
 EXAMPLES = dict(
-    re.findall(
-        r"^`([\w.]+\.py)`:\n\n```py\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
-    )
+    re.findall(r"^`([\w.]+\.py)`:\n\n```py\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 )
 
 

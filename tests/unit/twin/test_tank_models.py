@@ -14,7 +14,7 @@ import xarray as xr
 
 from sloshlab.errors import RigError
 from sloshlab.rig import Rig
-from sloshlab.twin import liquid_effects, rate_independent_forces, tank_models
+from sloshlab.twin import rate_independent_forces, tank_models
 from sloshlab.twin.excitation import free, harmonic, stepped_sine
 from sloshlab.twin.law import VELOCITY, law
 from sloshlab.twin.structure import single_degree_of_freedom
