@@ -238,7 +238,7 @@ def _evidence(examination: Examination, found: Findings) -> dict[str, Any]:
     told = {}
     for candidate in effects.values():
         on = examination.evidence_on(candidate.effect)
-        told[f"{candidate.effect.block}.{candidate.effect.name}"] = {
+        told[f"{candidate.effect.block}.{candidate.effect.name.removesuffix('_60')}"] = {
             "for": list(on.speaks_for),
             "against": list(on.speaks_against),
             "open": list(on.still_open),

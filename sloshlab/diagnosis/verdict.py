@@ -260,7 +260,8 @@ def _nothing(found: Findings) -> str:
 
 def _unknown(found: Findings, named: Explanation | None, block: str = "") -> str:
     where = block or where_of(found)
-    closest = f"; the nearest known effect is {' + '.join(named.keys)}" if named else ""
+    nearest = " and ".join(_named_and_placed(one) for one in named.fit.candidates) if named else ""
+    closest = f"; the nearest known effect is {nearest}" if nearest else ""
     return f"Something is missing that has no name here, most likely in the {where}{closest}."
 
 
@@ -323,9 +324,6 @@ def equals_of(best: Explanation) -> list[tuple[str, ...]]:
 
 
 def _described(best: Explanation, candidate: Candidate) -> str:
-    name = candidate.effect.name.removesuffix("_60").replace("_", " ")
-    place = candidate.channel.replace("+", " and ").replace("<", " from ")
-    place = f" of {place}" if place else f" in the {candidate.effect.block}"
     numbers = []
     for parameter in candidate.effect.parameters:
         words, units = named_and_units(parameter.name)
@@ -334,7 +332,14 @@ def _described(best: Explanation, candidate: Candidate) -> str:
         )
         label = f"{words} " if len(candidate.effect.parameters) > 1 else ""
         numbers.append(f"{label}{estimate}{units and ' ' + units} ({low} to {high})")
-    return f"{name}{place}, {', '.join(numbers)}"
+    return f"{_named_and_placed(candidate)}, {', '.join(numbers)}"
+
+
+def _named_and_placed(candidate: Candidate) -> str:
+    """Words for an effect and for where it acts."""
+    name = candidate.effect.name.removesuffix("_60").replace("_", " ")
+    place = candidate.channel.replace("+", " and ").replace("<", " from ")
+    return f"{name} of {place}" if place else f"{name} in the {candidate.effect.block}"
 
 
 def named_and_units(parameter: str) -> tuple[str, str]:
@@ -397,7 +402,7 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
             "heldout_runs": [run.name for run in found.split.held_out],
         },
         "limits": list(found.split.limits),
-        "failed": found.failed,
+        "failed": {key.replace("mains_hum_60", "mains_hum"): why for key, why in found.failed.items()},
     }
 
 
