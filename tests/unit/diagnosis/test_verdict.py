@@ -1,0 +1,309 @@
+"""What a verdict makes of findings whose costs were written by hand, in units of the log-likelihood."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from math import log
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from recorded_oscillators import effect
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, Surroundings
+from sloshlab.diagnosis.case import Case
+from sloshlab.diagnosis.examination import Examination, examination_facts
+from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.force_surface import surface_effect
+from sloshlab.diagnosis.free_run_fit import FreeRunFit
+from sloshlab.diagnosis.split import Split
+from sloshlab.diagnosis.verdict import Verdict, verdict_facts, verdict_of, with_place
+
+assert effects.__all__
+N = 10_000
+"""Coefficients of the fitted runs, and of the held-out ones."""
+PER_NUMBER = 0.5 * log(2 * N)
+FRICTION = {"structure.coulomb_friction.force_n": 0.37}
+STRIBECK = {
+    "structure.stribeck_friction.coulomb_n": 0.3,
+    "structure.stribeck_friction.static_n": 0.5,
+    "structure.stribeck_friction.stribeck_velocity_m_per_s": 0.02,
+}
+DRAG = {"structure.quadratic_drag.drag_n_s2_per_m2": 0.8}
+OFFSET = {"structure.constant_force.force_n": -0.2}
+BOTH_SIDES = {
+    "structure.asymmetric_friction.force_up_n": 0.5,
+    "structure.asymmetric_friction.force_down_n": 0.2,
+}
+HUM = {"sensor.mains_hum_60.acceleration_tip.amplitude": 0.25}
+NOISE = 1.0
+
+
+class HandMade(Findings):
+    """Findings without recordings."""
+
+    @property
+    def n_fitting(self) -> int:
+        return N
+
+    @property
+    def n_held_out(self) -> int:
+        return N
+
+    def readings(self, explanation: Explanation) -> dict[str, Any]:
+        return {}
+
+
+def candidates_of(values: Mapping[str, float]) -> tuple[Candidate, ...]:
+    """Those whose numbers these are, ``block.name[.channel].parameter``."""
+    found = []
+    for key in dict.fromkeys(name.rpartition(".")[0] for name in values):
+        block, name, *channel = key.split(".", 2)
+        found.append(Candidate(effect(f"{block}.{name}"), cast(Surroundings, None), *channel))
+    return tuple(found)
+
+
+def left(
+    fitted: float,
+    held_out: float,
+    values: Mapping[str, float] | None = None,
+    *,
+    squares: float | None = None,
+    rms: float = NOISE,
+    surface: str = "",
+) -> Explanation:
+    """What leaves so much log-likelihood of the fitted and of the held-out runs unexplained.
+
+    `squares` is the mean square of the one channel; of ten noise floors for the baseline, one for the rest.
+    """
+    candidates = (Candidate(surface_effect(surface), cast(Surroundings, None)),) if surface else ()
+    candidates += candidates_of(values or {})
+    names = tuple(values or {})
+    cost = N + 2 * fitted
+    fit = FreeRunFit(
+        candidates, dict(values or {}), cost, cost, 1e-4 * np.eye(len(names)), names, np.ones(len(names))
+    )
+    squares = squares if squares is not None else NOISE if candidates else 10.0
+    return Explanation(fit, N + 2 * held_out, rms, {"acceleration_tip": squares})
+
+
+def findings(
+    retuned: Explanation,
+    explanations: Sequence[Explanation] = (),
+    ceilings: Sequence[Explanation] = (),
+    failed: Mapping[str, str] | None = None,
+) -> Findings:
+    return HandMade(
+        cast(Case, None), cast(Any, None), Split((), (), ()), cast(Surroundings, None), [], [],
+        left(9e4, 9e4), retuned, list(explanations), list(ceilings), dict(failed or {}), {},
+    )  # fmt: skip
+
+
+def judged(*parts: Any, **more: Any) -> Verdict:
+    return verdict_of(findings(*parts, **more))
+
+
+def names(verdict: Verdict) -> list[tuple[str, ...]]:
+    return [one.names for one in verdict.alternatives]
+
+
+BASELINE = left(500.0, 500.0)
+ANY_FORCE = left(0.0, 0.0, surface="structure")
+
+
+@pytest.mark.parametrize(
+    ("baseline", "kind"),
+    [
+        pytest.param(left(12.2, 12.2), "named", id="just enough"),
+        pytest.param(left(500.0, 11.8), "nothing_missing", id="held-out runs do not ask for it"),
+        pytest.param(left(11.8, 500.0), "nothing_missing", id="fitted runs do not ask for it"),
+        pytest.param(left(500.0, 500.0, squares=1.24), "nothing_missing", id="less than half a noise floor"),
+        pytest.param(left(500.0, 500.0, squares=1.26), "named", id="half a noise floor"),
+    ],
+)
+def test_something_is_missing_where_both_kinds_of_runs_ask_for_it_and_it_is_worth_a_word(
+    baseline: Explanation, kind: str
+) -> None:
+    verdict = judged(baseline, [left(0.0, 0.0, FRICTION)])
+    assert verdict.kind == kind
+    assert (verdict.best is None) == (kind == "nothing_missing")
+
+
+def test_gains_count_in_units_of_what_the_best_description_leaves() -> None:
+    """Four times the noise is left by the best: gains of 12 units of noise are three of these."""
+    friction = left(1.5 * N, 1.5 * N, FRICTION, squares=4.0)
+    baseline = left(1.5 * N + 40.0, 1.5 * N + 40.0)
+    assert judged(baseline, [friction]).kind == "nothing_missing"
+    baseline = left(1.5 * N + 50.0, 1.5 * N + 50.0)
+    assert judged(baseline, [friction]).kind == "named"
+    assert judged(baseline, [friction]).gain == pytest.approx(12.5)
+
+
+@pytest.mark.parametrize("better", [0.0, 0.9 * PER_NUMBER])
+def test_friction_of_one_number_is_named_before_friction_of_three(better: float) -> None:
+    """Stribeck's two numbers more must gain log √n each, over all runs; what includes another is no rival."""
+    verdict = judged(BASELINE, [left(0.0, 0.0, STRIBECK), left(better, better, FRICTION)])
+    assert verdict.kind == "named"
+    assert names(verdict) == [("coulomb_friction",)]
+
+
+def test_friction_of_three_numbers_is_named_where_it_is_better_by_more() -> None:
+    verdict = judged(BASELINE, [left(20.0, 20.0, FRICTION), left(0.0, 0.0, STRIBECK)])
+    assert (verdict.kind, names(verdict)) == ("named", [("stribeck_friction",)])
+
+
+def test_a_wider_effect_does_not_make_a_narrower_one_doubtful_but_a_stranger_does() -> None:
+    """Within six of the best after what its numbers cost: Stribeck's is friction too, drag is not."""
+    nearly = [left(0.0, 0.0, STRIBECK), left(4.0, 4.0, FRICTION)]
+    assert names(judged(BASELINE, nearly)) == [("coulomb_friction",)]
+    verdict = judged(BASELINE, [*nearly, left(6.0, 6.0, DRAG)])
+    assert verdict.kind == "indistinguishable"
+    assert names(verdict) == [("coulomb_friction",), ("quadratic_drag",)]
+    assert "decays or sweeps at two or more amplitudes" in verdict.separating_experiment
+    assert "cannot be told from quadratic drag" in verdict.statement
+
+
+@pytest.mark.parametrize(("behind", "kind"), [(2.9, "indistinguishable"), (3.1, "named")])
+def test_another_explanation_is_as_good_within_six(behind: float, kind: str) -> None:
+    assert judged(BASELINE, [left(0.0, 0.0, FRICTION), left(behind, behind, DRAG)]).kind == kind
+
+
+def test_one_name_in_two_blocks_is_two_explanations() -> None:
+    damper = [{f"{block}.viscous_damping.damping_n_s_per_m": 0.6} for block in ("structure", "tank")]
+    found = findings(BASELINE, [left(0.0, 0.0, damper[0]), left(1.0, 1.0, damper[1])])
+    verdict = verdict_of(found)
+    assert verdict.kind == "indistinguishable"
+    assert [one.named_in_blocks for one in verdict.alternatives] == [
+        ("structure.viscous_damping",),
+        ("tank.viscous_damping",),
+    ]
+    assert verdict_facts(found, verdict)["alternatives"] == [["viscous_damping"]]
+
+
+def test_the_same_effect_on_another_channel_is_no_other_explanation() -> None:
+    gains = [{f"sensor.sensor_gain.{name}.ratio": -0.06} for name in ("acceleration_tip", "force_interface")]
+    verdict = judged(BASELINE, [left(0.0, 0.0, gains[0]), left(1.0, 1.0, gains[1])])
+    assert (verdict.kind, len(verdict.alternatives)) == ("named", 1)
+
+
+def test_the_same_force_under_another_name_is_always_listed() -> None:
+    found = findings(BASELINE, [left(0.0, 0.0, BOTH_SIDES), left(300.0, 300.0, FRICTION)])
+    verdict = verdict_of(found)
+    assert verdict.kind == "indistinguishable"
+    assert verdict_facts(found, verdict)["alternatives"] == [
+        ["asymmetric_friction"],
+        ["constant_force", "coulomb_friction"],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("friction", "kind"),
+    [
+        pytest.param(left(40.0, 40.0, FRICTION, squares=1.5), "unknown", id="clearly better"),
+        pytest.param(left(40.0, 40.0, FRICTION, squares=1.2), "named", id="by too little to speak of"),
+        pytest.param(left(11.0, 40.0, FRICTION, squares=1.5), "named", id="on held-out runs alone"),
+        pytest.param(left(40.0, 11.0, FRICTION, squares=1.5), "named", id="on fitted runs alone"),
+        pytest.param(left(5.0, 5.0, FRICTION, rms=1.14), "named", id="within fifteen per cent"),
+        pytest.param(left(5.0, 5.0, FRICTION, rms=1.16), "unknown", id="not adequate"),
+        pytest.param(left(5.0, 489.0, FRICTION), "unknown", id="without a gain of its own"),
+    ],
+)
+def test_a_nameless_description_that_is_clearly_better_leaves_the_name_unknown(
+    friction: Explanation, kind: str
+) -> None:
+    verdict = judged(BASELINE, [friction], [ANY_FORCE])
+    assert verdict.kind == kind
+    if kind == "unknown":
+        assert verdict.alternatives == []
+        assert verdict.best is friction
+        assert verdict.probabilities["unknown"] > 0.5
+
+
+def test_what_has_no_name_at_all_is_unknown_in_the_block_that_a_force_helps() -> None:
+    found = findings(BASELINE, [], [ANY_FORCE, left(-5.0, -5.0, surface="tank")])
+    verdict = verdict_of(found)
+    assert (verdict.kind, verdict.best) == ("unknown", None)
+    assert "most likely in the tank" in verdict.statement
+    [told] = verdict_facts(found, verdict)["effects"]
+    assert (told["name"], told["block"], told["parameters"]) == ("unknown", "tank", {})
+    placed = with_place(found, verdict, "seen below 2 g", "structure")
+    assert (
+        placed.statement
+        == "Something is missing that has no name here, most likely in the structure; seen below 2 g."
+    )
+    assert verdict_facts(found, placed)["effects"][0]["block"] == "structure"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "names_"), [(0.2, [("quadratic_drag",)]), (0.19, [("missing_mode",)])], ids=["at a bound", "inside"]
+)
+def test_a_number_at_its_bound_is_no_name(ratio: float, names_: list[tuple[str, ...]]) -> None:
+    """A mode that is damped as much as a mode may be is none."""
+    mode = {f"structure.missing_mode.{name}": value for name, value in
+            (("frequency_hz", 9.0), ("damping_ratio", ratio), ("participation", 0.1))}  # fmt: skip
+    verdict = judged(BASELINE, [left(0.0, 0.0, mode), left(10.0, 10.0, DRAG)])
+    assert names(verdict) == names_
+
+
+def test_a_bound_of_zero_is_a_size_like_others() -> None:
+    assert not left(0.0, 0.0, {"structure.viscous_damping.damping_n_s_per_m": 0.0}).rests_on_a_bound
+    assert left(0.0, 0.0, {"structure.viscous_damping.damping_n_s_per_m": 1e4}).rests_on_a_bound
+
+
+@pytest.mark.parametrize(
+    ("friction", "named"),
+    [
+        pytest.param(left(13.0, 13.0, FRICTION, squares=1.5), 2, id="better"),
+        pytest.param(left(11.0, 13.0, FRICTION, squares=1.5), 1, id="not on fitted runs"),
+        pytest.param(left(13.0, 11.0, FRICTION, squares=1.5), 1, id="not on held-out runs"),
+        pytest.param(left(13.0, 13.0, FRICTION, squares=1.2), 1, id="too little to speak of"),
+    ],
+)
+def test_two_effects_are_named_where_the_second_is_worth_it(friction: Explanation, named: int) -> None:
+    verdict = judged(BASELINE, [friction, left(0.0, 0.0, {**FRICTION, **HUM})])
+    assert verdict.best is not None
+    assert len(verdict.best.keys) == named
+
+
+def test_an_explanation_that_does_not_run_on_held_out_runs_is_none() -> None:
+    broken = Explanation(left(0.0, 0.0, DRAG).fit, np.inf, np.inf)
+    verdict = judged(BASELINE, [broken, left(1.0, 1.0, FRICTION)])
+    assert names(verdict) == [("coulomb_friction",)]
+    assert "quadratic_drag" not in verdict.probabilities
+
+
+def test_two_lines_of_the_mains_are_one_name_for_programs() -> None:
+    """Whatever the verdict: what is tried at 50 and at 60 Hz is called mains_hum in every place."""
+    cell = "sensor.mains_hum_60.force_interface"
+    for ceilings, kind in (([], "named"), ([left(-500.0, -500.0, surface="structure", squares=0.1)], "unknown")):
+        found = findings(BASELINE, [left(0.0, 0.0, HUM, squares=1.5)], ceilings, {cell: "does not run"})
+        verdict = verdict_of(found)
+        assert verdict.kind == kind
+        examination = Examination(None, {}, (), [], {"channels": ["acceleration_tip"]})
+        facts = {**verdict_facts(found, verdict), **examination_facts(examination, found)}
+        assert "mains_hum_60" not in json.dumps(facts)
+        assert facts["failed"] == {"sensor.mains_hum.force_interface": "does not run"}
+        assert "mains hum of acceleration_tip" in facts["statement"]
+        assert max(facts["probabilities"], key=facts["probabilities"].get) in ("mains_hum", "unknown")
+
+
+def test_probabilities_sum_to_one_and_follow_the_held_out_runs() -> None:
+    """Ratio of two explanations of one number each: exp of the difference of their log-likelihoods."""
+    verdict = judged(BASELINE, [left(0.0, 0.0, FRICTION), left(0.0, 2.0, DRAG)], [left(0.0, -5.0, surface="tank")])
+    shares = verdict.probabilities
+    assert sum(shares.values()) == pytest.approx(1.0, abs=1e-3)
+    assert shares["coulomb_friction"] / shares["quadratic_drag"] == pytest.approx(np.exp(2.0))
+    assert shares["coulomb_friction"] / shares["unknown"] == pytest.approx(np.exp(2 * PER_NUMBER - 5.0))
+
+
+def test_intervals_are_ninety_per_cent_wide_and_wider_where_the_fit_leaves_more() -> None:
+    """Standard error 0.01: 0.37 ± 1.645 × 0.01 at the noise floor, twice that at two noise floors."""
+    for rms, width in ((0.9, 0.016449), (2.0, 0.032897)):
+        found = findings(BASELINE, [left(0.0, 0.0, FRICTION, rms=rms)])
+        [told] = verdict_facts(found, verdict_of(found))["effects"]
+        force = told["parameters"]["force_n"]
+        assert (force["estimate"], force["level"]) == (0.37, 0.9)
+        assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
+        assert 0.37 - force["low"] == pytest.approx(width, rel=1e-4)
