@@ -260,7 +260,7 @@ def _nothing(found: Findings) -> str:
 
 def _unknown(found: Findings, named: Explanation | None, block: str = "") -> str:
     where = block or where_of(found)
-    nearest = " and ".join(_named_and_placed(one) for one in named.fit.candidates) if named else ""
+    nearest = " and ".join(named_and_placed(one) for one in named.fit.candidates) if named else ""
     closest = f"; the nearest known effect is {nearest}" if nearest else ""
     return f"Something is missing that has no name here, most likely in the {where}{closest}."
 
@@ -332,11 +332,16 @@ def _described(best: Explanation, candidate: Candidate) -> str:
         )
         label = f"{words} " if len(candidate.effect.parameters) > 1 else ""
         numbers.append(f"{label}{estimate}{units and ' ' + units} ({low} to {high})")
-    return f"{_named_and_placed(candidate)}, {', '.join(numbers)}"
+    return f"{named_and_placed(candidate)}, {', '.join(numbers)}"
 
 
-def _named_and_placed(candidate: Candidate) -> str:
-    """Words for an effect and for where it acts."""
+def named_and_placed(candidate: Candidate) -> str:
+    """Words for an effect and for where it acts.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    """
     name = candidate.effect.name.removesuffix("_60").replace("_", " ")
     place = candidate.channel.replace("+", " and ").replace("<", " from ")
     return f"{name} of {place}" if place else f"{name} in the {candidate.effect.block}"
