@@ -131,14 +131,15 @@ def test_something_is_missing_where_both_kinds_of_runs_ask_for_it_and_it_is_wort
     assert (verdict.best is None) == (kind == "nothing_missing")
 
 
-def test_gains_count_in_units_of_what_the_best_description_leaves() -> None:
-    """Four times the noise is left by the best: gains of 12 units of noise are three of these."""
+@pytest.mark.parametrize("which", ["fitted", "held_out"])
+def test_gains_count_in_units_of_what_the_best_description_leaves(which: str) -> None:
+    """Four times the noise is left by the best: twelve units are 48 of noise."""
     friction = left(1.5 * N, 1.5 * N, FRICTION, squares=4.0)
-    baseline = left(1.5 * N + 40.0, 1.5 * N + 40.0)
-    assert judged(baseline, [friction]).kind == "nothing_missing"
-    baseline = left(1.5 * N + 50.0, 1.5 * N + 50.0)
-    assert judged(baseline, [friction]).kind == "named"
-    assert judged(baseline, [friction]).gain == pytest.approx(12.5)
+    for gain, kind in ((47.0, "nothing_missing"), (49.0, "named")):
+        gains = {"fitted": 1000.0, "held_out": 1000.0, which: gain}
+        verdict = judged(left(1.5 * N + gains["fitted"], 1.5 * N + gains["held_out"]), [friction])
+        assert verdict.kind == kind
+        assert verdict.gain == pytest.approx(gains["held_out"] / 4)
 
 
 @pytest.mark.parametrize("better", [0.0, 0.9 * PER_NUMBER])
