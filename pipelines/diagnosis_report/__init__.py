@@ -1,4 +1,4 @@
-"""The report on a diagnosis: one sentence on top, then the fit on held-out runs, where, and the evidence."""
+"""The report on a diagnosis: one sentence on top, then where, the evidence, and the fit on held-out runs."""
 
 from pipelines.diagnosis_report.sections import page_of
 

@@ -8,52 +8,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis_report.results import Diagnosis
-from pipelines.report.axes import plain_log_ticks, power_of_ten
+from pipelines.report.axes import power_of_ten
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, WORK_COLOURS, new_figure, plain, png_bytes
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.mismatch import ChannelMismatch, mismatches
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.verdict import named_and_placed
 
 FloatArray = NDArray[np.float64]
 _MOST_ROWS = 18
-_SHOWN_CYCLES = 12
+_SHOWN_CYCLES = 10
+FAINT_COLOUR = "#b8c4d0"
 _EXCESS_OF_NOISE = 1.0
 
 
 def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
     """Believed, retuned, named and ceiling on runs that chose nothing."""
     found = diagnosis.findings
-    rows: list[tuple[str, Explanation]] = [("as believed", found.believed), ("retuned", found.retuned)]
+    rows: list[tuple[str, Explanation, str]] = [
+        ("as believed", found.believed, NEUTRAL_COLOUR),
+        ("retuned", found.retuned, NEUTRAL_COLOUR),
+    ]
     if diagnosis.verdict.best is not None:
-        rows.append(
-            (plain(" + ".join(diagnosis.verdict.best.names).replace("_", " "), 34), diagnosis.verdict.best)
-        )
+        rows.append((words(diagnosis.verdict.best, "\n+ "), diagnosis.verdict.best, REFERENCE_COLOUR))
     if found.ceilings:
-        rows.append(("any force (ceiling)", min(found.ceilings, key=lambda one: one.held_out)))
-    values = [one.held_out_rms for _, one in rows]
+        rows.append(("any force (ceiling)", min(found.ceilings, key=lambda one: one.held_out), FAINT_COLOUR))
+    values = [one.held_out_rms for _, one, _ in rows]
     figure = new_figure(0.6 + 0.36 * len(rows))
     axes = figure.subplots()
-    axes.barh(
-        range(len(rows)), values, color=[NEUTRAL_COLOUR] * 2 + [REFERENCE_COLOUR] * (len(rows) - 2), height=0.6
-    )
+    axes.barh(range(len(rows)), values, color=[colour for _, _, colour in rows], height=0.6)
     axes.axvline(1.0, color="black", lw=1.0, ls="--")
-    axes.set_yticks(range(len(rows)), [label for label, _ in rows])
+    axes.set_yticks(range(len(rows)), [label for label, _, _ in rows])
     axes.invert_yaxis()
     axes.set(
-        xscale="log", xlabel="error on held-out runs / noise floor", xlim=(min(0.5, *values), 1.6 * max(values))
+        xscale="log",
+        xlabel="error on held-out runs / noise floor",
+        xlim=(0.6 * min(1.0, *values), 1.6 * max(values)),
     )
     plain_ticks_within_decades(axes.xaxis)
     for i, value in enumerate(values):
-        label = axes.annotate(
-            f"{value:.2f}", (value, i), (4, 0), textcoords="offset points", va="center", fontsize=8
-        )
-        label.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6})
+        beside = max(value, 1.0) if 0.75 < value < 1.0 else value
+        axes.annotate(f"{value:.2f}", (beside, i), (4, 0), textcoords="offset points", va="center", fontsize=8)
     runs = ", ".join(run.name for run in found.split.held_out)
+    sought = "" if found.ceilings else " No ceiling was sought, because nothing stands out of the noise any more."
     caption = (
-        "Root mean square of the residuals of short-time spectra over their noise, where the "
-        "recording stands out of "
-        f"the noise, on runs that chose nothing ({runs}). The dashed line is the noise floor."
+        "Root mean square of the residuals of short-time spectra over their noise, where the recording stands out "
+        f"of the noise, on runs that chose nothing ({runs}). The dashed line is the noise floor.{sought}"
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
 
@@ -64,23 +65,25 @@ def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
     chosen = sorted(found.explanations, key=lambda one: one.held_out)[:_MOST_ROWS]
     if not chosen:
         raise NothingToDrawError("no candidate promised anything")
-    figure = new_figure(0.9 + 0.24 * len(chosen))
+    gains = np.array(
+        [(found.retuned.held_out - one.held_out, found.retuned.fit.cost - one.fit.cost) for one in chosen]
+    )
+    least = max(1.0, 10.0 ** np.floor(np.log10(max(gains[gains > 1.0].min(initial=1.0), 1.0))))
+    shown = np.maximum(gains, 0.5 * least)
+    lines = np.array([len(one.keys) for one in chosen])
+    figure = new_figure(0.9 + 0.15 * len(chosen) + 0.13 * int(lines.sum()))
     axes = figure.subplots()
     place = np.arange(len(chosen))
-    fit = [max(found.retuned.fit.cost - one.fit.cost, 0.1) for one in chosen]
-    held = [max(found.retuned.held_out - one.held_out, 0.1) for one in chosen]
-    axes.barh(place - 0.18, held, 0.34, color=REFERENCE_COLOUR, label="held-out runs")
-    axes.barh(place + 0.18, fit, 0.34, color=NEUTRAL_COLOUR, label="fitted runs")
-    labels = [plain(" + ".join(one.keys).replace(".", " · ").replace("_", " "), 60) for one in chosen]
-    axes.set_yticks(place, labels, fontsize=7)
+    axes.barh(place - 0.18, shown[:, 0], 0.34, color=REFERENCE_COLOUR, label="held-out runs")
+    axes.barh(place + 0.18, shown[:, 1], 0.34, color=NEUTRAL_COLOUR, label="fitted runs")
+    axes.set_yticks(place, [words(one, "\n+ ") for one in chosen], fontsize=7)
     axes.invert_yaxis()
-    axes.set(xscale="log", xlabel="decrease of the sum of squares below that of the retuned baseline")
-    plain_log_ticks(axes.xaxis)
+    axes.set(xscale="log", xlabel="gain over the retuned baseline", xlim=(0.5 * least, 1.5 * shown.max()))
+    plain_ticks_within_decades(axes.xaxis)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", ncols=2)
     caption = (
-        "What each explanation gains over the retuned baseline; bars that end at 0.1 gain nothing or "
-        "lose. The best on "
-        "held-out runs is on top."
+        "What each explanation gains over the retuned baseline: the decrease of the sum of squares. What has no "
+        "bar gains nothing or loses. The best on held-out runs is on top."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
 
@@ -125,49 +128,80 @@ def where(name: str, diagnosis: Diagnosis) -> ReportFigure:
 
 
 def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
-    """A held-out run, recorded and simulated, with what is left."""
+    """The held-out run that is missed most, recorded and simulated, with what is left."""
     found = diagnosis.findings
-    observed = max(found.held_out, key=lambda run: _size(run[0]))
-    run = observed[0].run
-    before = found.readings(found.retuned)[run.name]
+    readings = found.readings(found.retuned)
     named = named_channels(diagnosis)
-    missed = {one.channel: float((one.residual(before[one.channel]) ** 2).sum()) for one in observed}
-    shown = sorted(observed, key=lambda one: (one.channel not in named, -missed[one.channel]))[:2]
-    after = found.readings(diagnosis.verdict.best)[run.name] if diagnosis.verdict.best is not None else None
+
+    def missed(one: Observation) -> float:
+        return float((one.residual(readings[one.run.name][one.channel]) ** 2).sum())
+
+    observed = max(found.held_out, key=lambda run: sum(missed(one) for one in run))
+    run = observed[0].run
+    shown = sorted(observed, key=lambda one: (one.channel not in named, -missed(one)))[:2]
+    steps: list[tuple[str, dict[str, FloatArray], str, Any]] = [
+        ("baseline retuned", readings[run.name], NEUTRAL_COLOUR, "-")
+    ]
+    if diagnosis.verdict.best is not None:
+        after = found.readings(diagnosis.verdict.best)[run.name]
+        steps.append((extended_label(diagnosis), after, REFERENCE_COLOUR, (0, (4, 1.5))))
     time = np.asarray(run.recording["time"].values, np.float64)
-    stretch = _stretch(time, found.surroundings.frequency_hz)
     figure = new_figure(1.9 * len(shown) + 0.4)
     grid = np.atleast_2d(figure.subplots(len(shown), 2, sharex="col"))
     for (left, right), one in zip(grid, shown, strict=True):
         recorded = np.asarray(run.recording[one.channel].values, np.float64)
-        units = str(run.recording[one.channel].attrs.get("units", ""))
-        left.plot(time[stretch], recorded[stretch], color="black", lw=1.4, label="recorded")
-        left.plot(time[stretch], before[one.channel][stretch], color=NEUTRAL_COLOUR, lw=0.9, label="retuned")
-        right.plot(time, _left(one, recorded - before[one.channel]), color=NEUTRAL_COLOUR, lw=0.6)
-        if after is not None:
-            label = extended_label(diagnosis)
-            left.plot(time[stretch], after[one.channel][stretch], color=REFERENCE_COLOUR, lw=0.9, label=label)
-            right.plot(time, _left(one, recorded - after[one.channel]), color=REFERENCE_COLOUR, lw=0.6)
+        factor, units = _handy(recorded, str(run.recording[one.channel].attrs.get("units", "")))
+        if one is shown[0]:
+            lacking = recorded - steps[0][1][one.channel]
+            stretch = _stretch(time, found.surroundings.frequency_hz, _left(one, lacking))
+        left.plot(time[stretch], factor * recorded[stretch], color=FAINT_COLOUR, lw=2.6, label="recorded")
+        for label, simulated, colour, line in steps:
+            values = simulated[one.channel]
+            left.plot(time[stretch], factor * values[stretch], color=colour, lw=0.9, ls=line, label=label)
+            right.plot(time, factor * _left(one, recorded - values), color=colour, lw=0.6)
         left.set_ylabel(f"{plain(one.channel)}\n[{plain(units)}]", fontsize=7)
+        right.axvspan(time[stretch][0], time[stretch][-1], color="#f0ead8", zorder=0)
     grid[0, 0].set_title("recorded and simulated, a stretch")
     grid[0, 1].set_title("recorded − simulated")
     grid[-1, 0].set_xlabel("time [s]")
     grid[-1, 1].set_xlabel("time [s]")
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     caption = (
-        f"Held-out run {plain(run.name)}, the channels that are missed most; the mean is taken off where it means "
-        "nothing. Releases and offsets are those of the fit, or believed where the run was not fitted."
+        f"Held-out run {plain(run.name)}, the channels that are missed most; on the left the stretch that is "
+        "shaded on the right. The mean is taken off where it means nothing. Releases and offsets are those of the "
+        "fit, or believed where the run was not fitted."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
 
 
 def plain_ticks_within_decades(axis: Any) -> None:
-    """Ticks at 1, 2, 5 of every decade, as plain numbers: for axes that cover one or two."""
+    """Ticks within every decade as plain numbers, as many as there is room for; limits must be set."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    axis.set_major_locator(LogLocator(subs=_steps_of_a_decade(*axis.get_view_interval()), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: short_tick(value)))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _steps_of_a_decade(low: float, high: float) -> tuple[float, ...]:
+    """Few enough to stay apart: an axis may cover half a decade or six."""
+    decades = np.log10(high / low)
+    return (1.0, 2.0, 5.0) if decades < 2.2 else (1.0, 3.0) if decades < 3.2 else (1.0,)
+
+
+def short_tick(value: float) -> str:
+    """A tick as a plain number where that is short.
+
+    Examples
+    --------
+    >>> short_tick(0.5), short_tick(20000.0), short_tick(2e5), short_tick(1e6)
+    ('0.5', '20000', '2·10⁵', '10⁶')
+    """
+    if value < 1e5:
+        return power_of_ten(value)
+    exponent = int(np.floor(np.log10(value) + 1e-9))
+    mantissa = round(value / 10.0**exponent)
+    return power_of_ten(10.0**exponent) if mantissa == 1 else f"{mantissa}·{power_of_ten(10.0**exponent)}"
 
 
 def _same(found: list[ChannelMismatch], wanted: ChannelMismatch) -> ChannelMismatch:
@@ -200,11 +234,22 @@ def extended_label(diagnosis: Diagnosis) -> str:
     return "nearest known effect" if diagnosis.verdict.kind == "unknown" else "with what was left out"
 
 
-def _size(one: Observation) -> float:
-    return float(np.mean(one.spectra**2))
+def words(one: Explanation, between: str = " + ") -> str:
+    """Effects of an explanation and where they act."""
+    return between.join(plain(named_and_placed(candidate), 64) for candidate in one.fit.candidates)
 
 
-def _stretch(time: FloatArray, frequency_hz: float) -> slice:
+def _handy(values: FloatArray, units: str) -> tuple[float, str]:
+    """Factor and unit in which values are handy, units as people write them."""
+    if units == "m" and float(np.nanmax(np.abs(values))) < 0.1:
+        return 1e3, "mm"
+    return 1.0, {"m s-2": "m/s²", "m s-1": "m/s"}.get(units, units)
+
+
+def _stretch(time: FloatArray, frequency_hz: float, lacking: FloatArray) -> slice:
+    """The cycles that are missed most."""
     step = time[1] - time[0]
-    n = int(_SHOWN_CYCLES / max(frequency_hz, 1e-6) / step)
-    return slice(0, max(10, min(n, time.size)))
+    n = max(10, min(int(_SHOWN_CYCLES / max(frequency_hz, 1e-6) / step), time.size))
+    power = np.concatenate([[0.0], np.cumsum(np.nan_to_num(lacking) ** 2)])
+    first = int(np.argmax(power[n:] - power[:-n]))
+    return slice(first, first + n)

@@ -39,14 +39,11 @@ def page_of(diagnosis: Diagnosis) -> Page:
         tables.sensor_error_table(diagnosis),
     )
     drawn: dict[str, tuple[dict[str, Draw], tuple[Table | None, ...]]] = {
-        "Does it help": (
-            {"held_out_errors": figures.held_out_errors, "time_histories": figures.time_histories},
-            (tables.parameter_table(diagnosis), tables.baseline_table(diagnosis)),
-        ),
         "Where": (
             {
                 "block_shares": figures_where.block_shares,
                 "where": figures.where,
+                "time_histories": figures.time_histories,
                 "residual_profiles": figures_where.residual_profiles,
             },
             where_tables,
@@ -63,6 +60,10 @@ def page_of(diagnosis: Diagnosis) -> Page:
                 tables.left_out_table(diagnosis),
             ),
         ),
+        "Does it help": (
+            {"held_out_errors": figures.held_out_errors},
+            (tables.parameter_table(diagnosis), tables.baseline_table(diagnosis)),
+        ),
         "What remains": ({}, (tables.remains_table(diagnosis), tables.limits_table(diagnosis))),
     }
     plans = tuple(
@@ -77,6 +78,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
         title="What was left out",
         subtitle=f"{diagnosis.findings.case.name} · sloshlab {__version__}",
         flags=diagnosis.findings.split.limits,
+        lead=diagnosis.verdict.statement,
         summary=_sentences(diagnosis),
         plans=(*plans, SectionPlan("Provenance", (), (tables.provenance_table(diagnosis),))),
         papers=(_TRANSFORM, _ROBUST),
@@ -85,7 +87,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
 
 def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     verdict, found = diagnosis.verdict, diagnosis.findings
-    lines = [verdict.statement]
+    lines = []
     if verdict.separating_experiment:
         lines.append(f"To tell them apart: {verdict.separating_experiment}.")
     names = sorted(verdict.probabilities.items(), key=lambda item: -item[1])[:4]
@@ -95,7 +97,7 @@ def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     lines.append(
         f"{len(found.case.runs)} runs, {len(found.split.fitting)} fitted and "
         f"{len(found.split.held_out)} held out; "
-        f"{len(found.explanations)} explanations fitted, {len(found.screened)} candidates set aside after a first "
-        f"step, {len(found.failed)} failed."
+        f"{len(found.explanations)} explanations fitted, {len(found.screened)} candidates set aside early, "
+        f"{len(found.failed)} failed."
     )
     return tuple(lines)

@@ -8,53 +8,70 @@ from typing import Any, Final
 
 import numpy as np
 
+from pipelines.diagnosis_report.figures import extended_label
 from pipelines.diagnosis_report.results import Diagnosis
 from pipelines.report.numbers import MISSING, signed, text
 from pipelines.report.tables import Table
+from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.evidence import ALONE, CANNOT_TELL
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.verdict import interval
+from sloshlab.diagnosis.free_run_fit import MOST_TOLERANCES
+from sloshlab.diagnosis.verdict import interval, named_and_placed, named_and_units
 
 _MOST_EXPLANATIONS: Final = 14
+_MOST_LEFT_OUT: Final = 12
+_OF_THE_CHANNEL: Final = ("limit", "amplitude")
 
 
-def parameter_table(diagnosis: Diagnosis) -> Table:
+def parameter_table(diagnosis: Diagnosis) -> Table | None:
     """Numbers of the effects with their intervals."""
     best = diagnosis.verdict.best
+    if best is None:
+        return None
     rows: list[tuple[str, ...]] = []
-    for candidate in () if best is None else best.fit.candidates:
+    for candidate in best.fit.candidates:
         for parameter in candidate.effect.parameters:
-            assert best is not None
             estimate, low, high = interval(best, candidate, parameter.name)
-            rows.append((candidate.key, parameter.name, text(estimate, 4), f"{text(low, 4)} … {text(high, 4)}"))
+            words, units = named_and_units(parameter.name)
+            unit = units or ("of the channel" if parameter.name in _OF_THE_CHANNEL else "1")
+            bounds = f"{text(low, 4)} … {text(high, 4)}"
+            rows.append((named_and_placed(candidate), words, text(estimate, 4), bounds, unit))
+    is_named = diagnosis.verdict.kind != "unknown"
     return Table(
-        "Numbers of what was left out",
-        ("effect", "parameter", "estimate", "90 % interval"),
-        tuple(rows) or ((MISSING, MISSING, MISSING, MISSING),),
+        "Numbers of what was left out" if is_named else "Numbers of the nearest known effect",
+        ("effect", "parameter", "estimate", "90 % interval", "unit"),
+        tuple(rows),
         "Fitted in free-running simulation over all fitting runs, with the baseline's parameters free.",
     )
 
 
 def baseline_table(diagnosis: Diagnosis) -> Table:
     """What retuning did to the baseline, with and without the effect."""
-    found = diagnosis.findings
+    found, best = diagnosis.findings, diagnosis.verdict.best
     rows = []
     for parameter in found.model.parameters:
         if parameter.name.startswith(("release", "offset")):
             continue
         retuned = found.retuned.fit.values.get(parameter.name, parameter.believed)
         row = [parameter.name, text(parameter.believed, 4), text(parameter.tolerance, 2), text(retuned, 4)]
-        row.append(signed((retuned - parameter.believed) / parameter.tolerance, 2))
-        best = diagnosis.verdict.best
-        if best is None:
-            row.append(MISSING)
-        else:
-            after = best.fit.values.get(parameter.name, parameter.believed)
-            row.append(signed((after - parameter.believed) / parameter.tolerance, 2))
+        row.append(_moved(parameter, retuned))
+        if best is not None:
+            row.append(_moved(parameter, best.fit.values.get(parameter.name, parameter.believed)))
         rows.append(tuple(row))
-    header = ("parameter", "believed", "tolerance", "retuned", "in tolerances", "with the effect, in tolerances")
-    caption = "A retuned value far outside of its tolerance is a sign that something else is missing."
+    header: tuple[str, ...] = ("parameter", "believed", "tolerance", "retuned", "moved, in tolerances")
+    header += () if best is None else ("moved with the effect, in tolerances",)
+    caption = (
+        f"A number that wants to move by more than its tolerance asks for a second look at the rig file; beyond "
+        f"{MOST_TOLERANCES:g} tolerances it is held. One of a mode that no run excites means nothing."
+    )
     return Table("The baseline's own parameters", header, tuple(rows), caption)
+
+
+def _moved(parameter: BaselineParameter, value: float) -> str:
+    """How far a number is from what is believed, and whether it is held there."""
+    tolerances = (value - parameter.believed) / parameter.tolerance
+    held = " (held)" if abs(tolerances) > MOST_TOLERANCES - 1e-3 else ""
+    return signed(tolerances if abs(tolerances) >= 0.005 else 0.0, 2) + held
 
 
 def explanation_table(diagnosis: Diagnosis) -> Table:
@@ -63,8 +80,8 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
     everything: list[tuple[str, Explanation]] = [
         ("baseline as believed", found.believed),
         ("baseline retuned", found.retuned),
-        *[(f"{one.keys[0]} (ceiling)", one) for one in found.ceilings],
-        *[(" + ".join(one.keys), one) for one in found.explanations],
+        *[(f"{_named(one)} (ceiling)", one) for one in found.ceilings],
+        *[(_named(one), one) for one in found.explanations],
     ]
     rows = [
         (label, text(one.fit.cost, 4), text(one.held_out, 4), text(one.held_out_rms, 3))
@@ -81,17 +98,24 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
 def left_out_table(diagnosis: Diagnosis) -> Table:
     """Candidates that were not fitted to the end, and why."""
     found = diagnosis.findings
-    rows = [(name, f"failed: {why}") for name, why in sorted(found.failed.items())]
-    rows += [
-        (name, f"a first step in free-running simulation promises a decrease of {text(gain, 3)}")
-        for name, gain in sorted(found.screened.items(), key=lambda item: -item[1])
-    ]
+    fitted = {one.keys[0] for one in found.explanations if len(one.keys) == 1}
+    gains = sorted(found.screened.items(), key=lambda item: -item[1])
+    rows = [(_beside(name, fitted), f"failed: {why}") for name, why in sorted(found.failed.items())]
+    rows += [(_beside(name, fitted), text(gain, 3)) for name, gain in gains[:_MOST_LEFT_OUT]]
+    if rest := gains[_MOST_LEFT_OUT:]:
+        rows.append((", ".join(_beside(name, fitted) for name, _ in rest), f"{text(rest[0][1], 3)} or less"))
     return Table(
         "Candidates that were not fitted to the end",
-        ("candidate", "why"),
+        ("candidate", "promised decrease of the sum of squares"),
         tuple(rows) or ((MISSING, MISSING),),
-        "Each was simulated from every one of its starts.",
+        "Each was simulated from every one of its starts, and set aside by what a first step promised or by what "
+        "the first stages of a fit had gained, beside better ones.",
     )
+
+
+def _beside(key: str, fitted: Collection[str]) -> str:
+    """A candidate, and that it was tried beside another where it has a fit of its own."""
+    return f"{key} (as a second effect)" if key in fitted else key
 
 
 def cut_table(diagnosis: Diagnosis) -> Table:
@@ -149,7 +173,7 @@ def sensor_error_table(diagnosis: Diagnosis) -> Table | None:
     if cut is None or not answers:
         return None
     rows = [
-        (one.term, f"{text(one.share, 3)} ({text(one.low, 3)} … {text(one.high, 3)})", _holds(one.holds))
+        (one.term, f"{_share(one.share)} ({_share(one.low)} … {_share(one.high)})", _holds(one.holds))
         for one in answers
         if one.term != ALONE
     ]
@@ -160,26 +184,28 @@ def sensor_error_table(diagnosis: Diagnosis) -> Table | None:
 def answers_table(diagnosis: Diagnosis, place: str) -> Table:
     """Answers to the physical questions on the force at one place."""
     character = diagnosis.examination.characters[place]
-    rows = [
-        (
-            one.question,
-            one.finding,
-            one.quantity + (f" [{one.units}]" if one.units != "1" else ""),
-            text(one.value, 3),
-            f"{text(one.low, 3)} … {text(one.high, 3)}" if math.isfinite(one.low) else MISSING,
-            one.remark or MISSING,
-        )
-        for one in character.answers
-    ]
-    return Table(
-        f"Physical questions to the force missing at the {place}",
-        ("question", "finding", "by", "value", "90 % interval", "remark"),
-        tuple(rows),
+    rows = []
+    for one in character.answers:
+        shown = _share if one.quantity.startswith("share") else text
+        low_high = f"{shown(one.low)} … {shown(one.high)}" if math.isfinite(one.low) else MISSING
+        quantity = one.quantity + (f" [{one.units}]" if one.units != "1" else "")
+        rows.append((one.question, one.finding, quantity, shown(one.value), low_high, one.remark or MISSING))
+    caption = (
         f"The force is {text(character.size_n, 3)} N RMS beyond the block's own parameters, its noise "
-        f"{text(character.noise_n, 2)} N. Intervals are by drawing stretches of the runs; what the block's own "
-        "damping may be off is in that of the energy. “The first” is the displacement of a structure, the "
-        "acceleration of a tank.",
+        f"{text(character.noise_n, 2)} N."
     )
+    if len(rows) > 1:
+        caption += (
+            " Intervals are by drawing stretches of the runs; what the block's own damping may be off is in that "
+            f"of the energy. “The first” is the {'acceleration' if place == 'tank' else 'displacement'}."
+        )
+    title = f"Physical questions to the force missing at the {place}"
+    return Table(title, ("question", "finding", "by", "value", "90 % interval", "remark"), tuple(rows), caption)
+
+
+def _share(value: float) -> str:
+    """A share to a thousandth; what is less is nothing."""
+    return MISSING if not math.isfinite(value) else "0" if abs(value) < 5e-4 else f"{value:.3f}".replace("-", "−")
 
 
 def evidence_table(diagnosis: Diagnosis) -> Table:
@@ -204,7 +230,7 @@ def evidence_table(diagnosis: Diagnosis) -> Table:
         gain = found.retuned.held_out - one.held_out
         rows.append(
             (
-                " + ".join(one.keys),
+                _named(one),
                 _standing(diagnosis, one, alternatives),
                 text(gain, 3),
                 "; ".join(dict.fromkeys(for_)) or MISSING,
@@ -233,7 +259,7 @@ def remains_table(diagnosis: Diagnosis) -> Table:
     found = diagnosis.findings
     steps = [("believed", found.believed), ("retuned", found.retuned)]
     if diagnosis.verdict.best is not None:
-        steps.append(("with what was left out", diagnosis.verdict.best))
+        steps.append((extended_label(diagnosis), diagnosis.verdict.best))
     readings = [found.readings(step) for _, step in steps]
     names = dict.fromkeys(one.channel for run in found.held_out for one in run)
     rows = []
@@ -271,6 +297,11 @@ def limits_table(diagnosis: Diagnosis) -> Table:
             limits.append(f"force at the {place}: no answer on {', '.join(undecided)}")
     rows = tuple((limit,) for limit in dict.fromkeys(limits)) or ((MISSING,),)
     return Table("Limits", ("what these recordings cannot tell",), rows)
+
+
+def _named(one: Explanation) -> str:
+    """Effects of an explanation and where they act."""
+    return " + ".join(named_and_placed(candidate) for candidate in one.fit.candidates)
 
 
 def _standing(diagnosis: Diagnosis, one: Explanation, alternatives: Collection[tuple[str, ...]]) -> str:

@@ -37,6 +37,8 @@ class Page:
         Sections with their figures and tables.
     papers : tuple of Citation
         What the methods rest on.
+    lead : str
+        The result in one sentence, before everything else, if one says it.
     """
 
     title: str
@@ -45,6 +47,7 @@ class Page:
     summary: tuple[str, ...]
     plans: tuple[SectionPlan, ...]
     papers: tuple[Citation, ...]
+    lead: str = ""
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,7 @@ def page_html(page: Page, sections: Sequence[Section]) -> str:
     return template.render(
         title=page.title,
         subtitle=page.subtitle,
+        lead=page.lead,
         css=_safe_css(files.joinpath("page.css").read_text(encoding="utf-8")),
         flags=page.flags,
         summary=page.summary,

@@ -42,6 +42,8 @@ class Surroundings:
         The same channels with their largest reading.
     channel : str
         Where an effect of a sensor acts, while its starts are asked for; several of one device are joined by `+`.
+    has_one_frequency : bool
+        Whether the tank moves at one frequency, the same in all runs.
     """
 
     rig: Rig
@@ -58,6 +60,7 @@ class Surroundings:
     blocks: tuple[str, ...] = BLOCKS
     peaks: Mapping[str, float] = field(default_factory=dict)
     channel: str = ""
+    has_one_frequency: bool = False
 
     @property
     def reading(self) -> float:

@@ -27,6 +27,7 @@ from sloshlab.diagnosis.free_run_fit import (
     fitted_baseline,
     huber_cost,
     mean_squares,
+    mean_squares_of_runs,
     robust_weights,
     run_of,
     scanned,
@@ -52,6 +53,8 @@ _MOST_FITTED: Final = 10
 _SOFT: Final = 0.1
 _MOST_SCANNED: Final = 1
 _MOST_STARTS: Final = 2
+_ONE_FREQUENCY: Final = 1.1
+"""Of x_rms a_rms/v_rms², which is one for a harmonic motion, times the ratio of the frequencies of runs."""
 _LEAST_SHARE_OF_GAIN: Final = 0.5
 """Of the best candidate's gain after the first stages; the others do not go on."""
 Told = Callable[[str, int, int], None]
@@ -72,12 +75,15 @@ class Explanation:
         Root mean square of the weighted residuals where the recording stands out of the noise.
     by_channel : dict
         Mean square of the same per channel, large residuals counted less.
+    by_run : dict
+        The same per run and channel, of fitted and held-out runs.
     """
 
     fit: FreeRunFit
     held_out: float
     held_out_rms: float
     by_channel: dict[str, float] = field(default_factory=dict)
+    by_run: dict[tuple[str, str], float] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -197,7 +203,7 @@ def findings_of(
 
 def _weighted_observations(case: Case, model: DiagnosedModel, parts: Split) -> dict[str, list[Observation]]:
     """Observations of all runs, weighted by the scatter of repeats about a retuned baseline."""
-    plain = {run.name: observations(run, model.compared(run)) for run in case.runs}
+    plain = {run.name: observations(run, model.compared(run), model.driving(run)) for run in case.runs}
     fit, _ = fitted(
         FreeRunProblem(model, [_loosened(plain[run.name]) for run in case.runs]), model.believed, n_iterations=5
     )
@@ -299,7 +305,11 @@ class _Search:
         informative = np.concatenate([one.informative.ravel() for one in observed])
         chosen = residual[informative] if informative.any() else residual
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
-        return Explanation(fit, huber_cost(residual), rms, mean_squares(observed, residual))
+        fitted_to = self._problem(fit)
+        at_fit = fitted_to.residual(fitted_to.theta_of(fit.values))
+        by_run = mean_squares_of_runs([one for run in fitted_to.runs for one in run], at_fit)
+        by_run |= mean_squares_of_runs(observed, residual)
+        return Explanation(fit, huber_cost(residual), rms, mean_squares(observed, residual), by_run)
 
     def _one_more(
         self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
@@ -419,13 +429,14 @@ class _Search:
     def _surroundings(self, fit: FreeRunFit) -> Surroundings:
         """Sizes of the motion, from the retuned simulation of the fitting runs."""
         largest = np.zeros(3)
-        frequencies = []
+        frequencies, spreads = [], []
         for observed in self.fitting:
             run = observed[0].run
             place = self.model.motion(run, fit.values)
             largest = np.maximum(largest, np.abs(place).max(axis=0))
             rms = place.std(axis=0)
             frequencies.append(rms[2] / max(rms[1], 1e-12) / (2 * np.pi))
+            spreads.append(rms[2] * rms[0] / max(rms[1] ** 2, 1e-300))
         return Surroundings(
             rig=cast(Rig, self.case.rig),  # None where the twin is a user's own: effects that ask are not offered
             twin=self.model.twin,
@@ -440,6 +451,7 @@ class _Search:
             longest_run_s=max(observed[0].run.duration_s for observed in self.fitting),
             blocks=self.model.blocks,
             peaks=_sizes(self.fitting, self.model, lambda values: np.nanmax(np.abs(values))),
+            has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
         )
 
 

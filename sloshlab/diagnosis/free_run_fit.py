@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from sloshlab.diagnosis.observations import Observation
 from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
+_Label = TypeVar("_Label")
 _STEP: Final = 0.005
 """Of a difference, in tolerances; a frequency must not move by much of a cycle."""
 _COARSE_STEP: Final = 0.03
@@ -30,6 +31,7 @@ MOST_TOLERANCES: Final = 4.0
 _LEAST_SHARE_OF_PROMISE: Final = 0.3
 _LAST_STAGE: Final = 0.03
 """Of the tolerance: small steps along a valley add up to more than the gates of a verdict."""
+_FEWEST_IN_A_RUN: Final = 50
 _N_DRAWN: Final = 32
 _N_REFINED: Final = 2
 _LEFT_BEHIND: Final = 1.05
@@ -228,16 +230,33 @@ def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[
     residual : ndarray
         Of all of them, one after another.
     """
-    sums: dict[str, list[float]] = {}
+    return _means(observed, residual, lambda one: one.channel)
+
+
+def mean_squares_of_runs(observed: Sequence[Observation], residual: FloatArray) -> dict[tuple[str, str], float]:
+    """The same per run and channel, where a run shows enough of a channel.
+
+    Parameters
+    ----------
+    observed : sequence of Observation
+    residual : ndarray
+    """
+    return _means(observed, residual, lambda one: (one.run.name, one.channel), least=_FEWEST_IN_A_RUN)
+
+
+def _means(
+    observed: Sequence[Observation], residual: FloatArray, label: Callable[[Observation], _Label], least: int = 1
+) -> dict[_Label, float]:
+    sums: dict[_Label, list[float]] = {}
     first = 0
     for one in observed:
         own = residual[first : first + one.spectra.size]
         first += one.spectra.size
         chosen = own[one.informative.ravel()]
-        total = sums.setdefault(one.channel, [0.0, 0.0])
+        total = sums.setdefault(label(one), [0.0, 0.0])
         total[0] += huber_cost(chosen)
         total[1] += chosen.size
-    return {name: squares / n for name, (squares, n) in sums.items() if n}
+    return {name: squares / n for name, (squares, n) in sums.items() if n >= least}
 
 
 def robust_weights(residual: FloatArray, limit: float = _ROBUST) -> FloatArray:

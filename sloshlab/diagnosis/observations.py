@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
+from sloshlab.conditioning.integration import DRIFT_CORNER_HZ
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times_s, lapped_spectra
 
@@ -18,6 +19,8 @@ BLOCK_S: Final = 0.5
 ZERO_IS_KNOWN: Final = "zero_is_known"
 """Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
+_SLOWEST_INTEGRATED_HZ: Final = 5 * DRIFT_CORNER_HZ
+_FOR_NOTHING: Final = 100.0
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
 _LEAST_SHARE: Final = 1e-4
 """No channel is believed to better than this share of its RMS per coefficient; quantisation and rounding."""
@@ -82,18 +85,21 @@ class Observation:
         return np.asarray((self.spectra - self.of(values)) / np.sqrt(self.variance))
 
 
-def observations(run: CaseRun, names: Sequence[str]) -> list[Observation]:
+def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()) -> list[Observation]:
     """Channels of a run, weighted by the noise of their sensors alone.
 
     Parameters
     ----------
     run : CaseRun
     names : sequence of str
+    driving : sequence of str
+        Channels that drive the simulation.
 
     Notes
     -----
     The noise of a sensor is `noise_std` where the recording states it, or what the quietest of bands near the
-    end of its spectrum shows; never less than 10⁻⁴ of the channel.
+    end of its spectrum shows; never less than 10⁻⁴ of the channel. Where accelerometers drive the simulation, slow
+    displacements and velocities are lost with the drift that integration removes, and count for nothing.
     """
     rate = run.attributes.sampling_rate_hz
     n_bands = max(8, 2 * round(0.5 * BLOCK_S * rate))
@@ -110,8 +116,17 @@ def observations(run: CaseRun, names: Sequence[str]) -> list[Observation]:
         white = _white_level(spectra)
         least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
         variance = np.full(spectra.shape, max(stated, white, least, 1e-300))
+        if variable.attrs["quantity"] in ("displacement", "velocity") and _is_integrated(run, driving):
+            slow = band_frequencies_hz(n_bands, rate) < _SLOWEST_INTEGRATED_HZ
+            variance[:, slow] += _FOR_NOTHING * (spectra[:, slow] ** 2).mean()
         found.append(Observation(run, name, keeps_mean, known, spectra, variance))
     return found
+
+
+def _is_integrated(run: CaseRun, driving: Sequence[str]) -> bool:
+    """Whether a simulation knows displacements of the base from accelerometers alone."""
+    present = [run.recording[name] for name in driving if name in run.recording.data_vars]
+    return any(one.attrs["quantity"] == "acceleration" for one in present)
 
 
 def within_band(observed: Sequence[Observation]) -> list[Observation]:
@@ -214,8 +229,8 @@ def _weighted(observation: Observation, variance: FloatArray) -> Observation:
 
 
 def _floor(observation: Observation) -> FloatArray:
-    """Variance by the sensor alone."""
-    return np.asarray(np.full(observation.variance.shape, observation.variance.min()))
+    """Variance by the sensor alone, of an observation that is weighted by nothing else."""
+    return observation.variance
 
 
 def _at_limits(values: FloatArray, attributes: Mapping[str, object]) -> NDArray[np.bool_]:

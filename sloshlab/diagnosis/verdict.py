@@ -6,9 +6,9 @@ twice the mean square that is left there by the best description (never less tha
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from sloshlab.diagnosis.candidate import Candidate, channels_of, known_effects
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.mismatch import mismatches, summary
 
+_Place = TypeVar("_Place")
 LEAST_GAIN: Final = 12.0
 """Held-out log-likelihood ratio from which something is missing."""
 LEAST_MORE: Final = 12.0
@@ -105,7 +106,7 @@ def verdict_of(found: Findings) -> Verdict:
         named is None
         or scale.held_out_gain(found.retuned, named) < LEAST_GAIN
         or adequacy > ADEQUATE
-        or any(_is_clearly_better(one, named, scale) for one in described)
+        or any(_shows_more(one, named, scale) for one in described)
     ):
         certain = _certain(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, _unknown(found, named), "", certain)
@@ -174,12 +175,17 @@ def _shortest_sufficient(found: Findings, scale: _Scale) -> Explanation | None:
 
 
 def _is_clearly_better(more: Explanation, less: Explanation, scale: _Scale) -> bool:
-    """By more than chance on both kinds of runs, and by a size that is worth speaking of."""
-    return (
-        scale.held_out_gain(less, more) > LEAST_MORE
-        and scale.fit_gain(less, more) > LEAST_MORE
-        and strength(less, more) >= LEAST_STRENGTH
-    )
+    """By more than chance on both kinds of runs, and on held-out runs by a size that is worth speaking of."""
+    return _gains(more, less, scale) and strength(less, more) >= LEAST_STRENGTH
+
+
+def _shows_more(more: Explanation, less: Explanation, scale: _Scale) -> bool:
+    """The same, with a size that is worth speaking of in any channel of any run, fitted ones too."""
+    return _gains(more, less, scale) and _largest_strength(less.by_run, more.by_run) >= LEAST_STRENGTH
+
+
+def _gains(more: Explanation, less: Explanation, scale: _Scale) -> bool:
+    return scale.held_out_gain(less, more) > LEAST_MORE and scale.fit_gain(less, more) > LEAST_MORE
 
 
 def strength(before: Explanation, after: Explanation) -> float:
@@ -190,11 +196,12 @@ def strength(before: Explanation, after: Explanation) -> float:
     before, after : Explanation
         With fewer and with more effects.
     """
-    removed = [
-        (before.by_channel[name] - left) / max(1.0, left)
-        for name, left in after.by_channel.items()
-        if name in before.by_channel
-    ]
+    return _largest_strength(before.by_channel, after.by_channel)
+
+
+def _largest_strength(before: Mapping[_Place, float], after: Mapping[_Place, float]) -> float:
+    """Square root of the largest decrease of a mean square over what is left, or over the noise floor."""
+    removed = [(before[place] - left) / max(1.0, left) for place, left in after.items() if place in before]
     return float(np.sqrt(max([0.0, *removed])))
 
 
@@ -207,10 +214,24 @@ def _alternatives(found: Findings, best: Explanation, scale: _Scale) -> list[Exp
             continue
         if one.rests_on_a_bound or _includes(one, best):
             continue
-        if scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION:
+        is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
+        if is_alike or _is_alike_at_one_frequency(found, one, best):
             alike.append(one)
             seen.add(one.named_in_blocks)
     return alike
+
+
+def _is_alike_at_one_frequency(found: Findings, one: Explanation, best: Explanation) -> bool:
+    """Look-alikes of one frequency that differ by less than the noise floor in every channel of every run.
+
+    What tells them apart then are beginnings and ends, on which no name should rest.
+    """
+    if not found.surroundings.has_one_frequency or len(one.keys) != 1 or len(best.keys) != 1:
+        return False
+    this, other = one.fit.candidates[0].effect, best.fit.candidates[0].effect
+    if this.name not in other.look_alikes and other.name not in this.look_alikes:
+        return False
+    return _largest_strength(one.by_run, best.by_run) < 1.0
 
 
 def _includes(wider: Explanation, narrower: Explanation) -> bool:
