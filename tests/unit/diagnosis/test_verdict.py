@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from math import log
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -39,6 +40,7 @@ BOTH_SIDES = {
 }
 HUM = {"sensor.mains_hum_60.acceleration_tip.amplitude": 0.25}
 NOISE = 1.0
+AT = cast(Surroundings, SimpleNamespace(has_one_frequency=False))
 
 
 class HandMade(Findings):
@@ -61,7 +63,7 @@ def candidates_of(values: Mapping[str, float]) -> tuple[Candidate, ...]:
     found = []
     for key in dict.fromkeys(name.rpartition(".")[0] for name in values):
         block, name, *channel = key.split(".", 2)
-        found.append(Candidate(effect(f"{block}.{name}"), cast(Surroundings, None), *channel))
+        found.append(Candidate(effect(f"{block}.{name}"), AT, *channel))
     return tuple(found)
 
 
@@ -78,7 +80,7 @@ def left(
 
     `squares` is the mean square of the one channel; of ten noise floors for the baseline, one for the rest.
     """
-    candidates = (Candidate(surface_effect(surface), cast(Surroundings, None)),) if surface else ()
+    candidates = (Candidate(surface_effect(surface), AT),) if surface else ()
     candidates += candidates_of(values or {})
     names = tuple(values or {})
     cost = N + 2 * fitted
@@ -96,7 +98,7 @@ def findings(
     failed: Mapping[str, str] | None = None,
 ) -> Findings:
     return HandMade(
-        cast(Case, None), cast(Any, None), Split((), (), ()), cast(Surroundings, None), [], [],
+        cast(Case, None), cast(Any, None), Split((), (), ()), AT, [], [],
         left(9e4, 9e4), retuned, list(explanations), list(ceilings), dict(failed or {}), {},
     )  # fmt: skip
 
