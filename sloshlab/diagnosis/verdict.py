@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from sloshlab.diagnosis.candidate import Candidate, channels_of, known_effects
+from sloshlab.diagnosis.candidate import Candidate, channels_of
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.mismatch import mismatches, summary
 
@@ -394,9 +394,8 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
 
 
 def _experiment(alternatives: Sequence[Explanation]) -> str:
-    names = {name for one in alternatives for name in one.names}
-    told = [effect.separated_by for effect in known_effects() if effect.name in names and effect.separated_by]
-    return "; or ".join(dict.fromkeys(told))
+    effects = [candidate.effect for one in alternatives for candidate in one.fit.candidates]
+    return "; or ".join(dict.fromkeys(effect.separated_by for effect in effects if effect.separated_by))
 
 
 def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
