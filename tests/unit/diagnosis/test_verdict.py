@@ -40,7 +40,10 @@ BOTH_SIDES = {
 }
 HUM = {"sensor.mains_hum_60.acceleration_tip.amplitude": 0.25}
 NOISE = 1.0
-AT = cast(Surroundings, SimpleNamespace(has_one_frequency=False))
+TIP = "acceleration_tip"
+AT, AT_ONE_FREQUENCY = (
+    cast(Surroundings, SimpleNamespace(has_one_frequency=one_frequency)) for one_frequency in (False, True)
+)
 
 
 class HandMade(Findings):
@@ -73,12 +76,14 @@ def left(
     values: Mapping[str, float] | None = None,
     *,
     squares: float | None = None,
+    in_one_run: float | None = None,
     rms: float = NOISE,
     surface: str = "",
 ) -> Explanation:
     """What leaves so much log-likelihood of the fitted and of the held-out runs unexplained.
 
-    `squares` is the mean square of the one channel; of ten noise floors for the baseline, one for the rest.
+    `squares` is the mean square of the one channel, ten for the baseline, one for the rest; `in_one_run` that of
+    one run where it differs.
     """
     candidates = (Candidate(surface_effect(surface), AT),) if surface else ()
     candidates += candidates_of(values or {})
@@ -88,7 +93,8 @@ def left(
         candidates, dict(values or {}), cost, cost, 1e-4 * np.eye(len(names)), names, np.ones(len(names))
     )
     squares = squares if squares is not None else NOISE if candidates else 10.0
-    return Explanation(fit, N + 2 * held_out, rms, {"acceleration_tip": squares})
+    by_run = {("run_1", TIP): squares, ("run_2", TIP): squares if in_one_run is None else in_one_run}
+    return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run)
 
 
 def findings(
@@ -96,9 +102,10 @@ def findings(
     explanations: Sequence[Explanation] = (),
     ceilings: Sequence[Explanation] = (),
     failed: Mapping[str, str] | None = None,
+    at: Surroundings = AT,
 ) -> Findings:
     return HandMade(
-        cast(Case, None), cast(Any, None), Split((), (), ()), AT, [], [],
+        cast(Case, None), cast(Any, None), Split((), (), ()), at, [], [],
         left(9e4, 9e4), retuned, list(explanations), list(ceilings), dict(failed or {}), {},
     )  # fmt: skip
 
@@ -173,6 +180,31 @@ def test_another_explanation_is_as_good_within_six(behind: float, kind: str) -> 
     assert judged(BASELINE, [left(0.0, 0.0, FRICTION), left(behind, behind, DRAG)]).kind == kind
 
 
+STIFFER = {"structure.stiffness_change.stiffness_n_per_m": -90.0}
+LIGHTER = {"structure.mass_error.mass_kg": 0.05}
+
+
+@pytest.mark.parametrize(
+    ("at", "other", "in_one_run", "kind"),
+    [
+        pytest.param(AT_ONE_FREQUENCY, LIGHTER, 1.9, "indistinguishable", id="look-alikes"),
+        pytest.param(AT_ONE_FREQUENCY, LIGHTER, 2.1, "named", id="told by more than the noise in one run"),
+        pytest.param(AT_ONE_FREQUENCY, DRAG, 1.0, "named", id="strangers"),
+        pytest.param(AT, LIGHTER, 1.0, "named", id="several frequencies"),
+    ],
+)
+def test_beginnings_and_ends_do_not_tell_look_alikes_of_one_frequency(
+    at: Surroundings, other: Mapping[str, float], in_one_run: float, kind: str
+) -> None:
+    """Fifty units of likelihood between a mass and a spring, but less than the noise anywhere."""
+    other_one = left(50.0, 50.0, other, in_one_run=in_one_run)
+    verdict = verdict_of(findings(BASELINE, [left(0.0, 0.0, STIFFER), other_one], at=at))
+    assert verdict.kind == kind
+    if kind == "indistinguishable":
+        assert names(verdict) == [("stiffness_change",), ("mass_error",)]
+        assert verdict.separating_experiment == "a known mass added to the tank"
+
+
 def test_one_name_in_two_blocks_is_two_explanations() -> None:
     damper = [{f"{block}.viscous_damping.damping_n_s_per_m": 0.6} for block in ("structure", "tank")]
     found = findings(BASELINE, [left(0.0, 0.0, damper[0]), left(1.0, 1.0, damper[1])])
@@ -206,6 +238,8 @@ def test_the_same_force_under_another_name_is_always_listed() -> None:
     [
         pytest.param(left(40.0, 40.0, FRICTION, squares=1.5), "unknown", id="clearly better"),
         pytest.param(left(40.0, 40.0, FRICTION, squares=1.2), "named", id="by too little to speak of"),
+        pytest.param(left(40.0, 40.0, FRICTION, in_one_run=1.26), "unknown", id="clearly in one run"),
+        pytest.param(left(40.0, 40.0, FRICTION, in_one_run=1.24), "named", id="in one run by too little"),
         pytest.param(left(11.0, 40.0, FRICTION, squares=1.5), "named", id="on held-out runs alone"),
         pytest.param(left(40.0, 11.0, FRICTION, squares=1.5), "named", id="on fitted runs alone"),
         pytest.param(left(5.0, 5.0, FRICTION, rms=1.14), "named", id="within fifteen per cent"),
