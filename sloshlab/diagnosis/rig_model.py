@@ -34,7 +34,7 @@ from sloshlab.twin.twin import Twin
 FloatArray = NDArray[np.float64]
 STEPS_PER_PERIOD: Final = 12.0
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
-_MOST_KEPT_RUNS: Final = 400
+_MOST_KEPT_BYTES: Final = 3e8
 _RELEASE: Final = "release of "
 _TOLERANCE_OF_SHAPE: Final = 0.01
 """Of the value at the tip: where a sensor sits, and that a beam is not quite uniform."""
@@ -57,6 +57,12 @@ class _Truth:
 
     channels: dict[str, FloatArray]
     modes: dict[str, FloatArray]
+
+    @property
+    def n_bytes(self) -> int:
+        """Memory that it holds."""
+        held = {id(part): part.nbytes for part in (*self.channels.values(), *self.modes.values())}
+        return sum(held.values())
 
 
 class RigModel:
@@ -82,6 +88,7 @@ class RigModel:
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}
         self._truths: OrderedDict[tuple[Any, ...], _Truth] = OrderedDict()
+        self._kept_bytes = 0
         self._lock = threading.Lock()
         self._channels = {run.name: self._channels_of(run) for run in self.runs}
         n_modes = 0 if self.twin.structure is None else self.twin.structure.masses_kg.size
@@ -200,9 +207,12 @@ class RigModel:
                 moving.setdefault(order, np.ascontiguousarray(simulation.modes[:, order]))
                 truth.modes[name] = moving[order]
         with self._lock:
+            if key in self._truths:
+                self._kept_bytes -= self._truths.pop(key).n_bytes
             self._truths[key] = truth
-            while len(self._truths) > _MOST_KEPT_RUNS:
-                self._truths.popitem(last=False)
+            self._kept_bytes += truth.n_bytes
+            while self._kept_bytes > _MOST_KEPT_BYTES and len(self._truths) > 1:
+                self._kept_bytes -= self._truths.popitem(last=False)[1].n_bytes
         return truth
 
     def _simulation(
