@@ -409,19 +409,23 @@ class _Search:
             return self._with_any_force(retuned)
         if self._problem(best.fit).is_down_to_noise(best.fit):
             return []
-        return [*self._with_any_force(retuned), *self._with_any_force(best.fit)]
+        alone = self._with_any_force(retuned)
+        helpful = [one.fit.candidates[-1].effect.block for one in sorted(alone, key=lambda one: one.fit.cost)]
+        return [*alone, *self._with_any_force(best.fit, helpful[:1])]
 
-    def _with_any_force(self, base: FreeRunFit) -> list[Explanation]:
+    def _with_any_force(
+        self, base: FreeRunFit, blocks: Sequence[str] = ("structure", "tank")
+    ) -> list[Explanation]:
         found = []
-        for i, block in enumerate(("structure", "tank")):
+        for i, block in enumerate(blocks):
             effect = surface_effect(block)
             if block not in self.surroundings.blocks or not effect.needs(self.surroundings):
                 continue
-            self.told("finding what any force could explain", i, 2)
+            self.told("finding what any force could explain", i, len(blocks))
             candidate = Candidate(effect, self.surroundings)
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
             start = {**base.values, **candidate.starts()[0]}
-            fit, _ = fitted(problem, start, n_iterations=5, shares=(STAGES[1], 0.0))
+            fit, _ = fitted(problem, start, n_iterations=3, shares=(STAGES[1], 0.0))
             if not fit.trouble:
                 found.append(self.judged(fit))
         return found

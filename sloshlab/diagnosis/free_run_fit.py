@@ -34,10 +34,12 @@ _LAST_STAGE: Final = 0.03
 _FEWEST_IN_A_RUN: Final = 50
 _N_DRAWN: Final = 32
 _N_REFINED: Final = 2
-_LEFT_BEHIND: Final = 1.05
+_LEFT_BEHIND: Final = 1.02
 """Cost after the first stages, over the best one so far, beyond which another start is given up."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel in which nothing more is to be found."""
+_CAME_BACK: Final = 0.02
+"""Of a number, within which a fit from elsewhere has found the same place."""
 STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
 SCANNED: Final = (0.75, 0.9, 1.1, 1.3)
 N_THREADS = 2
@@ -493,10 +495,16 @@ def scanned(problem: FreeRunProblem, fit: FreeRunFit, name: str, *, n_iterations
     n_iterations : int
         At most, per stage.
     """
-    best = fit
+    best, share = fit, STAGES[1]
+    reached = soft_cost(problem, fit, share)
     for factor in SCANNED:
         start = {**fit.values, name: fit.values[name] * factor}
-        other, _ = fitted(problem, start, n_iterations=n_iterations, shares=STAGES[1:])
+        other, _ = fitted(problem, start, n_iterations=n_iterations, shares=(share,))
+        if other.trouble or soft_cost(problem, other, share) > _LEFT_BEHIND * reached:
+            continue
+        if abs(other.values[name] - fit.values[name]) < _CAME_BACK * abs(fit.values[name]):
+            continue
+        other, _ = fitted(problem, other.values, n_iterations=n_iterations, shares=STAGES[2:])
         if not other.trouble and other.cost < best.cost:
             best = other
     return best
