@@ -128,10 +128,12 @@ class CaseDrawing:
         for effect, strength in zip(drawn, wanted, strict=True):
             assert floor is not None
             change, reached = _scaled(effect, strength, laboratory, floor, plain)
-            if reached < (WEAKEST_MASKED if kind == "masked" else 3.0):
+            if not reached >= (WEAKEST_MASKED if kind == "masked" else 3.0):  # NaN is not strong enough either
                 raise LookupError(f"{effect.name} cannot be made strong enough")
             changes.append(change)
             described.append(_description(effect, change, reached))
+            if not all(map(math.isfinite, (reached, *change.parameters.values()))):
+                raise ArithmeticError(f"{effect.name} has no finite size")
         signals = laboratory.signals(changes) if changes else plain
         nuisance: dict[str, Any] = {}
         if kind == "nothing":

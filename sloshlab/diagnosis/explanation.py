@@ -32,6 +32,7 @@ from sloshlab.diagnosis.free_run_fit import (
     run_of,
     scanned,
     soft_cost,
+    stages_for,
 )
 from sloshlab.diagnosis.observations import (
     Observation,
@@ -50,9 +51,9 @@ from sloshlab.rig import Rig
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
 _MOST_FITTED: Final = 10
-_SOFT: Final = 0.1
 _MOST_SCANNED: Final = 1
 _MOST_STARTS: Final = 2
+_ALWAYS_FINISHED: Final = 3
 _ONE_FREQUENCY: Final = 1.1
 """Of x_rms a_rms/v_rms², which is one for a harmonic motion, times the ratio of the frequencies of runs."""
 _LEAST_SHARE_OF_GAIN: Final = 0.5
@@ -315,39 +316,45 @@ class _Search:
         self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
         """Fit each of some candidates beside what is in `base` already; the promising ones to the end."""
-        promising = self._screen(base, jacobian, pool, what)
+        shares = stages_for(self._problem(base), base)
+        promising = self._screen(base, jacobian, pool, what, shares)
         begun_fits = []
         for i, (candidate, starts) in enumerate(promising):
             self.told(f"{what}: {candidate.key}", i, 2 * len(promising))
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
-            cost, fit = begun(problem, starts)
+            cost, fit = begun(problem, starts, shares)
             if fit.trouble:
                 self.failed[candidate.key] = fit.trouble
             else:
                 begun_fits.append((cost, problem, fit))
         kept = []
         lowest = min((cost for cost, _, _ in begun_fits), default=0.0)
-        at_base = soft_cost(self._problem(base), base, STAGES[1])
+        at_base = soft_cost(self._problem(base), base, shares[min(1, len(shares) - 1)])
         for i, (cost, problem, fit) in enumerate(sorted(begun_fits, key=lambda one: one[0])):
             key = fit.candidates[-1].key
-            if at_base - cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest):
+            if i >= _ALWAYS_FINISHED and at_base - cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest):
                 self.screened[key] = max(at_base - cost, 0.0)
                 continue
             self.told(f"{what}: {key}, to the end", len(promising) + i, 2 * len(promising))
-            done = finished(problem, fit)
-            if i < _MOST_SCANNED and not problem.is_down_to_noise(done):
-                done = scanned(problem, done, f"{key}.{fit.candidates[-1].effect.parameters[0].name}")
+            done = finished(problem, fit, shares)
+            if i < _MOST_SCANNED and shares == STAGES and not problem.is_down_to_noise(done):
+                done = scanned(problem, done, f"{key}.{fit.candidates[-1].effect.parameters[0].name}", shares)
             kept.append(self.judged(done))
         self.explanations += kept
         return kept
 
     def _screen(
-        self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
+        self,
+        base: FreeRunFit,
+        jacobian: BlockJacobian,
+        pool: Sequence[Candidate],
+        what: str,
+        shares: Sequence[float],
     ) -> list[tuple[Candidate, list[dict[str, float]]]]:
         """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from."""
         problem = FreeRunProblem(self.model, self.fitting, base.candidates)
         residual = problem.residual(problem.theta_of(base.values))
-        softness = problem.softness(_SOFT)
+        softness = problem.softness(shares[min(1, len(shares) - 1)])
         weights = softness * robust_weights(softness * residual, 10.0)
         weighted = jacobian.weighted(weights)
         prior = np.diag(np.where(np.arange(jacobian.n_columns) < problem.n_baseline, 1.0, 0.0))
@@ -373,7 +380,8 @@ class _Search:
                 self.failed[candidate.key] = "does not run from any start"
                 continue
             looks.sort(key=lambda one: -one[0])
-            believed = base.values if base.candidates else self.model.believed
+            is_near = base.candidates or shares != STAGES
+            believed = base.values if is_near else self.model.believed
             starts = [{**believed, **start} for _, start, _ in looks[:_MOST_STARTS]]
             promised.append((looks[0][0], candidate, [*starts, {**base.values, **looks[0][2]}]))
         promised.sort(key=lambda one: -one[0])

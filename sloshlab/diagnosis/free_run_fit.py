@@ -38,6 +38,8 @@ _LEFT_BEHIND: Final = 1.02
 """Cost after the first stages, over the best one so far, beyond which another start is given up."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel in which nothing more is to be found."""
+_SHOWN: Final = 3.0
+"""How much softer than the largest relative residual a stage may be to be of use."""
 _CAME_BACK: Final = 0.02
 """Of a number, within which a fit from elsewhere has found the same place."""
 STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
@@ -395,19 +397,43 @@ class _Descent:
         )
 
 
+def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
+    """The stages in which what a fit leaves shows; in softer ones it would be within what is believed anyway.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    fit : FreeRunFit
+        Without the effects that are to be fitted.
+    """
+    residual, first, largest = problem.residual(problem.theta_of(fit.values)), 0, 0.0
+    for one in (one for run in problem.runs for one in run):
+        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
+        first += one.spectra.size
+        left = float(np.mean(own**2 * one.variance)) / max(float(np.mean(one.spectra**2)), 1e-300)
+        largest = max(largest, float(np.sqrt(left)))
+    return tuple(share for share in STAGES if share < _SHOWN * largest) or STAGES[-1:]
+
+
 def begun(
-    problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], *, n_iterations: int = 6
+    problem: FreeRunProblem,
+    starts: Sequence[Mapping[str, float]],
+    shares: Sequence[float] = STAGES,
+    *,
+    n_iterations: int = 6,
 ) -> tuple[float, FreeRunFit]:
-    """The first stages of a fit from the best of several starts, and its cost with channels believed to a tenth.
+    """The first two stages of a fit from the best of several starts, and its cost in the second.
 
     Parameters
     ----------
     problem : FreeRunProblem
     starts : sequence of mappings
+    shares : sequence of float
+        All stages.
     n_iterations : int
         At most, per stage.
     """
-    first, second, *_ = STAGES
+    first, second = shares[0], shares[min(1, len(shares) - 1)]
     best: tuple[float, FreeRunFit] | None = None
     for start in starts:
         fit, _ = fitted(problem, start, n_iterations=n_iterations, shares=(first,))
@@ -417,13 +443,17 @@ def begun(
     if best is None:
         trouble = "does not run from any of its starts"
         return np.inf, FreeRunFit(problem.candidates, dict(starts[0]), np.inf, np.inf, trouble=trouble)
+    if second == first:
+        return best
     fit, _ = fitted(problem, best[1].values, n_iterations=n_iterations, shares=(second,))
     return soft_cost(problem, fit, second), fit
 
 
-def finished(problem: FreeRunProblem, fit: FreeRunFit, *, n_iterations: int = 6) -> FreeRunFit:
+def finished(
+    problem: FreeRunProblem, fit: FreeRunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = 6
+) -> FreeRunFit:
     """The remaining stages of a fit that was begun."""
-    return fitted(problem, fit.values, n_iterations=n_iterations, shares=STAGES[2:])[0]
+    return fitted(problem, fit.values, n_iterations=n_iterations, shares=shares[2:])[0] if len(shares) > 2 else fit
 
 
 def fitted_from(
@@ -483,7 +513,9 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
     return best
 
 
-def scanned(problem: FreeRunProblem, fit: FreeRunFit, name: str, *, n_iterations: int = 5) -> FreeRunFit:
+def scanned(
+    problem: FreeRunProblem, fit: FreeRunFit, name: str, shares: Sequence[float] = STAGES, *, n_iterations: int = 5
+) -> FreeRunFit:
     """The best of a fit and of fits from other sizes of one of its numbers, to leave a side valley.
 
     Parameters
@@ -492,10 +524,12 @@ def scanned(problem: FreeRunProblem, fit: FreeRunFit, name: str, *, n_iterations
     fit : FreeRunFit
     name : str
         Of the number.
+    shares : sequence of float
+        Stages; the first is left out.
     n_iterations : int
         At most, per stage.
     """
-    best, share = fit, STAGES[1]
+    best, share = fit, shares[1]
     reached = soft_cost(problem, fit, share)
     for factor in SCANNED:
         start = {**fit.values, name: fit.values[name] * factor}
@@ -504,7 +538,7 @@ def scanned(problem: FreeRunProblem, fit: FreeRunFit, name: str, *, n_iterations
             continue
         if abs(other.values[name] - fit.values[name]) < _CAME_BACK * abs(fit.values[name]):
             continue
-        other, _ = fitted(problem, other.values, n_iterations=n_iterations, shares=STAGES[2:])
+        other, _ = fitted(problem, other.values, n_iterations=n_iterations, shares=shares[2:])
         if not other.trouble and other.cost < best.cost:
             best = other
     return best
