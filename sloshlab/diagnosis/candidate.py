@@ -44,6 +44,8 @@ class Surroundings:
         Where an effect of a sensor acts, while its starts are asked for; several of one device are joined by `+`.
     has_one_frequency : bool
         Whether the tank moves at one frequency, the same in all runs.
+    missed_hz : tuple of float
+        Frequencies about which the retuned baseline misses the recordings most: there a mode may be missing.
     """
 
     rig: Rig
@@ -61,6 +63,7 @@ class Surroundings:
     peaks: Mapping[str, float] = field(default_factory=dict)
     channel: str = ""
     has_one_frequency: bool = False
+    missed_hz: tuple[float, ...] = ()
 
     @property
     def reading(self) -> float:

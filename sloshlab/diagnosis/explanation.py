@@ -54,6 +54,7 @@ _MOST_FITTED: Final = 10
 _MOST_SCANNED: Final = 1
 _MOST_STARTS: Final = 2
 _ALWAYS_FINISHED: Final = 3
+_MOST_PEAKS: Final = 3
 _ONE_FREQUENCY: Final = 1.1
 """Of x_rms a_rms/v_rms², which is one for a harmonic motion, times the ratio of the frequencies of runs."""
 _LEAST_SHARE_OF_GAIN: Final = 0.5
@@ -440,6 +441,7 @@ class _Search:
 
     def _surroundings(self, fit: FreeRunFit) -> Surroundings:
         """Sizes of the motion, from the retuned simulation of the fitting runs."""
+        problem = self._problem(fit)
         largest = np.zeros(3)
         frequencies, spreads = [], []
         for observed in self.fitting:
@@ -463,6 +465,7 @@ class _Search:
             longest_run_s=max(observed[0].run.duration_s for observed in self.fitting),
             blocks=self.model.blocks,
             peaks=_sizes(self.fitting, self.model, lambda values: np.nanmax(np.abs(values))),
+            missed_hz=_most_missed_hz(self.fitting, problem.residual(problem.theta_of(fit.values))),
             has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
         )
 
@@ -486,6 +489,25 @@ def _resized(start: dict[str, float], factor: float) -> dict[str, float]:
     first = next(iter(start))
     factor = min(max(factor, 0.1), 10.0)
     return {**start, first: start[first] * factor} if len(start) == 1 else start
+
+
+def _most_missed_hz(fitting: Sequence[Sequence[Observation]], residual: FloatArray) -> tuple[float, ...]:
+    """Frequencies of the highest peaks of weighted residuals, all runs and channels together."""
+    n_bands = max(one.spectra.shape[1] for run in fitting for one in run)
+    power, count, first = np.zeros(n_bands), np.full(n_bands, 1e-300), 0
+    frequencies = np.zeros(n_bands)
+    for one in (one for run in fitting for one in run):
+        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
+        first += one.spectra.size
+        n = one.spectra.shape[1]
+        power[:n] += (own**2).sum(axis=0)
+        count[:n] += one.spectra.shape[0]
+        frequencies[:n] = one.frequencies_hz
+    mean = power / count
+    beside = np.pad(mean, 1)
+    peaks = np.flatnonzero((mean >= beside[:-2]) & (mean >= beside[2:]) & (frequencies > 0))
+    highest = peaks[np.argsort(-mean[peaks])][:_MOST_PEAKS]
+    return tuple(float(frequencies[k]) for k in highest)
 
 
 def _sizes(

@@ -186,11 +186,11 @@ MODE = force_effect(
     "structure",
     lambda at: [
         {
-            "frequency_hz": ratio * at.frequency_hz,
+            "frequency_hz": frequency,
             "damping_ratio": 0.02,
             "participation": 0.02 * at.moving_mass_kg,
         }
-        for ratio in (0.6, 1.6, 2.5, 4.0)
+        for frequency in (*(ratio * at.frequency_hz for ratio in (0.6, 1.6, 2.5, 4.0)), *at.missed_hz)
     ],
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("mass_error", "stiffness_change"),

@@ -224,8 +224,8 @@ LATERAL = force_effect(
     LATERAL_MODE,
     "tank",
     lambda at: [
-        {"frequency_hz": ratio * at.frequency_hz, "mass_kg": 0.2 * at.rig.liquid_mass_kg}
-        for ratio in (0.3, 0.7, 1.4)
+        {"frequency_hz": frequency, "mass_kg": 0.2 * at.rig.liquid_mass_kg}
+        for frequency in (*(ratio * at.frequency_hz for ratio in (0.3, 0.7, 1.4)), *at.missed_hz)
     ],
     fitted=("frequency_hz", "mass_kg"),
     look_alikes=("missing_mode",),
