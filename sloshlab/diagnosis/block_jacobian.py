@@ -55,6 +55,18 @@ class BlockJacobian:
             first += size
         return cls(len(columns), tuple(blocks))
 
+    def beside(self, more: BlockJacobian) -> BlockJacobian:
+        """With the columns of another one after its own; both have the same rows in the same blocks."""
+        blocks = tuple(
+            _Block(
+                own.rows,
+                np.concatenate([own.columns, new.columns + self.n_columns]),
+                np.ascontiguousarray(np.hstack([own.values, new.values])),
+            )
+            for own, new in zip(self.blocks, more.blocks, strict=True)
+        )
+        return BlockJacobian(self.n_columns + more.n_columns, blocks)
+
     def weighted(self, weights: FloatArray) -> BlockJacobian:
         """Every row times its weight."""
         return BlockJacobian(

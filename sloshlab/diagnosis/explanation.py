@@ -50,13 +50,16 @@ from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
-_MOST_FITTED: Final = 10
+_MOST_FITTED: Final = 12
 _MOST_SCANNED: Final = 1
 _MOST_STARTS: Final = 2
 _ALWAYS_FINISHED: Final = 3
 _MOST_PEAKS: Final = 3
+_LEAST_TO_BUILD_ON: Final = 24.0
+"""Decrease of the cost by one effect, below which nobody looks for a second one."""
 _ONE_FREQUENCY: Final = 1.1
 """Of x_rms a_rms/v_rms², which is one for a harmonic motion, times the ratio of the frequencies of runs."""
+_LEAST_SHARE_OF_PROMISE: Final = 0.02
 _LEAST_SHARE_OF_GAIN: Final = 0.5
 """Of the best candidate's gain after the first stages; the others do not go on."""
 Told = Callable[[str, int, int], None]
@@ -275,7 +278,7 @@ class _Search:
         self.surroundings = self._surroundings(retuned_fit)
         everything = candidates(self.surroundings)
         self._one_more(retuned_fit, jacobian, everything, "fitting one effect")
-        self._add_greedily(everything)
+        self._add_greedily(retuned_fit, everything)
         ceilings = self._ceilings(retuned_fit)
         return Findings(
             self.case,
@@ -319,27 +322,29 @@ class _Search:
         """Fit each of some candidates beside what is in `base` already; the promising ones to the end."""
         shares = stages_for(self._problem(base), base)
         promising = self._screen(base, jacobian, pool, what, shares)
+        is_near = shares != STAGES
         begun_fits = []
         for i, (candidate, starts) in enumerate(promising):
             self.told(f"{what}: {candidate.key}", i, 2 * len(promising))
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
-            cost, fit = begun(problem, starts, shares)
-            if fit.trouble:
-                self.failed[candidate.key] = fit.trouble
+            one = begun(problem, starts, shares, near=jacobian if is_near else None)
+            if one.fit.trouble:
+                self.failed[candidate.key] = one.fit.trouble
             else:
-                begun_fits.append((cost, problem, fit))
+                begun_fits.append(one)
         kept = []
-        lowest = min((cost for cost, _, _ in begun_fits), default=0.0)
+        lowest = min((one.cost for one in begun_fits), default=0.0)
         at_base = soft_cost(self._problem(base), base, shares[min(1, len(shares) - 1)])
-        for i, (cost, problem, fit) in enumerate(sorted(begun_fits, key=lambda one: one[0])):
-            key = fit.candidates[-1].key
-            if i >= _ALWAYS_FINISHED and at_base - cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest):
-                self.screened[key] = max(at_base - cost, 0.0)
+        for i, one in enumerate(sorted(begun_fits, key=lambda each: each.cost)):
+            candidate = one.fit.candidates[-1]
+            if i >= _ALWAYS_FINISHED and at_base - one.cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest):
+                self.screened[candidate.key] = max(at_base - one.cost, 0.0)
                 continue
-            self.told(f"{what}: {key}, to the end", len(promising) + i, 2 * len(promising))
-            done = finished(problem, fit, shares)
-            if i < _MOST_SCANNED and shares == STAGES and not problem.is_down_to_noise(done):
-                done = scanned(problem, done, f"{key}.{fit.candidates[-1].effect.parameters[0].name}", shares)
+            self.told(f"{what}: {candidate.key}, to the end", len(promising) + i, 2 * len(promising))
+            done = finished(one, shares)
+            if i < _MOST_SCANNED and not is_near and not one.problem.is_down_to_noise(done):
+                number = f"{candidate.key}.{candidate.effect.parameters[0].name}"
+                done = scanned(one.problem, done, number, shares)
             kept.append(self.judged(done))
         self.explanations += kept
         return kept
@@ -354,12 +359,12 @@ class _Search:
     ) -> list[tuple[Candidate, list[dict[str, float]]]]:
         """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from."""
         problem = FreeRunProblem(self.model, self.fitting, base.candidates)
-        residual = problem.residual(problem.theta_of(base.values))
-        softness = problem.softness(shares[min(1, len(shares) - 1)])
-        weights = softness * robust_weights(softness * residual, 10.0)
-        weighted = jacobian.weighted(weights)
-        prior = np.diag(np.where(np.arange(jacobian.n_columns) < problem.n_baseline, 1.0, 0.0))
-        inverse = np.linalg.pinv(weighted.normal() + prior)
+        theta = problem.theta_of(base.values)
+        residual = problem.residual(theta)
+        looks_at = [
+            _Look.of(problem, theta, residual, jacobian, share)
+            for share in dict.fromkeys((shares[min(1, len(shares) - 1)], shares[-1]))
+        ]
         promised = []
         for i, candidate in enumerate(pool):
             self.told(f"{what}: first look", i, len(pool))
@@ -371,36 +376,44 @@ class _Search:
                 moved = extended.residual(extended.theta_of({**base.values, **start}))
                 if not np.isfinite(moved).all():
                     continue
-                direction = weights * (moved - residual)
-                direction = direction - weighted.times(inverse @ weighted.transposed_times(direction))
-                size = float(direction @ direction)
-                along = float(direction @ (weights * residual))
-                factor = -along / size if size > 0 else 0.0
-                looks.append((along**2 / size if size > 0 else 0.0, start, _resized(start, factor)))
+                gains = [look.gain(moved - residual) for look in looks_at]
+                looks.append(([gain for gain, _ in gains], start, _resized(start, max(gains)[1])))
             if not looks:
                 self.failed[candidate.key] = "does not run from any start"
                 continue
-            looks.sort(key=lambda one: -one[0])
-            is_near = base.candidates or shares != STAGES
-            believed = base.values if is_near else self.model.believed
-            starts = [{**believed, **start} for _, start, _ in looks[:_MOST_STARTS]]
-            promised.append((looks[0][0], candidate, [*starts, {**base.values, **looks[0][2]}]))
-        promised.sort(key=lambda one: -one[0])
-        top = promised[0][0] if promised else 0.0
+            looks.sort(key=lambda one: -max(one[0]))
+            if shares != STAGES:
+                starts = [{**base.values, **sized} for _, _, sized in looks[:_MOST_STARTS]]
+            else:
+                believed = base.values if base.candidates else self.model.believed
+                starts = [{**believed, **start} for _, start, _ in looks[:_MOST_STARTS]]
+                starts.append({**base.values, **looks[0][2]})
+            promised.append((np.max([one[0] for one in looks], axis=0), candidate, starts))
+        return self._chosen(promised)
+
+    def _chosen(
+        self, promised: Sequence[tuple[FloatArray, Candidate, list[dict[str, float]]]]
+    ) -> list[tuple[Candidate, list[dict[str, float]]]]:
+        """The candidates that promise most, in a soft look or in a hard one."""
+        if not promised:
+            return []
+        top = np.maximum(np.max([gains for gains, _, _ in promised], axis=0), _LEAST_PREDICTED)
+        ordered = sorted(promised, key=lambda one: -float(np.max(one[0] / top)))
         chosen = []
-        for rank, (gain, candidate, starts) in enumerate(promised):
-            if gain < max(_LEAST_PREDICTED, 0.02 * top) or rank >= _MOST_FITTED:
-                self.screened[candidate.key] = gain
+        for rank, (gains, candidate, starts) in enumerate(ordered):
+            is_little = gains.max() < _LEAST_PREDICTED or float(np.max(gains / top)) < _LEAST_SHARE_OF_PROMISE
+            if is_little or rank >= _MOST_FITTED:
+                self.screened[candidate.key] = float(gains.max())
             else:
                 chosen.append((candidate, starts))
         return chosen
 
-    def _add_greedily(self, pool: Sequence[Candidate]) -> None:
+    def _add_greedily(self, retuned: FreeRunFit, pool: Sequence[Candidate]) -> None:
         """A second effect beside the best first one."""
         if not self.explanations:
             return
         best = min(self.explanations, key=lambda one: one.fit.cost)
-        if self._problem(best.fit).is_down_to_noise(best.fit):
+        if retuned.cost - best.fit.cost < _LEAST_TO_BUILD_ON or self._problem(best.fit).is_down_to_noise(best.fit):
             return
         problem = FreeRunProblem(self.model, self.fitting, best.fit.candidates)
         theta = problem.theta_of(best.fit.values)
@@ -468,6 +481,47 @@ class _Search:
             missed_hz=_most_missed_hz(self.fitting, problem.residual(problem.theta_of(fit.values))),
             has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
         )
+
+
+class _Look:
+    """What one Gauss–Newton step promises, with channels believed to a share of their RMS.
+
+    Parameters at their bounds cannot follow an effect; all others do, and what is believed of them counts.
+    """
+
+    def __init__(self, weights: FloatArray, weighted: BlockJacobian, left: FloatArray) -> None:
+        self._weights, self._weighted, self._left = weights, weighted, left
+        self._can_move: NDArray[np.intp] = np.zeros(0, np.intp)
+        self._inverse, self._gradient = np.zeros((0, 0)), np.zeros(0)
+
+    @classmethod
+    def of(
+        cls,
+        problem: FreeRunProblem,
+        theta: FloatArray,
+        residual: FloatArray,
+        jacobian: BlockJacobian,
+        share: float,
+    ) -> _Look:
+        """At a place that was fitted."""
+        softness = problem.softness(share)
+        weights = softness * robust_weights(softness * residual, 10.0)
+        look = cls(weights, jacobian.weighted(weights), weights * residual)
+        prior = np.where(np.arange(jacobian.n_columns) < problem.n_baseline, 1.0, 0.0)
+        look._can_move = np.flatnonzero(~problem.at_bounds(theta))
+        movable = np.ix_(look._can_move, look._can_move)
+        look._inverse = np.linalg.pinv((look._weighted.normal() + np.diag(prior))[movable])
+        look._gradient = (look._weighted.transposed_times(look._left) + prior * theta)[look._can_move]
+        return look
+
+    def gain(self, change: FloatArray) -> tuple[float, float]:
+        """Decrease of the cost by the best multiple of a change of the residuals, and that multiple."""
+        direction = self._weights * change
+        touched = self._weighted.transposed_times(direction)[self._can_move]
+        followed = self._inverse @ touched
+        size = float(direction @ direction - followed @ touched)
+        along = float(direction @ self._left - followed @ self._gradient)
+        return (along**2 / size, -along / size) if size > 0 else (0.0, 0.0)
 
 
 class _WithEffects(FreeRunProblem):

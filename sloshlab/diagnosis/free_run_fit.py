@@ -38,7 +38,7 @@ _LEFT_BEHIND: Final = 1.02
 """Cost after the first stages, over the best one so far, beyond which another start is given up."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel in which nothing more is to be found."""
-_SHOWN: Final = 3.0
+_SHOWN: Final = 1.5
 """How much softer than the largest relative residual a stage may be to be of use."""
 _CAME_BACK: Final = 0.02
 """Of a number, within which a fit from elsewhere has found the same place."""
@@ -154,6 +154,12 @@ class FreeRunProblem:
         """Scaled parameters; those that are not given are as believed."""
         known = np.array([values.get(name, centre) for name, centre in zip(self.names, self.centres, strict=True)])
         return np.asarray((known - self.centres) / self.scales)
+
+    def at_bounds(self, theta: FloatArray) -> NDArray[np.bool_]:
+        """Which parameters are as large or as small as they may be."""
+        physical = self.centres + theta * self.scales
+        near = 1e-6 * (self.high - self.low)
+        return np.asarray((physical <= self.low + near) | (physical >= self.high - near))
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
@@ -287,6 +293,8 @@ def fitted(
     n_iterations: int = 8,
     tolerance: float = 1e-3,
     shares: Sequence[float] = STAGES,
+    known: BlockJacobian | None = None,
+    is_last: bool = True,
 ) -> tuple[FreeRunFit, BlockJacobian]:
     """Levenberg–Marquardt; deviations of the baseline count against what is believed of it.
 
@@ -301,6 +309,10 @@ def fitted(
     shares : sequence of float
         Stages. In each, every channel is believed to this share of its RMS only, so that details which jump with
         the parameters, such as where friction stops a decay, do not hide the way; zero is the last one.
+    known : BlockJacobian, optional
+        From nearby, to begin with; it is changed.
+    is_last : bool
+        Whether the fit may end only with a Jacobian that was made where it ends.
 
     Returns
     -------
@@ -321,22 +333,24 @@ def fitted(
             problem.candidates, problem.values(theta), np.inf, np.inf, trouble="does not run from its start"
         )
         return empty, BlockJacobian(theta.size, ())
-    descent = _Descent(problem, theta, residual)
+    descent = _Descent(problem, theta, residual, known)
     for share in shares:
-        descent.stage(share, n_iterations, tolerance)
+        descent.stage(share, n_iterations, tolerance, needs_fresh=is_last and share == shares[-1])
     return descent.fit(), descent.jacobian
 
 
 class _Descent:
     """Where a fit stands."""
 
-    def __init__(self, problem: FreeRunProblem, theta: FloatArray, residual: FloatArray) -> None:
+    def __init__(
+        self, problem: FreeRunProblem, theta: FloatArray, residual: FloatArray, known: BlockJacobian | None
+    ) -> None:
         self.problem, self.theta, self.residual = problem, theta, residual
         n = theta.size
         self.prior = np.where(np.arange(n) < problem.n_baseline, 1.0, 0.0)
-        self.jacobian, self.hessian = BlockJacobian(n, ()), np.eye(n)
+        self.jacobian, self.hessian = known or BlockJacobian(n, ()), np.eye(n)
 
-    def stage(self, share: float, n_iterations: int, tolerance: float) -> None:
+    def stage(self, share: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:
         """Descend with every channel believed to a share of its RMS."""
         softness, damping, is_fresh = self.problem.softness(share), 1e-3, False
         is_wanted = not self.jacobian.blocks
@@ -348,7 +362,7 @@ class _Descent:
                 is_fresh = True
             gain, promised, damping = self._step(softness, damping)
             is_done = gain < tolerance * (1.0 if share > 0 else _LAST_STAGE) and (iteration > 0 or gain <= 0)
-            if is_done and (is_fresh or share > 0):
+            if is_done and (is_fresh or not needs_fresh):
                 break
             is_wanted = is_done or gain < _LEAST_SHARE_OF_PROMISE * promised
             is_fresh = is_fresh and gain <= 0
@@ -415,14 +429,35 @@ def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
     return tuple(share for share in STAGES if share < _SHOWN * largest) or STAGES[-1:]
 
 
+@dataclass(frozen=True, eq=False)
+class BegunFit:
+    """A fit after its first two stages.
+
+    Attributes
+    ----------
+    problem : FreeRunProblem
+    fit : FreeRunFit
+    jacobian : BlockJacobian
+        Where it stands, nearly.
+    cost : float
+        With the channels known only to the share of the second stage.
+    """
+
+    problem: FreeRunProblem
+    fit: FreeRunFit
+    jacobian: BlockJacobian
+    cost: float
+
+
 def begun(
     problem: FreeRunProblem,
     starts: Sequence[Mapping[str, float]],
     shares: Sequence[float] = STAGES,
     *,
+    near: BlockJacobian | None = None,
     n_iterations: int = 6,
-) -> tuple[float, FreeRunFit]:
-    """The first two stages of a fit from the best of several starts, and its cost in the second.
+) -> BegunFit:
+    """The first two stages of a fit from the best of several starts.
 
     Parameters
     ----------
@@ -430,30 +465,43 @@ def begun(
     starts : sequence of mappings
     shares : sequence of float
         All stages.
+    near : BlockJacobian, optional
+        Of the parameters without those of the last candidate, where the starts are near its place.
     n_iterations : int
         At most, per stage.
     """
     first, second = shares[0], shares[min(1, len(shares) - 1)]
-    best: tuple[float, FreeRunFit] | None = None
+    best: BegunFit | None = None
     for start in starts:
-        fit, _ = fitted(problem, start, n_iterations=n_iterations, shares=(first,))
+        known = None if near is None else _extended(problem, start, near)
+        fit, jacobian = fitted(
+            problem, start, n_iterations=n_iterations, shares=(first,), known=known, is_last=False
+        )
         if not fit.trouble:
-            cost = soft_cost(problem, fit, first)
-            best = (cost, fit) if best is None or cost < best[0] else best
+            reached = BegunFit(problem, fit, jacobian, soft_cost(problem, fit, first))
+            best = reached if best is None or reached.cost < best.cost else best
     if best is None:
         trouble = "does not run from any of its starts"
-        return np.inf, FreeRunFit(problem.candidates, dict(starts[0]), np.inf, np.inf, trouble=trouble)
+        fit = FreeRunFit(problem.candidates, dict(starts[0]), np.inf, np.inf, trouble=trouble)
+        return BegunFit(problem, fit, BlockJacobian(len(problem.names), ()), np.inf)
     if second == first:
         return best
-    fit, _ = fitted(problem, best[1].values, n_iterations=n_iterations, shares=(second,))
-    return soft_cost(problem, fit, second), fit
+    fit, jacobian = fitted(
+        problem,
+        best.fit.values,
+        n_iterations=n_iterations,
+        shares=(second,),
+        known=best.jacobian,
+        is_last=False,
+    )
+    return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second))
 
 
-def finished(
-    problem: FreeRunProblem, fit: FreeRunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = 6
-) -> FreeRunFit:
-    """The remaining stages of a fit that was begun."""
-    return fitted(problem, fit.values, n_iterations=n_iterations, shares=shares[2:])[0] if len(shares) > 2 else fit
+def finished(begun_fit: BegunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = 6) -> FreeRunFit:
+    """The remaining stages of a fit that was begun; the last one in any case."""
+    rest = shares[2:] or shares[-1:]
+    values, known = begun_fit.fit.values, begun_fit.jacobian
+    return fitted(begun_fit.problem, values, n_iterations=n_iterations, shares=rest, known=known)[0]
 
 
 def fitted_from(
@@ -468,8 +516,17 @@ def fitted_from(
     n_iterations : int
         At most, per stage.
     """
-    _, fit = begun(problem, starts, n_iterations=n_iterations)
-    return fit if fit.trouble else finished(problem, fit, n_iterations=n_iterations)
+    start = begun(problem, starts, n_iterations=n_iterations)
+    return start.fit if start.fit.trouble else finished(start, n_iterations=n_iterations)
+
+
+def _extended(problem: FreeRunProblem, start: Mapping[str, float], near: BlockJacobian) -> BlockJacobian | None:
+    """A Jacobian from nearby with the columns of the parameters that it has not, made where a fit starts."""
+    theta = problem.theta_of(start)
+    at = problem.residual(theta)
+    if not np.isfinite(at).all():
+        return None
+    return near.beside(problem.jacobian(theta, at, range(near.n_columns, theta.size)))
 
 
 def soft_cost(problem: FreeRunProblem, fit: FreeRunFit, share: float) -> float:
