@@ -29,6 +29,8 @@ ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
+_LITTLE: Final = 0.05
+"""Of a mean square that an effect of one frequency explains, which may be in beginnings and ends."""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
 """What it would have if it had a name."""
 _UNITS: Final = (
@@ -222,16 +224,19 @@ def _alternatives(found: Findings, best: Explanation, scale: _Scale) -> list[Exp
 
 
 def _is_alike_at_one_frequency(found: Findings, one: Explanation, best: Explanation) -> bool:
-    """Look-alikes of one frequency that differ by less than the noise floor in every channel of every run.
+    """Look-alikes of one frequency that differ by less than the noise floor, or by little of what they explain.
 
-    What tells them apart then are beginnings and ends, on which no name should rest.
+    What tells them apart then are beginnings and ends of runs, on which no name should rest.
     """
     if not found.surroundings.has_one_frequency or len(one.keys) != 1 or len(best.keys) != 1:
         return False
     this, other = one.fit.candidates[0].effect, best.fit.candidates[0].effect
     if this.name not in other.look_alikes and other.name not in this.look_alikes:
         return False
-    return _largest_strength(one.by_run, best.by_run) < 1.0
+    return all(
+        left - best.by_run[cell] < max(1.0, _LITTLE * (found.retuned.by_run[cell] - best.by_run[cell]))
+        for cell, left in one.by_run.items()
+    )
 
 
 def _includes(wider: Explanation, narrower: Explanation) -> bool:
