@@ -346,8 +346,30 @@ class _Search:
                 number = f"{candidate.key}.{candidate.effect.parameters[0].name}"
                 done = scanned(one.problem, done, number, shares)
             kept.append(self.judged(done))
+        kept += self._generalised(base, kept, pool, what)
         self.explanations += kept
         return kept
+
+    def _generalised(
+        self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
+    ) -> list[Explanation]:
+        """Effects of which the best one is a special case, from there: they cannot be worse."""
+        best = min(kept, key=lambda one: one.fit.cost, default=None)
+        if best is None or self._problem(best.fit).is_down_to_noise(best.fit):
+            return []
+        special = best.fit.candidates[-1]
+        found = []
+        for candidate in pool:
+            effect = candidate.effect
+            if effect.block != special.effect.block or special.effect.name not in effect.includes:
+                continue
+            self.told(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
+            problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
+            starts = [{**best.fit.values, **one} for one in _as_large(candidate, special, best.fit)]
+            one = begun(problem, starts, STAGES[1:])
+            if not one.fit.trouble:
+                found.append(self.judged(finished(one, STAGES[1:])))
+        return found
 
     def _screen(
         self,
@@ -419,7 +441,19 @@ class _Search:
         theta = problem.theta_of(best.fit.values)
         at = problem.residual(theta)
         jacobian = problem.jacobian(theta, at, range(theta.size))
-        self._one_more(best.fit, jacobian, pool, "fitting a second effect")
+        self._take_away(self._one_more(best.fit, jacobian, pool, "fitting a second effect"))
+
+    def _take_away(self, pairs: Sequence[Explanation]) -> None:
+        """Each effect of the best pair alone, from the numbers that it has there: one of them may be enough."""
+        pair = min(pairs, key=lambda one: one.fit.cost, default=None)
+        if pair is None:
+            return
+        for i, candidate in enumerate(pair.fit.candidates):
+            self.told(f"taking away one of two effects: {candidate.key} is left", i, len(pair.keys))
+            problem = FreeRunProblem(self.model, self.fitting, (candidate,))
+            fit, _ = fitted(problem, pair.fit.values, shares=STAGES[-2:])
+            if not fit.trouble:
+                self.explanations.append(self.judged(fit))
 
     def _problem(self, fit: FreeRunFit) -> FreeRunProblem:
         return FreeRunProblem(self.model, self.fitting, fit.candidates)
@@ -536,6 +570,18 @@ class _WithEffects(FreeRunProblem):
     ) -> None:
         super().__init__(model, runs, (), fixed)
         self.candidates = tuple(effects_)
+
+
+def _as_large(wider: Candidate, special: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
+    """Starts of an effect with all numbers of one unit as large as that of its special case was found."""
+    name = special.effect.parameters[0].name
+    unit, size = name.partition("_")[2], abs(fit.values[f"{special.key}.{name}"])
+    starts = []
+    for start in wider.starts():
+        alike = [key for key in start if key.rpartition(".")[2].partition("_")[2] == unit]
+        factor = size / max(abs(start[alike[0]]), 1e-300) if alike else 1.0
+        starts.append({key: value * (factor if key in alike else 1.0) for key, value in start.items()})
+    return starts
 
 
 def _resized(start: dict[str, float], factor: float) -> dict[str, float]:

@@ -441,12 +441,15 @@ class BegunFit:
         Where it stands, nearly.
     cost : float
         With the channels known only to the share of the second stage.
+    is_near : bool
+        Whether it began with a Jacobian from nearby, and may go on with its own.
     """
 
     problem: FreeRunProblem
     fit: FreeRunFit
     jacobian: BlockJacobian
     cost: float
+    is_near: bool
 
 
 def begun(
@@ -478,12 +481,12 @@ def begun(
             problem, start, n_iterations=n_iterations, shares=(first,), known=known, is_last=False
         )
         if not fit.trouble:
-            reached = BegunFit(problem, fit, jacobian, soft_cost(problem, fit, first))
+            reached = BegunFit(problem, fit, jacobian, soft_cost(problem, fit, first), near is not None)
             best = reached if best is None or reached.cost < best.cost else best
     if best is None:
         trouble = "does not run from any of its starts"
         fit = FreeRunFit(problem.candidates, dict(starts[0]), np.inf, np.inf, trouble=trouble)
-        return BegunFit(problem, fit, BlockJacobian(len(problem.names), ()), np.inf)
+        return BegunFit(problem, fit, BlockJacobian(len(problem.names), ()), np.inf, near is not None)
     if second == first:
         return best
     fit, jacobian = fitted(
@@ -491,16 +494,16 @@ def begun(
         best.fit.values,
         n_iterations=n_iterations,
         shares=(second,),
-        known=best.jacobian,
+        known=best.jacobian if best.is_near else None,
         is_last=False,
     )
-    return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second))
+    return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second), best.is_near)
 
 
 def finished(begun_fit: BegunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = 6) -> FreeRunFit:
     """The remaining stages of a fit that was begun; the last one in any case."""
     rest = shares[2:] or shares[-1:]
-    values, known = begun_fit.fit.values, begun_fit.jacobian
+    values, known = begun_fit.fit.values, begun_fit.jacobian if begun_fit.is_near else None
     return fitted(begun_fit.problem, values, n_iterations=n_iterations, shares=rest, known=known)[0]
 
 

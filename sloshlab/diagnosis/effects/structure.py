@@ -90,7 +90,7 @@ STRIBECK = force_effect(
             "static_n": 0.02 * at.force_n,
             "stribeck_velocity_m_per_s": share * at.velocity_m_per_s,
         }
-        for share in (0.05, 0.2)
+        for share in (0.05, 0.2, 0.6)
     ],
     look_alikes=("coulomb_friction",),
     separated_by="slow motion about the Stribeck velocity",
