@@ -205,6 +205,14 @@ def test_beginnings_and_ends_do_not_tell_look_alikes_of_one_frequency(
         assert verdict.separating_experiment == "a known mass added to the tank"
 
 
+@pytest.mark.parametrize(("in_one_run", "kind"), [(5.8, "indistinguishable"), (6.1, "named")])
+def test_nor_does_a_twentieth_of_what_they_explain(in_one_run: float, kind: str) -> None:
+    """101 noise floors before, one after: another that leaves less than 1 + 0.05 × 100 is as good."""
+    baseline = left(500.0, 500.0, squares=101.0)
+    described = [left(0.0, 0.0, STIFFER), left(50.0, 50.0, LIGHTER, in_one_run=in_one_run)]
+    assert verdict_of(findings(baseline, described, at=AT_ONE_FREQUENCY)).kind == kind
+
+
 def test_one_name_in_two_blocks_is_two_explanations() -> None:
     damper = [{f"{block}.viscous_damping.damping_n_s_per_m": 0.6} for block in ("structure", "tank")]
     found = findings(BASELINE, [left(0.0, 0.0, damper[0]), left(1.0, 1.0, damper[1])])
