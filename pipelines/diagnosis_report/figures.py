@@ -62,7 +62,7 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
 def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
     """How much each candidate helps, on fitted and on held-out runs."""
     found = diagnosis.findings
-    chosen = sorted(found.explanations, key=lambda one: one.held_out)[:_MOST_ROWS]
+    chosen = diagnosis.explanations[:_MOST_ROWS]
     if not chosen:
         raise NothingToDrawError("no candidate promised anything")
     gains = np.array(

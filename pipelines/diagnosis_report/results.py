@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sloshlab.diagnosis.examination import Examination
-from sloshlab.diagnosis.explanation import Findings
+from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.verdict import Verdict
 
 
@@ -19,3 +19,11 @@ class Diagnosis:
     verdict: Verdict
     examination: Examination
     provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def explanations(self) -> list[Explanation]:
+        """Every explanation that was fitted, once, by its best fit; the best on held-out runs first."""
+        best: dict[frozenset[str], Explanation] = {}
+        for one in sorted(self.findings.explanations, key=lambda one: one.fit.cost):
+            best.setdefault(frozenset(one.keys), one)
+        return sorted(best.values(), key=lambda one: one.held_out)

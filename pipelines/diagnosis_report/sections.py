@@ -97,7 +97,7 @@ def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     lines.append(
         f"{len(found.case.runs)} runs, {len(found.split.fitting)} fitted and "
         f"{len(found.split.held_out)} held out; "
-        f"{len(found.explanations)} explanations fitted, {len(found.screened)} candidates set aside early, "
+        f"{len(diagnosis.explanations)} explanations fitted, {len(found.screened)} candidates set aside early, "
         f"{len(found.failed)} failed."
     )
     return tuple(lines)

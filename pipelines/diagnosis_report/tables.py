@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -81,7 +81,7 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
         ("baseline as believed", found.believed),
         ("baseline retuned", found.retuned),
         *[(f"{_named(one)} (ceiling)", one) for one in found.ceilings],
-        *[(_named(one), one) for one in found.explanations],
+        *[(_named(one), one) for one in diagnosis.explanations],
     ]
     rows = [
         (label, text(one.fit.cost, 4), text(one.held_out, 4), text(one.held_out_rms, 3))
@@ -103,7 +103,7 @@ def left_out_table(diagnosis: Diagnosis) -> Table:
     rows = [(_beside(name, fitted), f"failed: {why}") for name, why in sorted(found.failed.items())]
     rows += [(_beside(name, fitted), text(gain, 3)) for name, gain in gains[:_MOST_LEFT_OUT]]
     if rest := gains[_MOST_LEFT_OUT:]:
-        rows.append((", ".join(_beside(name, fitted) for name, _ in rest), f"{text(rest[0][1], 3)} or less"))
+        rows.append((_grouped([name for name, _ in rest]), f"{text(rest[0][1], 3)} or less"))
     return Table(
         "Candidates that were not fitted to the end",
         ("candidate", "promised decrease of the sum of squares"),
@@ -111,6 +111,13 @@ def left_out_table(diagnosis: Diagnosis) -> Table:
         "Each was simulated from every one of its starts, and set aside by what a first step promised or by what "
         "the first stages of a fit had gained, beside better ones.",
     )
+
+
+def _grouped(keys: Sequence[str]) -> str:
+    """Effects with the number of places where each was tried."""
+    effects = [".".join(key.split(".")[:2]) for key in keys]
+    counts = {effect: effects.count(effect) for effect in dict.fromkeys(effects)}
+    return ", ".join(effect if n == 1 else f"{effect} ({n} places)" for effect, n in counts.items())
 
 
 def _beside(key: str, fitted: Collection[str]) -> str:
@@ -208,10 +215,12 @@ def _share(value: float) -> str:
     return MISSING if not math.isfinite(value) else "0" if abs(value) < 5e-4 else f"{value:.3f}".replace("-", "−")
 
 
-def evidence_table(diagnosis: Diagnosis) -> Table:
+def evidence_table(diagnosis: Diagnosis) -> Table | None:
     """For and against each explanation, the best on held-out runs first."""
     found, examination = diagnosis.findings, diagnosis.examination
-    chosen = sorted(found.explanations, key=lambda one: one.held_out)[:_MOST_EXPLANATIONS]
+    if not found.explanations:
+        return None
+    chosen = diagnosis.explanations[:_MOST_EXPLANATIONS]
     alternatives = {one.keys for one in diagnosis.verdict.alternatives}
     rows = []
     for one in chosen:
@@ -248,7 +257,7 @@ def evidence_table(diagnosis: Diagnosis) -> Table:
             "speaks against it",
             "cannot be told",
         ),
-        tuple(rows) or ((MISSING,) * 6,),
+        tuple(rows),
         "The tests on the missing force and on the sensors know of no candidate. Fits decide; a test that "
         "contradicts the named effect is a reason to doubt it.",
     )

@@ -146,6 +146,8 @@ class Effect:
         (surroundings) → channels on which it may act; one empty name where it acts on none.
     includes : tuple of str
         Effects that are special cases of it, in the same block; it cannot but describe what they do.
+    limits : callable
+        (surroundings) → bounds of parameters that depend on the place, in place of their own.
     spoken_for_by : tuple of str
         What tests on the missing force or the sensor say where it is missing: terms of `evidence.TERMS`.
     """
@@ -162,6 +164,7 @@ class Effect:
     places: Callable[[Surroundings], Sequence[str]] = lambda surroundings: [""]
     spoken_for_by: tuple[str, ...] = ()
     includes: tuple[str, ...] = ()
+    limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = lambda surroundings: {}
 
 
 @dataclass(frozen=True)
@@ -191,6 +194,11 @@ class Candidate:
             {f"{self.key}.{name}": value for name, value in numbers.items()}
             for numbers in self.effect.starts(replace(self.surroundings, channel=self.channel))
         ]
+
+    def bounds(self, parameter: EffectParameter) -> tuple[float, float]:
+        """Smallest and largest value of a parameter here."""
+        limits = self.effect.limits(replace(self.surroundings, channel=self.channel))
+        return limits.get(parameter.name, (parameter.low, parameter.high))
 
     def scale(self, parameter: str) -> float:
         """Size of a parameter, to count its steps in."""

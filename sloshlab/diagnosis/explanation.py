@@ -117,7 +117,7 @@ class Explanation:
             bound != 0 and abs(self.fit.values[f"{one.key}.{parameter.name}"] - bound) <= 1e-6 * abs(bound)
             for one in self.fit.candidates
             for parameter in one.effect.parameters
-            for bound in (parameter.low, parameter.high)
+            for bound in one.bounds(parameter)
         )
 
     @property

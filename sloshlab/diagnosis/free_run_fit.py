@@ -130,7 +130,7 @@ class FreeRunProblem:
         bounds = [
             (one.believed - MOST_TOLERANCES * one.tolerance, one.believed + MOST_TOLERANCES * one.tolerance)
             for one in self._baseline
-        ] + [(parameter.low, parameter.high) for one in self.candidates for parameter in one.effect.parameters]
+        ] + [one.bounds(parameter) for one in self.candidates for parameter in one.effect.parameters]
         self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
         self.n_simulations = 0
 

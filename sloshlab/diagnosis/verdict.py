@@ -395,7 +395,8 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
         return estimate, estimate, estimate
     width = _NORMAL_90 * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
     chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
-    return estimate, max(estimate - width, chosen.low), min(estimate + width, chosen.high)
+    lowest, highest = candidate.bounds(chosen)
+    return estimate, max(estimate - width, lowest), min(estimate + width, highest)
 
 
 def _experiment(alternatives: Sequence[Explanation]) -> str:

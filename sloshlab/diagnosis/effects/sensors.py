@@ -24,6 +24,8 @@ FloatArray = NDArray[np.float64]
 Others = Mapping[str, FloatArray]
 _MAINS_HZ: Final = 0.2
 _MOST_PAIRS: Final = 20
+_LARGEST_LEAK: Final = 0.1
+"""Of a channel's reading; what adds more is no leak but another connection or gain."""
 
 
 def _channels_and_devices(at: Surroundings) -> list[str]:
@@ -304,10 +306,19 @@ def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     return Extension(faults=(SensorFault(to, leaked(1.0), leaked(-1.0), key),))
 
 
-def _leaks(at: Surroundings) -> list[Numbers]:
+def _all_of_it(at: Surroundings) -> float:
+    """Ratio with which as much would leak as the channel itself reads."""
     to, _, source = at.channel.partition("<")
-    size = at.channels.get(to, 1.0) / max(at.channels.get(source, 1.0), 1e-300)
-    return [{"ratio": sign * 0.03 * size} for sign in (1, -1)]
+    return at.channels.get(to, 1.0) / max(at.channels.get(source, 1.0), 1e-300)
+
+
+def _leaks(at: Surroundings) -> list[Numbers]:
+    return [{"ratio": sign * 0.03 * _all_of_it(at)} for sign in (1, -1)]
+
+
+def _largest_leaks(at: Surroundings) -> Mapping[str, tuple[float, float]]:
+    most = _LARGEST_LEAK * _all_of_it(at)
+    return {"ratio": (-most, most)}
 
 
 CROSS_TALK = register(
@@ -321,6 +332,7 @@ CROSS_TALK = register(
         ("mass_error", "sensor_gain"),
         "the second channel disconnected",
         places=_pairs,
+        limits=_largest_leaks,
         spoken_for_by=("one channel alone", "another channel"),
     )
 )
