@@ -379,7 +379,7 @@ def own_tolerances(model: RigModel, forces: RunForces, place: str) -> FloatArray
         scale = 1.0 / structure.mode_shape[0] ** 2
         own[0] = 2 * tolerance("frequency of mode 1") * structure.stiffnesses_n_per_m[0] * scale
         own[1] = tolerance("damping of mode 1") * structure.dampings_kg_per_s[0] * scale
-        own[2] = tolerance("modal mass") * structure.masses_kg[0] * scale
+        own[2] = tolerance("modal mass of mode 1") * structure.masses_kg[0] * scale
     if place in (TANK, EITHER):
         own[2] = np.hypot(own[2], tolerance("carried mass") * forces.carried_mass_kg)
         for term in model.twin.terms:

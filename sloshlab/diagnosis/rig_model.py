@@ -351,7 +351,7 @@ def _of_structure(structure: Structure, *, moves: bool) -> list[BaselineParamete
         label = f"mode {i + 1}"
         found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02))
         found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2))
-    found.append(BaselineParameter("modal mass", 1.0, 0.01))
+    found += [BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01) for i in range(n)]
     if moves:
         found += [BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02) for i in range(n)]
     return found
@@ -362,7 +362,7 @@ def _varied_structure(structure: Structure, values: Mapping[str, float]) -> Stru
     frequency = np.array([values.get(f"frequency of mode {i + 1}", 1.0) for i in range(n)])
     damping = np.array([values.get(f"damping of mode {i + 1}", 1.0) for i in range(n)])
     participation = np.array([values.get(f"base participation of mode {i + 1}", 1.0) for i in range(n)])
-    mass = values.get("modal mass", 1.0)
+    mass = np.array([values.get(f"modal mass of mode {i + 1}", 1.0) for i in range(n)])
     return replace(
         structure,
         masses_kg=structure.masses_kg * mass,
