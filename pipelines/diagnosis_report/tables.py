@@ -15,7 +15,6 @@ from pipelines.report.tables import Table
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.evidence import ALONE, CANNOT_TELL
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import MOST_TOLERANCES
 from sloshlab.diagnosis.verdict import interval, named_and_placed, named_and_units
 
 _MOST_EXPLANATIONS: Final = 14
@@ -61,8 +60,8 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
     header: tuple[str, ...] = ("parameter", "believed", "tolerance", "retuned", "moved, in tolerances")
     header += () if best is None else ("moved with the effect, in tolerances",)
     caption = (
-        f"A number that wants to move by more than its tolerance asks for a second look at the rig file; beyond "
-        f"{MOST_TOLERANCES:g} tolerances it is held. One of a mode that no run excites means nothing."
+        "A number that wants to move by more than its tolerance asks for a second look at the rig file; beyond two "
+        "tolerances, dampings and releases beyond four, it is held. One of a mode that no run excites means nothing."
     )
     return Table("The baseline's own parameters", header, tuple(rows), caption)
 
@@ -70,7 +69,7 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
 def _moved(parameter: BaselineParameter, value: float) -> str:
     """How far a number is from what is believed, and whether it is held there."""
     tolerances = (value - parameter.believed) / parameter.tolerance
-    held = " (held)" if abs(tolerances) > MOST_TOLERANCES - 1e-3 else ""
+    held = " (held)" if abs(tolerances) > parameter.most_tolerances - 1e-3 else ""
     return signed(tolerances if abs(tolerances) >= 0.005 else 0.0, 2) + held
 
 
@@ -317,7 +316,10 @@ def _standing(diagnosis: Diagnosis, one: Explanation, alternatives: Collection[t
     verdict = diagnosis.verdict
     if verdict.best is not None and one.keys == verdict.best.keys:
         return verdict.kind if verdict.kind != "unknown" else "nearest, not adequate"
-    return "as good" if one.keys in alternatives else "worse"
+    if one.keys in alternatives:
+        return "as good"
+    is_more = verdict.best is not None and set(one.keys) > set(verdict.best.keys)
+    return "not worth one more effect" if is_more and verdict.kind != "unknown" else "worse"
 
 
 def _holds(holds: bool | None) -> str:

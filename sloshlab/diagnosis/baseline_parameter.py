@@ -18,6 +18,8 @@ class BaselineParameter:
     units : str
     is_reading : bool
         Whether it changes only what a channel reads, not the motion.
+    most_tolerances : float
+        How far it may be from what is believed of it; beyond, something else is the matter.
     """
 
     name: str
@@ -25,3 +27,4 @@ class BaselineParameter:
     tolerance: float
     units: str = "1"
     is_reading: bool = False
+    most_tolerances: float = 4.0

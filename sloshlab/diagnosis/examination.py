@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import Effect
 from sloshlab.diagnosis.evidence import CANNOT_TELL, Evidence, evidence
@@ -20,6 +21,7 @@ from sloshlab.diagnosis.residual_maps import ResidualMaps, residual_maps
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.sensor_character import SensorAnswer, said, sensor_character
 
+FloatArray = NDArray[np.float64]
 _CLEARLY = 1.5
 _MOST = 0.8
 
@@ -129,18 +131,42 @@ def seen_at(examination: Examination, best: Explanation | None) -> str:
     """
     faulty = best.channels if best is not None else ()
     worst = (faulty or examination.where.get("channels") or [""])[0]
-    parts = [_in_the_cycle(one) for one in examination.maps if one.channel == worst]
-    parts.append(_levels(examination, worst))
-    words = " ".join(part for part in parts if part)
+    if faulty:
+        cycle = [_of_a_channel(one) for one in examination.maps if one.channel == worst]
+    else:
+        block = best.fit.candidates[0].effect.block if best is not None else owning_block(examination)
+        cycle = [_of_a_force(examination, block)]
+    words = " ".join(part for part in (*cycle, _levels(examination, worst)) if part)
     return f"seen {words}" if words else ""
 
 
-def _in_the_cycle(one: ResidualMaps) -> str:
-    """Words for the part of the cycle with most of the residual, if one stands out."""
+def _of_a_channel(one: ResidualMaps) -> str:
+    """Words for the part of the cycle in which a faulty channel reads most of its error."""
     if one.phase is None or not np.isfinite(one.phase.excess).all():
         return ""
-    excess = np.maximum(one.phase.excess, 0.0)
-    phase = one.phase.middles
+    return _in_the_cycle(one.phase.middles, np.maximum(one.phase.excess, 0.0))
+
+
+def _of_a_force(examination: Examination, place: str) -> str:
+    """The same for the force that a block lacks beyond its own spring, damper and mass.
+
+    A motion that lags behind says nothing on what made it lag.
+    """
+    character = examination.characters.get(place)
+    if examination.cut is None or character is None or not character.is_there:
+        return ""
+    phases, squares = [], []
+    for one in examination.cut.forces(place):
+        velocity, acceleration = one.motion[:, 1], one.motion[:, 2]
+        scale = float(acceleration.std()) / max(float(velocity.std()), 1e-300)
+        own, *_ = np.linalg.lstsq(one.motion, one.force_n)
+        phases.append(np.arctan2(scale * velocity, acceleration))
+        squares.append((one.force_n - one.motion @ own) ** 2)
+    return _in_the_cycle(np.concatenate(phases), np.concatenate(squares))
+
+
+def _in_the_cycle(phase: FloatArray, excess: FloatArray) -> str:
+    """Words for the part of the cycle with most of something, if one stands out; a = a₀ cos φ."""
     mean = max(float(excess.mean()), 1e-300)
     near = {
         "at velocity reversals": np.abs(np.sin(phase)) < 0.5,
@@ -148,7 +174,9 @@ def _in_the_cycle(one: ResidualMaps) -> str:
         "about the lowest point": np.cos(phase) > 0.5,
         "about the highest point": np.cos(phase) < -0.5,
     }
-    sizes = {words: float(excess[chosen].mean()) / mean for words, chosen in near.items()}
+    sizes = {words: float(excess[chosen].mean()) / mean for words, chosen in near.items() if chosen.any()}
+    if len(sizes) < len(near):
+        return ""
     best = max(sizes, key=lambda words: sizes[words])
     if best in ("about the lowest point", "about the highest point"):
         other = min(sizes["about the lowest point"], sizes["about the highest point"])
@@ -165,9 +193,10 @@ def _levels(examination: Examination, worst: str) -> str:
         return ""
     low, high = levels
     largest = float(profile.edges[-1])
-    if high < 0.7 * largest:
+    if high < 0.7 * largest and low < 0.3 * high:
         return f"below {high:.2g} g"
-    return f"above {low:.2g} g" if low > 0.3 * largest else f"from {low:.2g} to {high:.2g} g"
+    is_above = low > 0.3 * largest and high >= 0.7 * largest
+    return f"above {low:.2g} g" if is_above else f"from {low:.2g} to {high:.2g} g"
 
 
 def examination_facts(examination: Examination, found: Findings) -> dict[str, Any]:

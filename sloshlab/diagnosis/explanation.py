@@ -346,8 +346,7 @@ class _Search:
                 number = f"{candidate.key}.{candidate.effect.parameters[0].name}"
                 done = scanned(one.problem, done, number, shares)
             kept.append(self.judged(done))
-        kept += self._generalised(base, kept, pool, what)
-        self.explanations += kept
+        self.explanations += [*kept, *self._generalised(base, kept, pool, what)]
         return kept
 
     def _generalised(
@@ -365,10 +364,10 @@ class _Search:
                 continue
             self.told(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
-            starts = [{**best.fit.values, **one} for one in _as_large(candidate, special, best.fit)]
-            one = begun(problem, starts, STAGES[1:])
+            starts = [{**best.fit.values, **one} for one in _as_its_special_case(candidate, special, best.fit)]
+            one = begun(problem, starts, STAGES[-2:])
             if not one.fit.trouble:
-                found.append(self.judged(finished(one, STAGES[1:])))
+                found.append(self.judged(finished(one, STAGES[-2:])))
         return found
 
     def _screen(
@@ -441,19 +440,24 @@ class _Search:
         theta = problem.theta_of(best.fit.values)
         at = problem.residual(theta)
         jacobian = problem.jacobian(theta, at, range(theta.size))
-        self._take_away(self._one_more(best.fit, jacobian, pool, "fitting a second effect"))
+        alone = self._take_away(self._one_more(best.fit, jacobian, pool, "fitting a second effect"))
+        self.explanations += alone
+        if min((one.fit.cost for one in alone), default=np.inf) < best.fit.cost:
+            self.explanations += self._generalised(retuned, alone, pool, "fitting one effect")
 
-    def _take_away(self, pairs: Sequence[Explanation]) -> None:
+    def _take_away(self, pairs: Sequence[Explanation]) -> list[Explanation]:
         """Each effect of the best pair alone, from the numbers that it has there: one of them may be enough."""
         pair = min(pairs, key=lambda one: one.fit.cost, default=None)
         if pair is None:
-            return
+            return []
+        found = []
         for i, candidate in enumerate(pair.fit.candidates):
             self.told(f"taking away one of two effects: {candidate.key} is left", i, len(pair.keys))
             problem = FreeRunProblem(self.model, self.fitting, (candidate,))
             fit, _ = fitted(problem, pair.fit.values, shares=STAGES[-2:])
             if not fit.trouble:
-                self.explanations.append(self.judged(fit))
+                found.append(self.judged(fit))
+        return found
 
     def _problem(self, fit: FreeRunFit) -> FreeRunProblem:
         return FreeRunProblem(self.model, self.fitting, fit.candidates)
@@ -572,16 +576,14 @@ class _WithEffects(FreeRunProblem):
         self.candidates = tuple(effects_)
 
 
-def _as_large(wider: Candidate, special: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
+def _as_its_special_case(wider: Candidate, special: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
     """Starts of an effect with all numbers of one unit as large as that of its special case was found."""
     name = special.effect.parameters[0].name
-    unit, size = name.partition("_")[2], abs(fit.values[f"{special.key}.{name}"])
-    starts = []
-    for start in wider.starts():
-        alike = [key for key in start if key.rpartition(".")[2].partition("_")[2] == unit]
-        factor = size / max(abs(start[alike[0]]), 1e-300) if alike else 1.0
-        starts.append({key: value * (factor if key in alike else 1.0) for key, value in start.items()})
-    return starts
+    unit, size = name.partition("_")[2], fit.values[f"{special.key}.{name}"]
+    return [
+        {key: size if key.rpartition(".")[2].partition("_")[2] == unit else value for key, value in start.items()}
+        for start in wider.starts()
+    ]
 
 
 def _resized(start: dict[str, float], factor: float) -> dict[str, float]:

@@ -26,8 +26,6 @@ _COARSE_STEP: Final = 0.03
 _TOLERANCES_OF_DAMPING: Final = 3.0
 _ROBUST: Final = 4.0
 _LARGEST_DAMPING: Final = 1e8
-MOST_TOLERANCES: Final = 4.0
-"""How far a baseline's parameter may be from what is believed of it; beyond, something else is the matter."""
 _LEAST_SHARE_OF_PROMISE: Final = 0.3
 _LAST_STAGE: Final = 0.03
 """Of the tolerance: small steps along a valley add up to more than the gates of a verdict."""
@@ -128,7 +126,10 @@ class FreeRunProblem:
         )
         self.n_baseline = len(self._baseline)
         bounds = [
-            (one.believed - MOST_TOLERANCES * one.tolerance, one.believed + MOST_TOLERANCES * one.tolerance)
+            (
+                one.believed - one.most_tolerances * one.tolerance,
+                one.believed + one.most_tolerances * one.tolerance,
+            )
             for one in self._baseline
         ] + [one.bounds(parameter) for one in self.candidates for parameter in one.effect.parameters]
         self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
