@@ -6,6 +6,7 @@ import json
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from recorded_oscillators import MASS_KG, NOISE, effect, motion, rig, run_of
 
@@ -14,6 +15,7 @@ from sloshlab.diagnosis.evidence import FORCE_TERMS, SENSOR_TERMS, TAKES
 from sloshlab.diagnosis.examination import Examination, examination_facts, examined, owning_block, seen_at
 from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.observations import observations
+from sloshlab.diagnosis.residual_maps import Profile, ResidualMaps
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.verdict import Verdict, named_and_units, with_place
 
@@ -53,10 +55,10 @@ def test_friction_is_spoken_for_and_a_spring_is_not(friction: tuple[Any, Examina
 
 
 def test_the_sentence_says_where_it_is_seen(friction: tuple[Any, Examination]) -> None:
-    """Sin φ is the velocity: undamped simulation and damped recording differ most where the motion is largest."""
+    """A motion that dies out too late lags at every speed: no part of the cycle is named for that."""
     words = seen_at(friction[1], None)
-    assert words.startswith("seen ")
-    assert " g" in words
+    assert words.startswith("seen below ")
+    assert words.endswith(" g")
     unknown = Verdict("unknown", None, [], 0.0, 0.0, "Something.", "", {})
     told = with_place(friction[0], unknown, words, "structure")
     assert told.block == "structure"
@@ -64,6 +66,63 @@ def test_the_sentence_says_where_it_is_seen(friction: tuple[Any, Examination]) -
     assert told.statement.endswith(f"; {words}.")
     nothing = Verdict("nothing_missing", None, [], 0.0, 0.0, "Nothing is missing.", "", {})
     assert with_place(friction[0], nothing, words, "structure") is nothing
+
+
+@pytest.mark.parametrize(
+    ("of_phase", "words"),
+    [
+        (lambda phase: np.sin(phase) ** 2, "at the largest velocities"),
+        (lambda phase: np.cos(phase) ** 4, "at velocity reversals"),
+        (lambda phase: np.maximum(np.cos(phase), 0.0) ** 2, "about the lowest point"),
+        (lambda phase: np.maximum(-np.cos(phase), 0.0) ** 2, "about the highest point"),
+        (lambda phase: 1.0 + 0.2 * np.cos(phase), ""),
+    ],
+)
+def test_the_part_of_the_cycle_in_words(of_phase: Any, words: str) -> None:
+    """a = a₀ cos φ upward: largest at the lowest point, the velocity largest at ±π/2."""
+    edges = np.linspace(-np.pi, np.pi, 25)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    maps = ResidualMaps("acceleration_tip", None, None, Profile(edges, 5.0 * of_phase(middles)))
+    sensor: Any = SimpleNamespace(channels=("acceleration_tip",))
+    told = seen_at(Examination(None, {}, (), [maps], {"channels": ["acceleration_tip"]}), sensor)
+    assert told == (f"seen {words}" if words else "")
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        lambda x, v: -np.sign(x) * np.maximum(np.abs(x) - 0.7, 0.0),
+        lambda x, v: -0.5 * np.sign(v),
+        lambda x, v: -0.5 * np.sign(v) - 3.0 * v + 8.0 * x,
+    ],
+    ids=["a stop", "friction", "friction beside a damper and a spring"],
+)
+def test_the_part_of_the_cycle_in_which_a_force_is_no_spring_and_no_damper(force: Any) -> None:
+    """Of x = cos t a stop is felt at the ends, and F sgn v − 4F v/π is F there and −0.27 F at the largest speed."""
+    phase = np.arange(5000) / 250.0
+    motion = np.column_stack([np.cos(phase), -np.sin(phase), -np.cos(phase)])
+    lacking = SimpleNamespace(motion=motion, force_n=force(motion[:, 0], motion[:, 1]))
+    cut: Any = SimpleNamespace(forces=lambda place: [lacking])
+    characters: Any = {"structure": SimpleNamespace(is_there=True)}
+    effect_ = SimpleNamespace(effect=SimpleNamespace(block="structure"))
+    best: Any = SimpleNamespace(channels=(), fit=SimpleNamespace(candidates=[effect_]))
+    assert seen_at(Examination(cut, characters, (), [], {}), best) == "seen at velocity reversals"
+
+
+@pytest.mark.parametrize(
+    ("held", "words"),
+    [
+        ((0.5, 4.0), "below 4 g"),
+        ((3.2, 5.3), "from 3.2 to 5.3 g"),
+        ((5.0, 8.0), "above 5 g"),
+        ((1.0, 8.0), "from 1 to 8 g"),
+    ],
+)
+def test_levels_that_hold_most_of_it_in_words(held: tuple[float, float], words: str) -> None:
+    """Of runs up to 8 g; 80 % of the mismatch lies between the two."""
+    maps = ResidualMaps("force_interface", None, Profile(np.linspace(0, 8, 11), np.ones(10)), None)
+    where = {"channels": ["force_interface"], "acceleration_g": list(held)}
+    assert seen_at(Examination(None, {}, (), [maps], where), None) == f"seen {words}"
 
 
 def test_the_facts_are_strict_json(friction: tuple[Any, Examination]) -> None:
