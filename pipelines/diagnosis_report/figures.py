@@ -17,7 +17,7 @@ from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.verdict import named_and_placed
 
 FloatArray = NDArray[np.float64]
-_MOST_ROWS = 18
+_MOST_ROWS = 14
 _SHOWN_CYCLES = 10
 FAINT_COLOUR = "#b8c4d0"
 _EXCESS_OF_NOISE = 1.0
@@ -60,30 +60,33 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
 
 
 def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
-    """How much each candidate helps, on fitted and on held-out runs."""
-    found = diagnosis.findings
-    chosen = diagnosis.explanations[:_MOST_ROWS]
-    if not chosen:
+    """What each explanation leaves, on fitted and on held-out runs."""
+    found, everything = diagnosis.findings, diagnosis.explanations
+    if not everything:
         raise NothingToDrawError("no candidate promised anything")
-    gains = np.array(
-        [(found.retuned.held_out - one.held_out, found.retuned.fit.cost - one.fit.cost) for one in chosen]
+    n_singles = sum(len(one.keys) == 1 for one in everything)
+    pairs = [one for one in everything if len(one.keys) > 1][: max(_MOST_ROWS - n_singles, 3)]
+    chosen = [one for one in everything if len(one.keys) == 1 or one in pairs]
+    rows = [*[(words(one, "\n+ "), one) for one in chosen], ("baseline retuned", found.retuned)]
+    left = np.array(
+        [(one.held_out / found.n_held_out, one.fit.misfit / found.n_fitting) for _, one in rows], np.float64
     )
-    least = max(1.0, 10.0 ** np.floor(np.log10(max(gains[gains > 1.0].min(initial=1.0), 1.0))))
-    shown = np.maximum(gains, 0.5 * least)
-    lines = np.array([len(one.keys) for one in chosen])
-    figure = new_figure(0.9 + 0.15 * len(chosen) + 0.13 * int(lines.sum()))
+    left = np.where(np.isfinite(left), left, np.nan)
+    n_lines = sum(label.count("\n") + 1 for label, _ in rows)
+    figure = new_figure(0.9 + 0.15 * len(rows) + 0.13 * n_lines)
     axes = figure.subplots()
-    place = np.arange(len(chosen))
-    axes.barh(place - 0.18, shown[:, 0], 0.34, color=REFERENCE_COLOUR, label="held-out runs")
-    axes.barh(place + 0.18, shown[:, 1], 0.34, color=NEUTRAL_COLOUR, label="fitted runs")
-    axes.set_yticks(place, [words(one, "\n+ ") for one in chosen], fontsize=7)
-    axes.invert_yaxis()
-    axes.set(xscale="log", xlabel="gain over the retuned baseline", xlim=(0.5 * least, 1.5 * shown.max()))
+    place = np.arange(len(rows))
+    axes.barh(place - 0.18, left[:, 0], 0.34, color=REFERENCE_COLOUR, label="held-out runs")
+    axes.barh(place + 0.18, left[:, 1], 0.34, color=NEUTRAL_COLOUR, label="fitted runs")
+    axes.set_yticks(place, [label for label, _ in rows], fontsize=7)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    limits = (0.7 * float(np.nanmin(left)), 1.3 * float(np.nanmax(left)))
+    axes.set(xscale="log", xlabel="mean square that is left / noise", xlim=limits)
     plain_ticks_within_decades(axes.xaxis)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", ncols=2)
     caption = (
-        "What each explanation gains over the retuned baseline: the decrease of the sum of squares. What has no "
-        "bar gains nothing or loses. The best on held-out runs is on top."
+        "What each explanation leaves of the recordings, over all coefficients; the best on held-out runs is on "
+        f"top. All single effects that were fitted to the end and the best pairs: {len(chosen)} of {len(everything)}."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
 

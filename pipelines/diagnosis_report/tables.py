@@ -60,8 +60,8 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
     header: tuple[str, ...] = ("parameter", "believed", "tolerance", "retuned", "moved, in tolerances")
     header += () if best is None else ("moved with the effect, in tolerances",)
     caption = (
-        "A number that wants to move by more than its tolerance asks for a second look at the rig file; beyond two "
-        "tolerances, dampings and releases beyond four, it is held. One of a mode that no run excites means nothing."
+        "A number that wants to move by more than its tolerance asks for a second look at the rig file; at two "
+        "tolerances, dampings at four, it is held. One of a mode that no run excites means nothing."
     )
     return Table("The baseline's own parameters", header, tuple(rows), caption)
 
