@@ -89,16 +89,21 @@ def test_the_part_of_the_cycle_in_words(of_phase: Any, words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "force",
+    ("force", "words"),
     [
-        lambda x, v: -np.sign(x) * np.maximum(np.abs(x) - 0.7, 0.0),
-        lambda x, v: -0.5 * np.sign(v),
-        lambda x, v: -0.5 * np.sign(v) - 3.0 * v + 8.0 * x,
+        pytest.param(lambda x, v: -0.5 * np.sign(v), "seen at velocity reversals", id="friction"),
+        pytest.param(
+            lambda x, v: -0.5 * np.sign(v) - 3.0 * v + 8.0 * x,
+            "seen at velocity reversals",
+            id="and its own block",
+        ),
+        pytest.param(
+            lambda x, v: np.where(np.abs(v) > 0.8, x, 0.0), "seen at the largest velocities", id="where it is fast"
+        ),
     ],
-    ids=["a stop", "friction", "friction beside a damper and a spring"],
 )
-def test_the_part_of_the_cycle_in_which_a_force_is_no_spring_and_no_damper(force: Any) -> None:
-    """Of x = cos t a stop is felt at the ends, and F sgn v − 4F v/π is F there and −0.27 F at the largest speed."""
+def test_the_part_of_the_cycle_in_which_a_force_is_no_spring_and_no_damper(force: Any, words: str) -> None:
+    """Of x = cos t: F sgn v − 4F v/π is F at the ends and −0.27 F at the largest speed."""
     phase = np.arange(5000) / 250.0
     motion = np.column_stack([np.cos(phase), -np.sin(phase), -np.cos(phase)])
     lacking = SimpleNamespace(motion=motion, force_n=force(motion[:, 0], motion[:, 1]))
@@ -106,7 +111,7 @@ def test_the_part_of_the_cycle_in_which_a_force_is_no_spring_and_no_damper(force
     characters: Any = {"structure": SimpleNamespace(is_there=True)}
     effect_ = SimpleNamespace(effect=SimpleNamespace(block="structure"))
     best: Any = SimpleNamespace(channels=(), fit=SimpleNamespace(candidates=[effect_]))
-    assert seen_at(Examination(cut, characters, (), [], {}), best) == "seen at velocity reversals"
+    assert seen_at(Examination(cut, characters, (), [], {}), best) == words
 
 
 @pytest.mark.parametrize(
