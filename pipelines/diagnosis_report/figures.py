@@ -86,7 +86,8 @@ def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", ncols=2)
     caption = (
         "What each explanation leaves of the recordings, over all coefficients; the best on held-out runs is on "
-        f"top. All single effects that were fitted to the end and the best pairs: {len(chosen)} of {len(everything)}."
+        "top. All single effects that were fitted to the end and the best pairs: "
+        f"{len(chosen)} of {len(everything)}."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
 
