@@ -321,8 +321,8 @@ class _Search:
     ) -> list[Explanation]:
         """Fit each of some candidates beside what is in `base` already; the promising ones to the end."""
         shares = stages_for(self._problem(base), base)
-        promising = self._screen(base, jacobian, pool, what, shares)
-        is_near = shares != STAGES
+        is_near = shares != STAGES and not self._is_strained(base)
+        promising = self._screen(base, jacobian, pool, what, shares, is_near=is_near)
         begun_fits = []
         for i, (candidate, starts) in enumerate(promising):
             self.told(f"{what}: {candidate.key}", i, 2 * len(promising))
@@ -342,12 +342,17 @@ class _Search:
                 continue
             self.told(f"{what}: {candidate.key}, to the end", len(promising) + i, 2 * len(promising))
             done = finished(one, shares)
-            if i < _MOST_SCANNED and not is_near and not one.problem.is_down_to_noise(done):
+            if i < _MOST_SCANNED and shares == STAGES and not one.problem.is_down_to_noise(done):
                 number = f"{candidate.key}.{candidate.effect.parameters[0].name}"
                 done = scanned(one.problem, done, number, shares)
             kept.append(self.judged(done))
         self.explanations += [*kept, *self._generalised(base, kept, pool, what)]
         return kept
+
+    def _is_strained(self, fit: FreeRunFit) -> bool:
+        """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""
+        problem = self._problem(fit)
+        return bool(problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline].any())
 
     def _generalised(
         self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
@@ -377,6 +382,8 @@ class _Search:
         pool: Sequence[Candidate],
         what: str,
         shares: Sequence[float],
+        *,
+        is_near: bool,
     ) -> list[tuple[Candidate, list[dict[str, float]]]]:
         """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from."""
         problem = FreeRunProblem(self.model, self.fitting, base.candidates)
@@ -403,7 +410,7 @@ class _Search:
                 self.failed[candidate.key] = "does not run from any start"
                 continue
             looks.sort(key=lambda one: -max(one[0]))
-            if shares != STAGES:
+            if is_near:
                 starts = [{**base.values, **sized} for _, _, sized in looks[:_MOST_STARTS]]
             else:
                 believed = base.values if base.candidates else self.model.believed

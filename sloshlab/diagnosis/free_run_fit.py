@@ -496,7 +496,7 @@ def begun(
         n_iterations=n_iterations,
         shares=(second,),
         known=best.jacobian if best.is_near else None,
-        is_last=False,
+        is_last=best.is_near,
     )
     return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second), best.is_near)
 

@@ -97,9 +97,8 @@ def verdict_of(found: Findings) -> Verdict:
     described = [*found.explanations, *found.ceilings]
     ceiling = min([*described, found.retuned], key=lambda one: one.held_out)
     gain = scale.held_out_gain(found.retuned, ceiling)
-    fit_gain = max([scale.fit_gain(found.retuned, one) for one in described], default=0.0)
     probabilities = _probabilities(found, scale)
-    if gain < LEAST_GAIN or fit_gain < LEAST_GAIN or strength(found.retuned, ceiling) < LEAST_STRENGTH:
+    if not any(_shows_more(one, found.retuned, scale) for one in described):
         certain = _certain(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, _nothing(found), "", certain)
     named = _shortest_sufficient(found, scale)
