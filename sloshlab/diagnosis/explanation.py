@@ -51,6 +51,8 @@ from sloshlab.rig import Rig
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
 _MOST_FITTED: Final = 12
+_MOST_BESIDE: Final = 6
+"""Candidates that are fitted from a first look, as a first effect and as a second one."""
 _MOST_SCANNED: Final = 1
 _MOST_STARTS: Final = 2
 _ALWAYS_FINISHED: Final = 3
@@ -370,9 +372,10 @@ class _Search:
             self.told(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
             starts = [{**best.fit.values, **one} for one in _as_its_special_case(candidate, special, best.fit)]
-            one = begun(problem, starts, STAGES[-2:])
-            if not one.fit.trouble:
-                found.append(self.judged(finished(one, STAGES[-2:])))
+            costs = [huber_cost(problem.residual(problem.theta_of(start))) for start in starts]
+            fit, _ = fitted(problem, starts[int(np.argmin(costs))], n_iterations=6, shares=STAGES[-2:])
+            if not fit.trouble:
+                found.append(self.judged(fit))
         return found
 
     def _screen(
@@ -417,10 +420,10 @@ class _Search:
                 starts = [{**believed, **start} for _, start, _ in looks[:_MOST_STARTS]]
                 starts.append({**base.values, **looks[0][2]})
             promised.append((np.max([one[0] for one in looks], axis=0), candidate, starts))
-        return self._chosen(promised)
+        return self._chosen(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
 
     def _chosen(
-        self, promised: Sequence[tuple[FloatArray, Candidate, list[dict[str, float]]]]
+        self, promised: Sequence[tuple[FloatArray, Candidate, list[dict[str, float]]]], most: int
     ) -> list[tuple[Candidate, list[dict[str, float]]]]:
         """The candidates that promise most, in a soft look or in a hard one."""
         if not promised:
@@ -430,7 +433,7 @@ class _Search:
         chosen = []
         for rank, (gains, candidate, starts) in enumerate(ordered):
             is_little = gains.max() < _LEAST_PREDICTED or float(np.max(gains / top)) < _LEAST_SHARE_OF_PROMISE
-            if is_little or rank >= _MOST_FITTED:
+            if is_little or rank >= most:
                 self.screened[candidate.key] = float(gains.max())
             else:
                 chosen.append((candidate, starts))
