@@ -1,8 +1,8 @@
-"""Speed and memory: shaker analysis, twin, reduced-order model, numerical tank, live recording, in one run.
+"""Speed and memory: analysis, twin, reduced-order model, numerical tank, recording, diagnosis, in one run.
 
 Each measurement runs in a process of its own, on one core. Times are processor times, the best of several
-repeats after a warm-up that compiles the kernels; training runs once on two cores and is timed by the clock. The
-parent prints the table and says where a figure misses its aim.
+repeats after a warm-up that compiles the kernels; training and diagnoses run once, on two cores, and are timed by
+the clock. The parent prints the table and says where a figure misses its aim.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from tests.benchmarks.diagnosis import LONGEST_LABEL, MEDIAN_LABEL, diagnosis_figures
+from tests.benchmarks.diagnosis import MEMORY_LABEL as DIAGNOSIS_MEMORY_LABEL
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
 from tests.benchmarks.reduced_order_model import MEMORY_LABEL, PRODUCT_LABEL, TIME_LABEL, model_figures
 from tests.benchmarks.reduced_order_model_in_the_twin import LOOP_LABEL
@@ -28,6 +30,9 @@ AIMS = {
     FREE_LABEL: 0.1,
     RANDOM_LABEL: 1.0,
     LOOP_LABEL: 0.05,
+    MEDIAN_LABEL: 60.0,
+    LONGEST_LABEL: 180.0,
+    DIAGNOSIS_MEMORY_LABEL: 2.0,
     TIME_LABEL: 300.0,
     MEMORY_LABEL: 1.5,
     **{label(layers): aim for layers, aim in RESOLUTIONS.items()},
@@ -99,6 +104,9 @@ def main() -> None:
     figures |= model_figures()
     figures |= tank_figures(ONE_CORE)
     figures |= recording_figures()
+    print("diagnosing six cases …", flush=True)
+    with tempfile.TemporaryDirectory() as name:
+        figures |= diagnosis_figures(Path(name))
     sys.exit(1 if printed(figures) else 0)
 
 
