@@ -286,7 +286,10 @@ def surroundings(model: UserTwinModel) -> Surroundings:
     )
 
 
-@pytest.mark.parametrize("twin", [RELEASED, ITSELF], ids=["engine", "simulates by itself"])
+@pytest.mark.parametrize(
+    "twin",
+    [pytest.param(RELEASED, id="engine"), pytest.param(ITSELF, id="simulates by itself", marks=pytest.mark.slow)],
+)
 def test_friction_of_a_closed_form_is_found(twin: MechanicalTwin | FreeTwin) -> None:
     """The decay is the closed form with noise; the stiffness is believed 0.6 % too large."""
     noise = np.random.default_rng(5).normal(0, 1e-5, N)
