@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import log
-from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -41,9 +41,20 @@ BOTH_SIDES = {
 HUM = {"sensor.mains_hum_60.acceleration_tip.amplitude": 0.25}
 NOISE = 1.0
 TIP = "acceleration_tip"
-AT, AT_ONE_FREQUENCY = (
-    cast(Surroundings, SimpleNamespace(has_one_frequency=one_frequency)) for one_frequency in (False, True)
+AT = Surroundings(
+    rig=cast(Any, None),
+    twin=cast(Any, None),
+    displacement_m=0.02,
+    velocity_m_per_s=0.8,
+    acceleration_m_per_s2=32.0,
+    frequency_hz=6.4,
+    force_n=70.0,
+    channels={TIP: 16.0, "force_interface": 35.0},
+    driving=(),
+    sampling_rate_hz=250.0,
+    longest_run_s=4.0,
 )
+AT_ONE_FREQUENCY = replace(AT, has_one_frequency=True)
 
 
 class HandMade(Findings):
