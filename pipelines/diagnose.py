@@ -14,8 +14,9 @@ from pipelines.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.examination import examination_facts, examined, owning_block, seen_at
-from sloshlab.diagnosis.explanation import explained_extension, findings_of
+from sloshlab.diagnosis.explanation import explained_extension
 from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.search import findings_of
 from sloshlab.diagnosis.user_effects import load_user_effects
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of, with_place

@@ -121,7 +121,7 @@ def verdict_of(found: Findings) -> Verdict:
         adequacy,
         _statement(found, named, alternatives, kind),
         _experiment(alternatives) if kind == "indistinguishable" else "",
-        probabilities,
+        _certain(probabilities, *(_label(one) for one in alternatives)),
     )
 
 
@@ -257,7 +257,7 @@ def _probabilities(found: Findings, scale: _Scale) -> dict[str, float]:
     scores: dict[str, float] = {"none": -found.retuned.held_out / scale.held_out}
     for one in found.explanations:
         if np.isfinite(one.held_out):
-            label = " + ".join(name.removesuffix("_60") for name in one.names)
+            label = _label(one)
             score = -one.held_out / scale.held_out - scale.per_number * one.n_numbers
             scores[label] = max(scores.get(label, -np.inf), score)
     ceiling = min(found.ceilings, key=lambda one: one.held_out, default=None)
@@ -269,11 +269,17 @@ def _probabilities(found: Findings, scale: _Scale) -> dict[str, float]:
     return {name: weight / total for name, weight in weights.items() if weight / total > 1e-4}
 
 
-def _certain(probabilities: dict[str, float], name: str) -> dict[str, float]:
+def _certain(probabilities: dict[str, float], *decided: str) -> dict[str, float]:
     """Probabilities after the gates: half of the weight to what they decided."""
     shared = {key: 0.5 * value for key, value in probabilities.items()}
-    shared[name] = shared.get(name, 0.0) + 0.5
+    labels = tuple(dict.fromkeys(decided))
+    for label in labels:
+        shared[label] = shared.get(label, 0.0) + 0.5 / len(labels)
     return shared
+
+
+def _label(one: Explanation) -> str:
+    return " + ".join(name.removesuffix("_60") for name in one.names)
 
 
 def _nothing(found: Findings) -> str:
@@ -308,10 +314,10 @@ def _statement(found: Findings, best: Explanation, alternatives: Sequence[Explan
 
 
 def explained_share(found: Findings, best: Explanation) -> float:
-    """What an explanation gains on held-out runs over the retuned baseline, over what the best of all gains."""
-    ceiling = min([*found.ceilings, *found.explanations, best], key=lambda one: one.held_out)
-    possible = found.retuned.held_out - ceiling.held_out
-    gained = found.retuned.held_out - best.held_out
+    """Share of what any description explains of the held-out runs beyond the retuned baseline."""
+    ceiling = min(one.held_out_rms for one in (*found.ceilings, *found.explanations, best))
+    possible = found.retuned.held_out_rms**2 - ceiling**2
+    gained = found.retuned.held_out_rms**2 - best.held_out_rms**2
     return min(max(gained / possible, 0.0), 1.0) if possible > 0 else 0.0
 
 
@@ -352,9 +358,7 @@ def _described(best: Explanation, candidate: Candidate) -> str:
     numbers = []
     for parameter in candidate.effect.parameters:
         words, units = named_and_units(parameter.name)
-        estimate, low, high = (
-            f"{value:.3g}".replace("-", "−") for value in interval(best, candidate, parameter.name)
-        )
+        estimate, low, high = _with_digits(*interval(best, candidate, parameter.name))
         label = f"{words} " if len(candidate.effect.parameters) > 1 else ""
         numbers.append(f"{label}{estimate}{units and ' ' + units} ({low} to {high})")
     return f"{named_and_placed(candidate)}, {', '.join(numbers)}"
@@ -370,6 +374,20 @@ def named_and_placed(candidate: Candidate) -> str:
     name = candidate.effect.name.removesuffix("_60").replace("_", " ")
     place = candidate.channel.replace("+", " and ").replace("<", " from ")
     return f"{name} of {place}" if place else f"{name} in the {candidate.effect.block}"
+
+
+def _with_digits(estimate: float, low: float, high: float) -> tuple[str, str, str]:
+    """Three digits, or as many as tell the interval from its middle.
+
+    Examples
+    --------
+    >>> _with_digits(39.0343, 39.0126, 39.056), _with_digits(-0.37, -0.41, -0.33)
+    (('39.03', '39.01', '39.06'), ('−0.37', '−0.41', '−0.33'))
+    """
+    width, size = high - low, max(abs(low), abs(high))
+    digits = 3 if width <= 0 or size <= 0 else min(max(3, 1 + int(np.ceil(np.log10(size / width)))), 8)
+    first, second, third = (f"{value:.{digits}g}".replace("-", "−") for value in (estimate, low, high))
+    return first, second, third
 
 
 def named_and_units(parameter: str) -> tuple[str, str]:

@@ -17,7 +17,8 @@ import pytest
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, known_effects
 from sloshlab.diagnosis.case import read_case
-from sloshlab.diagnosis.free_run_fit import FreeRunFit, FreeRunProblem, fitted, fitted_from, huber_cost
+from sloshlab.diagnosis.free_run_fit import fitted, fitted_from
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
 

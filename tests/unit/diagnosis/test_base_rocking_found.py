@@ -12,7 +12,8 @@ from scipy.signal import lsim
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, candidates
-from sloshlab.diagnosis.free_run_fit import FreeRunProblem, fitted_from
+from sloshlab.diagnosis.free_run_fit import fitted_from
+from sloshlab.diagnosis.free_run_problem import FreeRunProblem
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.modal.cantilever import Cantilever, cantilever_modes

@@ -27,14 +27,8 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Effect, EffectParameter
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import Extension
-from sloshlab.diagnosis.free_run_fit import (
-    FreeRunFit,
-    FreeRunProblem,
-    fitted,
-    fitted_from,
-    huber_cost,
-    robust_weights,
-)
+from sloshlab.diagnosis.free_run_fit import fitted, fitted_from
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost, robust_weights
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING

@@ -16,7 +16,8 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, known_effects
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
-from sloshlab.diagnosis.free_run_fit import FreeRunProblem, fitted_from
+from sloshlab.diagnosis.free_run_fit import fitted_from
+from sloshlab.diagnosis.free_run_problem import FreeRunProblem
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.user_twin import (
     AddedForce,

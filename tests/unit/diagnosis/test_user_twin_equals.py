@@ -7,7 +7,7 @@ import pytest
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, known_effects
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import FreeRunFit
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.verdict import equals_of
 
 assert effects.__all__

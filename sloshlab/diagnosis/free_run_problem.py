@@ -1,0 +1,283 @@
+"""What free-running simulations miss of recordings, weighted, as a function of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.block_jacobian import BlockJacobian
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.extension import NOTHING, Extension
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.errors import SloshlabError
+
+FloatArray = NDArray[np.float64]
+_Label = TypeVar("_Label")
+_STEP: Final = 0.005
+"""Of a difference, in tolerances; a frequency must not move by much of a cycle."""
+_COARSE_STEP: Final = 0.03
+_TOLERANCES_OF_DAMPING: Final = 3.0
+ROBUST: Final = 4.0
+"""Standard deviations from which a residual counts with its size, not with its square."""
+_FEWEST_IN_A_RUN: Final = 50
+DOWN_TO_NOISE: Final = 1.15
+"""Mean square of the weighted residuals of a channel in which nothing more is to be found."""
+N_THREADS = 2
+_POOL: Final = ThreadPoolExecutor(N_THREADS)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRunFit:
+    """A fitted simulation.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        Effects beyond the baseline.
+    values : dict
+        Baseline parameters by name, and ``key.parameter`` of every candidate.
+    cost : float
+        Sum of squares of weighted residuals (large ones counted less) and of deviations from what is believed.
+    misfit : float
+        The part of the residuals.
+    covariance : ndarray, shape (n, n)
+        Of the free parameters in scaled values, in the order of `names`.
+    names : tuple of str
+    scales : ndarray, shape (n,)
+    n_simulations : int
+    trouble : str
+        Why there is no result; empty where there is one.
+    """
+
+    candidates: tuple[Candidate, ...]
+    values: dict[str, float]
+    cost: float
+    misfit: float
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    names: tuple[str, ...] = ()
+    scales: FloatArray = field(default_factory=lambda: np.zeros(0))
+    n_simulations: int = 0
+    trouble: str = ""
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of a parameter in its own unit."""
+        i = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)) * self.scales[i])
+
+
+class FreeRunProblem:
+    """Weighted residuals of one set of observations as a function of scaled parameters.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    runs : sequence of sequences of Observation
+        Per run.
+    candidates : sequence of Candidate
+    fixed : mapping, optional
+        Baseline parameters that are not free.
+    """
+
+    def __init__(
+        self,
+        model: DiagnosedModel,
+        runs: Sequence[Sequence[Observation]],
+        candidates: Sequence[Candidate] = (),
+        fixed: Mapping[str, float] | None = None,
+    ) -> None:
+        self.model, self.runs, self.candidates = model, [run for run in runs if run], tuple(candidates)
+        self.fixed = dict(fixed or {})
+        present = {observation.run.name for run in self.runs for observation in run}
+        self._baseline = [
+            parameter
+            for parameter in model.parameters
+            if parameter.name not in self.fixed and run_of(parameter.name, model) in ("", *present)
+        ]
+        self.names = tuple(
+            [parameter.name for parameter in self._baseline]
+            + [f"{one.key}.{parameter.name}" for one in self.candidates for parameter in one.effect.parameters]
+        )
+        self.scales = np.array(
+            [parameter.tolerance for parameter in self._baseline]
+            + [one.scale(parameter.name) for one in self.candidates for parameter in one.effect.parameters]
+        )
+        self.centres = np.array(
+            [parameter.believed for parameter in self._baseline] + [0.0] * (len(self.names) - len(self._baseline))
+        )
+        self.n_baseline = len(self._baseline)
+        bounds = [
+            (
+                one.believed - one.most_tolerances * one.tolerance,
+                one.believed + one.most_tolerances * one.tolerance,
+            )
+            for one in self._baseline
+        ] + [one.bounds(parameter) for one in self.candidates for parameter in one.effect.parameters]
+        self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
+        self.n_simulations = 0
+
+    @property
+    def moves(self) -> NDArray[np.bool_]:
+        """Which of the baseline's parameters change the motion, not only what a channel reads."""
+        return np.array([not parameter.is_reading for parameter in self._baseline])
+
+    def is_down_to_noise(self, fit: FreeRunFit) -> bool:
+        """Whether a fit leaves no more than the noise in any channel."""
+        residual = self.residual(self.theta_of(fit.values))
+        left = mean_squares([one for run in self.runs for one in run], residual)
+        return max(left.values(), default=0.0) < DOWN_TO_NOISE
+
+    def values(self, theta: FloatArray) -> dict[str, float]:
+        """Parameters by name in their own units."""
+        physical = np.clip(self.centres + theta * self.scales, self.low, self.high)
+        return {**self.fixed, **dict(zip(self.names, physical.tolist(), strict=True))}
+
+    def theta_of(self, values: Mapping[str, float]) -> FloatArray:
+        """Scaled parameters; those that are not given are as believed."""
+        known = np.array([values.get(name, centre) for name, centre in zip(self.names, self.centres, strict=True)])
+        return np.asarray((known - self.centres) / self.scales)
+
+    def at_bounds(self, theta: FloatArray) -> NDArray[np.bool_]:
+        """Which parameters are as large or as small as they may be."""
+        physical = self.centres + theta * self.scales
+        near = 1e-6 * (self.high - self.low)
+        return np.asarray((physical <= self.low + near) | (physical >= self.high - near))
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
+        values = self.values(theta)
+        if N_THREADS == 1 or len(self.runs) == 1:
+            return np.concatenate([self._of_run(run, values) for run in self.runs])
+        return np.concatenate(list(_POOL.map(lambda run: self._of_run(run, values), self.runs)))
+
+    def _of_run(self, run: Sequence[Observation], values: Mapping[str, float]) -> FloatArray:
+        self.n_simulations += 1
+        try:
+            readings = self.model.simulate(run[0].run, values, extension_of(self.candidates, values))
+        except SloshlabError:
+            return np.full(sum(observation.spectra.size for observation in run), np.inf)
+        return np.concatenate([observation.residual(readings[observation.channel]).ravel() for observation in run])
+
+    def softness(self, share: float) -> FloatArray:
+        """Factors of the residuals as if all channels were known only to a share of their RMS."""
+        return np.concatenate(
+            [
+                np.sqrt(one.variance / (one.variance + share**2 * float(np.mean(one.spectra**2)))).ravel()
+                for run in self.runs
+                for one in run
+            ]
+        )
+
+    def jacobian(
+        self, theta: FloatArray, at: FloatArray, columns: Sequence[int], *, coarse: bool = False
+    ) -> BlockJacobian:
+        """Derivatives of the residuals by some scaled parameters, by differences of simulations.
+
+        Coarse ones look further, past the jags that dry friction and contacts give a residual.
+        """
+        found = []
+        for column in columns:
+            is_effect, is_damping = column >= self.n_baseline, self.names[column].startswith("damping")
+            step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
+            if is_effect:
+                step *= max(abs(theta[column]), 0.05)
+            elif is_damping and coarse:
+                step *= _TOLERANCES_OF_DAMPING
+            moved = theta.copy()
+            physical = self.centres[column] + (theta[column] + step) * self.scales[column]
+            moved[column] += step if physical <= self.high[column] else -step
+            difference = (self._residual_moved(moved, column, at) - at) / (moved[column] - theta[column])
+            found.append(difference if np.isfinite(difference).all() else np.zeros(at.size))
+        return BlockJacobian.of_columns(found, [one.spectra.size for run in self.runs for one in run])
+
+    def _residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
+        """Residuals after one parameter was moved; of the other runs unchanged where it belongs to one."""
+        owner = run_of(self.names[column], self.model)
+        if not owner:
+            return self.residual(theta)
+        moved, first, values = at.copy(), 0, self.values(theta)
+        for run in self.runs:
+            size = sum(one.spectra.size for one in run)
+            if run[0].run.name == owner:
+                moved[first : first + size] = self._of_run(run, values)
+            first += size
+        return moved
+
+
+def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:
+    """What the candidates add, with their numbers taken from the values."""
+    total = NOTHING
+    for one in candidates:
+        numbers = {parameter.name: values[f"{one.key}.{parameter.name}"] for parameter in one.effect.parameters}
+        total = total + one.extension(numbers)
+    return total
+
+
+def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[str, float]:
+    """Mean square of the informative residuals of each channel over all runs, large ones counted less.
+
+    Parameters
+    ----------
+    observed : sequence of Observation
+    residual : ndarray
+        Of all of them, one after another.
+    """
+    return _means(observed, residual, lambda one: one.channel)
+
+
+def mean_squares_of_runs(observed: Sequence[Observation], residual: FloatArray) -> dict[tuple[str, str], float]:
+    """The same per run and channel, where a run shows enough of a channel.
+
+    Parameters
+    ----------
+    observed : sequence of Observation
+    residual : ndarray
+    """
+    return _means(observed, residual, lambda one: (one.run.name, one.channel), least=_FEWEST_IN_A_RUN)
+
+
+def _means(
+    observed: Sequence[Observation], residual: FloatArray, label: Callable[[Observation], _Label], least: int = 1
+) -> dict[_Label, float]:
+    sums: dict[_Label, list[float]] = {}
+    first = 0
+    for one in observed:
+        own = residual[first : first + one.spectra.size]
+        first += one.spectra.size
+        chosen = own[one.informative.ravel()]
+        total = sums.setdefault(label(one), [0.0, 0.0])
+        total[0] += huber_cost(chosen)
+        total[1] += chosen.size
+    return {name: squares / n for name, (squares, n) in sums.items() if n >= least}
+
+
+def robust_weights(residual: FloatArray, limit: float = ROBUST) -> FloatArray:
+    """Square roots of Huber's weights: a burst or a lost block counts with its size, not with its square."""
+    size = np.abs(residual)
+    return np.asarray(np.where(size > limit, np.sqrt(limit / np.maximum(size, 1e-300)), 1.0))
+
+
+def huber_cost(residual: FloatArray, limit: float = ROBUST) -> float:
+    """Sum of squares, of which those beyond some standard deviations, four by default, grow only linearly."""
+    size = np.abs(residual)
+    return float(np.where(size > limit, 2 * limit * size - limit**2, size**2).sum())
+
+
+def run_of(name: str, model: DiagnosedModel) -> str:
+    """The run to which a parameter belongs alone; empty where it belongs to all.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter.
+    model : DiagnosedModel
+    """
+    for run in model.runs:
+        if name.endswith((f"release of {run.name}", f" in {run.name}")):
+            return run.name
+    return ""

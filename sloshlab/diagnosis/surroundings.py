@@ -1,0 +1,95 @@
+"""What effects may know of a case to choose sizes that matter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.candidate import Surroundings
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.recording import channels
+from sloshlab.rig import Rig
+
+FloatArray = NDArray[np.float64]
+_MOST_PEAKS: Final = 3
+_ONE_FREQUENCY: Final = 1.1
+"""Of x_rms a_rms/v_rms², which is one for a harmonic motion, times the ratio of the frequencies of runs."""
+
+
+def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -> Surroundings:
+    """Sizes of the motion, from the retuned simulation of the fitting runs.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+        Of the baseline alone.
+    fit : FreeRunFit
+    rig : Rig or None
+        None where the twin is a user's own: effects that ask for it are not offered.
+    """
+    model, fitting = problem.model, problem.runs
+    largest = np.zeros(3)
+    frequencies, spreads = [], []
+    for observed in fitting:
+        run = observed[0].run
+        place = model.motion(run, fit.values)
+        largest = np.maximum(largest, np.abs(place).max(axis=0))
+        rms = place.std(axis=0)
+        frequencies.append(rms[2] / max(rms[1], 1e-12) / (2 * np.pi))
+        spreads.append(rms[2] * rms[0] / max(rms[1] ** 2, 1e-300))
+    return Surroundings(
+        rig=cast(Rig, rig),
+        twin=model.twin,
+        displacement_m=float(largest[0]),
+        velocity_m_per_s=float(largest[1]),
+        acceleration_m_per_s2=float(largest[2]),
+        frequency_hz=float(np.median(frequencies)),
+        force_n=float(model.moving_mass_kg * largest[2]),
+        channels=_sizes(fitting, model),
+        driving=tuple(sorted({name for run in fitting for name in model.driving(run[0].run)})),
+        sampling_rate_hz=fitting[0][0].run.attributes.sampling_rate_hz,
+        longest_run_s=max(observed[0].run.duration_s for observed in fitting),
+        blocks=model.blocks,
+        peaks=_sizes(fitting, model, lambda values: np.nanmax(np.abs(values))),
+        missed_hz=_most_missed_hz(fitting, problem.residual(problem.theta_of(fit.values))),
+        has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
+    )
+
+
+def _most_missed_hz(fitting: Sequence[Sequence[Observation]], residual: FloatArray) -> tuple[float, ...]:
+    """Frequencies of the highest peaks of weighted residuals, all runs and channels together."""
+    n_bands = max(one.spectra.shape[1] for run in fitting for one in run)
+    power, count, first = np.zeros(n_bands), np.full(n_bands, 1e-300), 0
+    frequencies = np.zeros(n_bands)
+    for one in (one for run in fitting for one in run):
+        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
+        first += one.spectra.size
+        n = one.spectra.shape[1]
+        power[:n] += (own**2).sum(axis=0)
+        count[:n] += one.spectra.shape[0]
+        frequencies[:n] = one.frequencies_hz
+    mean = power / count
+    beside = np.pad(mean, 1)
+    peaks = np.flatnonzero((mean >= beside[:-2]) & (mean >= beside[2:]) & (frequencies > 0))
+    highest = peaks[np.argsort(-mean[peaks])][:_MOST_PEAKS]
+    return tuple(float(frequencies[k]) for k in highest)
+
+
+def _sizes(
+    fitting: Sequence[Sequence[Observation]],
+    model: DiagnosedModel,
+    size: Callable[[FloatArray], float] = np.nanstd,
+) -> dict[str, float]:
+    """Channels, compared and driving, with their size, the RMS by default."""
+    found: dict[str, float] = {}
+    for observed in fitting:
+        run = observed[0].run
+        for name in (*[one.channel for one in observed], *model.driving(run)):
+            if name in channels(run.recording):
+                found[name] = max(found.get(name, 0.0), float(size(run.recording[name].values)))
+    return found
