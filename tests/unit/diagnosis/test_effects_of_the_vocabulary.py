@@ -62,7 +62,7 @@ def named(name: str) -> list[Effect]:
     return [one for one in known_effects() if one.name == name and one.equation]
 
 
-@pytest.mark.parametrize(("name", "blocks", "parameters"), VOCABULARY, ids=lambda value: str(value)[:24])
+@pytest.mark.parametrize(("name", "blocks", "parameters"), VOCABULARY, ids=[name for name, _, _ in VOCABULARY])
 def test_an_effect_has_its_blocks_and_parameters(name: str, blocks: tuple[str, ...], parameters: set[str]) -> None:
     found = named(name)
     assert sorted(one.block for one in found) == sorted(blocks)
