@@ -26,6 +26,7 @@ from sealed_trial.strength import ONLY_DAMPING, QUICK, NoiseFloor, magnitude_for
 WEAKEST_CLEAR, STRONGEST_CLEAR = 3.5, 30.0
 WEAKEST_MASKED, STRONGEST_MASKED = 0.3, 3.0
 _HIDDEN_DRAWS = 8
+_LEFT_OPEN = 1.2
 
 
 @dataclass(frozen=True)
@@ -128,8 +129,9 @@ class CaseDrawing:
         for effect, strength in zip(drawn, wanted, strict=True):
             assert floor is not None
             change, reached = _scaled(effect, strength, laboratory, floor, plain)
-            if not reached >= (WEAKEST_MASKED if kind == "masked" else 3.0):  # NaN is not strong enough either
-                raise LookupError(f"{effect.name} cannot be made strong enough")
+            least, most = _strengths_of(kind)
+            if not least <= reached <= most:  # NaN is neither
+                raise LookupError(f"{effect.name} cannot be made as strong as its class is")
             changes.append(change)
             described.append(_description(effect, change, reached))
             if not all(map(math.isfinite, (reached, *change.parameters.values()))):
@@ -185,6 +187,13 @@ class CaseDrawing:
         if not others:
             raise LookupError("no second block for this plan")
         return [first, others[0]]
+
+
+def _strengths_of(kind: str) -> tuple[float, float]:
+    """Weakest and strongest that a class allows, with what the search for a magnitude leaves open."""
+    if kind == "masked":
+        return WEAKEST_MASKED, STRONGEST_MASKED * _LEFT_OPEN
+    return 3.0, STRONGEST_CLEAR * _LEFT_OPEN
 
 
 def _clear(generator: np.random.Generator) -> float:
