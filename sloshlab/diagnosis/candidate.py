@@ -124,6 +124,24 @@ def channels_of(place: str) -> tuple[str, ...]:
     return tuple(place.partition(_FROM)[0].split(_TOGETHER))
 
 
+def _everywhere(surroundings: Surroundings) -> bool:
+    """Acts in any twin."""
+    del surroundings
+    return True
+
+
+def _on_no_channel(surroundings: Surroundings) -> Sequence[str]:
+    """Acts on a block as a whole."""
+    del surroundings
+    return [""]
+
+
+def _its_own_limits(surroundings: Surroundings) -> Mapping[str, tuple[float, float]]:
+    """Has the same bounds at every place."""
+    del surroundings
+    return {}
+
+
 @dataclass(frozen=True)
 class Effect:
     """One kind of missing physics.
@@ -160,11 +178,11 @@ class Effect:
     extension: Callable[[Numbers, Surroundings, str], Extension]
     look_alikes: tuple[str, ...] = ()
     separated_by: str = ""
-    needs: Callable[[Surroundings], bool] = lambda surroundings: True
-    places: Callable[[Surroundings], Sequence[str]] = lambda surroundings: [""]
+    needs: Callable[[Surroundings], bool] = _everywhere
+    places: Callable[[Surroundings], Sequence[str]] = _on_no_channel
     spoken_for_by: tuple[str, ...] = ()
     includes: tuple[str, ...] = ()
-    limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = lambda surroundings: {}
+    limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = _its_own_limits
 
 
 @dataclass(frozen=True)
