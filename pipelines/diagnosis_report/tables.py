@@ -60,7 +60,7 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
     header: tuple[str, ...] = ("parameter", "believed", "tolerance", "retuned", "moved, in tolerances")
     header += () if best is None else ("moved with the effect, in tolerances",)
     caption = (
-        "A number that wants to move by more than its tolerance asks for a second look at the rig file; at two "
+        "A number that wants to move by more than its tolerance asks for a second look at the rig file; at 1.25 "
         "tolerances, dampings at four, it is held. One of a mode that no run excites means nothing."
     )
     return Table("The baseline's own parameters", header, tuple(rows), caption)

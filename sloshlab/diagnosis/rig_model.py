@@ -36,8 +36,8 @@ STEPS_PER_PERIOD: Final = 12.0
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _MOST_KEPT_BYTES: Final = 3e8
 _RELEASE: Final = "release of "
-_TWICE: Final = 2.0
-"""Tolerances by which masses, frequencies and gains may be off; damping and releases may be off by more."""
+_AS_NORMAL: Final = 1.25
+"""Tolerances by which masses, frequencies and gains may be off; beyond, something else is the matter."""
 _TOLERANCE_OF_SHAPE: Final = 0.01
 """Of the value at the tip: where a sensor sits, and that a beam is not quite uniform."""
 
@@ -293,9 +293,9 @@ class RigModel:
                     found.append(BaselineParameter(f"{term.name}.{name}", value, 0.2 * abs(value)))
         names = sorted({name for run in self.runs for name in self.compared(run)})
         if any(name.startswith("force") for name in names):
-            found.append(BaselineParameter("carried mass", 1.0, 0.01, most_tolerances=_TWICE))
+            found.append(BaselineParameter("carried mass", 1.0, 0.01, most_tolerances=_AS_NORMAL))
         found += [
-            BaselineParameter(f"gain of {name}", 1.0, 0.01, is_reading=True, most_tolerances=_TWICE)
+            BaselineParameter(f"gain of {name}", 1.0, 0.01, is_reading=True, most_tolerances=_AS_NORMAL)
             for name in names
         ]
         cells = _cells(names)
@@ -354,14 +354,14 @@ def _of_structure(structure: Structure, *, moves: bool) -> list[BaselineParamete
     found = []
     for i in range(n):
         label = f"mode {i + 1}"
-        found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02, most_tolerances=_TWICE))
+        found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02, most_tolerances=_AS_NORMAL))
         found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2))
     found += [
-        BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01, most_tolerances=_TWICE) for i in range(n)
+        BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01, most_tolerances=_AS_NORMAL) for i in range(n)
     ]
     if moves:
         found += [
-            BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02, most_tolerances=_TWICE)
+            BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02, most_tolerances=_AS_NORMAL)
             for i in range(n)
         ]
     return found

@@ -184,7 +184,7 @@ CLIPPING = _sensor_effect(
     "sensor_clipping",
     "y → min(max(y, −limit), limit), limit in the unit of the channel",
     (EffectParameter("limit", 1e-9, 1e9),),
-    lambda at: [{"limit": at.peaks.get(at.channel, 2.0 * at.reading)}],
+    lambda at: [{"limit": share * at.peaks.get(at.channel, 2.0 * at.reading)} for share in (1.0, 0.97, 0.8)],
     _clipped,
     None,
     spoken_for_by=("one channel alone", "at the largest readings"),
