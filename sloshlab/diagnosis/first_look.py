@@ -15,32 +15,33 @@ class FirstLook:
     """What one Gauss–Newton step promises, with channels believed to a share of their RMS.
 
     Parameters at their bounds cannot follow an effect; all others do, and what is believed of them counts.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    theta, residual : ndarray
+        Where it was fitted, and what is left there.
+    jacobian : BlockJacobian
+        There.
+    share : float
     """
 
-    def __init__(self, weights: FloatArray, weighted: BlockJacobian, left: FloatArray) -> None:
-        self._weights, self._weighted, self._left = weights, weighted, left
-        self._can_move: NDArray[np.intp] = np.zeros(0, np.intp)
-        self._inverse, self._gradient = np.zeros((0, 0)), np.zeros(0)
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         problem: FreeRunProblem,
         theta: FloatArray,
         residual: FloatArray,
         jacobian: BlockJacobian,
         share: float,
-    ) -> FirstLook:
-        """At a place that was fitted."""
+    ) -> None:
         softness = problem.softness(share)
-        weights = softness * robust_weights(softness * residual, 10.0)
-        look = cls(weights, jacobian.weighted(weights), weights * residual)
+        self._weights = softness * robust_weights(softness * residual, 10.0)
+        self._weighted, self._left = jacobian.weighted(self._weights), self._weights * residual
+        self._can_move = np.flatnonzero(~problem.at_bounds(theta))
         prior = np.where(np.arange(jacobian.n_columns) < problem.n_baseline, 1.0, 0.0)
-        look._can_move = np.flatnonzero(~problem.at_bounds(theta))
-        movable = np.ix_(look._can_move, look._can_move)
-        look._inverse = np.linalg.pinv((look._weighted.normal() + np.diag(prior))[movable])
-        look._gradient = (look._weighted.transposed_times(look._left) + prior * theta)[look._can_move]
-        return look
+        movable = np.ix_(self._can_move, self._can_move)
+        self._inverse = np.linalg.pinv((self._weighted.normal() + np.diag(prior))[movable])
+        self._gradient = (self._weighted.transposed_times(self._left) + prior * theta)[self._can_move]
 
     def gain(self, change: FloatArray) -> tuple[float, float]:
         """Decrease of the cost by the best multiple of a change of the residuals, and that multiple."""

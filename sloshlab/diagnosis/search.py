@@ -230,7 +230,7 @@ class _Search:
         theta = problem.theta_of(base.values)
         residual = problem.residual(theta)
         looks_at = [
-            FirstLook.of(problem, theta, residual, jacobian, share)
+            FirstLook(problem, theta, residual, jacobian, share)
             for share in dict.fromkeys((shares[min(1, len(shares) - 1)], shares[-1]))
         ]
         promised = []

@@ -112,7 +112,7 @@ def verdict_of(found: Findings) -> Verdict:
         certain = _certain(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, _unknown(found, named), "", certain)
     alternatives = _alternatives(found, named, scale)
-    kind = "named" if len(alternatives) == 1 and not _has_equal(named) else "indistinguishable"
+    kind = "named" if len(alternatives) == 1 and not equals_of(named) else "indistinguishable"
     return Verdict(
         kind,
         named,
@@ -246,10 +246,6 @@ def _includes(wider: Explanation, narrower: Explanation) -> bool:
         for name in (one.effect.name, *one.effect.includes)
     }
     return held >= set(narrower.named_in_blocks)
-
-
-def _has_equal(best: Explanation) -> bool:
-    return bool(equals_of(best))
 
 
 def _probabilities(found: Findings, scale: _Scale) -> dict[str, float]:
