@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,20 @@ def class_order(n_cases: int, generator: np.random.Generator) -> list[str]:
     return [order[k] for k in generator.permutation(len(order))]
 
 
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """A laboratory before anything is hidden in it."""
+
+    laboratory: Laboratory
+    plain: list[Signals]
+    scales: Scales
+    sensors: dict[str, Sensor]
+
+    @cached_property
+    def floor(self) -> NoiseFloor:
+        return NoiseFloor(self.laboratory, self.plain, self.sensors)
+
+
 class CaseDrawing:
     """Draws one case after the other, covering the vocabulary evenly.
 
@@ -82,6 +97,7 @@ class CaseDrawing:
         self._seed = [int(value) for value in seed]
         self._used: Counter[str] = Counter()
         self._plans: list[str] = []
+        self._prepared: dict[tuple[int, int, str], _Prepared] = {}
 
     def _generator(self, *more: int) -> np.random.Generator:
         return np.random.default_rng([*self._seed, *more])
@@ -108,27 +124,36 @@ class CaseDrawing:
                 continue
         raise ArithmeticError(f"case {number} of class {kind}: no draw can be measured")
 
+    def _laboratory(self, number: int, redrawn: int, plan_name: str) -> _Prepared:
+        """Rig, plan and sensors, the same for every hidden draw."""
+        key = (number, redrawn, plan_name)
+        if key not in self._prepared:
+            generator = self._generator(number, 2, redrawn)
+            rig = drawn_rig(plan_name.partition("_")[0], generator)
+            plan = drawn_plan(plan_name, rig, generator)
+            laboratory = Laboratory(rig, plan, int(generator.integers(2**31)))
+            plain = laboratory.signals()
+            scales = scales_of(laboratory, plain)
+            sensors = {
+                channel: drawn_sensor(
+                    max(scales.rms[channel], _least_rms(scales, channel)), scales.peak[channel], generator
+                )
+                for channel in plain[0]
+            }
+            self._prepared = {key: _Prepared(laboratory, plain, scales, sensors)}
+        return self._prepared[key]
+
     def _attempted(self, number: int, attempt: int, name: str, kind: str, plan_name: str) -> DrawnCase:
         # what the laboratory does is drawn again only when no hidden draw fits it: it must not tell the class
-        generator = self._generator(number, 2, attempt // _HIDDEN_DRAWS)
-        rig = drawn_rig(plan_name.partition("_")[0], generator)
-        plan = drawn_plan(plan_name, rig, generator)
-        laboratory = Laboratory(rig, plan, int(generator.integers(2**31)))
-        plain = laboratory.signals()
-        scales = scales_of(laboratory, plain)
-        sensors = {
-            channel: drawn_sensor(
-                max(scales.rms[channel], _least_rms(scales, channel)), scales.peak[channel], generator
-            )
-            for channel in plain[0]
-        }
+        prepared = self._laboratory(number, attempt // _HIDDEN_DRAWS, plan_name)
+        laboratory, plain, sensors = prepared.laboratory, prepared.plain, prepared.sensors
         hidden = self._generator(number, 3, attempt)
-        drawn, accepted, wanted = self._drawn_effects(kind, plan, rig, scales, hidden)
-        floor = NoiseFloor(laboratory, plain, sensors) if drawn else None
+        drawn, accepted, wanted = self._drawn_effects(
+            kind, laboratory.plan, laboratory.rig, prepared.scales, hidden
+        )
         changes, described = [], []
         for effect, strength in zip(drawn, wanted, strict=True):
-            assert floor is not None
-            change, reached = _scaled(effect, strength, laboratory, floor, plain)
+            change, reached = _scaled(effect, strength, laboratory, prepared.floor, plain)
             least, most = _strengths_of(kind)
             if not least <= reached <= most:  # NaN is neither
                 raise LookupError(f"{effect.name} cannot be made as strong as its class is")
@@ -144,7 +169,7 @@ class CaseDrawing:
         for one in described:
             self._used[one["name"]] += 1
         truth = HiddenTruth(
-            name, kind, described, accepted, {"plan": plan_name, "rig_factors": rig.factors, **nuisance}
+            name, kind, described, accepted, {"plan": plan_name, "rig_factors": laboratory.rig.factors, **nuisance}
         )
         late = tuple(change for change in changes if change.late_distortion is not None)
         return DrawnCase(laboratory, sensors, signals, late, truth)
@@ -210,6 +235,7 @@ def _scaled(
     effect: DrawnEffect, wanted: float, laboratory: Laboratory, floor: NoiseFloor, plain: list[Signals]
 ) -> tuple[Change, float]:
     """The effect with the magnitude that shows as strongly as wanted."""
+    floor.start_anew()
     rate = laboratory.plan.sampling_rate_hz
 
     def strength_of(magnitude: float) -> float:

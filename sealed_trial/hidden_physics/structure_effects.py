@@ -129,7 +129,7 @@ def quadratic(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
 def stiffness(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Spring beyond the laboratory's uncertainty."""
     unit = 0.1 * _sign(generator) * scales.stiffness_n_per_m
-    return _one("stiffness_change", "stiffness_n_per_m", at.STIFFNESS_CHANGE, unit, 0.6, 4.0)
+    return _one("stiffness_change", "stiffness_n_per_m", at.STIFFNESS_CHANGE, unit, 0.1, 4.0)
 
 
 def clearance(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
@@ -159,7 +159,7 @@ def missing_mode(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
 def mass(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Moving mass that is not in the tank."""
     unit = 0.1 * _sign(generator) * scales.mass_kg
-    return _one("mass_error", "mass_kg", at.STRUCTURE_MASS, unit, 0.6, 3.0)
+    return _one("mass_error", "mass_kg", at.STRUCTURE_MASS, unit, 0.1, 3.0)
 
 
 def constant(scales: Scales, generator: np.random.Generator) -> DrawnEffect:

@@ -171,7 +171,7 @@ def loss(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
 def mass(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """More or less mass in the tank than weighed."""
     unit = 0.08 * (1 if generator.random() < 0.5 else -1) * scales.mass_kg
-    return _effect("mass_error", lambda m: Change({"mass_kg": m * unit}, {at.TANK_MASS: m * unit}), 0.5, 3.0)
+    return _effect("mass_error", lambda m: Change({"mass_kg": m * unit}, {at.TANK_MASS: m * unit}), 0.1, 3.0)
 
 
 TANK_EFFECTS: Final = (
