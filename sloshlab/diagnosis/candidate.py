@@ -90,11 +90,14 @@ class EffectParameter:
     name : str
         With its unit, as in the vocabulary.
     low, high : float
+    may_rest : bool
+        Whether it may be as small or as large as that in earnest; other effects at a bound are no answer.
     """
 
     name: str
     low: float
     high: float
+    may_rest: bool = False
 
 
 Numbers = Mapping[str, float]
@@ -142,6 +145,12 @@ def _its_own_limits(surroundings: Surroundings) -> Mapping[str, tuple[float, flo
     return {}
 
 
+def nowhere(size: float) -> Sequence[Mapping[str, tuple[float, float]]]:
+    """Is worth no look where it differs from its special case."""
+    del size
+    return []
+
+
 @dataclass(frozen=True)
 class Effect:
     """One kind of missing physics.
@@ -168,6 +177,11 @@ class Effect:
         (surroundings) → bounds of parameters that depend on the place, in place of their own.
     spoken_for_by : tuple of str
         What tests on the missing force or the sensor say where it is missing: terms of `evidence.TERMS`.
+    differs : callable
+        (number of a special case that was found) → bounds of its own numbers, in which it clearly is not that
+        case; where it describes as much there, the two cannot be told apart.
+    variant_of : str
+        Name of the effect of which this is another form; answers have that name.
     """
 
     name: str
@@ -183,6 +197,13 @@ class Effect:
     spoken_for_by: tuple[str, ...] = ()
     includes: tuple[str, ...] = ()
     limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = _its_own_limits
+    differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = nowhere
+    variant_of: str = ""
+
+    @property
+    def known_as(self) -> str:
+        """The name that an answer has."""
+        return self.variant_of or self.name
 
 
 @dataclass(frozen=True)

@@ -263,11 +263,13 @@ def _number(value: float) -> float | None:
 
 
 def _evidence(examination: Examination, found: Findings) -> dict[str, Any]:
-    effects = {one.effect.name: one for explanation in found.explanations for one in explanation.fit.candidates}
+    effects = {
+        one.effect.known_as: one for explanation in found.explanations for one in explanation.fit.candidates
+    }
     told = {}
     for candidate in effects.values():
         on = examination.evidence_on(candidate.effect)
-        told[f"{candidate.effect.block}.{candidate.effect.name.removesuffix('_60')}"] = {
+        told[f"{candidate.effect.block}.{candidate.effect.known_as}"] = {
             "for": list(on.speaks_for),
             "against": list(on.speaks_against),
             "open": list(on.still_open),

@@ -44,7 +44,7 @@ class Explanation:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of its effects, sorted."""
-        return tuple(sorted(one.effect.name for one in self.fit.candidates))
+        return tuple(sorted(one.effect.known_as for one in self.fit.candidates))
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -54,7 +54,7 @@ class Explanation:
     @property
     def named_in_blocks(self) -> tuple[str, ...]:
         """Blocks and names of its effects, sorted; several channels may have the same."""
-        return tuple(sorted(f"{one.effect.block}.{one.effect.name}" for one in self.fit.candidates))
+        return tuple(sorted(f"{one.effect.block}.{one.effect.known_as}" for one in self.fit.candidates))
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -65,7 +65,9 @@ class Explanation:
     def rests_on_a_bound(self) -> bool:
         """Whether a number is as large or as small as its effect allows: then it is something else."""
         return any(
-            bound != 0 and abs(self.fit.values[f"{one.key}.{parameter.name}"] - bound) <= 1e-6 * abs(bound)
+            bound != 0
+            and not parameter.may_rest
+            and abs(self.fit.values[f"{one.key}.{parameter.name}"] - bound) <= 1e-6 * abs(bound)
             for one in self.fit.candidates
             for parameter in one.effect.parameters
             for bound in one.bounds(parameter)
@@ -117,6 +119,11 @@ class Findings:
             run.name: self.model.simulate(run, explanation.fit.values, explained_extension(explanation))
             for run in self.case.runs
         }
+
+    @property
+    def has_repeats(self) -> bool:
+        """Whether runs of one test tell what the recordings' scatter is."""
+        return any(len(test) > 1 for test in self.case.tests())
 
     @property
     def n_fitting(self) -> int:

@@ -249,6 +249,23 @@ def begun(
     return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second), best.is_near)
 
 
+def nearest(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], share: float) -> Mapping[str, float]:
+    """The start with the lowest cost before anything is fitted, channels known only to a share of their RMS.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    starts : sequence of mappings
+    share : float
+    """
+    if len(starts) == 1:
+        return starts[0]
+    softness = problem.softness(share)
+    left = [softness * problem.residual(problem.theta_of(start)) for start in starts]
+    costs = [huber_cost(one) if np.isfinite(one).all() else np.inf for one in left]
+    return starts[int(np.argmin(costs))]
+
+
 def finished(begun_fit: BegunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = 6) -> FreeRunFit:
     """The remaining stages of a fit that was begun; the last one in any case."""
     rest = shares[2:] or shares[-1:]

@@ -36,8 +36,12 @@ STEPS_PER_PERIOD: Final = 12.0
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _MOST_KEPT_BYTES: Final = 3e8
 _RELEASE: Final = "release of "
+_FLUCTUATION: Final = "damping of the liquid in "
+_TOLERANCE_OF_FLUCTUATION: Final = 0.05
+"""By which a chaotic liquid damps more or less in one run than on average."""
+_DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
 _AS_NORMAL: Final = 1.25
-"""Tolerances by which masses, frequencies and gains may be off; beyond, something else is the matter."""
+"""Tolerances by which masses, frequencies, losses and gains may be off; beyond, something else is the matter."""
 _TOLERANCE_OF_SHAPE: Final = 0.01
 """Of the value at the tip: where a sensor sits, and that a beam is not quite uniform."""
 
@@ -118,6 +122,13 @@ class RigModel:
         """Displacement, velocity, acceleration of the tank, absolute, shape (n, 3)."""
         return np.asarray(self._simulation(run, values, NOTHING, ()).places[:, 1])
 
+    def _belongs(self, parameter: str, run: CaseRun) -> bool:
+        """Whether a number of the motion is of this run or of all."""
+        for beginning in (_RELEASE, _FLUCTUATION):
+            if parameter.startswith(beginning):
+                return parameter == beginning + run.name
+        return True
+
     def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
         """Write `extended_twin` as a twin."""
         save_twin(self.extended_twin(values, extension), path)
@@ -188,7 +199,7 @@ class RigModel:
         physical = tuple(
             values.get(parameter.name, parameter.believed)
             for parameter in self.parameters
-            if not parameter.is_reading and parameter.name.removeprefix(_RELEASE) in (parameter.name, run.name)
+            if not parameter.is_reading and self._belongs(parameter.name, run)
         )
         undone = tuple(fault for fault in extension.faults if fault.channel in self.driving(run))
         others = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
@@ -221,7 +232,7 @@ class RigModel:
         self, run: CaseRun, values: Mapping[str, float], extension: Extension, undone: Sequence[SensorFault]
     ) -> Simulation:
         drive = self._drive(run, tuple(undone))
-        twin = self._varied(run, values, extension)
+        twin = self._varied(run, values, extension, fluctuation=values.get(_FLUCTUATION + run.name, 1.0))
         rate = drive.excitation.sampling_rate_hz
         start = values.get(f"{_RELEASE}{run.name}", drive.initial_displacement_m)
         simulation = twin.simulate(
@@ -237,7 +248,9 @@ class RigModel:
         run = next((one for one in self.runs if one.attributes.configuration == "sloshing"), self.runs[0])
         return self._varied(run, values, extension)
 
-    def _varied(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> Twin:
+    def _varied(
+        self, run: CaseRun, values: Mapping[str, float], extension: Extension, *, fluctuation: float = 1.0
+    ) -> Twin:
         twin = self.twin
         structure = twin.structure
         if structure is not None:
@@ -245,7 +258,9 @@ class RigModel:
             if extension.structure is not None:
                 structure = extension.structure(structure)
         terms = tuple(
-            _varied_term(term, values) for term in twin.terms if structure is not None or term.place == "tank"
+            _fluctuating(_varied_term(term, values), fluctuation)
+            for term in twin.terms
+            if structure is not None or term.place == "tank"
         )
         terms += tuple(term for term in extension.terms if structure is not None or term.place == "tank")
         liquid = tuple(term for term in terms if term.place == "tank")
@@ -286,11 +301,14 @@ class RigModel:
     def _parameters(self) -> tuple[BaselineParameter, ...]:
         found: list[BaselineParameter] = []
         if self.twin.structure is not None:
-            found += _of_structure(self.twin.structure, moves=any(not run.is_free for run in self.runs))
+            bends = self.rig.structure is not None and self.rig.structure.kind == "beam"
+            moves = any(not run.is_free for run in self.runs)
+            found += _of_structure(self.twin.structure, has_participation=moves and bends)
         for term in self.twin.terms:
             for name, value in term.values.items():
                 if name in _TUNED_NUMBERS and value:
-                    found.append(BaselineParameter(f"{term.name}.{name}", value, 0.2 * abs(value)))
+                    number = f"{term.name}.{name}"
+                    found.append(BaselineParameter(number, value, 0.2 * abs(value), most_tolerances=_AS_NORMAL))
         names = sorted({name for run in self.runs for name in self.compared(run)})
         if any(name.startswith("force") for name in names):
             found.append(BaselineParameter("carried mass", 1.0, 0.01, most_tolerances=_AS_NORMAL))
@@ -308,7 +326,10 @@ class RigModel:
             for shapes in self._shapes.values()
             for shape in shapes
         ]
+        fluctuates = any(_damps_as_liquid(term) for term in self.twin.terms)
         for run in self.runs:
+            if fluctuates and run.attributes.configuration == "sloshing":
+                found.append(BaselineParameter(_FLUCTUATION + run.name, 1.0, _TOLERANCE_OF_FLUCTUATION))
             if run.is_free:
                 start = self._drive(run, ()).initial_displacement_m
                 found.append(BaselineParameter(f"{_RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
@@ -349,17 +370,17 @@ def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:
     return max(1, min(1000, math.ceil(needed / sampling_rate_hz)))
 
 
-def _of_structure(structure: Structure, *, moves: bool) -> list[BaselineParameter]:
+def _of_structure(structure: Structure, *, has_participation: bool) -> list[BaselineParameter]:
     n = structure.masses_kg.size
     found = []
     for i in range(n):
         label = f"mode {i + 1}"
         found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02, most_tolerances=_AS_NORMAL))
-        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2))
+        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2, most_tolerances=_AS_NORMAL))
     found += [
         BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01, most_tolerances=_AS_NORMAL) for i in range(n)
     ]
-    if moves:
+    if has_participation:
         found += [
             BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02, most_tolerances=_AS_NORMAL)
             for i in range(n)
@@ -385,6 +406,17 @@ def _varied_structure(structure: Structure, values: Mapping[str, float]) -> Stru
 def _varied_term(term: Term, values: Mapping[str, float]) -> Term:
     changed = {name: values[f"{term.name}.{name}"] for name in term.values if f"{term.name}.{name}" in values}
     return term.changed(**changed) if changed else term
+
+
+def _damps_as_liquid(term: Term) -> bool:
+    return term.place == "tank" and bool(term.values.get(_DAMPING_OF_LIQUID))
+
+
+def _fluctuating(term: Term, factor: float) -> Term:
+    """The damping of the liquid as it was in one run: what moves chaotically never damps twice alike."""
+    if factor == 1.0 or not _damps_as_liquid(term):
+        return term
+    return term.changed(**{_DAMPING_OF_LIQUID: factor * term.values[_DAMPING_OF_LIQUID]})
 
 
 def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:

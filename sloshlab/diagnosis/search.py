@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final, cast
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.candidate import Candidate, candidates
+from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.explanation import Explanation, Findings
@@ -22,6 +23,7 @@ from sloshlab.diagnosis.free_run_fit import (
     finished,
     fitted,
     fitted_baseline,
+    nearest,
     scanned,
     soft_cost,
     stages_for,
@@ -40,11 +42,12 @@ from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.split import Split, split
 from sloshlab.diagnosis.surroundings import surroundings_of
+from sloshlab.diagnosis.units import named_and_units
 from sloshlab.errors import InputError
 
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
-_MOST_FITTED: Final = 12
+_MOST_FITTED: Final = 9
 _MOST_BESIDE: Final = 6
 """Candidates that are fitted from a first look, as a first effect and as a second one."""
 _MOST_SCANNED: Final = 1
@@ -53,8 +56,12 @@ _ALWAYS_FINISHED: Final = 3
 _LEAST_TO_BUILD_ON: Final = 24.0
 """Decrease of the cost by one effect, below which nobody looks for a second one."""
 _LEAST_SHARE_OF_PROMISE: Final = 0.02
-_LEAST_SHARE_OF_GAIN: Final = 0.5
+_LEAST_SHARE_OF_GAIN: Final = 0.3
 """Of the best candidate's gain after the first stages; the others do not go on."""
+_SIZES: Final = (0.03, 0.1, 0.3, 1.0, 3.0)
+_SOFT: Final = 0.03
+_MOST_LOOK_ALIKES: Final = 4
+Limits = Mapping[str, tuple[float, float]]
 Told = Callable[[str, int, int], None]
 
 assert effects.__all__  # importing the vocabulary makes it known
@@ -118,6 +125,7 @@ class _Search:
         everything = candidates(self.surroundings)
         self._one_more(retuned_fit, jacobian, everything, "fitting one effect")
         self._add_greedily(retuned_fit, everything)
+        self._polish()
         ceilings = self._ceilings(retuned_fit)
         return Findings(
             self.case,
@@ -159,9 +167,9 @@ class _Search:
         self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
         """Fit each of some candidates beside what is in `base` already; the promising ones to the end."""
-        shares = stages_for(self._problem(base), base)
-        is_near = shares != STAGES and not self._is_strained(base)
-        promising = self._screen(base, jacobian, pool, what, shares, is_near=is_near)
+        shares, is_strained = stages_for(self._problem(base), base), self._is_strained(base)
+        is_near = shares != STAGES and not is_strained
+        promising = self._screen(base, jacobian, pool, what, shares, is_near=is_near, is_strained=is_strained)
         begun_fits = []
         for i, (candidate, starts) in enumerate(promising):
             self.told(f"{what}: {candidate.key}", i, 2 * len(promising))
@@ -185,34 +193,91 @@ class _Search:
                 number = f"{candidate.key}.{candidate.effect.parameters[0].name}"
                 done = scanned(one.problem, done, number, shares)
             kept.append(self.judged(done))
+        kept += self._look_alikes(base, kept, pool, what)
         self.explanations += [*kept, *self._generalised(base, kept, pool, what)]
         return kept
+
+    def _look_alikes(
+        self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
+    ) -> list[Explanation]:
+        """Effects that the same recordings may show as the best one, in its place."""
+        best = min(kept, key=lambda one: one.fit.cost, default=None)
+        if best is None or base.candidates or base.cost - best.fit.cost < _LEAST_TO_BUILD_ON:
+            return []
+        before, after = (soft_cost(self._problem(one), one, _SOFT) for one in (base, best.fit))
+        special, fitted_already = best.fit.candidates[-1], {one.keys[-1] for one in kept}
+        nearest_of: dict[str, tuple[float, FreeRunProblem, dict[str, float]]] = {}
+        for candidate in pool:
+            if candidate.key in fitted_already or not _look_alike(candidate, special):
+                continue
+            self.told(f"{what}: {candidate.key} in place of {special.effect.name}", 0, 1)
+            problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
+            softness = problem.softness(_SOFT)
+            sizes = _of_many_sizes(candidate.starts())
+            starts = [{**at, **one} for at in (best.fit.values, self._eased(base)) for one in sizes]
+            costs = [huber_cost(softness * problem.residual(problem.theta_of(start))) for start in starts]
+            name = f"{candidate.effect.block}.{candidate.effect.name}"
+            if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
+                nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
+        found = []
+        for _, problem, start in sorted(nearest_of.values(), key=lambda one: one[0])[:_MOST_LOOK_ALIKES]:
+            fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
+            if not fit.trouble:
+                found.append(self.judged(fit))
+        return found
 
     def _is_strained(self, fit: FreeRunFit) -> bool:
         """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""
         problem = self._problem(fit)
         return bool(problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline].any())
 
+    def _eased(self, fit: FreeRunFit) -> dict[str, float]:
+        """Its numbers, those at bounds of the baseline as believed: an effect may take their place."""
+        problem = self._problem(fit)
+        at_bounds = problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline]
+        strained = [name for name, is_at in zip(problem.names, at_bounds, strict=False) if is_at]
+        return {**fit.values, **{name: self.model.believed[name] for name in strained}}
+
     def _generalised(
         self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
         """Effects of which the best one is a special case, from there: they cannot be worse."""
         best = min(kept, key=lambda one: one.fit.cost, default=None)
-        if best is None or self._problem(best.fit).is_down_to_noise(best.fit):
+        if best is None:
             return []
-        special = best.fit.candidates[-1]
+        special, is_done = best.fit.candidates[-1], self._problem(best.fit).is_down_to_noise(best.fit)
         found = []
         for candidate in pool:
             effect = candidate.effect
-            if effect.block != special.effect.block or special.effect.name not in effect.includes:
+            if effect.block != special.effect.block or special.effect.known_as not in effect.includes:
                 continue
             self.told(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
+            found += self._differing(problem, candidate, special, best.fit)
+            if is_done:
+                continue
             starts = [{**best.fit.values, **one} for one in _as_its_special_case(candidate, special, best.fit)]
             costs = [huber_cost(problem.residual(problem.theta_of(start))) for start in starts]
             fit, _ = fitted(problem, starts[int(np.argmin(costs))], n_iterations=6, shares=STAGES[-2:])
             if not fit.trouble:
                 found.append(self.judged(fit))
+        return found
+
+    def _differing(
+        self, problem: FreeRunProblem, candidate: Candidate, special: Candidate, fit: FreeRunFit
+    ) -> list[Explanation]:
+        """A general effect where it clearly is not its special case."""
+        if len(special.effect.parameters) > 1:
+            return []
+        size = fit.values[f"{special.key}.{special.effect.parameters[0].name}"]
+        found = []
+        for limits in candidate.effect.differs(size):
+            bounded = replace(candidate, effect=replace(candidate.effect, limits=_always(limits)))
+            start = {f"{candidate.key}.{name}": 0.5 * (low + high) for name, (low, high) in limits.items()}
+            within = FreeRunProblem(self.model, self.fitting, (*problem.candidates[:-1], bounded))
+            one, _ = fitted(within, {**fit.values, **start}, n_iterations=4, shares=STAGES[-2:])
+            if not one.trouble:
+                found.append(self.judged(replace(one, candidates=(*problem.candidates[:-1], candidate))))
         return found
 
     def _screen(
@@ -224,6 +289,7 @@ class _Search:
         shares: Sequence[float],
         *,
         is_near: bool,
+        is_strained: bool,
     ) -> list[tuple[Candidate, list[dict[str, float]]]]:
         """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from."""
         problem = FreeRunProblem(self.model, self.fitting, base.candidates)
@@ -239,7 +305,7 @@ class _Search:
             if candidate.key in [one.key for one in base.candidates]:
                 continue
             looks = []
-            for start in candidate.starts():
+            for start in _with_smaller_ones(candidate.starts()):
                 extended = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
                 moved = extended.residual(extended.theta_of({**base.values, **start}))
                 if not np.isfinite(moved).all():
@@ -254,8 +320,12 @@ class _Search:
                 starts = [{**base.values, **sized} for _, _, sized in looks[:_MOST_STARTS]]
             else:
                 believed = base.values if base.candidates else self.model.believed
-                starts = [{**believed, **start} for _, start, _ in looks[:_MOST_STARTS]]
-                starts.append({**base.values, **looks[0][2]})
+                far = [{**believed, **start} for _, start, _ in looks[:_MOST_STARTS]]
+                close = [{**base.values, **looks[0][2]}]
+                if is_strained:
+                    close.append({**self._eased(base), **looks[0][2]})
+                extended = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
+                starts = [dict(nearest(extended, group, shares[0])) for group in (far, close)]
             promised.append((np.max([one[0] for one in looks], axis=0), candidate, starts))
         return self._chosen(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
 
@@ -288,9 +358,25 @@ class _Search:
         at = problem.residual(theta)
         jacobian = problem.jacobian(theta, at, range(theta.size))
         alone = self._take_away(self._one_more(best.fit, jacobian, pool, "fitting a second effect"))
-        self.explanations += alone
         if min((one.fit.cost for one in alone), default=np.inf) < best.fit.cost:
-            self.explanations += self._generalised(retuned, alone, pool, "fitting one effect")
+            alone += self._look_alikes(retuned, alone, pool, "fitting one effect")
+            alone += self._generalised(retuned, alone, pool, "fitting one effect")
+        self.explanations += alone
+
+    def _polish(self) -> None:
+        """The best explanations of one and of two effects to where they converge."""
+        for n in (1, 2):
+            best = min(
+                (one for one in self.explanations if len(one.keys) == n),
+                key=lambda one: one.fit.cost,
+                default=None,
+            )
+            if best is None:
+                continue
+            self.told(f"polishing {' and '.join(best.keys)}", 0, 1)
+            fit, _ = fitted(self._problem(best.fit), best.fit.values, n_iterations=10, shares=STAGES[-2:])
+            if not fit.trouble and fit.cost < best.fit.cost:
+                self.explanations.append(self.judged(fit))
 
     def _take_away(self, pairs: Sequence[Explanation]) -> list[Explanation]:
         """Each effect of the best pair alone, from the numbers that it has there: one of them may be enough."""
@@ -355,11 +441,39 @@ class _WithEffects(FreeRunProblem):
 def _as_its_special_case(wider: Candidate, special: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
     """Starts of an effect with all numbers of one unit as large as that of its special case was found."""
     name = special.effect.parameters[0].name
-    unit, size = name.partition("_")[2], fit.values[f"{special.key}.{name}"]
+    unit, size = _unit(name), fit.values[f"{special.key}.{name}"]
     return [
-        {key: size if key.rpartition(".")[2].partition("_")[2] == unit else value for key, value in start.items()}
-        for start in wider.starts()
+        {key: size if _unit(key) == unit else value for key, value in start.items()} for start in wider.starts()
     ]
+
+
+def _always(limits: Limits) -> Callable[[Surroundings], Limits]:
+    return lambda surroundings: limits
+
+
+def _unit(number: str) -> str:
+    """Of a number of a candidate."""
+    return named_and_units(number.rpartition(".")[2])[1]
+
+
+def _look_alike(one: Candidate, other: Candidate) -> bool:
+    return one.effect.known_as in other.effect.look_alikes or other.effect.known_as in one.effect.look_alikes
+
+
+def _of_many_sizes(starts: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+    """Starts with their first number, or all of one unit, at several sizes."""
+    found = []
+    for start in starts:
+        unit = _unit(next(iter(start)))
+        for factor in _SIZES:
+            found.append({name: value * (factor if _unit(name) == unit else 1.0) for name, value in start.items()})
+    return found
+
+
+def _with_smaller_ones(starts: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+    """Effects of one number at a tenth of their size too: the step from the full one may lead nowhere."""
+    smaller = [{name: 0.1 * size for name, size in one.items()} for one in starts if len(one) == 1]
+    return [*starts, *smaller]
 
 
 def _resized(start: dict[str, float], factor: float) -> dict[str, float]:

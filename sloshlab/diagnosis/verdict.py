@@ -12,9 +12,10 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from sloshlab.diagnosis.candidate import Candidate, channels_of
+from sloshlab.diagnosis.candidate import Candidate, channels_of, known_effects
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.mismatch import mismatches, summary
+from sloshlab.diagnosis.units import named_and_units
 
 _Place = TypeVar("_Place")
 LEAST_GAIN: Final = 12.0
@@ -23,33 +24,24 @@ LEAST_MORE: Final = 12.0
 """The same, by which a further effect must improve on fewer."""
 LEAST_SEPARATION: Final = 6.0
 """The same, by which an explanation must beat another to be the only one."""
-LEAST_STRENGTH: Final = 0.5
+LEAST_STRENGTH: Final = 0.25
 """What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of."""
+LEAST_MORE_STRENGTH: Final = 0.5
+"""The same of a further effect, of a more general one, or of what has no name."""
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
+LARGEST_REMAINDER: Final = 1.25
+"""Held-out error in noise floors, as repeats tell it, beyond which something is left whatever was found."""
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
+_OFF: Final = 3.0
+"""Errors of estimates over their standard errors, on cases whose truth was known."""
+_CALIBRATION: Final = 0.01
+_IN_UNITS_OF_THE_CHANNEL: Final = ("amplitude", "rate", "limit")
 _LITTLE: Final = 0.05
 """Of a mean square that an effect of one frequency explains, which may be in beginnings and ends."""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
 """What it would have if it had a name."""
-_UNITS: Final = (
-    ("_n_s2_per_m2", "N s²/m²"),
-    ("_n_s_per_m", "N s/m"),
-    ("_n_per_m3", "N/m³"),
-    ("_n_per_m2", "N/m²"),
-    ("_n_per_m", "N/m"),
-    ("_rad_per_n_m", "rad/(N m)"),
-    ("_m_per_s", "m/s"),
-    ("_kg_per_s", "kg/s"),
-    ("_per_m", "1/m"),
-    ("_hz", "Hz"),
-    ("_kg", "kg"),
-    ("_n", "N"),
-    ("_g", "g"),
-    ("_s", "s"),
-    ("_m", "m"),
-)
 _EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force."""
 
@@ -98,7 +90,8 @@ def verdict_of(found: Findings) -> Verdict:
     ceiling = min([*described, found.retuned], key=lambda one: one.held_out)
     gain = scale.held_out_gain(found.retuned, ceiling)
     probabilities = _probabilities(found, scale)
-    if not any(_shows_more(one, found.retuned, scale) for one in described):
+    is_more = any(_shows_more(one, found.retuned, scale, LEAST_STRENGTH) for one in described)
+    if not is_more and not leaves_more(found, found.retuned):
         certain = _certain(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, _nothing(found), "", certain)
     named = _shortest_sufficient(found, scale)
@@ -107,6 +100,7 @@ def verdict_of(found: Findings) -> Verdict:
         named is None
         or scale.held_out_gain(found.retuned, named) < LEAST_GAIN
         or adequacy > ADEQUATE
+        or leaves_more(found, named)
         or any(_shows_more(one, named, scale) for one in described)
     ):
         certain = _certain(probabilities, "unknown")
@@ -123,6 +117,17 @@ def verdict_of(found: Findings) -> Verdict:
         _experiment(alternatives) if kind == "indistinguishable" else "",
         _certain(probabilities, *(_label(one) for one in alternatives)),
     )
+
+
+def leaves_more(found: Findings, one: Explanation) -> bool:
+    """Whether an explanation leaves more of the held-out runs than repeats of a test differ by.
+
+    Parameters
+    ----------
+    found : Findings
+    one : Explanation
+    """
+    return found.has_repeats and one.held_out_rms > LARGEST_REMAINDER
 
 
 @dataclass(frozen=True)
@@ -168,21 +173,30 @@ def _shortest_sufficient(found: Findings, scale: _Scale) -> Explanation | None:
     singles, pairs = ([one for one in known if len(one.keys) == n] for n in (1, 2))
     if not singles:
         return None
-    single = max(singles, key=scale.evidence)
+    single = _without_excess(max(singles, key=scale.evidence), singles, scale)
     if not pairs:
         return single
     pair = max(pairs, key=scale.evidence)
     return pair if _is_clearly_better(pair, single, scale) else single
 
 
+def _without_excess(single: Explanation, singles: Sequence[Explanation], scale: _Scale) -> Explanation:
+    """A special case of an effect in its place, unless the general form is better by a size worth speaking of."""
+    for special in sorted(singles, key=lambda one: -scale.evidence(one)):
+        is_special = special.n_numbers < single.n_numbers and _includes(single, special)
+        if is_special and not _is_clearly_better(single, special, scale):
+            return special
+    return single
+
+
 def _is_clearly_better(more: Explanation, less: Explanation, scale: _Scale) -> bool:
     """By more than chance on both kinds of runs, and on held-out runs by a size that is worth speaking of."""
-    return _gains(more, less, scale) and strength(less, more) >= LEAST_STRENGTH
+    return _gains(more, less, scale) and strength(less, more) >= LEAST_MORE_STRENGTH
 
 
-def _shows_more(more: Explanation, less: Explanation, scale: _Scale) -> bool:
+def _shows_more(more: Explanation, less: Explanation, scale: _Scale, least: float = LEAST_MORE_STRENGTH) -> bool:
     """The same, with a size that is worth speaking of in any channel of any run, fitted ones too."""
-    return _gains(more, less, scale) and _largest_strength(less.by_run, more.by_run) >= LEAST_STRENGTH
+    return _gains(more, less, scale) and _largest_strength(less.by_run, more.by_run) >= least
 
 
 def _gains(more: Explanation, less: Explanation, scale: _Scale) -> bool:
@@ -213,9 +227,10 @@ def _alternatives(found: Findings, best: Explanation, scale: _Scale) -> list[Exp
     for one in sorted(found.explanations, key=lambda one: -scale.evidence(one)):
         if len(one.keys) > len(best.keys) or one.named_in_blocks in seen or not np.isfinite(one.held_out):
             continue
-        if one.rests_on_a_bound or _includes(one, best):
+        if one.rests_on_a_bound or (_includes(one, best) and not _differs(one, best)):
             continue
         is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
+        is_alike = is_alike or (_differs(one, best) and not _is_clearly_better(best, one, scale))
         if is_alike or _is_alike_at_one_frequency(found, one, best):
             alike.append(one)
             seen.add(one.named_in_blocks)
@@ -243,9 +258,23 @@ def _includes(wider: Explanation, narrower: Explanation) -> bool:
     held = {
         f"{one.effect.block}.{name}"
         for one in wider.fit.candidates
-        for name in (one.effect.name, *one.effect.includes)
+        for name in (one.effect.known_as, *one.effect.includes)
     }
     return held >= set(narrower.named_in_blocks)
+
+
+def _differs(wider: Explanation, narrower: Explanation) -> bool:
+    """Whether a more general effect has numbers with which it is clearly not its special case."""
+    if len(wider.keys) != 1 or len(narrower.keys) != 1:
+        return False
+    general, special = wider.fit.candidates[0], narrower.fit.candidates[0]
+    if len(special.effect.parameters) != 1:
+        return False
+    size = narrower.fit.values[f"{special.key}.{special.effect.parameters[0].name}"]
+    return any(
+        all(low <= wider.fit.values[f"{general.key}.{name}"] <= high for name, (low, high) in limits.items())
+        for limits in general.effect.differs(size)
+    )
 
 
 def _probabilities(found: Findings, scale: _Scale) -> dict[str, float]:
@@ -275,7 +304,7 @@ def _certain(probabilities: dict[str, float], *decided: str) -> dict[str, float]
 
 
 def _label(one: Explanation) -> str:
-    return " + ".join(name.removesuffix("_60") for name in one.names)
+    return " + ".join(one.names)
 
 
 def _nothing(found: Findings) -> str:
@@ -367,7 +396,7 @@ def named_and_placed(candidate: Candidate) -> str:
     ----------
     candidate : Candidate
     """
-    name = candidate.effect.name.removesuffix("_60").replace("_", " ")
+    name = candidate.effect.known_as.replace("_", " ")
     place = candidate.channel.replace("+", " and ").replace("<", " from ")
     return f"{name} of {place}" if place else f"{name} in the {candidate.effect.block}"
 
@@ -386,27 +415,19 @@ def _with_digits(estimate: float, low: float, high: float) -> tuple[str, str, st
     return first, second, third
 
 
-def named_and_units(parameter: str) -> tuple[str, str]:
-    """Words and units of a parameter's name.
-
-    Examples
-    --------
-    >>> named_and_units("stribeck_velocity_m_per_s"), named_and_units("ratio")
-    (('stribeck velocity', 'm/s'), ('ratio', ''))
-    """
-    for ending, units in _UNITS:
-        if parameter.endswith(ending):
-            return parameter.removesuffix(ending).replace("_", " "), units
-    return parameter.replace("_", " "), ""
-
-
 def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[float, float, float]:
-    """Estimate and 90 % interval of one parameter, widened by what the fit leaves unexplained."""
+    """Estimate and 90 % interval of one parameter.
+
+    The standard error of the fit knows noise alone; it is widened by what the fit leaves, by how far estimates
+    were off where the truth was known, and by the calibration of a channel in whose unit the number is.
+    """
     name = f"{candidate.key}.{parameter}"
     estimate = best.fit.values[name]
     if name not in best.fit.names:
         return estimate, estimate, estimate
-    width = _NORMAL_90 * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
+    scatter = _OFF * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
+    of_gain = _CALIBRATION * abs(estimate) if parameter in _IN_UNITS_OF_THE_CHANNEL else 0.0
+    width = _NORMAL_90 * float(np.hypot(scatter, of_gain))
     chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
     lowest, highest = candidate.bounds(chosen)
     return estimate, max(estimate - width, lowest), min(estimate + width, highest)
@@ -446,15 +467,23 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
             "heldout_runs": [run.name for run in found.split.held_out],
         },
         "limits": list(found.split.limits),
-        "failed": {key.replace("mains_hum_60", "mains_hum"): why for key, why in found.failed.items()},
+        "failed": {_as_known(key): why for key, why in found.failed.items()},
     }
+
+
+def _as_known(key: str) -> str:
+    """Key of a candidate with the name that an answer has."""
+    for effect in known_effects():
+        if effect.variant_of:
+            key = key.replace(f"{effect.block}.{effect.name}", f"{effect.block}.{effect.variant_of}")
+    return key
 
 
 def _names_of_alternatives(verdict: Verdict) -> list[list[str]]:
     """Every set of names once; an effect may be in it in two blocks, or with two lines of the mains."""
     sets = [one.names for one in verdict.alternatives]
     sets += [names for one in verdict.alternatives for names in equals_of(one)]
-    return [list(one) for one in dict.fromkeys(tuple(name.removesuffix("_60") for name in each) for each in sets)]
+    return [list(one) for one in dict.fromkeys(sets)]
 
 
 def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
@@ -476,7 +505,7 @@ def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
         for parameter in candidate.effect.parameters:
             estimate, low, high = interval(verdict.best, candidate, parameter.name)
             parameters[parameter.name] = {"estimate": estimate, "low": low, "high": high, "level": LEVEL}
-        name = candidate.effect.name.removesuffix("_60")
+        name = candidate.effect.known_as
         described.append(
             {
                 "name": name,

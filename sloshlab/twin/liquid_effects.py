@@ -15,8 +15,6 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 # mypy: disable-error-code="no-untyped-def"
 
 _G = GRAVITY_M_PER_S2
-_TRACKING_S = 0.2
-_AGITATED = 1.0
 _NEVER = 1e6
 
 
@@ -25,17 +23,17 @@ def _liquid_damping(motion, parameters, memory, rates):
     """−s [c · saturation + (m_l/π) ω W̄(â)] v; s builds up while the liquid is thrown about."""
     omega = sqrt(memory[1] / memory[0]) if memory[0] > 0 else 1.0
     omega = min(max(omega, 1.0), 1e4)
-    rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / _TRACKING_S
-    rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / _TRACKING_S
-    size = sqrt((omega * motion[VELOCITY]) ** 2 + motion[ACCELERATION] ** 2) / _G
-    rates[2] = ((1.0 if size > _AGITATED else 0.0) - memory[2]) / parameters[5]
+    rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / parameters[9]
+    rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / parameters[9]
+    size = sqrt(2.0 * max(memory[1], 0.0)) / _G
+    rates[2] = ((1.0 if size > parameters[8] else 0.0) - memory[2]) / parameters[5]
     built = memory[2] if parameters[5] > 1e-3 else 1.0
     damping = parameters[0]
     if size > parameters[4]:
         damping *= (parameters[4] / size) ** 2
-    over = size / parameters[2] - 1.0
-    if over > 0.0:
-        damping += parameters[1] / pi * omega * parameters[3] * min(over, 1.0)
+    if size > parameters[2]:
+        over = (size - parameters[2]) / (parameters[7] * parameters[2])
+        damping += parameters[1] / pi * omega * parameters[3] * 2.0 * over / (1.0 + over * over)
     return -built * damping * motion[VELOCITY]
 
 
@@ -51,6 +49,9 @@ LIQUID_DAMPING = register(
             Parameter("saturation_g", "1", 1e-3, 1e6, _NEVER),
             Parameter("time_constant_s", "s", 1e-4, 100.0, 1e-3),
             Parameter("start_frequency_hz", "Hz", 1e-3, 1e4, 10.0),
+            Parameter("rise", "1", 1e-3, 1e3, 1.0),
+            Parameter("agitated_g", "1", 1e-3, 1e6, 1.0),
+            Parameter("averaging_s", "s", 1e-3, 100.0, 0.2),
         ),
         _liquid_damping,
         memory=lambda values, table: (
@@ -59,7 +60,8 @@ LIQUID_DAMPING = register(
             0.0 if values["time_constant_s"] > 1e-3 else 1.0,
         ),
         uses_acceleration=True,
-        equation="−s [c (a_s/â)² beyond a_s + (m_l/π) Ω W̄_peak ramp(â/a_t − 1)] v, ṡ = (1 − s)/τ beyond 1 g",
+        equation="−s [c (a_s/â)² beyond a_s + (m_l/π) Ω W̄_peak 2b/(1 + b²)] v, b = (â/a_t − 1)/rise beyond a_t, "
+        "ṡ = (1 − s)/τ while agitated; â from the running mean square of a",
     )
 )
 
@@ -94,12 +96,12 @@ LATERAL_MODE = register(
 
 @law
 def _cushion(motion, parameters, memory, rates):
-    """All liquid on a gas spring that hardens as its height is used up."""
-    mass, gap = parameters[1], parameters[2]
+    """Liquid on a gas spring that hardens as it is compressed and softens as it expands."""
+    mass, hardening = parameters[1], parameters[2]
     stretch, closing = memory[0] - motion[DISPLACEMENT], memory[1] - motion[VELOCITY]
-    left = max(1.0 - abs(stretch) / gap, 0.02)
+    left = max(1.0 - hardening * stretch, 0.02)
     omega = sqrt(parameters[0] / mass)
-    push = omega * omega * stretch / left + 0.04 * omega * closing
+    push = omega * omega * stretch / left + 2.0 * parameters[3] * omega * closing
     rates[0], rates[1] = memory[1], -push
     return mass * (push + motion[ACCELERATION])
 
@@ -110,14 +112,15 @@ AIR_CUSHION = register(
         ("tank",),
         (
             Parameter("stiffness_n_per_m", "N m-1", 1.0, 1e9),
-            Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
-            Parameter("gap_m", "m", 1e-6, 100.0),
+            Parameter("mass_kg", "kg", 1e-9, 1e6),
+            Parameter("hardening_per_m", "m-1", -1e5, 1e5, 0.0),
+            Parameter("damping_ratio", "1", 0.0, 1.0, 0.02),
         ),
         _cushion,
         memory=lambda values, table: (0.0, 0.0),
         moves_with_place=True,
         uses_acceleration=True,
-        equation="m_l (k/m_l · s/(1 − |s|/gap) + a), the liquid on trapped gas, ζ = 0.02",
+        equation="m (k/m · s/(1 − hs) + 2ζω ṡ + a), liquid of mass m on trapped gas that s > 0 compresses",
     )
 )
 
@@ -146,9 +149,11 @@ def _faraday(motion, parameters, memory, rates):
     wave, speed = memory[0], memory[1]
     rates[0] = speed
     rates[1] = (
-        -0.06 * omega * speed - omega * omega * (1.0 + motion[ACCELERATION] / _G) * wave - omega * omega * wave**3
+        -2.0 * parameters[3] * omega * speed
+        - omega * omega * (1.0 + parameters[1] * motion[ACCELERATION] / _G) * wave
+        - omega * omega * wave**3
     )
-    return parameters[1] * parameters[2] * _G * wave
+    return parameters[2] * wave
 
 
 FARADAY_WAVE = register(
@@ -157,12 +162,13 @@ FARADAY_WAVE = register(
         ("tank",),
         (
             Parameter("frequency_hz", "Hz", 0.01, 1e4),
-            Parameter("growth", "1", -100.0, 100.0),
-            Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
+            Parameter("growth", "1", 0.0, 100.0, 1.0),
+            Parameter("force_n", "N", -1e6, 1e6),
+            Parameter("damping_ratio", "1", 0.0, 1.0, 0.03),
         ),
         _faraday,
         memory=lambda values, table: (1e-3, 0.0),
         uses_acceleration=True,
-        equation="growth · m_l g y, ÿ = −0.06 ω ẏ − ω² (1 + a/g) y − ω² y³",
+        equation="F y, ÿ = −2ζω ẏ − ω² (1 + growth · a/g) y − ω² y³",
     )
 )

@@ -6,12 +6,19 @@ Both turn where the velocity does; the engine finds that instant, so that no ste
 from __future__ import annotations
 
 from math import pi
+from typing import Final
 
 from sloshlab.twin.law import DIRECTION, DISPLACEMENT, VELOCITY, law
 from sloshlab.twin.terms import ForceKind, Parameter, register
 
 # the laws are compiled, so their arguments are described once, in sloshlab.twin.law
 # mypy: disable-error-code="no-untyped-def"
+
+
+_N_SPRINGS: Final = 7
+_SPRING_RATIO: Final = 2.5
+_OF_LOSS: Final = 1.0 / sum(1.0 / (_SPRING_RATIO**-j + _SPRING_RATIO**j) for j in range(-3, 4))
+"""Stiffness of a spring over ηk, for a loss factor η in the middle of the rates."""
 
 
 @law
@@ -50,6 +57,35 @@ STRUCTURAL_DAMPING = register(
     )
 )
 """k is what the place feels; its loss factor η is that of App. A, W/(2πU) with U = kA²/2."""
+
+
+@law
+def _relaxing_springs(motion, parameters, memory, rates):
+    """−ηk c Σ(y_j − x/2), ẏ_j = v − r_j y_j, rates r_j in a geometric series about the middle one."""
+    total = 0.0
+    for j in range(_N_SPRINGS):
+        rate = 2.0 * pi * parameters[2] * _SPRING_RATIO ** (j - 0.5 * (_N_SPRINGS - 1))
+        rates[j] = motion[VELOCITY] - rate * memory[j]
+        total += memory[j]
+    stiffness = _OF_LOSS * parameters[0] * parameters[1]
+    return -stiffness * (total - 0.5 * _N_SPRINGS * motion[DISPLACEMENT])
+
+
+LINEAR_STRUCTURAL_DAMPING = register(
+    ForceKind(
+        "linear_structural_damping",
+        ("structure",),
+        (
+            Parameter("loss_factor", "1", 0.0, 0.6),
+            Parameter("stiffness_n_per_m", "N m-1", 0.0, 1e9),
+            Parameter("frequency_hz", "Hz", 1e-3, 1e5),
+        ),
+        _relaxing_springs,
+        memory=lambda values, table: (0.0,) * _N_SPRINGS,
+        equation="−η k H(x): a loss factor that no frequency changes, by springs that relax about frequency_hz",
+    )
+)
+"""The same loss as a linear force, which superposes: for motion of many frequencies at once."""
 
 HYSTERESIS = register(
     ForceKind(

@@ -215,6 +215,32 @@ EFFECTIVE_MASS = register(
 
 
 @law
+def _fading_mass(motion, parameters, memory, rates):
+    """−β m_l a / (1 + (â/a_f)²), â from the running mean square of a."""
+    rates[0] = (motion[ACCELERATION] ** 2 - memory[0]) / parameters[3]
+    size = sqrt(2.0 * max(memory[0], 0.0)) / _G
+    return -parameters[0] * parameters[1] * motion[ACCELERATION] / (1.0 + (size / parameters[2]) ** 2)
+
+
+FADING_MASS = register(
+    ForceKind(
+        "fading_mass",
+        ("tank",),
+        (
+            Parameter("beta", "1", -0.99, 10.0),
+            Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
+            Parameter("fade_g", "1", 1e-3, 1e6),
+            Parameter("averaging_s", "s", 1e-3, 100.0, 0.2),
+        ),
+        _fading_mass,
+        memory=lambda values, table: (0.0,),
+        uses_acceleration=True,
+        equation="−β m_l a / (1 + (â/a_f)²): the share of the liquid that does not follow falls with the motion",
+    )
+)
+
+
+@law
 def _linear_response(motion, parameters, memory, rates):
     return memory[0]
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sloshlab.twin.excitation import free, harmonic_force
-from sloshlab.twin.rate_independent_forces import HYSTERESIS, STRUCTURAL_DAMPING
+from sloshlab.twin.excitation import Excitation, free, harmonic_force
+from sloshlab.twin.rate_independent_forces import HYSTERESIS, LINEAR_STRUCTURAL_DAMPING, STRUCTURAL_DAMPING
 from sloshlab.twin.structure import single_degree_of_freedom
 from sloshlab.twin.structure_forces import COULOMB_FRICTION
+from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
 M, K = 2.241, 3808.8
@@ -62,6 +63,56 @@ def test_structural_damping_and_friction_hold_together() -> None:
     assert result.events[-1, 3] == 0.0
     assert np.ptp(result.displacement_m[-1000:]) == 0.0
     assert abs(result.displacement_m[-1]) <= 1.0 / K / (1 - np.pi * 0.02 / 2) + 1e-12
+
+
+ETA, STEPS_PER_CYCLE = 0.05, 400
+
+
+def linear_loss(frequency_hz: float) -> Term:
+    return LINEAR_STRUCTURAL_DAMPING(loss_factor=ETA, stiffness_n_per_m=K, frequency_hz=frequency_hz)
+
+
+def damped(term: Term) -> Twin:
+    """A rig whose beginnings are forgotten soon."""
+    return Twin(single_degree_of_freedom(M, K, 12.0)).with_term(term)
+
+
+@pytest.mark.parametrize("middle_hz", [2.0, 3.0])
+@pytest.mark.parametrize("ratio", [0.32, 0.5, 1.0, 2.0, 3.1])
+def test_linear_structural_damping_has_one_loss_factor_over_a_decade(middle_hz: float, ratio: float) -> None:
+    """−f/x = ηk (2/π ln(ω/ω₀) + i): a loss that no frequency changes stiffens so (Kramers and Kronig)."""
+    frequency = ratio * middle_hz
+    n_cycles = int(np.ceil(20 * frequency))
+    result = damped(linear_loss(middle_hz)).simulate(
+        harmonic_force(10.0, frequency, n_cycles / frequency, STEPS_PER_CYCLE * frequency)
+    )
+    last = slice(-5 * STEPS_PER_CYCLE, None)
+    turned = np.exp(-2j * np.pi * frequency * result.time_s[last])
+    force, motion = (np.mean(series[last] * turned) for series in (result.forces_n[:, 0], result.displacement_m))
+    stiffness = -force / motion / (ETA * K)
+    assert stiffness.imag == pytest.approx(1.0, rel=0.05)
+    assert stiffness.real == pytest.approx(2 / np.pi * np.log(ratio), abs=0.05)
+    work = -(result.work_of_terms_j[-1, 0] - result.work_of_terms_j[-1 - 5 * STEPS_PER_CYCLE, 0]) / 5
+    assert work == pytest.approx(np.pi * ETA * K * (2 * abs(motion)) ** 2, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("term", "superposes"),
+    [(linear_loss(6.56), True), (STRUCTURAL_DAMPING(loss_factor=ETA, stiffness_n_per_m=K), False)],
+    ids=["linear", "Reid"],
+)
+def test_forces_of_two_frequencies_add_up_in_the_linear_law_alone(term: Term, superposes: bool) -> None:
+    rate, duration = 2000.0, 3.0
+    parts = [harmonic_force(force, frequency, duration, rate) for force, frequency in ((10.0, 4.1), (6.0, 9.7))]
+    one, other, both = (
+        damped(term).simulate(excitation).displacement_m
+        for excitation in (
+            *parts,
+            Excitation(rate, parts[0].n_samples, lambda t: parts[0].inputs(t) + parts[1].inputs(t)),
+        )
+    )
+    error = np.abs(both - one - other).max() / np.abs(both).max()
+    assert error < 1e-10 if superposes else error > 1e-3
 
 
 def test_first_loading_of_bouc_wen_follows_its_exponential() -> None:

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Final
 
-from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
+from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, nowhere, register
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.terms import ForceKind
+
+MOST_DAMPING_OF_A_MODE: Final = 0.2
+"""Ratio to the critical one; what is damped more is no resonance but relaxes, and is no mode."""
 
 
 def has_structure(surroundings: Surroundings) -> bool:
     """Whether there is a structure to act on."""
     return surroundings.twin.structure is not None
+
+
+def rocks(surroundings: Surroundings) -> bool:
+    """Whether the tank rotates as it moves, as at the tip of a beam."""
+    structure = surroundings.rig.structure
+    return structure is not None and structure.kind == "beam"
 
 
 def force_effect(
@@ -23,11 +33,14 @@ def force_effect(
     fixed: Callable[[Surroundings], Mapping[str, float]] | None = None,
     fitted: tuple[str, ...] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    may_rest: tuple[str, ...] = (),
     look_alikes: tuple[str, ...] = (),
     separated_by: str = "",
     needs: Callable[[Surroundings], bool] | None = None,
     spoken_for_by: tuple[str, ...] = (),
     includes: tuple[str, ...] = (),
+    differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = nowhere,
+    variant_of: str = "",
 ) -> Effect:
     """Register a force of the twin as an effect.
 
@@ -45,7 +58,9 @@ def force_effect(
         That of the kind by default.
     bounds : mapping, optional
         Narrower ones than those of the kind.
-    look_alikes, separated_by, needs, spoken_for_by, includes
+    may_rest : tuple of str
+        Names of numbers that may be at a bound in earnest.
+    look_alikes, separated_by, needs, spoken_for_by, includes, differs, variant_of
         As of `Effect`.
 
     Examples
@@ -62,7 +77,11 @@ def force_effect(
 
     narrower = bounds or {}
     parameters = tuple(
-        EffectParameter(parameter.name, *narrower.get(parameter.name, (parameter.low, parameter.high)))
+        EffectParameter(
+            parameter.name,
+            *narrower.get(parameter.name, (parameter.low, parameter.high)),
+            may_rest=parameter.name in may_rest,
+        )
         for parameter in kind.parameters
         if not fitted or parameter.name in fitted
     )
@@ -79,5 +98,7 @@ def force_effect(
             needs or (has_structure if block == "structure" else lambda surroundings: True),
             spoken_for_by=spoken_for_by,
             includes=includes,
+            variant_of=variant_of,
+            differs=differs,
         )
     )

@@ -52,6 +52,7 @@ def _sensor_effect(
     separated_by: str = "the channel beside a second sensor at the same place",
     places: Callable[[Surroundings], list[str]] | None = None,
     spoken_for_by: tuple[str, ...] = (),
+    variant_of: str = "",
 ) -> Effect:
     def extension(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         del at
@@ -75,6 +76,7 @@ def _sensor_effect(
             separated_by,
             places=places or (_compared_channels if undone is None else lambda at: list(at.channels)),
             spoken_for_by=spoken_for_by,
+            variant_of=variant_of,
         )
     )
 
@@ -252,8 +254,9 @@ HUM = [
         _humming(line, -1.0),
         separated_by="the channel with nothing moving",
         spoken_for_by=("one channel alone", "a line of the mains"),
+        variant_of=variant_of,
     )
-    for name, line in (("mains_hum", 50.0), ("mains_hum_60", 60.0))
+    for name, line, variant_of in (("mains_hum", 50.0, ""), ("mains_hum_60", 60.0, "mains_hum"))
 ]
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sloshlab.diagnosis.candidate import Numbers, Surroundings
-from sloshlab.diagnosis.effects.force_effect import force_effect
-from sloshlab.twin.rate_independent_forces import HYSTERESIS, STRUCTURAL_DAMPING
+from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, force_effect
+from sloshlab.twin.rate_independent_forces import HYSTERESIS, LINEAR_STRUCTURAL_DAMPING, STRUCTURAL_DAMPING
 from sloshlab.twin.structure_forces import (
     ASYMMETRIC_FRICTION,
     CLEARANCE,
@@ -20,13 +20,17 @@ from sloshlab.twin.structure_forces import (
     VISCOUS_DAMPING,
 )
 
-MOST_DAMPING_OF_A_MODE = 0.2
-"""Ratio to the critical one; what is damped more is no resonance but relaxes, and is no mode."""
 _OTHER_LEVELS = "decays or sweeps at two or more amplitudes"
 
 
 def _stiffness(at: Surroundings) -> float:
     return at.moving_mass_kg * at.omega**2
+
+
+def _static_stiffness(at: Surroundings) -> float:
+    """What the loss factor of the structure is a share of."""
+    structure = at.twin.structure
+    return _stiffness(at) if structure is None else structure.static_stiffness_n_per_m
 
 
 VISCOUS = force_effect(
@@ -61,6 +65,14 @@ COULOMB = force_effect(
         "third order",
     ),
 )
+
+
+def _clearly_asymmetric(force_n: float) -> list[dict[str, tuple[float, float]]]:
+    """More than twice as large in one direction, about the force that was found without a direction."""
+    more, less = (1.35 * force_n, 2.0 * force_n), (0.0, 0.65 * force_n)
+    return [{"force_up_n": more, "force_down_n": less}, {"force_up_n": less, "force_down_n": more}]
+
+
 ASYMMETRIC = force_effect(
     ASYMMETRIC_FRICTION,
     "structure",
@@ -80,6 +92,7 @@ ASYMMETRIC = force_effect(
         "constant part",
     ),
     includes=("coulomb_friction", "constant_force"),
+    differs=_clearly_asymmetric,
 )
 STRIBECK = force_effect(
     STRIBECK_FRICTION,
@@ -115,11 +128,22 @@ STRUCTURAL = force_effect(
     STRUCTURAL_DAMPING,
     "structure",
     lambda at: [{"loss_factor": 0.01}],
-    fixed=lambda at: {"stiffness_n_per_m": _stiffness(at)},
+    fixed=lambda at: {"stiffness_n_per_m": _static_stiffness(at)},
     fitted=("loss_factor",),
     look_alikes=("viscous_damping", "coulomb_friction"),
     separated_by="the same amplitude at two frequencies",
     spoken_for_by=("takes energy", "odd in velocity", "rate-independent", "work ∝ amplitude²", "no onset"),
+)
+LINEAR_STRUCTURAL = force_effect(
+    LINEAR_STRUCTURAL_DAMPING,
+    "structure",
+    lambda at: [{"loss_factor": 0.01}],
+    fixed=lambda at: {"stiffness_n_per_m": _static_stiffness(at), "frequency_hz": at.frequency_hz},
+    fitted=("loss_factor",),
+    look_alikes=("viscous_damping", "coulomb_friction"),
+    separated_by="the same amplitude at two frequencies",
+    spoken_for_by=("takes energy", "odd in velocity", "rate-independent", "work ∝ amplitude²", "no onset"),
+    variant_of="structural_damping",
 )
 
 
@@ -128,10 +152,12 @@ def _bouc_wen(at: Surroundings) -> list[Numbers]:
     return [
         {
             "stiffness_n_per_m": stiffness,
-            "beta_gamma": 0.5 / (share * at.displacement_m),
-            "beta_delta": 0.5 / (share * at.displacement_m),
+            "beta_gamma": 0.5 * stiffness / (stiffness * share * at.displacement_m) ** exponent,
+            "beta_delta": 0.5 * stiffness / (stiffness * share * at.displacement_m) ** exponent,
+            "exponent": exponent,
         }
-        for share in (0.1, 0.5)
+        for share in (0.1, 0.3)
+        for exponent in (1.0, 2.0)
     ]
 
 
@@ -139,7 +165,8 @@ BOUC_WEN = force_effect(
     HYSTERESIS,
     "structure",
     _bouc_wen,
-    fitted=("stiffness_n_per_m", "beta_gamma", "beta_delta"),
+    bounds={"exponent": (1.0, 3.0)},
+    may_rest=("exponent",),
     look_alikes=("coulomb_friction", "structural_damping"),
     separated_by="slow loops of several amplitudes",
     spoken_for_by=("takes energy", "memory", "rate-independent"),

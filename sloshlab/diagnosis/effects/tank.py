@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import pi
+from typing import Final
 
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
-from sloshlab.diagnosis.effects.force_effect import force_effect
+from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, force_effect, rocks
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.liquid_effects import AIR_CUSHION, FARADAY_WAVE, LATERAL_MODE, LIQUID_DAMPING, LIQUID_LOSS
 from sloshlab.twin.structure_forces import COULOMB_FRICTION, MASS_ERROR, QUADRATIC_DRAG, VISCOUS_DAMPING
-from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS
+from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS
 from sloshlab.twin.terms import Term
 
+_CONTACT_HZ: Final = 50.0
 _LEVELS = "decays or sweeps at accelerations below and above the threshold"
 
 
@@ -89,16 +92,23 @@ EFFECTIVE = force_effect(
     separated_by="runs with frozen and moving liquid, at several amplitudes",
     spoken_for_by=("does no work", "odd in displacement", "function of the state"),
 )
+FADING = force_effect(
+    FADING_MASS,
+    "tank",
+    lambda at: [{"beta": sign * 0.1, "fade_g": 0.4 * _largest_g(at)} for sign in (1, -1)],
+    fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
+    fitted=("beta", "fade_g"),
+    separated_by="runs with frozen and moving liquid, at several amplitudes",
+    spoken_for_by=("does no work", "odd in displacement"),
+    includes=("mass_error",),
+    variant_of="effective_mass",
+)
 
 
 def _damping(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     del channel
-    damper = LIQUID_DAMPING(
-        liquid_mass_kg=at.rig.liquid_mass_kg,
-        start_frequency_hz=at.frequency_hz,
-        threshold_g=numbers["threshold_g"],
-        peak_w_bar=numbers["peak_w_bar"],
-    )
+    known = {"liquid_mass_kg": at.rig.liquid_mass_kg, "start_frequency_hz": at.frequency_hz}
+    damper = LIQUID_DAMPING(place="tank", **known, **numbers)
     return Extension(terms=(damper,))
 
 
@@ -106,9 +116,23 @@ SLOSHING = register(
     Effect(
         "liquid_sloshing",
         "tank",
-        "−(m_l/π) Ω W̄(â) v; W̄ rises from nothing at the threshold to its peak at twice the threshold",
-        (EffectParameter("threshold_g", 0.02, 20.0), EffectParameter("peak_w_bar", 0.0, 20.0)),
-        lambda at: [{"threshold_g": share * _largest_g(at), "peak_w_bar": 0.5} for share in (0.1, 0.3, 0.6)],
+        "−(m_l/π) Ω W̄(â) v; W̄ rises from nothing at the threshold a_t to its peak at a_t (1 + rise), and falls",
+        (
+            EffectParameter("threshold_g", 0.02, 20.0),
+            EffectParameter("peak_w_bar", 0.0, 20.0),
+            EffectParameter("rise", 0.05, 20.0),
+            EffectParameter("averaging_s", 0.01, 5.0),
+        ),
+        lambda at: [
+            {
+                "threshold_g": share * _largest_g(at),
+                "peak_w_bar": 0.5,
+                "rise": rise,
+                "averaging_s": 2 / at.frequency_hz,
+            }
+            for share in (0.1, 0.3, 0.6)
+            for rise in (0.5, 2.0)
+        ],
         _damping,
         ("viscous_damping", "quadratic_drag"),
         _LEVELS,
@@ -154,10 +178,14 @@ DELAY = register(
     Effect(
         "breakup_delay",
         "tank",
-        "the damping of the liquid times s, ṡ = (1 − s)/τ while it is shaken beyond 1 g",
-        (EffectParameter("time_constant_s", 2e-3, 20.0),),
-        lambda at: [{"time_constant_s": n / at.frequency_hz} for n in (1.0, 5.0)],
-        _changed_damping(lambda term, numbers, at: term.changed(time_constant_s=numbers["time_constant_s"])),
+        "the damping of the liquid times s, ṡ = (1 − s)/τ while it is shaken beyond some g",
+        (EffectParameter("time_constant_s", 2e-3, 20.0), EffectParameter("agitated_g", 0.02, 20.0)),
+        lambda at: [
+            {"time_constant_s": n / at.frequency_hz, "agitated_g": share * _largest_g(at)}
+            for n in (1.0, 5.0)
+            for share in (0.1, 0.4)
+        ],
+        _changed_damping(lambda term, numbers, at: term.changed(**numbers)),
         ("high_g_saturation",),
         "a sudden start at constant amplitude",
         _damps,
@@ -169,9 +197,16 @@ SATURATION = register(
         "high_g_saturation",
         "tank",
         "the damping of the liquid times (a_s/â)² beyond a_s: work per cycle stops growing",
-        (EffectParameter("threshold_g", 0.02, 50.0),),
-        lambda at: [{"threshold_g": share * _largest_g(at)} for share in (0.3, 0.7)],
-        _changed_damping(lambda term, numbers, at: term.changed(saturation_g=numbers["threshold_g"])),
+        (EffectParameter("threshold_g", 0.02, 50.0), EffectParameter("averaging_s", 0.01, 5.0)),
+        lambda at: [
+            {"threshold_g": share * _largest_g(at), "averaging_s": 2 / at.frequency_hz}
+            for share in (0.3, 0.5, 0.7)
+        ],
+        _changed_damping(
+            lambda term, numbers, at: term.changed(
+                saturation_g=numbers["threshold_g"], averaging_s=numbers["averaging_s"]
+            )
+        ),
         ("breakup_delay", "liquid_sloshing"),
         _LEVELS,
         _damps,
@@ -189,7 +224,7 @@ def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         stiffness_n_per_m=numbers["stiffness_n_per_m"],
         damping_kg_per_s=numbers["damping_kg_per_s"],
         hardening_per_m=0.0,
-        beta=0.0,
+        beta=1.0 - numbers["share"],
         liquid_mass_kg=at.rig.liquid_mass_kg,
         height_m=height,
     )
@@ -200,19 +235,22 @@ IMPACT = register(
     Effect(
         "ceiling_impact",
         "tank",
-        "the liquid as one mass that flies between floor and ceiling and meets them through spring and damper",
+        "a share of the liquid that flies between floor and ceiling and meets them through spring and damper",
         (
             EffectParameter("gap_m", 1e-4, 1.0),
-            EffectParameter("stiffness_n_per_m", 500.0, 1e7),
+            EffectParameter("stiffness_n_per_m", 50.0, 1e7),
             EffectParameter("damping_kg_per_s", 0.0, 1e4),
+            EffectParameter("share", 0.002, 1.0, may_rest=True),
         ),
         lambda at: [
             {
-                "gap_m": (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
-                "stiffness_n_per_m": at.rig.liquid_mass_kg * (2 * 3.14159 * 40) ** 2,
-                "damping_kg_per_s": share * at.rig.liquid_mass_kg * 2 * 3.14159 * 40,
+                "gap_m": room * (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
+                "stiffness_n_per_m": share * at.rig.liquid_mass_kg * (2 * pi * _CONTACT_HZ) ** 2,
+                "damping_kg_per_s": 0.6 * share * at.rig.liquid_mass_kg * 2 * pi * _CONTACT_HZ,
+                "share": share,
             }
-            for share in (0.2, 0.8)
+            for share in (1.0, 0.2, 0.05)
+            for room in (1.0, 0.6)
         ],
         _impact,
         ("liquid_sloshing", "clearance"),
@@ -224,21 +262,29 @@ LATERAL = force_effect(
     LATERAL_MODE,
     "tank",
     lambda at: [
-        {"frequency_hz": frequency, "mass_kg": 0.2 * at.rig.liquid_mass_kg}
+        {"frequency_hz": frequency, "mass_kg": 0.2 * at.rig.liquid_mass_kg, "damping_ratio": 0.01}
         for frequency in (*(ratio * at.frequency_hz for ratio in (0.3, 0.7, 1.4)), *at.missed_hz)
     ],
-    fitted=("frequency_hz", "mass_kg"),
+    bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("missing_mode",),
     separated_by="a slow sweep over its frequency at small amplitude",
+    needs=rocks,
     spoken_for_by=("memory",),
     includes=("mass_error", "effective_mass"),
 )
 FARADAY = force_effect(
     FARADAY_WAVE,
     "tank",
-    lambda at: [{"frequency_hz": 0.5 * at.frequency_hz, "growth": 0.5}],
-    fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
-    fitted=("frequency_hz", "growth"),
+    lambda at: [
+        {
+            "frequency_hz": 0.5 * at.frequency_hz,
+            "growth": growth / _largest_g(at),
+            "force_n": 0.3 * _liquid_force(at),
+            "damping_ratio": 0.02,
+        }
+        for growth in (0.3, 1.0)
+    ],
+    bounds={"growth": (1e-3, 100.0), "damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     separated_by="spectra at half the frequency below and above the threshold",
     spoken_for_by=("half order", "memory", "onset"),
 )
@@ -253,13 +299,18 @@ LOSS = force_effect(
 CUSHION = force_effect(
     AIR_CUSHION,
     "tank",
-    lambda at: [{"stiffness_n_per_m": at.rig.liquid_mass_kg * (ratio * at.omega) ** 2} for ratio in (3.0, 8.0)],
-    fixed=lambda at: {
-        "liquid_mass_kg": at.rig.liquid_mass_kg,
-        "gap_m": (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
-    },
-    fitted=("stiffness_n_per_m",),
+    lambda at: [
+        {
+            "stiffness_n_per_m": 0.2 * at.rig.liquid_mass_kg * (2 * pi * frequency) ** 2,
+            "mass_kg": 0.2 * at.rig.liquid_mass_kg,
+            "hardening_per_m": 0.1 * (2 * pi * frequency) ** 2 / at.acceleration_m_per_s2,
+            "damping_ratio": 0.03,
+        }
+        for frequency in (*(ratio * at.frequency_hz for ratio in (1.7, 3.0, 6.0)), *at.missed_hz)
+    ],
+    bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("effective_mass", "lateral_mode"),
     separated_by="two pressures of the gas",
     spoken_for_by=("does no work", "odd in displacement"),
+    includes=("mass_error", "effective_mass", "lateral_mode"),
 )

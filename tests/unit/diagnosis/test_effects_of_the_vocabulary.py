@@ -54,7 +54,11 @@ LOOK_ALIKES = [
     ("sensor_gain", "mass_error"),
     ("cubic_stiffness", "quadratic_stiffness"),
 ]
-SAME_UNDER_ANOTHER_NAME = {"mains_hum_60"}
+
+
+def built_in() -> list[Effect]:
+    """Effects of the program, without those of users."""
+    return [one for one in known_effects() if one.extension.__module__.startswith("sloshlab.")]
 
 
 def named(name: str) -> list[Effect]:
@@ -67,13 +71,23 @@ def test_an_effect_has_its_blocks_and_parameters(name: str, blocks: tuple[str, .
     found = named(name)
     assert sorted(one.block for one in found) == sorted(blocks)
     for one in found:
-        assert {parameter.name for parameter in one.parameters} == parameters
+        assert parameters <= {parameter.name for parameter in one.parameters}
         assert all(parameter.low < parameter.high for parameter in one.parameters)
 
 
 def test_no_effect_of_the_program_is_outside_the_vocabulary() -> None:
-    known = {one.name for one in known_effects() if one.extension.__module__.startswith("sloshlab.")}
-    assert known - {name for name, _, _ in VOCABULARY} == SAME_UNDER_ANOTHER_NAME
+    assert {one.known_as for one in built_in()} == {name for name, _, _ in VOCABULARY}
+
+
+def test_another_form_of_an_effect_answers_with_its_name_block_and_parameters() -> None:
+    required = {name: parameters for name, _, parameters in VOCABULARY}
+    forms = [one for one in built_in() if one.variant_of]
+    assert {"fading_mass", "linear_structural_damping", "mains_hum_60"} <= {one.name for one in forms}
+    for one in forms:
+        [original] = [other for other in named(one.variant_of) if other.block == one.block]
+        assert not original.variant_of
+        assert one.known_as == original.known_as == original.name
+        assert required[original.name] <= {parameter.name for parameter in one.parameters}
 
 
 @pytest.mark.parametrize(("one", "other"), LOOK_ALIKES)

@@ -17,7 +17,8 @@ from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.residual_maps import Profile, ResidualMaps
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.verdict import Verdict, named_and_units, with_place
+from sloshlab.diagnosis.units import named_and_units
+from sloshlab.diagnosis.verdict import Verdict, with_place
 
 
 @pytest.fixture(scope="module")

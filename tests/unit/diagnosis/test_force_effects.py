@@ -7,6 +7,7 @@ with a memory are integrated along this motion by scipy. Nothing of the twin's l
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,11 @@ from recorded_oscillators import surroundings as surroundings_of
 from scipy.interpolate import CubicSpline
 
 from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, known_effects
-from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.candidate import Candidate, candidates, known_effects
+from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.rig import Structure
+from sloshlab.twin.tank_forces import FADING_MASS
 
 assert effects.__all__
 G = 9.80665
@@ -56,9 +59,24 @@ def missing_mode(m: Motion) -> np.ndarray:
 
 
 def bouc_wen(m: Motion) -> np.ndarray:
-    k, bg, bd = 100.0, 60.0, 60.0
-    [z] = along(m, lambda z, x, v, a: [k * v - bg * abs(v) * z[0] - bd * v * abs(z[0])], (0.0,))
+    k, bg, bd, nu = 100.0, 80.0, -40.0, 1.6
+    [z] = along(
+        m,
+        lambda z, x, v, a: [
+            k * v - bg * abs(v) * abs(z[0]) ** (nu - 1) * z[0] - bd * v * abs(z[0]) ** nu,
+        ],
+        (0.0,),
+    )
     return -z
+
+
+def relaxing_springs(m: Motion) -> np.ndarray:
+    """−ηk Σ c (y − x/2), ẏ = v − r y: seven rates about ω₀; c such that ηk is the loss at ω₀."""
+    loss, k = 0.02, MASS_KG * OMEGA**2
+    rates = OMEGA * 2.5 ** np.arange(-3.0, 4.0)
+    per_spring = 1 / np.sum(OMEGA * rates / (OMEGA**2 + rates**2))
+    y = along(m, lambda y, x, v, a: v - rates * y, (0.0,) * rates.size)
+    return -loss * k * per_spring * np.sum(y - 0.5 * m["x"], axis=0)
 
 
 def carried_oscillator(frequency_hz: float, mass: float, zeta: float, m: Motion) -> np.ndarray:
@@ -70,27 +88,33 @@ def carried_oscillator(frequency_hz: float, mass: float, zeta: float, m: Motion)
 
 
 def cushion(m: Motion) -> np.ndarray:
-    k, gap = 2.0e3, 0.5 * 0.0272
-    omega = np.sqrt(k / LIQUID_KG)
+    k, mass, h, zeta = 240.0, 0.05, 40.0, 0.05
+    damper = 2 * zeta * np.sqrt(k * mass)
 
-    def push(stretch: Any, closing: Any) -> Any:
-        return omega**2 * stretch / np.maximum(1 - np.abs(stretch) / gap, 0.02) + 0.04 * omega * closing
+    def gas(s: Any, closing: Any) -> Any:
+        return k * s / (1 - h * s) + damper * closing
 
-    y = along(m, lambda y, x, v, a: [y[1], -push(y[0] - x, y[1] - v)], (m["x"][0], 0.0))
-    return LIQUID_KG * (push(y[0] - m["x"], y[1] - m["v"]) + m["a"])
+    y = along(m, lambda y, x, v, a: [y[1], -gas(y[0] - x, y[1] - v) / mass], (m["x"][0], 0.0))
+    return gas(y[0] - m["x"], y[1] - m["v"]) + mass * m["a"]
 
 
 def wave(m: Motion) -> np.ndarray:
-    omega, growth = np.pi * OMEGA / (2 * np.pi), 0.4
+    omega, growth, force_n, zeta = 2 * np.pi * 3.1, 0.6, 1.5, 0.05
     y = along(
         m,
         lambda y, x, v, a: [
             y[1],
-            -0.06 * omega * y[1] - omega**2 * (1 + a / G) * y[0] - omega**2 * y[0] ** 3,
+            -2 * zeta * omega * y[1] - omega**2 * ((1 + growth * a / G) * y[0] + y[0] ** 3),
         ],
         (1e-3, 0.0),
     )
-    return growth * LIQUID_KG * G * y[0]
+    return force_n * y[0]
+
+
+def level_g(m: Motion, averaging_s: float = 0.2, start: float = 1e-6 * OMEGA**2) -> np.ndarray:
+    """Amplitude of a sine with the running mean square of a [g]."""
+    [square] = along(m, lambda y, x, v, a: [(a**2 - y[0]) / averaging_s], (start,))
+    return np.sqrt(2 * square) / G
 
 
 MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
@@ -109,7 +133,11 @@ MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
         {"loss_factor": 0.02},
         lambda m: -0.5 * np.pi * 0.02 * MASS_KG * OMEGA**2 * np.abs(m["x"]) * np.sign(m["v"]),
     ),
-    "structure.hysteresis": ({"stiffness_n_per_m": 100.0, "beta_gamma": 60.0, "beta_delta": 60.0}, bouc_wen),
+    "structure.linear_structural_damping": ({"loss_factor": 0.02}, relaxing_springs),
+    "structure.hysteresis": (
+        {"stiffness_n_per_m": 100.0, "beta_gamma": 80.0, "beta_delta": -40.0, "exponent": 1.6},
+        bouc_wen,
+    ),
     "structure.cubic_stiffness": ({"stiffness_n_per_m3": 3e5}, lambda m: -3e5 * m["x"] ** 3),
     "structure.quadratic_stiffness": ({"stiffness_n_per_m2": -9e3}, lambda m: 9e3 * m["x"] ** 2),
     "structure.stiffness_change": ({"stiffness_n_per_m": -150.0}, lambda m: 150.0 * m["x"]),
@@ -125,13 +153,23 @@ MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
     "tank.quadratic_drag": ({"drag_n_s2_per_m2": 0.8}, lambda m: -0.8 * m["v"] * np.abs(m["v"])),
     "tank.mass_error": ({"mass_kg": -0.03}, lambda m: 0.03 * m["a"]),
     "tank.effective_mass": ({"beta": 0.3}, lambda m: -0.3 * LIQUID_KG * m["a"]),
+    "tank.fading_mass": (
+        {"beta": 0.3, "fade_g": 2.5},
+        lambda m: -0.3 * LIQUID_KG * m["a"] / (1 + (level_g(m, start=0.0) / 2.5) ** 2),
+    ),
     "tank.liquid_loss": ({"rate_kg_per_s": 0.01}, lambda m: 0.01 * m["t"] * m["a"]),
     "tank.lateral_mode": (
-        {"frequency_hz": 4.5, "mass_kg": 0.03},
-        lambda m: carried_oscillator(4.5, 0.03, 0.01, m),
+        {"frequency_hz": 4.5, "mass_kg": 0.03, "damping_ratio": 0.05},
+        lambda m: carried_oscillator(4.5, 0.03, 0.05, m),
     ),
-    "tank.air_cushion": ({"stiffness_n_per_m": 2.0e3}, cushion),
-    "tank.faraday_wave": ({"frequency_hz": 0.5 * OMEGA / (2 * np.pi), "growth": 0.4}, wave),
+    "tank.air_cushion": (
+        {"stiffness_n_per_m": 240.0, "mass_kg": 0.05, "hardening_per_m": 40.0, "damping_ratio": 0.05},
+        cushion,
+    ),
+    "tank.faraday_wave": (
+        {"frequency_hz": 3.1, "growth": 0.6, "force_n": 1.5, "damping_ratio": 0.05},
+        wave,
+    ),
 }
 
 
@@ -149,7 +187,13 @@ def damped(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
 
 def moved(model: RigModel, key: str, numbers: Mapping[str, float]) -> dict[str, np.ndarray]:
     """The readings of a decay with an effect, as a motion."""
-    extension = NOTHING if not key else Candidate(effect(key), surroundings_of(model)).extension(numbers)
+    return moved_by(
+        model, NOTHING if not key else Candidate(effect(key), surroundings_of(model)).extension(numbers)
+    )
+
+
+def moved_by(model: RigModel, extension: Extension) -> dict[str, np.ndarray]:
+    """The readings of a decay with an extension, as a motion."""
     readings = model.simulate(model.runs[0], model.believed, extension)
     x, a = readings["displacement_tank"], readings["acceleration_tip"]
     t = np.arange(x.size) / RATE_HZ
@@ -216,48 +260,67 @@ def test_nothing_added_is_no_force(frozen: RigModel) -> None:
     assert np.abs(added(m)[smooth(m)]).max() < 2e-4 * STIFFNESS * START_M
 
 
-def tracked_omega(m: Motion, omega: float) -> np.ndarray:
-    """Root of the mean squares of a over v, each forgotten with 0.2 s."""
-    y = along(m, lambda y, x, v, a: [(v**2 - y[0]) / 0.2, (a**2 - y[1]) / 0.2], (1e-6, 1e-6 * omega**2))
+def tracked_omega(m: Motion, averaging_s: float) -> np.ndarray:
+    """Root of the running mean squares of a over v."""
+    y = along(
+        m,
+        lambda y, x, v, a: [(v**2 - y[0]) / averaging_s, (a**2 - y[1]) / averaging_s],
+        (1e-6, 1e-6 * OMEGA**2),
+    )
     return np.sqrt(y[1] / y[0])
 
 
-def test_sloshing_dissipates_beyond_its_threshold_alone(frozen: RigModel) -> None:
-    """(m_l/π) Ω W̄ v, W̄ rising from the threshold to its peak at twice the threshold."""
-    m = moved(frozen, "tank.liquid_sloshing", {"threshold_g": 2.2, "peak_w_bar": 2.0})
-    omega = tracked_omega(m, OMEGA)
-    size = np.hypot(omega * m["v"], m["a"]) / G
-    w_bar = 2.0 * np.clip(size / 2.2 - 1, 0.0, 1.0)
+def test_sloshing_dissipates_beyond_its_threshold_and_less_beyond_its_peak(frozen: RigModel) -> None:
+    """(m_l/π) Ω W̄ v; W̄ is 0 at 1.6 g, 2 at 1.6 g (1 + 0.4), and falls as 2b/(1 + b²) on both sides of it."""
+    m = moved(
+        frozen,
+        "tank.liquid_sloshing",
+        {"threshold_g": 1.6, "peak_w_bar": 2.0, "rise": 0.4, "averaging_s": 0.12},
+    )
+    level = level_g(m, 0.12)
+    b = np.maximum(level / 1.6 - 1, 0.0) / 0.4
+    expected = -LIQUID_KG / np.pi * tracked_omega(m, 0.12) * 2.0 * 2 * b / (1 + b**2) * m["v"]
     known = smooth(m)
-    expected = -LIQUID_KG / np.pi * omega * w_bar * m["v"]
     assert np.abs(added(m) - expected)[known].max() < 0.02 * np.abs(expected).max()
-    below = known & (size < 2.1)
+    assert (b[known] > 1.5).any()
+    below = known & (level < 1.55)
     assert below.sum() > 50
     assert np.abs(added(m)[below]).max() < 2e-4 * STIFFNESS * START_M
 
 
-def test_saturation_makes_the_damping_of_the_liquid_fall_with_the_square(damped: RigModel) -> None:
-    m = moved(damped, "tank.high_g_saturation", {"threshold_g": 2.2})
-    size = np.hypot(tracked_omega(m, OMEGA) * m["v"], m["a"]) / G
-    expected = -TANK_DAMPING * np.minimum(1.0, (2.2 / size) ** 2) * m["v"]
+def test_a_fading_mass_remembers_the_level_as_long_as_stated(frozen: RigModel) -> None:
+    term = FADING_MASS(beta=0.5, liquid_mass_kg=LIQUID_KG, fade_g=1.5, averaging_s=0.8)
+    m = moved_by(frozen, Extension(terms=(term,), key=tuple(term.values.items())))
+    level = level_g(m, 0.8, start=0.0)
+    expected = -0.5 * LIQUID_KG * m["a"] / (1 + (level / 1.5) ** 2)
     known = smooth(m)
     assert np.abs(added(m) - expected)[known].max() < 0.02 * np.abs(expected).max()
-    assert (size[known] > 3.0).any()
-    assert (size[known] < 2.1).any()
+    assert level[known].min() < 1.0
+    assert level[known].max() > 2.0
+
+
+def test_saturation_makes_the_damping_of_the_liquid_fall_with_the_square(damped: RigModel) -> None:
+    m = moved(damped, "tank.high_g_saturation", {"threshold_g": 2.2, "averaging_s": 0.12})
+    level = level_g(m, 0.12)
+    expected = -TANK_DAMPING * np.minimum(1.0, (2.2 / np.maximum(level, 1e-3)) ** 2) * m["v"]
+    known = smooth(m)
+    assert np.abs(added(m) - expected)[known].max() < 0.02 * np.abs(expected).max()
+    assert (level[known] > 2.6).any()
+    assert (level[known & (m["t"] > 1.0)] < 2.1).any()
 
 
 def test_a_delayed_break_up_builds_the_damping_of_the_liquid_up(damped: RigModel) -> None:
-    """ṡ = (1 − s)/τ while the motion exceeds 1 g, −s/τ below."""
-    m = moved(damped, "tank.breakup_delay", {"time_constant_s": 0.4})
-    size = np.hypot(tracked_omega(m, OMEGA) * m["v"], m["a"]) / G
-    over = (size > 1.0).astype(float)
-    built = np.zeros(size.size)
-    for i in range(1, size.size):
+    """ṡ = (1 − s)/τ while the level of the motion exceeds 2 g, −s/τ below."""
+    m = moved(damped, "tank.breakup_delay", {"time_constant_s": 0.4, "agitated_g": 2.0})
+    over = (level_g(m) > 2.0).astype(float)
+    built = np.zeros(over.size)
+    for i in range(1, over.size):
         built[i] = over[i - 1] + (built[i - 1] - over[i - 1]) * np.exp(-1 / (0.4 * RATE_HZ))
     known = smooth(m)
     expected = -TANK_DAMPING * built * m["v"]
     assert np.abs(added(m) - expected)[known].max() < 0.03 * np.abs(expected).max()
     assert built.max() > 0.5
+    assert built[-1] < 0.5 * built.max()
 
 
 def test_the_damper_of_the_baseline_is_there_without_an_effect(damped: RigModel) -> None:
@@ -268,12 +331,12 @@ def test_the_damper_of_the_baseline_is_there_without_an_effect(damped: RigModel)
 def test_a_liquid_that_meets_the_ceiling_takes_energy_and_leaves_a_lighter_tank_in_flight(
     frozen: RigModel,
 ) -> None:
-    numbers = {"gap_m": 0.0136, "stiffness_n_per_m": 4e3, "damping_kg_per_s": 6.0}
+    numbers = {"gap_m": 0.0136, "stiffness_n_per_m": 2.4e3, "damping_kg_per_s": 3.6, "share": 0.6}
     m, before = moved(frozen, "tank.ceiling_impact", numbers), moved(frozen, "", {})
     force = added(m)
-    # in flight the tank lacks the liquid: Δf = m_l (a + g)
+    # in flight the tank lacks the share that flies: Δf = 0.6 m_l (a + g)
     flying = smooth(m) & (m["a"] < -1.5 * G)
-    assert np.median(np.abs(force[flying] - LIQUID_KG * (m["a"][flying] + G))) < 0.02 * LIQUID_KG * G
+    assert np.median(np.abs(force[flying] - 0.6 * LIQUID_KG * (m["a"][flying] + G))) < 0.02 * LIQUID_KG * G
     assert np.sum(force * m["v"]) < 0
     late = m["t"] > 1.0
     assert np.abs(m["x"][late]).max() < 0.9 * np.abs(before["x"][late]).max()
@@ -289,3 +352,21 @@ def test_every_force_of_the_vocabulary_is_held_to_its_equation() -> None:
     }
     built_in = [one for one in known_effects() if one.extension.__module__.startswith("sloshlab.")]
     assert {f"{one.block}.{one.name}" for one in built_in if one.block in ("structure", "tank")} == held
+
+
+@pytest.mark.parametrize(("structure", "sought"), [("sdof", False), ("beam", True), (None, False)])
+def test_a_lateral_mode_is_sought_where_the_tank_rocks_alone(
+    frozen: RigModel, structure: str | None, sought: bool
+) -> None:
+    beam = Structure(
+        kind="beam",
+        frequencies_hz=(10.7,),
+        damping_ratios=(0.01,),
+        modal_masses_kg=(0.45,),
+        tip_mode_shape=(1.0,),
+    )
+    at = surroundings_of(frozen)
+    held = {"sdof": at.rig.structure, "beam": beam, None: None}[structure]
+    there = candidates(replace(at, rig=at.rig.model_copy(update={"structure": held})))
+    assert ("tank.lateral_mode" in {one.key for one in there}) == sought
+    assert "tank.effective_mass" in {one.key for one in there}

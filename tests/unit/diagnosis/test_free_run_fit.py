@@ -27,7 +27,7 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Effect, EffectParameter
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import Extension
-from sloshlab.diagnosis.free_run_fit import fitted, fitted_from
+from sloshlab.diagnosis.free_run_fit import STAGES, fitted, fitted_from
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost, robust_weights
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
@@ -182,6 +182,8 @@ def test_hidden_numbers_come_back_within_their_intervals(tmp_path: Path, key: st
         tmp_path, made(), [(f"{block}.{name}", *place) if place else (f"{block}.{name}", "")], free
     )
     fit = fit_of(problem)
+    if "friction" in name:  # as the search polishes its best: where a decay sticks has side valleys
+        fit, _ = fitted(problem, fit.values, shares=STAGES[-2:])
     assert fit.trouble == ""
     assert fit.misfit < 1.25 * sum(one.known.sum() for run in problem.runs for one in run)
     for parameter, value in truth.items():

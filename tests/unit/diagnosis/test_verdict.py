@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import log
 from typing import Any, cast
 
 import numpy as np
 import pytest
 from recorded_oscillators import effect
+from scipy.stats import norm
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings
@@ -57,8 +58,15 @@ AT = Surroundings(
 AT_ONE_FREQUENCY = replace(AT, has_one_frequency=True)
 
 
+@dataclass(frozen=True, eq=False)
 class HandMade(Findings):
     """Findings without recordings."""
+
+    repeats: bool = False
+
+    @property
+    def has_repeats(self) -> bool:
+        return self.repeats
 
     @property
     def n_fitting(self) -> int:
@@ -114,10 +122,11 @@ def findings(
     ceilings: Sequence[Explanation] = (),
     failed: Mapping[str, str] | None = None,
     at: Surroundings = AT,
+    repeats: bool = False,
 ) -> Findings:
     return HandMade(
         cast(Case, None), cast(Any, None), Split((), (), ()), at, [], [],
-        left(9e4, 9e4), retuned, list(explanations), list(ceilings), dict(failed or {}), {},
+        left(9e4, 9e4), retuned, list(explanations), list(ceilings), dict(failed or {}), {}, repeats,
     )  # fmt: skip
 
 
@@ -139,8 +148,8 @@ ANY_FORCE = left(0.0, 0.0, surface="structure")
         pytest.param(left(12.2, 12.2), "named", id="just enough"),
         pytest.param(left(500.0, 11.8), "nothing_missing", id="held-out runs do not ask for it"),
         pytest.param(left(11.8, 500.0), "nothing_missing", id="fitted runs do not ask for it"),
-        pytest.param(left(500.0, 500.0, squares=1.24), "nothing_missing", id="less than half a noise floor"),
-        pytest.param(left(500.0, 500.0, squares=1.26), "named", id="half a noise floor"),
+        pytest.param(left(500.0, 500.0, squares=1.06), "nothing_missing", id="less than a quarter noise floor"),
+        pytest.param(left(500.0, 500.0, squares=1.07), "named", id="a quarter noise floor"),
     ],
 )
 def test_something_is_missing_where_both_kinds_of_runs_ask_for_it_and_it_is_worth_a_word(
@@ -170,9 +179,18 @@ def test_friction_of_one_number_is_named_before_friction_of_three(better: float)
     assert names(verdict) == [("coulomb_friction",)]
 
 
-def test_friction_of_three_numbers_is_named_where_it_is_better_by_more() -> None:
-    verdict = judged(BASELINE, [left(20.0, 20.0, FRICTION), left(0.0, 0.0, STRIBECK)])
-    assert (verdict.kind, names(verdict)) == ("named", [("stribeck_friction",)])
+@pytest.mark.parametrize(
+    ("friction", "named"),
+    [
+        pytest.param(left(20.0, 20.0, FRICTION, squares=1.26), "stribeck_friction", id="by half a noise floor"),
+        pytest.param(left(20.0, 20.0, FRICTION, squares=1.24), "coulomb_friction", id="by less"),
+        pytest.param(left(20.0, 11.0, FRICTION, squares=1.26), "coulomb_friction", id="not on held-out runs"),
+    ],
+)
+def test_friction_of_three_numbers_is_named_where_it_is_better_by_more(friction: Explanation, named: str) -> None:
+    """By chance on both kinds of runs and by what is worth a word; else the special case is enough."""
+    verdict = judged(BASELINE, [friction, left(0.0, 0.0, STRIBECK)])
+    assert (verdict.kind, names(verdict)) == ("named", [(named,)])
 
 
 def test_a_wider_effect_does_not_make_a_narrower_one_doubtful_but_a_stranger_does() -> None:
@@ -243,13 +261,46 @@ def test_the_same_effect_on_another_channel_is_no_other_explanation() -> None:
 
 
 def test_the_same_force_under_another_name_is_always_listed() -> None:
-    found = findings(BASELINE, [left(0.0, 0.0, BOTH_SIDES), left(300.0, 300.0, FRICTION)])
+    found = findings(BASELINE, [left(0.0, 0.0, BOTH_SIDES), left(300.0, 300.0, FRICTION, squares=1.5)])
     verdict = verdict_of(found)
     assert verdict.kind == "indistinguishable"
     assert verdict_facts(found, verdict)["alternatives"] == [
         ["asymmetric_friction"],
         ["constant_force", "coulomb_friction"],
     ]
+
+
+@pytest.mark.parametrize(
+    ("up", "down", "listed"),
+    [
+        pytest.param(0.55, 0.2, True, id="more upward"),
+        pytest.param(0.2, 0.55, True, id="more downward"),
+        pytest.param(0.48, 0.2, False, id="not clearly more than 0.37 upward"),
+        pytest.param(0.55, 0.26, False, id="not clearly less than 0.37 downward"),
+        pytest.param(0.38, 0.36, False, id="nearly the special case"),
+    ],
+)
+def test_friction_of_two_directions_is_a_rival_where_it_clearly_has_two(
+    up: float, down: float, listed: bool
+) -> None:
+    """As good as friction without a direction, from which less than twice as much one way does not differ."""
+    numbers = {f"structure.asymmetric_friction.force_{way}_n": size for way, size in (("up", up), ("down", down))}
+    found = findings(BASELINE, [left(0.0, 0.0, FRICTION), left(0.0, 0.0, numbers)])
+    verdict = verdict_of(found)
+    assert verdict.kind == ("indistinguishable" if listed else "named")
+    rivals = [["asymmetric_friction"], ["constant_force", "coulomb_friction"]] if listed else []
+    assert verdict_facts(found, verdict)["alternatives"] == [["coulomb_friction"], *rivals]
+
+
+@pytest.mark.parametrize(
+    ("squares", "listed"), [(1.24, True), (1.26, False)], ids=["by little", "by what is worth a word"]
+)
+def test_a_rival_of_two_directions_is_given_up_where_friction_of_one_is_clearly_better(
+    squares: float, listed: bool
+) -> None:
+    rival = left(40.0, 40.0, BOTH_SIDES, squares=squares)
+    verdict = judged(BASELINE, [left(0.0, 0.0, FRICTION), rival])
+    assert (("asymmetric_friction",) in names(verdict)) == listed
 
 
 @pytest.mark.parametrize(
@@ -277,6 +328,23 @@ def test_a_nameless_description_that_is_clearly_better_leaves_the_name_unknown(
         assert verdict.probabilities["unknown"] > 0.5
 
 
+@pytest.mark.parametrize(
+    ("repeats", "rms", "more"),
+    [
+        pytest.param(True, 1.26, True, id="more than repeats differ by"),
+        pytest.param(True, 1.24, False, id="as repeats differ"),
+        pytest.param(False, 1.26, False, id="without repeats the noise is a guess"),
+    ],
+)
+def test_what_leaves_more_than_repeats_differ_by_is_unknown(repeats: bool, rms: float, more: bool) -> None:
+    """With a name and without: a name that is as good as any, and a baseline on which nothing gains."""
+    named = judged(BASELINE, [left(0.0, 0.0, FRICTION, rms=rms)], repeats=repeats)
+    assert named.kind == ("unknown" if more else "named")
+    assert named.adequacy == 1.0
+    nothing = judged(left(0.0, 0.0, rms=rms), [left(0.0, 0.0, FRICTION)], repeats=repeats)
+    assert nothing.kind == ("unknown" if more else "nothing_missing")
+
+
 def test_what_has_no_name_at_all_is_unknown_in_the_block_that_a_force_helps() -> None:
     found = findings(BASELINE, [], [ANY_FORCE, left(-5.0, -5.0, surface="tank")])
     verdict = verdict_of(found)
@@ -301,6 +369,22 @@ def test_a_number_at_its_bound_is_no_name(ratio: float, names_: list[tuple[str, 
             (("frequency_hz", 9.0), ("damping_ratio", ratio), ("participation", 0.1))}  # fmt: skip
     verdict = judged(BASELINE, [left(0.0, 0.0, mode), left(10.0, 10.0, DRAG)])
     assert names(verdict) == names_
+
+
+@pytest.mark.parametrize(
+    ("exponent", "gap_m", "rests"),
+    [
+        pytest.param(1.0, 0.01, False, id="least exponent"),
+        pytest.param(3.0, 0.01, False, id="largest exponent"),
+        pytest.param(2.0, 1.0, True, id="largest gap"),
+    ],
+)
+def test_an_exponent_may_rest_at_its_bound_and_a_gap_may_not(exponent: float, gap_m: float, rests: bool) -> None:
+    loop = {"stiffness_n_per_m": 100.0, "beta_gamma": 80.0, "beta_delta": 40.0, "exponent": exponent}
+    stop = {"gap_m": gap_m, "stiffness_n_per_m": 500.0}
+    numbers = {f"structure.hysteresis.{name}": size for name, size in loop.items()}
+    numbers |= {f"structure.clearance.{name}": size for name, size in stop.items()}
+    assert left(0.0, 0.0, numbers).rests_on_a_bound == rests
 
 
 def test_a_bound_of_zero_is_a_size_like_others() -> None:
@@ -355,12 +439,31 @@ def test_probabilities_sum_to_one_and_follow_the_held_out_runs() -> None:
     assert friction / shares["unknown"] == pytest.approx(np.exp(2 * PER_NUMBER - 5.0))
 
 
-def test_intervals_are_ninety_per_cent_wide_and_wider_where_the_fit_leaves_more() -> None:
-    """Standard error 0.01: 0.37 ± 1.645 × 0.01 at the noise floor, twice that at two noise floors."""
-    for rms, width in ((0.9, 0.016449), (2.0, 0.032897)):
-        found = findings(BASELINE, [left(0.0, 0.0, FRICTION, rms=rms)])
-        [told] = verdict_facts(found, verdict_of(found))["effects"]
-        force = told["parameters"]["force_n"]
-        assert (force["estimate"], force["level"]) == (0.37, 0.9)
-        assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
-        assert 0.37 - force["low"] == pytest.approx(width, rel=1e-4)
+def interval_of(values: Mapping[str, float], rms: float = NOISE) -> dict[str, float]:
+    """What is told of the only number of an effect; its standard error is 0.01 at the noise floor."""
+    found = findings(BASELINE, [left(0.0, 0.0, values, rms=rms)])
+    [told] = verdict_facts(found, verdict_of(found))["effects"]
+    [number] = told["parameters"].values()
+    return dict(number)
+
+
+@pytest.mark.parametrize(("rms", "widened"), [(0.9, 1.0), (2.0, 2.0)])
+def test_intervals_are_as_wide_as_errors_were_and_wider_where_the_fit_leaves_more(
+    rms: float, widened: float
+) -> None:
+    """Three standard errors, twice that at two noise floors, at 90 %."""
+    force = interval_of(FRICTION, rms)
+    width = 3.0 * 0.01 * widened * norm.ppf(0.95)
+    assert (force["estimate"], force["level"]) == (0.37, 0.9)
+    assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
+    assert 0.37 - force["low"] == pytest.approx(width, rel=1e-4)
+
+
+def test_a_size_in_the_unit_of_a_channel_is_known_no_better_than_the_channel() -> None:
+    """One per cent of 4 m/s² beside three standard errors; a force is no reading."""
+    hum = interval_of({"sensor.mains_hum_60.acceleration_tip.amplitude": 4.0})
+    width = norm.ppf(0.95) * np.sqrt(0.03**2 + 0.04**2)
+    assert hum["high"] - 4.0 == pytest.approx(width, rel=1e-4)
+    assert 4.0 - hum["low"] == pytest.approx(width, rel=1e-4)
+    force = interval_of({"structure.coulomb_friction.force_n": 4.0})
+    assert force["high"] - 4.0 == pytest.approx(0.03 * norm.ppf(0.95), rel=1e-4)

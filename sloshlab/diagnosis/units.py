@@ -1,0 +1,37 @@
+"""Words and units in the names of numbers."""
+
+from __future__ import annotations
+
+from typing import Final
+
+_UNITS: Final = (
+    ("_n_s2_per_m2", "N s²/m²"),
+    ("_n_s_per_m", "N s/m"),
+    ("_n_per_m3", "N/m³"),
+    ("_n_per_m2", "N/m²"),
+    ("_n_per_m", "N/m"),
+    ("_rad_per_n_m", "rad/(N m)"),
+    ("_m_per_s", "m/s"),
+    ("_kg_per_s", "kg/s"),
+    ("_per_m", "1/m"),
+    ("_hz", "Hz"),
+    ("_kg", "kg"),
+    ("_n", "N"),
+    ("_g", "g"),
+    ("_s", "s"),
+    ("_m", "m"),
+)
+
+
+def named_and_units(parameter: str) -> tuple[str, str]:
+    """Words and units of a parameter's name.
+
+    Examples
+    --------
+    >>> named_and_units("stribeck_velocity_m_per_s"), named_and_units("ratio")
+    (('stribeck velocity', 'm/s'), ('ratio', ''))
+    """
+    for ending, units in _UNITS:
+        if parameter.endswith(ending):
+            return parameter.removesuffix(ending).replace("_", " "), units
+    return parameter.replace("_", " "), ""

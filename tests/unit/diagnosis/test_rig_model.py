@@ -1,0 +1,108 @@
+"""What of a rig may be otherwise than its file says, and in which runs it counts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded_oscillators import DAMPING, NOISE, decays, driven, motion, rig, run_of
+
+from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.rig import Rig
+
+TANK_DAMPING = 1.5
+STARTS_M, DURATION_S = (0.006, 0.018), 3.0
+TIP = "acceleration_tip"
+BEAM = """
+[tank]
+height_m = 0.0272
+length_m = 0.1172
+width_m = 0.0780
+dry_mass_kg = 0.33
+[liquid]
+density_kg_per_m3 = 1000.0
+fill_level = 0.5
+[structure]
+kind = "beam"
+length_m = 0.74
+width_m = 0.1
+thickness_m = 0.01
+frequencies_hz = [10.87, 78.31]
+damping_ratios = [0.01, 0.01]
+modal_masses_kg = [0.8956, 4.9]
+tip_mode_shape = [1.0, 1.0]
+[twin]
+tank_model = "frozen"
+"""
+
+
+@pytest.fixture(scope="module")
+def damped(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
+    """Two decays with moving liquid and one with frozen liquid, on a rig whose liquid is a damper."""
+    folder = tmp_path_factory.mktemp("damped")
+    _, x, _, a = motion(0.012, DURATION_S)
+    channels = {"displacement_tank": x, TIP: a}
+    frozen = run_of("frozen", channels, NOISE, 7, configuration="frozen", initial_displacement_m=0.012)
+    return RigModel(rig(folder, TANK_DAMPING), folder, [*decays(STARTS_M, DURATION_S), frozen])
+
+
+def fluctuations(model: RigModel) -> list[str]:
+    return [one.name for one in model.parameters if one.name.startswith("damping of the liquid")]
+
+
+def test_a_liquid_that_damps_has_a_number_in_every_run_in_which_it_moves(damped: RigModel, tmp_path: Path) -> None:
+    assert fluctuations(damped) == ["damping of the liquid in decay_0", "damping of the liquid in decay_1"]
+    assert fluctuations(RigModel(rig(tmp_path), tmp_path, decays(STARTS_M, 1.0))) == []
+
+
+def test_the_liquid_may_damp_more_in_one_run_and_as_believed_in_the_others(damped: RigModel) -> None:
+    """A fifth more of the liquid's damper beside that of the structure, in the run of that name alone."""
+    values = {**damped.believed, "damping of the liquid in decay_1": 1.2}
+    dampers = {"decay_0": DAMPING + TANK_DAMPING, "decay_1": DAMPING + 1.2 * TANK_DAMPING, "frozen": DAMPING}
+    for run in damped.runs:
+        read = damped.simulate(run, values, NOTHING)["displacement_tank"]
+        start = run.attributes.initial_displacement_m
+        assert start is not None
+        _, expected, _, _ = motion(start, DURATION_S, damping=dampers[run.name])
+        assert np.abs(read - expected).max() < 1e-4 * start
+        as_believed = damped.simulate(run, damped.believed, NOTHING)["displacement_tank"]
+        assert np.array_equal(read, as_believed) == (run.name != "decay_1")
+
+
+def participations(model: RigModel) -> list[str]:
+    return [one.name for one in model.parameters if one.name.startswith("base participation")]
+
+
+def test_the_base_drives_the_modes_of_a_beam_by_shares_of_their_own(tmp_path: Path) -> None:
+    """One degree of freedom has its mass for it; a beam that is only released needs none."""
+    assert participations(RigModel(rig(tmp_path), tmp_path, driven())) == []
+    (tmp_path / "beam.toml").write_text(BEAM, encoding="utf-8")
+    beam = Rig.from_toml(tmp_path / "beam.toml")
+    both = [f"base participation of mode {k}" for k in (1, 2)]
+    assert participations(RigModel(beam, tmp_path, driven())) == both
+    assert participations(RigModel(beam, tmp_path, decays((0.006,), 1.0))) == []
+
+
+NORMAL = {
+    "frequency of mode 1": (1.0, 0.02),
+    "damping of mode 1": (1.0, 0.2),
+    "modal mass of mode 1": (1.0, 0.01),
+    "viscous_damping.damping_n_s_per_m": (TANK_DAMPING, 0.2 * TANK_DAMPING),
+    f"gain of {TIP}": (1.0, 0.01),
+}
+
+
+def test_masses_frequencies_losses_and_gains_may_be_off_by_what_is_normal(damped: RigModel) -> None:
+    """Believed value and tolerance, at most 1.25 of them; what belongs to one run may be off by four."""
+    found = {one.name: one for one in damped.parameters}
+    for name, (believed, tolerance) in NORMAL.items():
+        assert found[name].believed == pytest.approx(believed)
+        assert found[name].tolerance == pytest.approx(tolerance)
+        assert found[name].most_tolerances == 1.25
+    for number in ("damping of the liquid", "release of", "offset of displacement_tank"):
+        of_one_run = [one for name, one in found.items() if name.startswith(number)]
+        assert len(of_one_run) >= 2
+        assert {one.most_tolerances for one in of_one_run} == {4.0}
+    assert found["damping of the liquid in decay_0"].tolerance == 0.05
