@@ -285,9 +285,12 @@ def _probabilities(found: Findings, scale: _Scale) -> dict[str, float]:
             label = _label(one)
             score = -one.held_out / scale.held_out - scale.per_number * one.n_numbers
             scores[label] = max(scores.get(label, -np.inf), score)
-    ceiling = min(found.ceilings, key=lambda one: one.held_out, default=None)
-    if ceiling is not None and np.isfinite(ceiling.held_out):
-        scores["unknown"] = -ceiling.held_out / scale.held_out - scale.per_number * _NUMBERS_OF_THE_UNKNOWN
+    named = {key for one in found.explanations for key in one.keys}
+    for one in found.ceilings:
+        if np.isfinite(one.held_out):
+            beside = sum(len(each.effect.parameters) for each in one.fit.candidates if each.key in named)
+            score = -one.held_out / scale.held_out - scale.per_number * (_NUMBERS_OF_THE_UNKNOWN + beside)
+            scores["unknown"] = max(scores.get("unknown", -np.inf), score)
     top = max(scores.values())
     weights = {name: float(np.exp(max(score - top, -700.0))) for name, score in scores.items()}
     total = sum(weights.values())

@@ -467,3 +467,11 @@ def test_a_size_in_the_unit_of_a_channel_is_known_no_better_than_the_channel() -
     assert 4.0 - hum["low"] == pytest.approx(width, rel=1e-4)
     force = interval_of({"structure.coulomb_friction.force_n": 4.0})
     assert force["high"] - 4.0 == pytest.approx(0.03 * norm.ppf(0.95), rel=1e-4)
+
+
+def test_any_force_beside_a_name_makes_the_name_no_less_probable() -> None:
+    """The numbers of what has a name count on both sides."""
+    known = left(110, 110, STRIBECK)
+    verdict = judged(left(2000, 2000), [known], [left(109, 107, STRIBECK, surface="structure")])
+    assert verdict.kind == "named"
+    assert verdict.probabilities["stribeck_friction"] > 0.9
