@@ -1,0 +1,88 @@
+"""What a first look promises is what least squares give, and where the misfit peaks is where it is looked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from sloshlab.diagnosis import surroundings
+from sloshlab.diagnosis.block_jacobian import BlockJacobian
+from sloshlab.diagnosis.first_look import FirstLook
+from sloshlab.diagnosis.free_run_problem import FreeRunProblem
+
+N, N_NUMBERS = 60, 4
+
+
+@dataclass
+class Linear:
+    """A problem whose channels are known as well as they are, with two numbers of the baseline."""
+
+    fixed: np.ndarray
+    soft: float = 1.0
+    n_baseline: int = 2
+
+    def softness(self, share: float) -> np.ndarray:
+        return np.full(N, self.soft)
+
+    def at_bounds(self, theta: np.ndarray) -> np.ndarray:
+        return self.fixed
+
+
+def least(columns: np.ndarray, residual: np.ndarray, prior: np.ndarray, theta: np.ndarray) -> float:
+    """Smallest |r + Jδ|² + Σ (θ + δ)² over the numbers that belief holds."""
+    matrix = np.vstack([columns, np.diag(np.sqrt(prior))])
+    right = -np.concatenate([residual, np.sqrt(prior) * theta])
+    step = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    return float(((matrix @ step - right) ** 2).sum())
+
+
+@pytest.mark.parametrize("soft", [1.0, 0.3])
+@pytest.mark.parametrize("fixed", [[False] * 4, [True, False, False, True]])
+def test_the_gain_is_that_of_least_squares_with_the_numbers_that_can_follow(
+    fixed: list[bool], soft: float
+) -> None:
+    generator = np.random.default_rng(3)
+    jacobian, residual, change = (generator.standard_normal(shape) for shape in ((N, N_NUMBERS), (N,), (N,)))
+    theta = np.array([0.4, -0.7, 0.2, 0.1])
+    problem = cast(FreeRunProblem, cast(Any, Linear(np.array(fixed), soft)))
+    known = BlockJacobian.of_columns(list(jacobian.T), [25, N - 25])
+    gain, size = FirstLook(problem, theta, residual, known, 0.1).gain(change)
+    free = ~np.array(fixed)
+    prior, place = np.array([1.0, 1.0, 0.0, 0.0])[free], theta[free]
+    without = least(soft * jacobian[:, free], soft * residual, prior, place)
+    beside = np.column_stack([soft * jacobian[:, free], soft * change])
+    with_it = least(beside, soft * residual, np.append(prior, 0.0), np.append(place, 0.0))
+    assert gain == pytest.approx(without - with_it, rel=1e-9)
+    moved = least(soft * jacobian[:, free], soft * (residual + size * change), prior, place)
+    assert moved == pytest.approx(with_it, rel=1e-9)
+
+
+def test_a_change_that_the_baseline_can_make_promises_nothing() -> None:
+    generator = np.random.default_rng(4)
+    jacobian, residual = generator.standard_normal((N, N_NUMBERS)), generator.standard_normal(N)
+    problem = cast(FreeRunProblem, cast(Any, Linear(np.zeros(N_NUMBERS, bool), n_baseline=0)))
+    look = FirstLook(problem, np.zeros(N_NUMBERS), residual, BlockJacobian.of_columns(list(jacobian.T), [N]), 0.1)
+    assert look.gain(jacobian @ [1.0, -2.0, 0.5, 3.0])[0] < 1e-9
+
+
+@dataclass
+class Spectra:
+    """As much of an observation as has frequencies."""
+
+    spectra: np.ndarray
+    frequencies_hz: np.ndarray
+
+
+def test_modes_are_sought_at_the_highest_peaks_of_all_channels_together() -> None:
+    frequencies = np.arange(40) * 0.5
+    quiet, loud = np.full((6, 40), 0.1), np.full((3, 40), 0.1)
+    quiet[:, 7] = 2.0
+    loud[:, [20, 30]] = 5.0, 4.0
+    loud[:, 21] = 4.5  # a shoulder, no peak of its own
+    runs = [[Spectra(quiet, frequencies)], [Spectra(loud, frequencies)]]
+    residual = np.concatenate([quiet.ravel(), loud.ravel()])
+    found = surroundings._most_missed_hz(cast(Any, runs), residual)
+    assert found == (10.0, 15.0, 3.5)
