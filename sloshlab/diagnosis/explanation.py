@@ -33,6 +33,8 @@ class Explanation:
         Mean square of the same per channel, large residuals counted less.
     by_run : dict
         The same per run and channel, of fitted and held-out runs.
+    rms_without_bursts : float
+        As `held_out_rms`, of the quieter three quarters of the times of every channel and run.
     """
 
     fit: FreeRunFit
@@ -40,6 +42,7 @@ class Explanation:
     held_out_rms: float
     by_channel: dict[str, float] = field(default_factory=dict)
     by_run: dict[tuple[str, str], float] = field(default_factory=dict)
+    rms_without_bursts: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:

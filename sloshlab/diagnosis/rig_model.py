@@ -301,9 +301,7 @@ class RigModel:
     def _parameters(self) -> tuple[BaselineParameter, ...]:
         found: list[BaselineParameter] = []
         if self.twin.structure is not None:
-            bends = self.rig.structure is not None and self.rig.structure.kind == "beam"
-            moves = any(not run.is_free for run in self.runs)
-            found += _of_structure(self.twin.structure, has_participation=moves and bends)
+            found += _of_structure(self.twin.structure, moves=any(not run.is_free for run in self.runs))
         for term in self.twin.terms:
             for name, value in term.values.items():
                 if name in _TUNED_NUMBERS and value:
@@ -370,7 +368,8 @@ def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:
     return max(1, min(1000, math.ceil(needed / sampling_rate_hz)))
 
 
-def _of_structure(structure: Structure, *, has_participation: bool) -> list[BaselineParameter]:
+def _of_structure(structure: Structure, *, moves: bool) -> list[BaselineParameter]:
+    """Participations hold the gain of the sensor at the base too, which drives the twin and is not compared."""
     n = structure.masses_kg.size
     found = []
     for i in range(n):
@@ -380,7 +379,7 @@ def _of_structure(structure: Structure, *, has_participation: bool) -> list[Base
     found += [
         BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01, most_tolerances=_AS_NORMAL) for i in range(n)
     ]
-    if has_participation:
+    if moves:
         found += [
             BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02, most_tolerances=_AS_NORMAL)
             for i in range(n)

@@ -34,6 +34,7 @@ from sloshlab.diagnosis.free_run_problem import (
     huber_cost,
     mean_squares,
     mean_squares_of_runs,
+    rms_without_bursts,
     run_of,
 )
 from sloshlab.diagnosis.noise_floor import weighted_observations
@@ -126,6 +127,7 @@ class _Search:
         self._one_more(retuned_fit, jacobian, everything, "fitting one effect")
         self._add_greedily(retuned_fit, everything)
         self._polish()
+        retuned = self._retuned_from_explanations(retuned)
         ceilings = self._ceilings(retuned_fit)
         return Findings(
             self.case,
@@ -161,7 +163,8 @@ class _Search:
         at_fit = fitted_to.residual(fitted_to.theta_of(fit.values))
         by_run = mean_squares_of_runs([one for run in fitted_to.runs for one in run], at_fit)
         by_run |= mean_squares_of_runs(observed, residual)
-        return Explanation(fit, huber_cost(residual), rms, mean_squares(observed, residual), by_run)
+        quieter = rms_without_bursts(observed, residual)
+        return Explanation(fit, huber_cost(residual), rms, mean_squares(observed, residual), by_run, quieter)
 
     def _one_more(
         self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
@@ -364,8 +367,8 @@ class _Search:
         self.explanations += alone
 
     def _polish(self) -> None:
-        """The best explanations of one and of two effects to where they converge."""
-        for n in (1, 2):
+        """The best explanations of one and of two effects to where they converge, and each of the two alone."""
+        for n in (2, 1):
             best = min(
                 (one for one in self.explanations if len(one.keys) == n),
                 key=lambda one: one.fit.cost,
@@ -376,7 +379,25 @@ class _Search:
             self.told(f"polishing {' and '.join(best.keys)}", 0, 1)
             fit, _ = fitted(self._problem(best.fit), best.fit.values, n_iterations=10, shares=STAGES[-2:])
             if not fit.trouble and fit.cost < best.fit.cost:
-                self.explanations.append(self.judged(fit))
+                best = self.judged(fit)
+                self.explanations.append(best)
+            if n > 1:
+                self.explanations += self._take_away([best])
+
+    def _retuned_from_explanations(self, retuned: Explanation) -> Explanation:
+        """The retuned baseline from where the best explanations have it: what an effect gains must be its own."""
+        best = retuned
+        for chosen in (
+            min(self.explanations, key=lambda one: one.fit.cost, default=None),
+            min(self.explanations, key=lambda one: one.held_out, default=None),
+        ):
+            if chosen is None:
+                continue
+            self.told("retuning the baseline from an explanation", 0, 1)
+            fit, _ = fitted(self._problem(retuned.fit), chosen.fit.values, n_iterations=10, shares=STAGES[-2:])
+            if not fit.trouble and fit.cost < best.fit.cost:
+                best = self.judged(fit)
+        return best
 
     def _take_away(self, pairs: Sequence[Explanation]) -> list[Explanation]:
         """Each effect of the best pair alone, from the numbers that it has there: one of them may be enough."""

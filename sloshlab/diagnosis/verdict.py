@@ -24,10 +24,8 @@ LEAST_MORE: Final = 12.0
 """The same, by which a further effect must improve on fewer."""
 LEAST_SEPARATION: Final = 6.0
 """The same, by which an explanation must beat another to be the only one."""
-LEAST_STRENGTH: Final = 0.25
+LEAST_STRENGTH: Final = 0.5
 """What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of."""
-LEAST_MORE_STRENGTH: Final = 0.5
-"""The same of a further effect, of a more general one, or of what has no name."""
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LARGEST_REMAINDER: Final = 1.25
@@ -90,7 +88,7 @@ def verdict_of(found: Findings) -> Verdict:
     ceiling = min([*described, found.retuned], key=lambda one: one.held_out)
     gain = scale.held_out_gain(found.retuned, ceiling)
     probabilities = _probabilities(found, scale)
-    is_more = any(_shows_more(one, found.retuned, scale, LEAST_STRENGTH) for one in described)
+    is_more = any(_shows_more(one, found.retuned, scale) for one in described)
     if not is_more and not leaves_more(found, found.retuned):
         certain = _certain(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, _nothing(found), "", certain)
@@ -127,7 +125,7 @@ def leaves_more(found: Findings, one: Explanation) -> bool:
     found : Findings
     one : Explanation
     """
-    return found.has_repeats and one.held_out_rms > LARGEST_REMAINDER
+    return found.has_repeats and one.rms_without_bursts > LARGEST_REMAINDER
 
 
 @dataclass(frozen=True)
@@ -191,12 +189,12 @@ def _without_excess(single: Explanation, singles: Sequence[Explanation], scale: 
 
 def _is_clearly_better(more: Explanation, less: Explanation, scale: _Scale) -> bool:
     """By more than chance on both kinds of runs, and on held-out runs by a size that is worth speaking of."""
-    return _gains(more, less, scale) and strength(less, more) >= LEAST_MORE_STRENGTH
+    return _gains(more, less, scale) and strength(less, more) >= LEAST_STRENGTH
 
 
-def _shows_more(more: Explanation, less: Explanation, scale: _Scale, least: float = LEAST_MORE_STRENGTH) -> bool:
+def _shows_more(more: Explanation, less: Explanation, scale: _Scale) -> bool:
     """The same, with a size that is worth speaking of in any channel of any run, fitted ones too."""
-    return _gains(more, less, scale) and _largest_strength(less.by_run, more.by_run) >= least
+    return _gains(more, less, scale) and _largest_strength(less.by_run, more.by_run) >= LEAST_STRENGTH
 
 
 def _gains(more: Explanation, less: Explanation, scale: _Scale) -> bool:

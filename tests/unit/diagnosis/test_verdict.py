@@ -113,7 +113,7 @@ def left(
     )
     squares = squares if squares is not None else NOISE if candidates else 10.0
     by_run = {("run_1", TIP): squares, ("run_2", TIP): squares if in_one_run is None else in_one_run}
-    return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run)
+    return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run, rms)
 
 
 def findings(
@@ -148,8 +148,8 @@ ANY_FORCE = left(0.0, 0.0, surface="structure")
         pytest.param(left(12.2, 12.2), "named", id="just enough"),
         pytest.param(left(500.0, 11.8), "nothing_missing", id="held-out runs do not ask for it"),
         pytest.param(left(11.8, 500.0), "nothing_missing", id="fitted runs do not ask for it"),
-        pytest.param(left(500.0, 500.0, squares=1.06), "nothing_missing", id="less than a quarter noise floor"),
-        pytest.param(left(500.0, 500.0, squares=1.07), "named", id="a quarter noise floor"),
+        pytest.param(left(500.0, 500.0, squares=1.24), "nothing_missing", id="less than half a noise floor"),
+        pytest.param(left(500.0, 500.0, squares=1.26), "named", id="half a noise floor"),
     ],
 )
 def test_something_is_missing_where_both_kinds_of_runs_ask_for_it_and_it_is_worth_a_word(
