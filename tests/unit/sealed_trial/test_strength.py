@@ -43,6 +43,7 @@ def of_stiffness(plan_name: str, factor: float, share: float) -> float:
     return floor.strength(changed, damping_is_known=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan_name", ["sdof_decays", "sdof_base"])
 def test_a_stiffness_within_the_tolerance_of_the_frequency_does_not_show(plan_name: str) -> None:
     # 0.988 √1.07 = 1.022 and 1.02 √0.94 = 0.989 are frequencies that the laboratory regards as possible
