@@ -32,8 +32,8 @@ LARGEST_REMAINDER: Final = 1.25
 """Held-out error in noise floors, as repeats tell it, beyond which something is left whatever was found."""
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
-_OFF: Final = 3.0
-"""Errors of estimates over their standard errors, on cases whose truth was known."""
+_ERRORS_OVER_STANDARD_ERRORS: Final = 3.0
+"""On cases whose truth was known."""
 _CALIBRATION: Final = 0.01
 _IN_UNITS_OF_THE_CHANNEL: Final = ("amplitude", "rate", "limit")
 _LITTLE: Final = 0.05
@@ -426,7 +426,7 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
     estimate = best.fit.values[name]
     if name not in best.fit.names:
         return estimate, estimate, estimate
-    scatter = _OFF * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
+    scatter = _ERRORS_OVER_STANDARD_ERRORS * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
     of_gain = _CALIBRATION * abs(estimate) if parameter in _IN_UNITS_OF_THE_CHANNEL else 0.0
     width = _NORMAL_90 * float(np.hypot(scatter, of_gain))
     chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
@@ -468,8 +468,16 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
             "heldout_runs": [run.name for run in found.split.held_out],
         },
         "limits": list(found.split.limits),
-        "failed": {_as_known(key): why for key, why in found.failed.items()},
+        "failed": _failed(found.failed),
     }
+
+
+def _failed(reasons: Mapping[str, str]) -> dict[str, str]:
+    """Why candidates could not be fitted; forms of one effect under its name, each with its reason."""
+    known: dict[str, list[str]] = {}
+    for key, why in reasons.items():
+        known.setdefault(_as_known(key), []).append(why)
+    return {key: "; ".join(dict.fromkeys(each)) for key, each in known.items()}
 
 
 def _as_known(key: str) -> str:

@@ -1,6 +1,7 @@
 """Losses that do not depend on how fast a cycle is run through: structural damping and Bouc–Wen hysteresis.
 
-Both turn where the velocity does; the engine finds that instant, so that no step looks across it.
+Reid's law and the hysteresis turn where the velocity does; the engine finds that instant, so that no step looks
+across it. Relaxing springs are linear and turn nowhere.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 
 _N_SPRINGS: Final = 7
 _SPRING_RATIO: Final = 2.5
-_OF_LOSS: Final = 1.0 / sum(1.0 / (_SPRING_RATIO**-j + _SPRING_RATIO**j) for j in range(-3, 4))
+_OF_LOSS: Final = 1.0 / sum(
+    1.0 / (_SPRING_RATIO**-j + _SPRING_RATIO**j) for j in range(-(_N_SPRINGS // 2), _N_SPRINGS // 2 + 1)
+)
 """Stiffness of a spring over ηk, for a loss factor η in the middle of the rates."""
 
 

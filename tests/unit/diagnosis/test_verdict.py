@@ -414,6 +414,12 @@ def test_an_explanation_that_does_not_run_on_held_out_runs_is_none() -> None:
     assert "quadratic_drag" not in verdict.probabilities
 
 
+def test_no_form_of_an_effect_hides_why_another_could_not_be_fitted() -> None:
+    reasons = {"tank.effective_mass": "does not run", "tank.fading_mass": "ends early"}
+    found = findings(BASELINE, [left(0.0, 0.0, FRICTION)], failed=reasons)
+    assert verdict_facts(found, verdict_of(found))["failed"] == {"tank.effective_mass": "does not run; ends early"}
+
+
 def test_two_lines_of_the_mains_are_one_name_for_programs() -> None:
     """Whatever the verdict: what is tried at 50 and at 60 Hz is called mains_hum in every place."""
     cell = "sensor.mains_hum_60.force_interface"
