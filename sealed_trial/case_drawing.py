@@ -96,6 +96,7 @@ class CaseDrawing:
     def __init__(self, seed: Sequence[int]) -> None:
         self._seed = [int(value) for value in seed]
         self._used: Counter[str] = Counter()
+        self._failed: Counter[str] = Counter()
         self._plans: list[str] = []
         self._prepared: dict[tuple[int, int, str], _Prepared] = {}
 
@@ -109,20 +110,23 @@ class CaseDrawing:
         return self._plans.pop()
 
     def case(self, number: int, name: str, kind: str) -> DrawnCase:
-        """Draw a case of a class.
+        """Draw a case of a class; with another plan where nothing of the class fits the one whose turn it is.
 
         Raises
         ------
         ArithmeticError
-            If no draw gives a motion that does not diverge.
+            If no draw of any plan gives a motion that can be measured.
         """
-        plan_name = self._next_plan(number)
-        for attempt in range(3 * _HIDDEN_DRAWS):
-            try:
-                return self._attempted(number, attempt, name, kind, plan_name)
-            except (ArithmeticError, LookupError):
-                continue
-        raise ArithmeticError(f"case {number} of class {kind}: no draw can be measured")
+        first = self._next_plan(number)
+        others = [PLANS[k] for k in self._generator(number, 5).permutation(len(PLANS)) if PLANS[k] != first]
+        self._failed.clear()
+        for plan_name in (first, *others):
+            for attempt in range(3 * _HIDDEN_DRAWS):
+                try:
+                    return self._attempted(number, attempt, name, kind, plan_name)
+                except (ArithmeticError, LookupError):
+                    continue
+        raise ArithmeticError(f"no draw of class {kind} in {3 * _HIDDEN_DRAWS} attempts with each plan")
 
     def _laboratory(self, number: int, redrawn: int, plan_name: str) -> _Prepared:
         """Rig, plan and sensors, the same for every hidden draw."""
@@ -156,6 +160,7 @@ class CaseDrawing:
             change, reached = _scaled(effect, strength, laboratory, prepared.floor, plain)
             least, most = _strengths_of(kind)
             if not least <= reached <= most:  # NaN is neither
+                self._failed[effect.name] += 1
                 raise LookupError(f"{effect.name} cannot be made as strong as its class is")
             changes.append(change)
             described.append(_description(effect, change, reached))
@@ -199,11 +204,12 @@ class CaseDrawing:
     def _chosen(
         self, effects: Sequence[HiddenEffect], n: int, generator: np.random.Generator
     ) -> list[HiddenEffect]:
-        """Those least used so far, of different blocks, ties by lot."""
+        """Those that failed least in this case and are least used so far, of different blocks, ties by lot."""
         if len(effects) < n:
             raise LookupError("too few effects for this plan")
         order = sorted(
-            (effects[k] for k in generator.permutation(len(effects))), key=lambda effect: self._used[effect.name]
+            (effects[k] for k in generator.permutation(len(effects))),
+            key=lambda effect: (self._failed[effect.name], self._used[effect.name]),
         )
         first = order[0]
         others = [effect for effect in order[1:] if effect.block != first.block]

@@ -22,7 +22,7 @@ from sealed_trial.case_recording import write_case
 from sealed_trial.sealing.commitment import case_hashes, commitment, salt_of
 from sealed_trial.sealing.locked_truths import locked, opened
 from sloshlab.atomic_file import filled_folder, write_bytes
-from sloshlab.errors import InputError
+from sloshlab.errors import AnalysisError, InputError
 
 DOMAINS: Final = {"sealed": b"sloshlab blind trial, sealed", "development": b"sloshlab blind trial, development"}
 COMMITMENTS: Final = "commitments.json"
@@ -83,6 +83,8 @@ def seal(
     ------
     InputError
         If the folder is in use or the number of cases is impossible.
+    AnalysisError
+        If a case cannot be drawn from this seed.
     """
     if not 6 <= n_cases <= _MOST_CASES:
         raise InputError("--cases", got=str(n_cases), allowed=f"6 … {_MOST_CASES}")
@@ -96,7 +98,10 @@ def seal(
     with filled_folder(folder) as complete:
         for number, kind in enumerate(class_order(n_cases, np.random.default_rng([*words, 0]))):
             name = f"case_{number + 1:03d}"
-            case = drawing.case(number, name, kind)
+            try:
+                case = drawing.case(number, name, kind)
+            except ArithmeticError as error:
+                raise AnalysisError(name, got=str(error), remedy="another --seed") from error
             write_case(complete / "cases" / name, case, np.random.default_rng([*words, number, 4]))
             truths[name] = case.truth
             said(name)

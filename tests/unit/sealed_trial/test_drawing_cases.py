@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -96,6 +98,33 @@ def test_the_class_of_a_case_changes_neither_rig_nor_plan_nor_sensors() -> None:
             for name in ours
         ]
         assert any(changed) or other.late
+
+
+def test_where_nothing_of_a_class_fits_a_plan_another_plan_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawing, tried = CaseDrawing([11, 12]), []
+
+    def fits_one_frequency_only(number: int, attempt: int, name: str, kind: str, plan: str) -> str:
+        tried.append(plan)
+        if plan != "shaker_one_frequency":
+            raise LookupError(plan)
+        return plan
+
+    monkeypatch.setattr(drawing, "_attempted", fits_one_frequency_only)
+    drawing._plans = ["beam_decays"]
+    assert drawing.case(0, "case_001", "single") == "shaker_one_frequency"
+    assert tried[0] == "beam_decays"
+    monkeypatch.setattr(drawing, "_attempted", lambda *told: (_ for _ in ()).throw(LookupError()))
+    with pytest.raises(ArithmeticError, match="no draw of class single"):
+        drawing.case(1, "case_002", "single")
+
+
+def test_effects_that_cannot_be_as_strong_as_wanted_come_last_in_the_same_case() -> None:
+    effects = [SimpleNamespace(name=name, block=name) for name in ("a", "b", "c")]
+    drawing = CaseDrawing([1])
+    drawing._failed["a"] += 1
+    drawing._used.update({"b": 1, "c": 2})
+    first = [drawing._chosen(effects, 1, np.random.default_rng(k))[0].name for k in range(5)]  # type: ignore[arg-type]
+    assert first == ["b"] * 5
 
 
 def test_the_same_seed_draws_the_same_case() -> None:
