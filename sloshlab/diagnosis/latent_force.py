@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.force_inversion import (
     ORDERS,
     AskedForce,
@@ -105,7 +105,11 @@ class RunForces:
 
 
 def run_forces(
-    model: RigModel, observed: Sequence[Observation], values: Mapping[str, float], without: Collection[str] = ()
+    model: RigModel,
+    observed: Sequence[Observation],
+    values: Mapping[str, float],
+    without: Collection[str] = (),
+    extension: Extension = NOTHING,
 ) -> RunForces:
     """Latent forces of one run.
 
@@ -118,6 +122,8 @@ def run_forces(
         Of the baseline's parameters.
     without : collection of str
         Channels that are not to be believed.
+    extension : Extension, optional
+        Effects that the simulation has beyond the baseline.
 
     Raises
     ------
@@ -125,8 +131,9 @@ def run_forces(
         If the baseline does not reach the end of the run.
     """
     run = observed[0].run
-    simulation = model._simulation(run, values, NOTHING, ())
-    readings = model.simulate(run, values, NOTHING)
+    undone = [fault for fault in extension.faults if fault.channel in model.driving(run)]
+    simulation = model._simulation(run, values, extension, undone)
+    readings = model.simulate(run, values, extension)
     missed = {one.channel: _missed(one, readings[one.channel], values, run.is_free) for one in observed}
     believed = [one for one in observed if one.channel not in without]
     if simulation.twin.structure is None:

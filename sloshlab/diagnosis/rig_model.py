@@ -40,6 +40,8 @@ _FLUCTUATION: Final = "damping of the liquid in "
 _TOLERANCE_OF_FLUCTUATION: Final = 0.05
 """By which a chaotic liquid damps more or less in one run than on average."""
 _DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
+_AT_THE_END: Final = 1e-4
+"""Of the end of a range, within which a reading is at it."""
 _AS_NORMAL: Final = 1.25
 """Tolerances by which masses, frequencies, losses and gains may be off; beyond, something else is the matter."""
 _TOLERANCE_OF_SHAPE: Final = 0.01
@@ -48,13 +50,14 @@ _TOLERANCE_OF_SHAPE: Final = 0.01
 
 @dataclass(frozen=True, eq=False)
 class _Channels:
-    """What is needed of a run's channels again and again."""
+    """What is needed of a run's channels again and again; ranges of those that reach their ends."""
 
     compared: tuple[str, ...]
     attributes: Mapping[str, Mapping[str, Any]]
     recorded: Mapping[str, FloatArray]
     driving: Mapping[str, FloatArray]
     n_cells: int
+    saturated: Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +152,7 @@ class RigModel:
                 if name not in names
             },
             max(1, sum(name.startswith("force_cell") for name in channels(run.recording, "force"))),
+            {name: span for name in names if (span := _saturated(run.recording[name])) is not None},
         )
 
     def _compared(self, run: CaseRun) -> list[str]:
@@ -159,7 +163,7 @@ class RigModel:
             name
             for name in names
             if not (name in drive.channels and n == 1)
-            and not name.endswith("_root")
+            and (run.is_free or not name.endswith("_root"))
             and self._has_counterpart(run, name)
         ]
 
@@ -192,7 +196,9 @@ class RigModel:
             for fault in extension.faults:
                 if fault.channel == name:
                     reading = fault.reading(reading, rate, others, self._channels[run.name].recorded[name])
-            readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
+            reading = reading + values.get(f"offset of {name} in {run.name}", 0.0)
+            span = self._channels[run.name].saturated.get(name)
+            readings[name] = reading if span is None else np.clip(reading, *span)
         return readings
 
     def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> _Truth:
@@ -313,6 +319,7 @@ class RigModel:
         found += [
             BaselineParameter(f"gain of {name}", 1.0, 0.01, is_reading=True, most_tolerances=_AS_NORMAL)
             for name in names
+            if not name.endswith("_root")  # a base at rest has none to tell, and participations hold it otherwise
         ]
         cells = _cells(names)
         found += [
@@ -343,6 +350,15 @@ class RigModel:
 
 
 _TUNED_NUMBERS: Final = ("damping_n_s_per_m", "damping_kg_per_s", "force_n", "stiffness_n_per_m")
+
+
+def _saturated(channel: xr.DataArray) -> tuple[float, float] | None:
+    """Declared range of a channel whose readings reach its ends; None where they do not."""
+    low, high = (float(channel.attrs.get(f"range_{end}", np.nan)) for end in ("min", "max"))
+    reaches = np.nanmin(channel.values) <= low * (1 - _AT_THE_END) or np.nanmax(channel.values) >= high * (
+        1 - _AT_THE_END
+    )
+    return (low, high) if low < 0 < high and reaches else None
 
 
 def _cells(names: Iterable[str]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final, cast
 
 import numpy as np
@@ -16,6 +16,7 @@ from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.first_look import FirstLook
+from sloshlab.diagnosis.force_starts import ForceStarts
 from sloshlab.diagnosis.force_surface import surface_effect
 from sloshlab.diagnosis.free_run_fit import (
     STAGES,
@@ -31,6 +32,7 @@ from sloshlab.diagnosis.free_run_fit import (
 from sloshlab.diagnosis.free_run_problem import (
     FreeRunFit,
     FreeRunProblem,
+    extension_of,
     huber_cost,
     mean_squares,
     mean_squares_of_runs,
@@ -59,6 +61,9 @@ _LEAST_TO_BUILD_ON: Final = 24.0
 _LEAST_SHARE_OF_PROMISE: Final = 0.02
 _LEAST_SHARE_OF_GAIN: Final = 0.3
 """Of the best candidate's gain after the first stages; the others do not go on."""
+_MOST_BY_FORCE: Final = 2
+_ALIKE: Final = 0.85
+"""Share of the missing force that an effect's own may leave, to be fitted whatever a first look promises."""
 _SIZES: Final = (0.03, 0.1, 0.3, 1.0, 3.0)
 _SOFT: Final = 0.03
 _MOST_LOOK_ALIKES: Final = 4
@@ -298,6 +303,7 @@ class _Search:
         problem = FreeRunProblem(self.model, self.fitting, base.candidates)
         theta = problem.theta_of(base.values)
         residual = problem.residual(theta)
+        forces = self._force_starts(base)
         looks_at = [
             FirstLook(problem, theta, residual, jacobian, share)
             for share in dict.fromkeys((shares[min(1, len(shares) - 1)], shares[-1]))
@@ -307,9 +313,10 @@ class _Search:
             self.told(f"{what}: first look", i, len(pool))
             if candidate.key in [one.key for one in base.candidates]:
                 continue
+            by_force = None if forces is None else forces.of(candidate)
+            extended = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
             looks = []
-            for start in _with_smaller_ones(candidate.starts()):
-                extended = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
+            for start in [*_with_smaller_ones(candidate.starts()), *([by_force.numbers] if by_force else [])]:
                 moved = extended.residual(extended.theta_of({**base.values, **start}))
                 if not np.isfinite(moved).all():
                     continue
@@ -327,26 +334,33 @@ class _Search:
                 close = [{**base.values, **looks[0][2]}]
                 if is_strained:
                     close.append({**self._eased(base), **looks[0][2]})
-                extended = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
                 starts = [dict(nearest(extended, group, shares[0])) for group in (far, close)]
-            promised.append((np.max([one[0] for one in looks], axis=0), candidate, starts))
+            if by_force:
+                starts.append({**base.values, **by_force.numbers})
+            promise = np.max([one[0] for one in looks], axis=0)
+            promised.append(_Promise(candidate, starts, promise, by_force.share_left if by_force else 1.0))
         return self._chosen(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
 
-    def _chosen(
-        self, promised: Sequence[tuple[FloatArray, Candidate, list[dict[str, float]]]], most: int
-    ) -> list[tuple[Candidate, list[dict[str, float]]]]:
-        """The candidates that promise most, in a soft look or in a hard one."""
+    def _force_starts(self, base: FreeRunFit) -> ForceStarts | None:
+        """Of what a fit lacks; None for a twin of a user's own, of which the missing force is not known."""
+        if not isinstance(self.model, RigModel):
+            return None
+        return ForceStarts(self.model, self.fitting, base.values, extension_of(base.candidates, base.values))
+
+    def _chosen(self, promised: Sequence[_Promise], most: int) -> list[tuple[Candidate, list[dict[str, float]]]]:
+        """The candidates that promise most, in a soft look or in a hard one, or by their force."""
         if not promised:
             return []
-        top = np.maximum(np.max([gains for gains, _, _ in promised], axis=0), _LEAST_PREDICTED)
-        ordered = sorted(promised, key=lambda one: -float(np.max(one[0] / top)))
+        top = np.maximum(np.max([one.gains for one in promised], axis=0), _LEAST_PREDICTED)
+        by_force = sorted(promised, key=lambda one: one.share_left)[:_MOST_BY_FORCE]
         chosen = []
-        for rank, (gains, candidate, starts) in enumerate(ordered):
-            is_little = gains.max() < _LEAST_PREDICTED or float(np.max(gains / top)) < _LEAST_SHARE_OF_PROMISE
-            if is_little or rank >= most:
-                self.screened[candidate.key] = float(gains.max())
+        for rank, one in enumerate(sorted(promised, key=lambda one: -float(np.max(one.gains / top)))):
+            is_little = one.gains.max() < _LEAST_PREDICTED
+            is_little = is_little or float(np.max(one.gains / top)) < _LEAST_SHARE_OF_PROMISE
+            if (is_little or rank >= most) and not (one in by_force and one.share_left < _ALIKE):
+                self.screened[one.candidate.key] = float(one.gains.max())
             else:
-                chosen.append((candidate, starts))
+                chosen.append((one.candidate, one.starts))
         return chosen
 
     def _add_greedily(self, retuned: FreeRunFit, pool: Sequence[Candidate]) -> None:
@@ -443,6 +457,16 @@ class _Search:
             if not fit.trouble:
                 found.append(self.judged(fit))
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Promise:
+    """A candidate with starts, the gains that first looks promise, and the missing force that its own leaves."""
+
+    candidate: Candidate
+    starts: list[dict[str, float]]
+    gains: FloatArray
+    share_left: float
 
 
 class _WithEffects(FreeRunProblem):

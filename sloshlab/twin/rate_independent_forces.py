@@ -16,12 +16,9 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 # mypy: disable-error-code="no-untyped-def"
 
 
-_N_SPRINGS: Final = 7
-_SPRING_RATIO: Final = 2.5
-_OF_LOSS: Final = 1.0 / sum(
-    1.0 / (_SPRING_RATIO**-j + _SPRING_RATIO**j) for j in range(-(_N_SPRINGS // 2), _N_SPRINGS // 2 + 1)
-)
-"""Stiffness of a spring over ηk, for a loss factor η in the middle of the rates."""
+_N_SPRINGS: Final = 8
+_FASTEST: Final = 16.0
+"""Rate of the fastest spring over that of the middle one."""
 
 
 @law
@@ -64,14 +61,21 @@ STRUCTURAL_DAMPING = register(
 
 @law
 def _relaxing_springs(motion, parameters, memory, rates):
-    """−ηk c Σ(y_j − x/2), ẏ_j = v − r_j y_j, rates r_j in a geometric series about the middle one."""
-    total = 0.0
+    """−ηk Σ(y_j − s_j x)/Σl_j, ẏ_j = v − r_j y_j; l_j and s_j are loss and storage of a spring at ω.
+
+    Rates r_j lie evenly on a logarithmic axis, from ω/10^d to 16 ω, d decades of creep.
+    """
+    middle = 2.0 * pi * parameters[2]
+    slowest = 10.0 ** -parameters[3]
+    ratio = (_FASTEST / slowest) ** (1.0 / (_N_SPRINGS - 1))
+    relative, force, loss = slowest, 0.0, 0.0
     for j in range(_N_SPRINGS):
-        rate = 2.0 * pi * parameters[2] * _SPRING_RATIO ** (j - 0.5 * (_N_SPRINGS - 1))
-        rates[j] = motion[VELOCITY] - rate * memory[j]
-        total += memory[j]
-    stiffness = _OF_LOSS * parameters[0] * parameters[1]
-    return -stiffness * (total - 0.5 * _N_SPRINGS * motion[DISPLACEMENT])
+        rates[j] = motion[VELOCITY] - relative * middle * memory[j]
+        of_unit = 1.0 / (1.0 + relative * relative)
+        force += memory[j] - of_unit * motion[DISPLACEMENT]
+        loss += relative * of_unit
+        relative *= ratio
+    return -parameters[0] * parameters[1] * force / loss
 
 
 LINEAR_STRUCTURAL_DAMPING = register(
@@ -82,13 +86,17 @@ LINEAR_STRUCTURAL_DAMPING = register(
             Parameter("loss_factor", "1", 0.0, 0.6),
             Parameter("stiffness_n_per_m", "N m-1", 0.0, 1e9),
             Parameter("frequency_hz", "Hz", 1e-3, 1e5),
+            Parameter("creep_decades", "1", 0.3, 4.0, 1.2),
         ),
         _relaxing_springs,
         memory=lambda values, table: (0.0,) * _N_SPRINGS,
         equation="−η k H(x): a loss factor that no frequency changes, by springs that relax about frequency_hz",
     )
 )
-"""The same loss as a linear force, which superposes: for motion of many frequencies at once."""
+"""The same loss as a linear force, which superposes: for motion of many frequencies at once.
+
+What relaxes slower than the motion creeps: after a release the rest position moves for a while.
+"""
 
 HYSTERESIS = register(
     ForceKind(

@@ -137,9 +137,10 @@ STRUCTURAL = force_effect(
 LINEAR_STRUCTURAL = force_effect(
     LINEAR_STRUCTURAL_DAMPING,
     "structure",
-    lambda at: [{"loss_factor": 0.01}],
+    lambda at: [{"loss_factor": 0.01, "creep_decades": decades} for decades in (1.2, 2.4)],
     fixed=lambda at: {"stiffness_n_per_m": _static_stiffness(at), "frequency_hz": at.frequency_hz},
-    fitted=("loss_factor",),
+    fitted=("loss_factor", "creep_decades"),
+    may_rest=("creep_decades",),
     look_alikes=("viscous_damping", "coulomb_friction"),
     separated_by="the same amplitude at two frequencies",
     spoken_for_by=("takes energy", "odd in velocity", "rate-independent", "work ∝ amplitude²", "no onset"),

@@ -71,12 +71,12 @@ def bouc_wen(m: Motion) -> np.ndarray:
 
 
 def relaxing_springs(m: Motion) -> np.ndarray:
-    """−ηk Σ c (y − x/2), ẏ = v − r y: seven rates about ω₀; c such that ηk is the loss at ω₀."""
+    """−ηk Σ c (y − s x), ẏ = v − r y: eight rates about ω₀; c and s by loss and storage at ω₀."""
     loss, k = 0.02, MASS_KG * OMEGA**2
-    rates = OMEGA * 2.5 ** np.arange(-3.0, 4.0)
-    per_spring = 1 / np.sum(OMEGA * rates / (OMEGA**2 + rates**2))
+    rates = OMEGA * np.geomspace(10**-1.5, 16.0, 8)
+    moduli = 1j * OMEGA / (1j * OMEGA + rates)
     y = along(m, lambda y, x, v, a: v - rates * y, (0.0,) * rates.size)
-    return -loss * k * per_spring * np.sum(y - 0.5 * m["x"], axis=0)
+    return -loss * k / moduli.imag.sum() * (y.sum(axis=0) - moduli.real.sum() * m["x"])
 
 
 def carried_oscillator(frequency_hz: float, mass: float, zeta: float, m: Motion) -> np.ndarray:
@@ -133,7 +133,7 @@ MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
         {"loss_factor": 0.02},
         lambda m: -0.5 * np.pi * 0.02 * MASS_KG * OMEGA**2 * np.abs(m["x"]) * np.sign(m["v"]),
     ),
-    "structure.linear_structural_damping": ({"loss_factor": 0.02}, relaxing_springs),
+    "structure.linear_structural_damping": ({"loss_factor": 0.02, "creep_decades": 1.5}, relaxing_springs),
     "structure.hysteresis": (
         {"stiffness_n_per_m": 100.0, "beta_gamma": 80.0, "beta_delta": -40.0, "exponent": 1.6},
         bouc_wen,

@@ -1,0 +1,304 @@
+"""Where the numbers of an effect may start: its force along the motion beside the force that is missing.
+
+A simulation that runs freely has side valleys, where its phase slips or a contact comes a cycle late. A force on
+the motion that was measured has fewer, and costs no motion to compute: of every effect that is one more force, or
+another damper of the liquid, the numbers are sought there first. What springs, dampers and masses of the baseline
+can follow does not count, nor does what sensors cannot tell from noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, prev_fast_len, rfft
+from scipy.optimize import minimize
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.extension import NOTHING, Extension
+from sloshlab.diagnosis.latent_force import EITHER, LatentForce, run_forces
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.rig_model import RigModel, remembered
+from sloshlab.errors import SloshlabError
+from sloshlab.twin.excitation import Excitation, recorded
+from sloshlab.twin.terms import Term
+from sloshlab.twin.twin import Twin
+
+FloatArray = NDArray[np.float64]
+_MOST_SAMPLES: Final = 12_000
+_FEWEST_NUMBERS: Final = 2
+"""The size of an effect of one number comes from a first look."""
+_MOST_TRIED: Final = 2
+_N_EVALUATIONS: Final = 25, 50
+"""Per number: of every start that is tried, and then of the best."""
+_N_PROBED: Final = 400
+_TUNED: Final = "frequency_hz"
+"""A number to which a force is so sensitive that it is sought everywhere before."""
+_BEYOND: Final = 2.0
+_N_FREQUENCIES: Final = 40
+_IN_PROPORTION: Final = 1e-3
+_LEAST_FACTOR: Final = 1e-3
+_FARTHEST: Final = 4.0
+"""Of the logarithm of a number from its start."""
+_LEAST_EXPLAINED: Final = 0.03
+_POWER_KEPT: Final = 0.98
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """The motion of a place in one run, a short part of it where it is fastest, and where its force is heard."""
+
+    drive: Excitation
+    fastest: Excitation
+    heard: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """The missing force of a place in some runs, without what the baseline can follow of it.
+
+    Attributes
+    ----------
+    pieces : list of _Piece
+    force_n : ndarray, shape (n,)
+        All runs one after another.
+    followed : ndarray, shape (n, 3)
+        Orthonormal: springs, dampers and masses.
+    """
+
+    pieces: list[_Piece]
+    force_n: FloatArray
+    followed: FloatArray
+
+    def heard(self, added: Sequence[FloatArray]) -> FloatArray:
+        """Forces of the same runs, one after another, as far as they are heard and not followed."""
+        heard = [_band(force, piece.heard) for force, piece in zip(added, self.pieces, strict=True)]
+        return self._beyond(np.concatenate(heard))
+
+    def share_left(self, force: FloatArray) -> float:
+        """Share of the missing force that stays beside another."""
+        left = self.force_n - force
+        return float(left @ left) / max(float(self.force_n @ self.force_n), 1e-300)
+
+    def _beyond(self, force: FloatArray) -> FloatArray:
+        return np.asarray(force - self.followed @ (self.followed.T @ force))
+
+    @classmethod
+    def of(cls, forces: Sequence[LatentForce]) -> _Place | None:
+        """The runs that miss most, until there is enough of them; None where none misses anything."""
+        pieces: list[_Piece] = []
+        series: list[FloatArray] = []
+        motions: list[FloatArray] = []
+        n = 0
+        for one in sorted(forces, key=lambda each: -each.power_n2):
+            if one.power_n2 <= 0.0 or (pieces and n + one.force_n.size > _MOST_SAMPLES):
+                break
+            kept = slice(0, prev_fast_len(min(one.force_n.size, _MOST_SAMPLES), real=True))
+            force, motion, rate = one.force_n[kept], one.motion[kept], one.run.attributes.sampling_rate_hz
+            middle = int(np.argmax(np.abs(motion[:, 1])))
+            about = motion[max(0, middle - _N_PROBED // 2) : middle + _N_PROBED // 2]
+            piece = _Piece(_driven(rate, motion), _driven(rate, about), _heard(force))
+            pieces.append(piece)
+            series.append(_band(force, piece.heard))
+            motions.append(np.stack([_band(column, piece.heard) for column in motion.T], axis=1))
+            n += force.size
+        if not pieces:
+            return None
+        followed, _ = np.linalg.qr(np.concatenate(motions) / np.concatenate(motions).std(axis=0))
+        place = cls(pieces, np.concatenate(series), followed)
+        return replace(place, force_n=place._beyond(place.force_n))
+
+
+@dataclass(frozen=True)
+class ForceStart:
+    """Numbers of an effect whose force is like the missing one.
+
+    Attributes
+    ----------
+    numbers : dict
+        Named as in a fit.
+    share_left : float
+        Of the mean square of the missing force, beyond what the baseline can follow.
+    """
+
+    numbers: dict[str, float]
+    share_left: float
+
+
+class ForceStarts:
+    """The forces that a fit of a rig's twin lacks, and numbers of effects that make such forces.
+
+    Parameters
+    ----------
+    model : RigModel
+    fitting : sequence of sequences of Observation
+    values : mapping
+        Of the baseline's parameters, and of effects that it has already.
+    known : Extension, optional
+        Those effects.
+    """
+
+    def __init__(
+        self,
+        model: RigModel,
+        fitting: Sequence[Sequence[Observation]],
+        values: Mapping[str, float],
+        known: Extension = NOTHING,
+    ) -> None:
+        self._model = model
+        self._forces: list[LatentForce] = []
+        for observed in fitting:
+            with suppress(SloshlabError):
+                self._forces += run_forces(model, observed, values, extension=known).forces
+        self._places: dict[str, _Place | None] = {}
+
+    def of(self, candidate: Candidate) -> ForceStart | None:
+        """The best numbers for a candidate; None where its force explains next to nothing.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        """
+        parameters = candidate.effect.parameters
+        place = self._at(candidate.effect.block) if len(parameters) >= _FEWEST_NUMBERS else None
+        if place is None:
+            return None
+        names = [f"{candidate.key}.{parameter.name}" for parameter in parameters]
+        bounds = np.array([candidate.bounds(parameter) for parameter in parameters])
+
+        def left(numbers: FloatArray) -> float:
+            added = force(numbers)
+            return np.inf if added is None else place.share_left(added)
+
+        def force(numbers: FloatArray) -> FloatArray | None:
+            inside = np.clip(numbers, *bounds.T).tolist()
+            named = {one.name: value for one, value in zip(parameters, inside, strict=True)}
+            return self._force(candidate, named, place)
+
+        starts = [np.array([start[name] for name in names]) for start in candidate.starts()]
+        tuned = next((k for k, one in enumerate(parameters) if one.name == _TUNED), -1)
+        if tuned >= 0:
+            starts = [_with(starts[0], tuned, frequency) for frequency in _about(starts, tuned)]
+        begun = sorted((_sized(force, start, place) for start in starts), key=lambda one: one[0])
+        first, then = (n * len(names) for n in _N_EVALUATIONS)
+        share, numbers = min(
+            (_descended(left, start, first) for _, start in begun[:_MOST_TRIED]), key=lambda one: one[0]
+        )
+        if share < 1.0 - _LEAST_EXPLAINED:
+            share, numbers = _descended(left, numbers, then)
+        if not share < 1.0 - _LEAST_EXPLAINED:
+            return None
+        return ForceStart(dict(zip(names, np.clip(numbers, *bounds.T).tolist(), strict=True)), share)
+
+    def _at(self, block: str) -> _Place | None:
+        if block not in self._places:
+            self._places[block] = _Place.of([one for one in self._forces if one.place in (block, EITHER)])
+        return self._places[block]
+
+    def _force(self, candidate: Candidate, numbers: Mapping[str, float], place: _Place) -> FloatArray | None:
+        """Of an effect on the motion of its place, as far as it is heard; None where it is none or cannot be."""
+        try:
+            extension = candidate.extension(numbers)
+            if not all(_is_resolved(extension.terms, piece.fastest) for piece in place.pieces):
+                return None
+            added = [self._added(extension, piece.drive) for piece in place.pieces]
+        except SloshlabError:
+            return None
+        known = [one for one in added if one is not None and np.isfinite(one).all()]
+        return place.heard(known) if len(known) == len(added) else None
+
+    def _added(self, extension: Extension, drive: Excitation) -> FloatArray | None:
+        """What an extension adds to the force along a motion; None where it is no force."""
+        if extension.faults or extension.structure is not None:
+            return None
+        force = _along(extension.terms, drive)
+        if extension.liquid is not None:
+            liquid = tuple(term for term in self._model.twin.terms if term.place == "tank")
+            force = force + _along(extension.liquid(liquid), drive) - _along(liquid, drive)
+        return force
+
+
+def _about(starts: Sequence[FloatArray], place: int) -> list[float]:
+    """Values of one number from well below to well above those of all starts."""
+    known = [float(start[place]) for start in starts]
+    return [float(one) for one in np.geomspace(min(known) / _BEYOND, max(known) * _BEYOND, _N_FREQUENCIES)]
+
+
+def _with(start: FloatArray, place: int, value: float) -> FloatArray:
+    changed = start.copy()
+    changed[place] = value
+    return changed
+
+
+def _sized(
+    force: Callable[[FloatArray], FloatArray | None], start: FloatArray, place: _Place
+) -> tuple[float, FloatArray]:
+    """Share of the missing force that a start leaves at its best size, and the start with that size.
+
+    The size is in the number, if there is one, with which the force grows in proportion.
+    """
+    found = force(start)
+    size = 0.0 if found is None else float(found @ found)
+    if found is None or size == 0.0:
+        return np.inf, start
+    factor = float(found @ place.force_n) / size
+    for k in range(start.size):
+        doubled = force(_with(start, k, 2.0 * start[k]))
+        if doubled is not None and float(((doubled - 2.0 * found) ** 2).sum()) < _IN_PROPORTION**2 * size:
+            sized = _with(start, k, start[k] * max(factor, _LEAST_FACTOR))
+            return place.share_left(found * max(factor, _LEAST_FACTOR)), sized
+    return place.share_left(found), start
+
+
+def _descended(
+    left: Callable[[FloatArray], float], start: FloatArray, n_evaluations: int
+) -> tuple[float, FloatArray]:
+    """Simplex (Nelder and Mead 1965, doi:10.1093/comjnl/7.4.308) in logarithms of numbers of one sign each."""
+    scale = np.where(start == 0, 1.0, start)
+
+    def numbers(at: FloatArray) -> FloatArray:
+        return np.asarray(scale * np.exp(np.clip(at, -_FARTHEST, _FARTHEST)))
+
+    def cost(at: FloatArray) -> float:
+        value = left(numbers(at))
+        return value if np.isfinite(value) else 1e12
+
+    n = start.size
+    simplex = np.vstack([np.zeros(n), np.diag(np.full(n, 0.7))])
+    options = {"maxfev": n_evaluations, "initial_simplex": simplex, "xatol": 1e-2, "fatol": 1e-4}
+    found = minimize(cost, np.zeros(n), method="Nelder-Mead", options=options)
+    return float(found.fun), numbers(found.x)
+
+
+def _driven(rate_hz: float, motion: FloatArray) -> Excitation:
+    drive = recorded(rate_hz, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])
+    return remembered(drive)
+
+
+def _along(terms: Sequence[Term], drive: Excitation) -> FloatArray:
+    if not terms:
+        return np.zeros(drive.n_samples)
+    alone = Twin(None, tuple(replace(term, place="tank") for term in terms))
+    return np.asarray(alone.simulate(drive).require_done().forces_n.sum(axis=1))
+
+
+def _is_resolved(terms: Sequence[Term], drive: Excitation) -> bool:
+    """Whether a force does not turn more often than it is sampled, as a spring too stiff for its steps does."""
+    if not any(term.kind.events is not None for term in terms):
+        return True
+    alone = Twin(None, tuple(replace(term, place="tank") for term in terms))
+    return bool(alone.simulate(drive).require_done().n_events < drive.n_samples)
+
+
+def _heard(force: FloatArray) -> NDArray[np.bool_]:
+    """Frequencies up to which nearly all of a force lies."""
+    power = np.cumsum(np.abs(rfft(force)) ** 2)
+    return np.arange(power.size) <= int(np.searchsorted(power, _POWER_KEPT * power[-1]))
+
+
+def _band(series: FloatArray, passed: NDArray[np.bool_]) -> FloatArray:
+    return np.asarray(irfft(np.where(passed, rfft(series), 0.0), series.size))
