@@ -20,6 +20,8 @@ class BaselineParameter:
         Whether it changes only what a channel reads, not the motion.
     most_tolerances : float
         How far it may be from what is believed of it; beyond, something else is the matter.
+    channel : str
+        The only one whose reading it changes; empty where it may change several.
     """
 
     name: str
@@ -28,3 +30,4 @@ class BaselineParameter:
     units: str = "1"
     is_reading: bool = False
     most_tolerances: float = 4.0
+    channel: str = ""

@@ -33,7 +33,7 @@ _MOST_SAMPLES: Final = 12_000
 _FEWEST_NUMBERS: Final = 2
 """The size of an effect of one number comes from a first look."""
 _MOST_TRIED: Final = 2
-_N_EVALUATIONS: Final = 25, 50
+_N_EVALUATIONS: Final = 15, 40
 """Per number: of every start that is tried, and then of the best."""
 _N_PROBED: Final = 400
 _TUNED: Final = "frequency_hz"

@@ -190,20 +190,32 @@ class BegunFit:
         Where it stands, nearly.
     cost : float
         With the channels known only to the share of the second stage.
-    is_near : bool
-        Whether it began with a Jacobian from nearby, and may go on with its own.
     """
 
     problem: FreeRunProblem
     fit: FreeRunFit
     jacobian: BlockJacobian
     cost: float
-    is_near: bool
+
+
+@dataclass(frozen=True)
+class Start:
+    """Numbers from which a fit begins.
+
+    Attributes
+    ----------
+    values : mapping
+    is_near : bool
+        Whether the baseline's numbers are those of a fit whose Jacobian is known.
+    """
+
+    values: Mapping[str, float]
+    is_near: bool = False
 
 
 def begun(
     problem: FreeRunProblem,
-    starts: Sequence[Mapping[str, float]],
+    starts: Sequence[Start],
     shares: Sequence[float] = STAGES,
     *,
     near: BlockJacobian | None = None,
@@ -214,39 +226,34 @@ def begun(
     Parameters
     ----------
     problem : FreeRunProblem
-    starts : sequence of mappings
+    starts : sequence of Start
     shares : sequence of float
         All stages.
     near : BlockJacobian, optional
-        Of the parameters without those of the last candidate, where the starts are near its place.
+        Of the parameters without those of the last candidate, where starts that are near have them.
     n_iterations : int
         At most, per stage.
     """
     first, second = shares[0], shares[min(1, len(shares) - 1)]
     best: BegunFit | None = None
     for start in starts:
-        known = None if near is None else _extended(problem, start, near)
+        known = _extended(problem, start.values, near) if near is not None and start.is_near else None
         fit, jacobian = fitted(
-            problem, start, n_iterations=n_iterations, shares=(first,), known=known, is_last=False
+            problem, start.values, n_iterations=n_iterations, shares=(first,), known=known, is_last=False
         )
         if not fit.trouble:
-            reached = BegunFit(problem, fit, jacobian, soft_cost(problem, fit, first), near is not None)
+            reached = BegunFit(problem, fit, jacobian, soft_cost(problem, fit, first))
             best = reached if best is None or reached.cost < best.cost else best
     if best is None:
         trouble = "does not run from any of its starts"
-        fit = FreeRunFit(problem.candidates, dict(starts[0]), np.inf, np.inf, trouble=trouble)
-        return BegunFit(problem, fit, BlockJacobian(len(problem.names), ()), np.inf, near is not None)
+        fit = FreeRunFit(problem.candidates, dict(starts[0].values), np.inf, np.inf, trouble=trouble)
+        return BegunFit(problem, fit, BlockJacobian(len(problem.names), ()), np.inf)
     if second == first:
         return best
     fit, jacobian = fitted(
-        problem,
-        best.fit.values,
-        n_iterations=n_iterations,
-        shares=(second,),
-        known=best.jacobian if best.is_near else None,
-        is_last=best.is_near,
+        problem, best.fit.values, n_iterations=n_iterations, shares=(second,), known=best.jacobian, is_last=False
     )
-    return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second), best.is_near)
+    return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second))
 
 
 def nearest(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], share: float) -> Mapping[str, float]:
@@ -269,7 +276,7 @@ def nearest(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], shar
 def finished(begun_fit: BegunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = 6) -> FreeRunFit:
     """The remaining stages of a fit that was begun; the last one in any case."""
     rest = shares[2:] or shares[-1:]
-    values, known = begun_fit.fit.values, begun_fit.jacobian if begun_fit.is_near else None
+    values, known = begun_fit.fit.values, begun_fit.jacobian
     return fitted(begun_fit.problem, values, n_iterations=n_iterations, shares=rest, known=known)[0]
 
 
@@ -285,7 +292,7 @@ def fitted_from(
     n_iterations : int
         At most, per stage.
     """
-    start = begun(problem, starts, n_iterations=n_iterations)
+    start = begun(problem, [Start(one) for one in starts], n_iterations=n_iterations)
     return start.fit if start.fit.trouble else finished(start, n_iterations=n_iterations)
 
 

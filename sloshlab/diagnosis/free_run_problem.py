@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.candidate import Candidate, channels_of
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.observations import Observation
@@ -112,6 +112,10 @@ class FreeRunProblem:
             [parameter.believed for parameter in self._baseline] + [0.0] * (len(self.names) - len(self._baseline))
         )
         self.n_baseline = len(self._baseline)
+        driving = {name for run in self.runs for name in model.driving(run[0].run)}
+        self._seen_by = [(one.channel,) if one.channel else () for one in self._baseline] + [
+            _only_channels(one, driving) for one in self.candidates for _ in one.effect.parameters
+        ]
         bounds = [
             (
                 one.believed - one.most_tolerances * one.tolerance,
@@ -197,17 +201,27 @@ class FreeRunProblem:
         return BlockJacobian.of_columns(found, [one.spectra.size for run in self.runs for one in run])
 
     def _residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
-        """Residuals after one parameter was moved; of the other runs unchanged where it belongs to one."""
-        owner = run_of(self.names[column], self.model)
-        if not owner:
+        """Residuals after one parameter was moved; unchanged in other runs and channels where it has its own."""
+        owner, seen_by = run_of(self.names[column], self.model), self._seen_by[column]
+        if not owner and not seen_by:
             return self.residual(theta)
         moved, first, values = at.copy(), 0, self.values(theta)
         for run in self.runs:
-            size = sum(one.spectra.size for one in run)
-            if run[0].run.name == owner:
-                moved[first : first + size] = self._of_run(run, values)
-            first += size
+            parts = [one for one in run if not seen_by or one.channel in seen_by]
+            chosen = parts if not owner or run[0].run.name == owner else []
+            found = self._of_run(chosen, values) if chosen else np.zeros(0)
+            for one in run:
+                if one in chosen:
+                    moved[first : first + one.spectra.size] = found[: one.spectra.size]
+                    found = found[one.spectra.size :]
+                first += one.spectra.size
         return moved
+
+
+def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str, ...]:
+    """Channels that alone an effect changes; none given where it changes the motion."""
+    changed = channels_of(candidate.channel) if candidate.effect.block == "sensor" else ()
+    return () if any(name in driving for name in changed) else changed
 
 
 def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
+from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import DRIFT_CORNER_HZ
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times_s, lapped_spectra
@@ -107,7 +108,7 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
     for name in names:
         variable = run.recording[name]
         values = np.asarray(variable.values, np.float64)
-        known = np.isfinite(values) & ~_at_limits(values, variable.attrs)
+        known = np.isfinite(values) & ~clipped_samples(variable)
         if known.sum() < 2 * n_bands:
             continue
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
@@ -231,16 +232,6 @@ def _weighted(observation: Observation, variance: FloatArray) -> Observation:
 def _floor(observation: Observation) -> FloatArray:
     """Variance by the sensor alone, of an observation that is weighted by nothing else."""
     return observation.variance
-
-
-def _at_limits(values: FloatArray, attributes: Mapping[str, object]) -> NDArray[np.bool_]:
-    clipped = np.zeros(values.size, bool)
-    low, high = attributes.get("range_min"), attributes.get("range_max")
-    if isinstance(low, float | int):
-        clipped |= values <= float(low)
-    if isinstance(high, float | int):
-        clipped |= values >= float(high)
-    return clipped
 
 
 def _spectra(

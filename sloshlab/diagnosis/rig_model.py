@@ -40,8 +40,6 @@ _FLUCTUATION: Final = "damping of the liquid in "
 _TOLERANCE_OF_FLUCTUATION: Final = 0.05
 """By which a chaotic liquid damps more or less in one run than on average."""
 _DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
-_AT_THE_END: Final = 1e-4
-"""Of the end of a range, within which a reading is at it."""
 _AS_NORMAL: Final = 1.25
 """Tolerances by which masses, frequencies, losses and gains may be off; beyond, something else is the matter."""
 _TOLERANCE_OF_SHAPE: Final = 0.01
@@ -50,14 +48,13 @@ _TOLERANCE_OF_SHAPE: Final = 0.01
 
 @dataclass(frozen=True, eq=False)
 class _Channels:
-    """What is needed of a run's channels again and again; ranges of those that reach their ends."""
+    """What is needed of a run's channels again and again."""
 
     compared: tuple[str, ...]
     attributes: Mapping[str, Mapping[str, Any]]
     recorded: Mapping[str, FloatArray]
     driving: Mapping[str, FloatArray]
     n_cells: int
-    saturated: Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +149,6 @@ class RigModel:
                 if name not in names
             },
             max(1, sum(name.startswith("force_cell") for name in channels(run.recording, "force"))),
-            {name: span for name in names if (span := _saturated(run.recording[name])) is not None},
         )
 
     def _compared(self, run: CaseRun) -> list[str]:
@@ -196,9 +192,7 @@ class RigModel:
             for fault in extension.faults:
                 if fault.channel == name:
                     reading = fault.reading(reading, rate, others, self._channels[run.name].recorded[name])
-            reading = reading + values.get(f"offset of {name} in {run.name}", 0.0)
-            span = self._channels[run.name].saturated.get(name)
-            readings[name] = reading if span is None else np.clip(reading, *span)
+            readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
         return readings
 
     def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> _Truth:
@@ -317,7 +311,9 @@ class RigModel:
         if any(name.startswith("force") for name in names):
             found.append(BaselineParameter("carried mass", 1.0, 0.01, most_tolerances=_AS_NORMAL))
         found += [
-            BaselineParameter(f"gain of {name}", 1.0, 0.01, is_reading=True, most_tolerances=_AS_NORMAL)
+            BaselineParameter(
+                f"gain of {name}", 1.0, 0.01, is_reading=True, most_tolerances=_AS_NORMAL, channel=name
+            )
             for name in names
             if not name.endswith("_root")  # a base at rest has none to tell, and participations hold it otherwise
         ]
@@ -327,8 +323,8 @@ class RigModel:
             for name in cells[:-1]
         ]
         found += [
-            BaselineParameter(shape, 0.0, _TOLERANCE_OF_SHAPE, is_reading=True)
-            for shapes in self._shapes.values()
+            BaselineParameter(shape, 0.0, _TOLERANCE_OF_SHAPE, is_reading=True, channel=name)
+            for name, shapes in self._shapes.items()
             for shape in shapes
         ]
         fluctuates = any(_damps_as_liquid(term) for term in self.twin.terms)
@@ -343,22 +339,13 @@ class RigModel:
                     size = float(np.nanmax(np.abs(run.recording[name].values)))
                     found.append(
                         BaselineParameter(
-                            f"offset of {name} in {run.name}", 0.0, 0.01 * size, "m", is_reading=True
+                            f"offset of {name} in {run.name}", 0.0, 0.01 * size, "m", is_reading=True, channel=name
                         )
                     )
         return tuple(found)
 
 
 _TUNED_NUMBERS: Final = ("damping_n_s_per_m", "damping_kg_per_s", "force_n", "stiffness_n_per_m")
-
-
-def _saturated(channel: xr.DataArray) -> tuple[float, float] | None:
-    """Declared range of a channel whose readings reach its ends; None where they do not."""
-    low, high = (float(channel.attrs.get(f"range_{end}", np.nan)) for end in ("min", "max"))
-    reaches = np.nanmin(channel.values) <= low * (1 - _AT_THE_END) or np.nanmax(channel.values) >= high * (
-        1 - _AT_THE_END
-    )
-    return (low, high) if low < 0 < high and reaches else None
 
 
 def _cells(names: Iterable[str]) -> list[str]:

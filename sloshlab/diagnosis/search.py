@@ -20,6 +20,7 @@ from sloshlab.diagnosis.force_starts import ForceStarts
 from sloshlab.diagnosis.force_surface import surface_effect
 from sloshlab.diagnosis.free_run_fit import (
     STAGES,
+    Start,
     begun,
     finished,
     fitted,
@@ -131,7 +132,7 @@ class _Search:
         everything = candidates(self.surroundings)
         self._one_more(retuned_fit, jacobian, everything, "fitting one effect")
         self._add_greedily(retuned_fit, everything)
-        self._polish()
+        self._polish(everything)
         retuned = self._retuned_from_explanations(retuned)
         ceilings = self._ceilings(retuned_fit)
         return Findings(
@@ -182,7 +183,7 @@ class _Search:
         for i, (candidate, starts) in enumerate(promising):
             self.told(f"{what}: {candidate.key}", i, 2 * len(promising))
             problem = FreeRunProblem(self.model, self.fitting, (*base.candidates, candidate))
-            one = begun(problem, starts, shares, near=jacobian if is_near else None)
+            one = begun(problem, starts, shares, near=jacobian)
             if one.fit.trouble:
                 self.failed[candidate.key] = one.fit.trouble
             else:
@@ -298,7 +299,7 @@ class _Search:
         *,
         is_near: bool,
         is_strained: bool,
-    ) -> list[tuple[Candidate, list[dict[str, float]]]]:
+    ) -> list[tuple[Candidate, list[Start]]]:
         """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from."""
         problem = FreeRunProblem(self.model, self.fitting, base.candidates)
         theta = problem.theta_of(base.values)
@@ -326,17 +327,20 @@ class _Search:
                 self.failed[candidate.key] = "does not run from any start"
                 continue
             looks.sort(key=lambda one: -max(one[0]))
+            of_force = [{**base.values, **by_force.numbers}] if by_force else []
             if is_near:
-                starts = [{**base.values, **sized} for _, _, sized in looks[:_MOST_STARTS]]
+                close = [*of_force, *({**base.values, **sized} for _, _, sized in looks)]
+                starts = [Start(one, is_near=True) for one in close[:_MOST_STARTS]]
             else:
                 believed = base.values if base.candidates else self.model.believed
                 far = [{**believed, **start} for _, start, _ in looks[:_MOST_STARTS]]
-                close = [{**base.values, **looks[0][2]}]
+                close = [*of_force, {**base.values, **looks[0][2]}]
                 if is_strained:
                     close.append({**self._eased(base), **looks[0][2]})
-                starts = [dict(nearest(extended, group, shares[0])) for group in (far, close)]
-            if by_force:
-                starts.append({**base.values, **by_force.numbers})
+                starts = [
+                    Start(nearest(extended, far, shares[0]), is_near=bool(base.candidates)),
+                    Start(nearest(extended, close, shares[0]), is_near=True),
+                ]
             promise = np.max([one[0] for one in looks], axis=0)
             promised.append(_Promise(candidate, starts, promise, by_force.share_left if by_force else 1.0))
         return self._chosen(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
@@ -347,7 +351,7 @@ class _Search:
             return None
         return ForceStarts(self.model, self.fitting, base.values, extension_of(base.candidates, base.values))
 
-    def _chosen(self, promised: Sequence[_Promise], most: int) -> list[tuple[Candidate, list[dict[str, float]]]]:
+    def _chosen(self, promised: Sequence[_Promise], most: int) -> list[tuple[Candidate, list[Start]]]:
         """The candidates that promise most, in a soft look or in a hard one, or by their force."""
         if not promised:
             return []
@@ -380,8 +384,8 @@ class _Search:
             alone += self._generalised(retuned, alone, pool, "fitting one effect")
         self.explanations += alone
 
-    def _polish(self) -> None:
-        """The best explanations of one and of two effects to where they converge, and each of the two alone."""
+    def _polish(self, pool: Sequence[Candidate]) -> None:
+        """The best of one and of two effects to where they converge, special cases in their place, each alone."""
         for n in (2, 1):
             best = min(
                 (one for one in self.explanations if len(one.keys) == n),
@@ -395,8 +399,31 @@ class _Search:
             if not fit.trouble and fit.cost < best.fit.cost:
                 best = self.judged(fit)
                 self.explanations.append(best)
+            self.explanations += self._specialised(best, pool)
             if n > 1:
                 self.explanations += self._take_away([best])
+
+    def _specialised(self, wider: Explanation, pool: Sequence[Candidate]) -> list[Explanation]:
+        """Special cases in place of the effects of an explanation that were not tried with the others."""
+        tried = {frozenset(one.keys) for one in self.explanations}
+        found = []
+        for general in wider.fit.candidates:
+            others = [one for one in wider.fit.candidates if one is not general]
+            for special in pool:
+                effects_ = general.effect, special.effect
+                is_special = (
+                    effects_[1].known_as in effects_[0].includes and effects_[0].block == effects_[1].block
+                )
+                if not is_special or frozenset((special.key, *(one.key for one in others))) in tried:
+                    continue
+                self.told(f"polishing {special.key} in place of {general.effect.name}", 0, 1)
+                problem = FreeRunProblem(self.model, self.fitting, (*others, special))
+                sizes = _as_its_general_form(special, general, wider.fit)
+                start = nearest(problem, [{**wider.fit.values, **one} for one in sizes], _SOFT)
+                fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-2:])
+                if not fit.trouble:
+                    found.append(self.judged(fit))
+        return found
 
     def _retuned_from_explanations(self, retuned: Explanation) -> Explanation:
         """The retuned baseline from where the best explanations have it: what an effect gains must be its own."""
@@ -464,7 +491,7 @@ class _Promise:
     """A candidate with starts, the gains that first looks promise, and the missing force that its own leaves."""
 
     candidate: Candidate
-    starts: list[dict[str, float]]
+    starts: list[Start]
     gains: FloatArray
     share_left: float
 
@@ -490,6 +517,20 @@ def _as_its_special_case(wider: Candidate, special: Candidate, fit: FreeRunFit) 
     return [
         {key: size if _unit(key) == unit else value for key, value in start.items()} for start in wider.starts()
     ]
+
+
+def _as_its_general_form(special: Candidate, general: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
+    """Starts of a special case, and one with its number as large as those of one unit of the general form."""
+    starts = special.starts()
+    [*names] = starts[0]
+    alike = [
+        fit.values[f"{general.key}.{one.name}"]
+        for one in general.effect.parameters
+        if _unit(one.name) == _unit(names[0])
+    ]
+    if len(names) == 1 and alike:
+        starts.append({names[0]: float(np.mean(alike))})
+    return starts
 
 
 def _always(limits: Limits) -> Callable[[Surroundings], Limits]:

@@ -25,7 +25,10 @@ LEAST_MORE: Final = 12.0
 LEAST_SEPARATION: Final = 6.0
 """The same, by which an explanation must beat another to be the only one."""
 LEAST_STRENGTH: Final = 0.5
-"""What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of."""
+"""What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of.
+
+Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
+"""
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LARGEST_REMAINDER: Final = 1.25
@@ -174,17 +177,17 @@ def _shortest_sufficient(found: Findings, scale: _Scale) -> Explanation | None:
     single = _without_excess(max(singles, key=scale.evidence), singles, scale)
     if not pairs:
         return single
-    pair = max(pairs, key=scale.evidence)
+    pair = _without_excess(max(pairs, key=scale.evidence), pairs, scale)
     return pair if _is_clearly_better(pair, single, scale) else single
 
 
-def _without_excess(single: Explanation, singles: Sequence[Explanation], scale: _Scale) -> Explanation:
-    """A special case of an effect in its place, unless the general form is better by a size worth speaking of."""
-    for special in sorted(singles, key=lambda one: -scale.evidence(one)):
-        is_special = special.n_numbers < single.n_numbers and _includes(single, special)
-        if is_special and not _is_clearly_better(single, special, scale):
+def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: _Scale) -> Explanation:
+    """A special case of effects in their place, unless the general form is better by a size worth speaking of."""
+    for special in sorted(alike, key=lambda one: -scale.evidence(one)):
+        is_special = special.n_numbers < best.n_numbers and _includes(best, special)
+        if is_special and not _is_clearly_better(best, special, scale):
             return special
-    return single
+    return best
 
 
 def _is_clearly_better(more: Explanation, less: Explanation, scale: _Scale) -> bool:
@@ -213,8 +216,8 @@ def strength(before: Explanation, after: Explanation) -> float:
 
 
 def _largest_strength(before: Mapping[_Place, float], after: Mapping[_Place, float]) -> float:
-    """Square root of the largest decrease of a mean square over what is left, or over the noise floor."""
-    removed = [(before[place] - left) / max(1.0, left) for place, left in after.items() if place in before]
+    """Square root of the largest decrease of a mean square over what is left, both not below the noise floor."""
+    removed = [max(before[place], 1.0) / max(left, 1.0) - 1.0 for place, left in after.items() if place in before]
     return float(np.sqrt(max([0.0, *removed])))
 
 
