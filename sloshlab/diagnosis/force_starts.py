@@ -20,7 +20,7 @@ from scipy.optimize import minimize
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.extension import NOTHING, Extension
-from sloshlab.diagnosis.latent_force import EITHER, LatentForce, run_forces
+from sloshlab.diagnosis.latent_force import EITHER, STRUCTURE, TANK, LatentForce, run_forces
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RigModel, remembered
 from sloshlab.errors import SloshlabError
@@ -35,6 +35,8 @@ _FEWEST_NUMBERS: Final = 2
 _MOST_TRIED: Final = 2
 _N_EVALUATIONS: Final = 15, 40
 """Per number: of every start that is tried, and then of the best."""
+_FOLLOWED: Final = {STRUCTURE: [0, 1], EITHER: [0, 1], TANK: [2, 1]}
+"""Motions of a place whose multiples the baseline follows; with all three any force of a free motion is one."""
 _N_PROBED: Final = 400
 _TUNED: Final = "frequency_hz"
 """A number to which a force is so sensitive that it is sought everywhere before."""
@@ -44,6 +46,7 @@ _IN_PROPORTION: Final = 1e-3
 _LEAST_FACTOR: Final = 1e-3
 _FARTHEST: Final = 4.0
 """Of the logarithm of a number from its start."""
+_ABOVE_NOISE: Final = 1.0
 _LEAST_EXPLAINED: Final = 0.03
 _POWER_KEPT: Final = 0.98
 
@@ -66,8 +69,8 @@ class _Place:
     pieces : list of _Piece
     force_n : ndarray, shape (n,)
         All runs one after another.
-    followed : ndarray, shape (n, 3)
-        Orthonormal: springs, dampers and masses.
+    followed : ndarray, shape (n, 2)
+        Orthonormal: spring and damper of the structure, mass and damper of the tank.
     """
 
     pieces: list[_Piece]
@@ -93,24 +96,27 @@ class _Place:
         pieces: list[_Piece] = []
         series: list[FloatArray] = []
         motions: list[FloatArray] = []
-        n = 0
+        n, of_noise = 0, 0.0
         for one in sorted(forces, key=lambda each: -each.power_n2):
             if one.power_n2 <= 0.0 or (pieces and n + one.force_n.size > _MOST_SAMPLES):
                 break
             kept = slice(0, prev_fast_len(min(one.force_n.size, _MOST_SAMPLES), real=True))
             force, motion, rate = one.force_n[kept], one.motion[kept], one.run.attributes.sampling_rate_hz
+            own_motion = motion[:, _FOLLOWED[one.place]]
+            own, *_ = np.linalg.lstsq(own_motion, force)
             middle = int(np.argmax(np.abs(motion[:, 1])))
             about = motion[max(0, middle - _N_PROBED // 2) : middle + _N_PROBED // 2]
-            piece = _Piece(_driven(rate, motion), _driven(rate, about), _heard(force))
+            piece = _Piece(_driven(rate, motion), _driven(rate, about), _heard(force - own_motion @ own))
             pieces.append(piece)
             series.append(_band(force, piece.heard))
-            motions.append(np.stack([_band(column, piece.heard) for column in motion.T], axis=1))
-            n += force.size
+            motions.append(np.stack([_band(column, piece.heard) for column in own_motion.T], axis=1))
+            n, of_noise = n + force.size, of_noise + force.size * one.standard_error_n**2
         if not pieces:
             return None
         followed, _ = np.linalg.qr(np.concatenate(motions) / np.concatenate(motions).std(axis=0))
         place = cls(pieces, np.concatenate(series), followed)
-        return replace(place, force_n=place._beyond(place.force_n))
+        place = replace(place, force_n=place._beyond(place.force_n))
+        return place if float(place.force_n @ place.force_n) > _ABOVE_NOISE * of_noise else None
 
 
 @dataclass(frozen=True)

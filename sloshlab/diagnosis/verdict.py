@@ -320,8 +320,12 @@ def _nothing(found: Findings) -> str:
 
 def _unknown(found: Findings, named: Explanation | None, block: str = "") -> str:
     where = block or where_of(found)
-    nearest = " and ".join(named_and_placed(one) for one in named.fit.candidates) if named else ""
-    closest = f"; the nearest known effect is {nearest}" if nearest else ""
+    closest = ""
+    if named is not None:
+        nearest = " and ".join(named_and_placed(one) for one in named.fit.candidates)
+        same = "".join(f" (the same as {' with '.join(one).replace('_', ' ')})" for one in equals_of(named))
+        share = f"{100 * explained_share(found, named):.0f} % of what can be explained"
+        closest = f"; the nearest known effect is {nearest}{same}, which explains {share}"
     return f"Something is missing that has no name here, most likely in the {where}{closest}."
 
 
