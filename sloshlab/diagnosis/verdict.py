@@ -40,7 +40,10 @@ _ERRORS_OVER_STANDARD_ERRORS: Final = 3.0
 _CALIBRATION: Final = 0.01
 _IN_UNITS_OF_THE_CHANNEL: Final = ("amplitude", "rate", "limit")
 _LITTLE: Final = 0.05
-"""Of a mean square that an effect of one frequency explains, which may be in beginnings and ends."""
+_LITTLE_OF_ONE_POWER: Final = 0.1
+"""Of a mean square that an effect of one frequency explains, which may be in beginnings and ends; the second one
+for effects whose work grows with the same power of the amplitude, which nothing else could tell apart.
+"""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
 """What it would have if it had a name."""
 _EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
@@ -248,8 +251,10 @@ def _is_alike_at_one_frequency(found: Findings, one: Explanation, best: Explanat
     this, other = one.fit.candidates[0].effect, best.fit.candidates[0].effect
     if this.name not in other.look_alikes and other.name not in this.look_alikes:
         return False
+    powers = [{term for term in effect.spoken_for_by if term.startswith("work")} for effect in (this, other)]
+    little = _LITTLE_OF_ONE_POWER if powers[0] and powers[0] == powers[1] else _LITTLE
     return all(
-        left - best.by_run[cell] < max(1.0, _LITTLE * (found.retuned.by_run[cell] - best.by_run[cell]))
+        left - best.by_run[cell] < max(1.0, little * (found.retuned.by_run[cell] - best.by_run[cell]))
         for cell, left in one.by_run.items()
     )
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import exp, pi
 
-from sloshlab.twin.law import DIRECTION, DISPLACEMENT, VELOCITY, law
+from sloshlab.twin.law import BASE_ACCELERATION, DIRECTION, DISPLACEMENT, VELOCITY, law
 from sloshlab.twin.terms import ForceKind, Parameter, register
 
 # the laws are compiled, so their arguments are described once, in sloshlab.twin.law
@@ -90,7 +90,7 @@ def _missing_mode(motion, parameters, memory, rates):
     damping, mass = 2 * parameters[1] * omega, parameters[2]
     stretch, closing = memory[0] - motion[DISPLACEMENT], memory[1] - motion[VELOCITY]
     force = mass * (omega * omega * stretch + damping * closing)
-    rates[0], rates[1] = memory[1], -force / mass
+    rates[0], rates[1] = memory[1], -force / mass - motion[BASE_ACCELERATION]
     return force
 
 
@@ -196,7 +196,7 @@ MISSING_MODE = register(
         _missing_mode,
         memory=lambda values, table: (0.0, 0.0),
         moves_with_place=True,
-        equation="mass on a spring and damper at the place",
+        equation="mass on a spring and damper at the place, which the base moves too",
     )
 )
 MASS_ERROR = register(

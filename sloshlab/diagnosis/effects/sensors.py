@@ -286,8 +286,13 @@ CLOCK = _sensor_effect(
 
 
 def _pairs(at: Surroundings) -> list[str]:
-    """Channel and source, sources of the same quantity first."""
-    pairs = [(to, source) for to in at.channels for source in at.channels if source != to]
+    """Channel and source, of the same quantity first; at one frequency a leak is a gain, but into what rests."""
+    pairs = [
+        (to, source)
+        for to in at.channels
+        for source in at.channels
+        if source != to and (to.endswith("_root") or not at.has_one_frequency)
+    ]
     pairs.sort(key=lambda pair: pair[0].partition("_")[0] != pair[1].partition("_")[0])
     return [f"{to}<{source}" for to, source in pairs[:_MOST_PAIRS]]
 

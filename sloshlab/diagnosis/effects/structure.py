@@ -105,6 +105,7 @@ STRIBECK = force_effect(
         }
         for share in (0.05, 0.2, 0.6)
     ],
+    bounds={"stribeck_velocity_m_per_s": (1e-3, 1e3)},
     look_alikes=("coulomb_friction",),
     separated_by="slow motion about the Stribeck velocity",
     spoken_for_by=("takes energy", "odd in velocity", "function of the state", "no onset", "third order"),

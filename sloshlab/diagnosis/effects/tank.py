@@ -95,9 +95,14 @@ EFFECTIVE = force_effect(
 FADING = force_effect(
     FADING_MASS,
     "tank",
-    lambda at: [{"beta": sign * 0.1, "fade_g": 0.4 * _largest_g(at)} for sign in (1, -1)],
+    lambda at: [
+        {"beta": sign * 0.1, "fade_g": 0.4 * _largest_g(at), "averaging_s": 2 / at.frequency_hz}
+        for sign in (1, -1)
+    ],
     fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
-    fitted=("beta", "fade_g"),
+    fitted=("beta", "fade_g", "averaging_s"),
+    bounds={"averaging_s": (0.05, 5.0)},
+    may_rest=("averaging_s",),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
     spoken_for_by=("does no work", "odd in displacement"),
     includes=("mass_error",),

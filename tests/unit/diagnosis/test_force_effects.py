@@ -154,7 +154,7 @@ MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
     "tank.mass_error": ({"mass_kg": -0.03}, lambda m: 0.03 * m["a"]),
     "tank.effective_mass": ({"beta": 0.3}, lambda m: -0.3 * LIQUID_KG * m["a"]),
     "tank.fading_mass": (
-        {"beta": 0.3, "fade_g": 2.5},
+        {"beta": 0.3, "fade_g": 2.5, "averaging_s": 0.2},
         lambda m: -0.3 * LIQUID_KG * m["a"] / (1 + (level_g(m, start=0.0) / 2.5) ** 2),
     ),
     "tank.liquid_loss": ({"rate_kg_per_s": 0.01}, lambda m: 0.01 * m["t"] * m["a"]),

@@ -1,0 +1,50 @@
+"""The ceiling: what any force could explain, alone and beside the best explanation with a name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sloshlab.diagnosis.candidate import Candidate, Surroundings
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.force_surface import surface_effect
+from sloshlab.diagnosis.free_run_fit import STAGES, fitted
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
+from sloshlab.diagnosis.search.fits import Fits, cheapest
+
+
+def ceilings(fits: Fits, at: Surroundings, known: Sequence[Explanation], retuned: FreeRunFit) -> list[Explanation]:
+    """The retuned baseline, and the best explanation, each with any force; none where all is explained.
+
+    Parameters
+    ----------
+    fits : Fits
+    at : Surroundings
+    known : sequence of Explanation
+    retuned : FreeRunFit
+    """
+    best = cheapest(known)
+    if best is None:
+        return _with_any_force(fits, at, retuned)
+    if fits.problem_of(best.fit).is_down_to_noise(best.fit):
+        return []
+    alone = _with_any_force(fits, at, retuned)
+    helpful = [one.fit.candidates[-1].effect.block for one in sorted(alone, key=lambda one: one.fit.cost)]
+    return [*alone, *_with_any_force(fits, at, best.fit, helpful[:1])]
+
+
+def _with_any_force(
+    fits: Fits, at: Surroundings, base: FreeRunFit, blocks: Sequence[str] = ("structure", "tank")
+) -> list[Explanation]:
+    found = []
+    for i, block in enumerate(blocks):
+        effect = surface_effect(block)
+        if block not in at.blocks or not effect.needs(at):
+            continue
+        fits.told("finding what any force could explain", i, len(blocks))
+        candidate = Candidate(effect, at)
+        problem = fits.problem((*base.candidates, candidate))
+        start = {**base.values, **candidate.starts()[0]}
+        fit, _ = fitted(problem, start, n_iterations=3, shares=(STAGES[1], 0.0))
+        if not fit.trouble:
+            found.append(fits.judged(fit))
+    return found

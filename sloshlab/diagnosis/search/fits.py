@@ -1,0 +1,116 @@
+"""What all fits of one search share: the runs, how a fit is judged on runs that chose nothing, what failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.free_run_fit import fitted
+from sloshlab.diagnosis.free_run_problem import (
+    FreeRunFit,
+    FreeRunProblem,
+    huber_cost,
+    mean_squares,
+    mean_squares_of_runs,
+    rms_without_bursts,
+    run_of,
+)
+from sloshlab.diagnosis.observations import Observation
+
+Told = Callable[[str, int, int], None]
+
+
+class Fits:
+    """Fits of one search.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    fitting, held_out : list of list of Observation
+        Runs that are fitted, and runs that choose nothing.
+    told : callable
+        Takes what is being done, how much of it is done, and how much there is.
+
+    Attributes
+    ----------
+    failed : dict
+        Candidates that could not be fitted, and why.
+    screened : dict
+        Candidates that promised too little, and how much.
+    """
+
+    def __init__(
+        self,
+        model: DiagnosedModel,
+        fitting: list[list[Observation]],
+        held_out: list[list[Observation]],
+        told: Told,
+    ) -> None:
+        self.model, self.fitting, self.held_out, self.told = model, fitting, held_out, told
+        self.failed: dict[str, str] = {}
+        self.screened: dict[str, float] = {}
+
+    def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
+        """The fitted runs with some effects."""
+        return FreeRunProblem(self.model, self.fitting, candidates)
+
+    def problem_of(self, fit: FreeRunFit) -> FreeRunProblem:
+        """The fitted runs with the effects of a fit."""
+        return self.problem(fit.candidates)
+
+    def judged(self, fit: FreeRunFit) -> Explanation:
+        """A fit with its held-out residuals; only releases and offsets of those runs are fitted to them."""
+        shared = {name: value for name, value in fit.values.items() if not run_of(name, self.model)}
+        problem = _WithEffects(self.model, self.held_out, fit.candidates, shared)
+        theta = problem.theta_of(fit.values)
+        if theta.size:
+            own, _ = fitted(problem, problem.values(theta), n_iterations=3)
+            theta = problem.theta_of(own.values)
+        residual = problem.residual(theta)
+        if not np.isfinite(residual).all():
+            return Explanation(fit, np.inf, np.inf)
+        observed = [one for run in problem.runs for one in run]
+        informative = np.concatenate([one.informative.ravel() for one in observed])
+        chosen = residual[informative] if informative.any() else residual
+        rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
+        fitted_to = self.problem_of(fit)
+        at_fit = fitted_to.residual(fitted_to.theta_of(fit.values))
+        by_run = mean_squares_of_runs([one for run in fitted_to.runs for one in run], at_fit)
+        by_run |= mean_squares_of_runs(observed, residual)
+        quieter = rms_without_bursts(observed, residual)
+        return Explanation(fit, huber_cost(residual), rms, mean_squares(observed, residual), by_run, quieter)
+
+    def is_strained(self, fit: FreeRunFit) -> bool:
+        """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""
+        problem = self.problem_of(fit)
+        return bool(problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline].any())
+
+    def eased(self, fit: FreeRunFit) -> dict[str, float]:
+        """Its numbers, those at bounds of the baseline as believed: an effect may take their place."""
+        problem = self.problem_of(fit)
+        at_bounds = problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline]
+        strained = [name for name, is_at in zip(problem.names, at_bounds, strict=False) if is_at]
+        return {**fit.values, **{name: self.model.believed[name] for name in strained}}
+
+
+def cheapest(explanations: Sequence[Explanation]) -> Explanation | None:
+    """The one with the lowest cost on the fitted runs; None of none."""
+    return min(explanations, key=lambda one: one.fit.cost, default=None)
+
+
+class _WithEffects(FreeRunProblem):
+    """Effects whose numbers are fixed; only what belongs to single runs is free."""
+
+    def __init__(
+        self,
+        model: DiagnosedModel,
+        runs: Sequence[Sequence[Observation]],
+        effects_: Sequence[Candidate],
+        fixed: dict[str, float],
+    ) -> None:
+        super().__init__(model, runs, (), fixed)
+        self.candidates = tuple(effects_)

@@ -1,0 +1,154 @@
+"""Effects in the place of one that was found: look-alikes, the general form of it, and its special cases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from sloshlab.diagnosis.candidate import Candidate, Surroundings
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest, soft_cost
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
+from sloshlab.diagnosis.search.fits import Fits, cheapest
+from sloshlab.diagnosis.search.start_numbers import as_its_general_form, as_its_special_case, of_many_sizes
+
+LEAST_TO_BUILD_ON: Final = 24.0
+"""Decrease of the cost by one effect, below which nobody looks for its look-alikes or a second one."""
+_SOFT: Final = 0.03
+_MOST_LOOK_ALIKES: Final = 4
+Limits = Mapping[str, tuple[float, float]]
+
+
+class InPlace:
+    """Fits of other effects in the place of one.
+
+    Parameters
+    ----------
+    fits : Fits
+    """
+
+    def __init__(self, fits: Fits) -> None:
+        self.fits = fits
+
+    def look_alikes(
+        self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
+    ) -> list[Explanation]:
+        """Effects that the same recordings may show as the best one, in its place."""
+        best = cheapest(kept)
+        if best is None or base.candidates or base.cost - best.fit.cost < LEAST_TO_BUILD_ON:
+            return []
+        before, after = (soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (base, best.fit))
+        special, fitted_already = best.fit.candidates[-1], {one.keys[-1] for one in kept}
+        nearest_of: dict[str, tuple[float, FreeRunProblem, dict[str, float]]] = {}
+        for candidate in pool:
+            if candidate.key in fitted_already or not _look_alike(candidate, special):
+                continue
+            self.fits.told(f"{what}: {candidate.key} in place of {special.effect.name}", 0, 1)
+            problem = self.fits.problem((*base.candidates, candidate))
+            softness = problem.softness(_SOFT)
+            sizes = of_many_sizes(candidate.starts())
+            starts = [{**at, **one} for at in (best.fit.values, self.fits.eased(base)) for one in sizes]
+            costs = [huber_cost(softness * problem.residual(problem.theta_of(start))) for start in starts]
+            name = f"{candidate.effect.block}.{candidate.effect.name}"
+            if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
+                nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
+        found = []
+        for _, problem, start in sorted(nearest_of.values(), key=lambda one: one[0])[:_MOST_LOOK_ALIKES]:
+            fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
+            if not fit.trouble:
+                found.append(self.fits.judged(fit))
+        return found
+
+    def generalised(
+        self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
+    ) -> list[Explanation]:
+        """Effects of which the best one is a special case, from there: they cannot be worse."""
+        best = cheapest(kept)
+        if best is None:
+            return []
+        last = best.fit.candidates[-1]
+        specials = [one for one in kept if one is best or _is_special_case(one.fit.candidates[-1], last)]
+        found = []
+        for special in {one.keys[-1]: one for one in sorted(specials, key=lambda one: -one.fit.cost)}.values():
+            found += self._more_general(base, special, pool, {one.keys[-1] for one in specials}, what)
+        return found
+
+    def _more_general(
+        self,
+        base: FreeRunFit,
+        best: Explanation,
+        pool: Sequence[Candidate],
+        known: Collection[str],
+        what: str,
+    ) -> list[Explanation]:
+        special, is_done = best.fit.candidates[-1], self.fits.problem_of(best.fit).is_down_to_noise(best.fit)
+        found = []
+        for candidate in pool:
+            if not _is_special_case(special, candidate):
+                continue
+            self.fits.told(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
+            problem = self.fits.problem((*base.candidates, candidate))
+            found += self._differing(problem, candidate, special, best.fit)
+            if is_done or candidate.key in known:
+                continue
+            starts = [{**best.fit.values, **one} for one in as_its_special_case(candidate, special, best.fit)]
+            costs = [huber_cost(problem.residual(problem.theta_of(start))) for start in starts]
+            fit, _ = fitted(problem, starts[int(np.argmin(costs))], n_iterations=6, shares=STAGES[-2:])
+            if not fit.trouble:
+                found.append(self.fits.judged(fit))
+        return found
+
+    def _differing(
+        self, problem: FreeRunProblem, candidate: Candidate, special: Candidate, fit: FreeRunFit
+    ) -> list[Explanation]:
+        """A general effect where it clearly is not its special case."""
+        if len(special.effect.parameters) > 1:
+            return []
+        size = fit.values[f"{special.key}.{special.effect.parameters[0].name}"]
+        found = []
+        for limits in candidate.effect.differs(size):
+            bounded = replace(candidate, effect=replace(candidate.effect, limits=_always(limits)))
+            start = {f"{candidate.key}.{name}": 0.5 * (low + high) for name, (low, high) in limits.items()}
+            within = self.fits.problem((*problem.candidates[:-1], bounded))
+            one, _ = fitted(within, {**fit.values, **start}, n_iterations=4, shares=STAGES[-2:])
+            if not one.trouble:
+                found.append(self.fits.judged(replace(one, candidates=(*problem.candidates[:-1], candidate))))
+        return found
+
+    def specialised(
+        self, wider: Explanation, known: Sequence[Explanation], pool: Sequence[Candidate]
+    ) -> list[Explanation]:
+        """Special cases in place of the effects of an explanation that were not tried with the others."""
+        tried = {frozenset(one.keys) for one in known}
+        found = []
+        for general in wider.fit.candidates:
+            others = [one for one in wider.fit.candidates if one is not general]
+            for special in pool:
+                if (
+                    not _is_special_case(special, general)
+                    or frozenset((special.key, *(one.key for one in others))) in tried
+                ):
+                    continue
+                self.fits.told(f"polishing {special.key} in place of {general.effect.name}", 0, 1)
+                problem = self.fits.problem((*others, special))
+                sizes = as_its_general_form(special, general, wider.fit)
+                start = nearest(problem, [{**wider.fit.values, **one} for one in sizes], _SOFT)
+                fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-2:])
+                if not fit.trouble:
+                    found.append(self.fits.judged(fit))
+        return found
+
+
+def _always(limits: Limits) -> Callable[[Surroundings], Limits]:
+    return lambda surroundings: limits
+
+
+def _is_special_case(special: Candidate, general: Candidate) -> bool:
+    return general.effect.block == special.effect.block and special.effect.known_as in general.effect.includes
+
+
+def _look_alike(one: Candidate, other: Candidate) -> bool:
+    return one.effect.known_as in other.effect.look_alikes or other.effect.known_as in one.effect.look_alikes

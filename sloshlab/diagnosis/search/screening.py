@@ -1,0 +1,168 @@
+"""Which candidates are worth a fit, and where it starts: first looks, and the force that is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.block_jacobian import BlockJacobian
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.first_look import FirstLook
+from sloshlab.diagnosis.force_starts import ForceStarts
+from sloshlab.diagnosis.free_run_fit import Start, nearest
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, extension_of
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.search.fits import Fits
+from sloshlab.diagnosis.search.start_numbers import resized, with_smaller_ones
+
+FloatArray = NDArray[np.float64]
+_LEAST_PREDICTED: Final = 8.0
+_MOST_FITTED: Final = 9
+_MOST_BESIDE: Final = 6
+"""Candidates that are fitted from a first look, as a first effect and as a second one."""
+_MOST_STARTS: Final = 2
+_LEAST_SHARE_OF_PROMISE: Final = 0.02
+_MOST_BY_FORCE: Final = 2
+_ALIKE: Final = 0.85
+"""Share of the missing force that an effect's own may leave, to be like it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """A start, with its only number as large as a first step says, and what that step gains in each look."""
+
+    gains: FloatArray
+    start: dict[str, float]
+    resized: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """What is known of a candidate before it is fitted.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    starts : list of Start
+    gains : ndarray, shape (n_looks,)
+        Decreases of the cost that first looks promise.
+    share_left : float
+        Of the missing force that its own leaves; one where that is not known.
+    """
+
+    candidate: Candidate
+    starts: list[Start]
+    gains: FloatArray
+    share_left: float
+
+    @property
+    def is_like_the_force(self) -> bool:
+        """Whether it is to be fitted whatever first looks promise."""
+        return self.share_left < _ALIKE
+
+
+class Screening:
+    """Candidates by what they promise beside a fit.
+
+    Parameters
+    ----------
+    fits : Fits
+    """
+
+    def __init__(self, fits: Fits) -> None:
+        self.fits = fits
+
+    def chosen(
+        self,
+        base: FreeRunFit,
+        jacobian: BlockJacobian,
+        pool: Sequence[Candidate],
+        what: str,
+        shares: Sequence[float],
+        *,
+        is_near: bool,
+    ) -> list[Promise]:
+        """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from."""
+        problem = self.fits.problem(base.candidates)
+        theta = problem.theta_of(base.values)
+        residual = problem.residual(theta)
+        forces = self._force_starts(base)
+        looks_at = [
+            FirstLook(problem, theta, residual, jacobian, share)
+            for share in dict.fromkeys((shares[min(1, len(shares) - 1)], shares[-1]))
+        ]
+        promised = []
+        for i, candidate in enumerate(pool):
+            self.fits.told(f"{what}: first look", i, len(pool))
+            if candidate.key in [one.key for one in base.candidates]:
+                continue
+            by_force = None if forces is None else forces.of(candidate)
+            extended = self.fits.problem((*base.candidates, candidate))
+            looks = []
+            for start in [*with_smaller_ones(candidate.starts()), *([by_force.numbers] if by_force else [])]:
+                moved = extended.residual(extended.theta_of({**base.values, **start}))
+                if np.isfinite(moved).all():
+                    gains = [look.gain(moved - residual) for look in looks_at]
+                    looks.append(
+                        _Look(np.array([gain for gain, _ in gains]), start, resized(start, max(gains)[1]))
+                    )
+            if not looks:
+                self.fits.failed[candidate.key] = "does not run from any start"
+                continue
+            looks.sort(key=lambda one: -float(one.gains.max()))
+            like = by_force.numbers if by_force else None
+            if is_near:
+                sets = [*([like] if like else []), *(look.resized for look in looks)]
+                starts = [Start({**base.values, **one}, is_near=True) for one in sets[:_MOST_STARTS]]
+            else:
+                starts = self._from_afar(base, extended, looks, like, shares[0])
+            gains_of = np.max([look.gains for look in looks], axis=0)
+            promised.append(Promise(candidate, starts, gains_of, by_force.share_left if by_force else 1.0))
+        return self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
+
+    def _from_afar(
+        self,
+        base: FreeRunFit,
+        problem: FreeRunProblem,
+        looks: Sequence[_Look],
+        like_the_force: dict[str, float] | None,
+        share: float,
+    ) -> list[Start]:
+        """A start with the baseline as believed and one with its numbers in a fit, each the nearest of several."""
+        believed = base.values if base.candidates else self.fits.model.believed
+        far = [{**believed, **look.start} for look in looks[:_MOST_STARTS]]
+        places = [base.values, *([self.fits.eased(base)] if self.fits.is_strained(base) else [])]
+        sets = [looks[0].resized, *([like_the_force] if like_the_force else [])]
+        close = [{**place, **one} for place in places for one in sets]
+        return [
+            Start(nearest(problem, far, share), is_near=bool(base.candidates)),
+            Start(nearest(problem, close, share), is_near=True),
+        ]
+
+    def _force_starts(self, base: FreeRunFit) -> ForceStarts | None:
+        """Of what a fit lacks; None for a twin of a user's own, of which the missing force is not known."""
+        if not isinstance(self.fits.model, RigModel):
+            return None
+        return ForceStarts(
+            self.fits.model, self.fits.fitting, base.values, extension_of(base.candidates, base.values)
+        )
+
+    def _best(self, promised: Sequence[Promise], most: int) -> list[Promise]:
+        """The candidates that promise most, in a soft look or in a hard one, or by their force."""
+        if not promised:
+            return []
+        top = np.maximum(np.max([one.gains for one in promised], axis=0), _LEAST_PREDICTED)
+        by_force = sorted(promised, key=lambda one: one.share_left)[:_MOST_BY_FORCE]
+        chosen = []
+        for rank, one in enumerate(sorted(promised, key=lambda one: -float(np.max(one.gains / top)))):
+            is_little = one.gains.max() < _LEAST_PREDICTED
+            is_little = is_little or float(np.max(one.gains / top)) < _LEAST_SHARE_OF_PROMISE
+            if (is_little or rank >= most) and not (one in by_force and one.is_like_the_force):
+                self.fits.screened[one.candidate.key] = float(one.gains.max())
+            else:
+                chosen.append(one)
+        return chosen

@@ -1,0 +1,103 @@
+"""From a case to fitted explanations, each judged on runs that chose nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, candidates
+from sloshlab.diagnosis.case import Case
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.free_run_fit import fitted_baseline
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, huber_cost
+from sloshlab.diagnosis.noise_floor import weighted_observations
+from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.search.any_force import ceilings
+from sloshlab.diagnosis.search.fits import Fits, Told, cheapest
+from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON
+from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
+from sloshlab.diagnosis.search.refinement import Refinement
+from sloshlab.diagnosis.split import split
+from sloshlab.diagnosis.surroundings import surroundings_of
+from sloshlab.errors import InputError
+
+assert effects.__all__  # importing the vocabulary makes it known
+
+
+def findings_of(
+    case: Case, told: Told = lambda what, done, of: None, model: DiagnosedModel | None = None
+) -> Findings:
+    """Retune, fit every candidate, add greedily, and find the ceiling.
+
+    Parameters
+    ----------
+    case : Case
+    told : callable, optional
+        Takes what is being done, how much of it is done, and how much there is.
+    model : DiagnosedModel, optional
+        A user's own twin of the same runs; that of the rig file by default.
+    """
+    require_one_rig(case)
+    if model is None:
+        if case.rig is None:
+            raise InputError(f"case {case.name}", got="neither a rig nor a twin", allowed="one of them")
+        model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs))
+    require_comparable(case, model)
+    parts = split(case)
+    told("retuning the baseline", 0, 1)
+    weighted = weighted_observations(case, model)
+    fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
+    held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]]
+    fits = Fits(model, fitting, held_out, told)
+    problem = fits.problem()
+    believed_values = problem.values(problem.theta_of(model.believed))
+    at_believed = huber_cost(problem.residual(problem.theta_of(believed_values)))
+    believed = fits.judged(FreeRunFit((), believed_values, at_believed, at_believed))
+    retuned_fit, jacobian = fitted_baseline(problem)
+    retuned = fits.judged(retuned_fit)
+    surroundings = surroundings_of(problem, retuned_fit, case.rig)
+    pool = candidates(surroundings)
+    found = OneMoreEffect(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
+    found += _second_effects(fits, found, retuned_fit, pool)
+    refinement = Refinement(fits)
+    found += refinement.polished(found, pool)
+    retuned = refinement.retuned_from(found, retuned)
+    return Findings(
+        case,
+        model,
+        parts,
+        surroundings,
+        fitting,
+        held_out,
+        believed,
+        retuned,
+        found,
+        ceilings(fits, surroundings, found, retuned_fit),
+        fits.failed,
+        fits.screened,
+    )
+
+
+def _second_effects(
+    fits: Fits, known: Sequence[Explanation], retuned: FreeRunFit, pool: Sequence[Candidate]
+) -> list[Explanation]:
+    """Pairs of the best first effect and another, and what is left of the best pair without either."""
+    best = cheapest(known)
+    if best is None or retuned.cost - best.fit.cost < LEAST_TO_BUILD_ON:
+        return []
+    problem = fits.problem_of(best.fit)
+    if problem.is_down_to_noise(best.fit):
+        return []
+    theta = problem.theta_of(best.fit.values)
+    jacobian = problem.jacobian(theta, problem.residual(theta), range(theta.size))
+    more = OneMoreEffect(fits)
+    pairs = more.fitted(best.fit, jacobian, pool, "fitting a second effect")
+    alone = Refinement(fits).take_away([one for one in pairs if one.keys[:-1] == best.keys])
+    cost = min((one.fit.cost for one in alone), default=best.fit.cost)
+    if cost < best.fit.cost:
+        alone += more.in_place.look_alikes(retuned, alone, pool, "fitting one effect")
+        alone += more.in_place.generalised(retuned, alone, pool, "fitting one effect")
+    return [*pairs, *alone]
