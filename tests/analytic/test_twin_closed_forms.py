@@ -194,6 +194,32 @@ def test_a_missing_mode_makes_two_degrees_of_freedom() -> None:
     np.testing.assert_allclose(result.memory[at, 0], [x[1] for x in expected], atol=1e-9)
 
 
+def test_a_base_moves_the_mass_of_a_missing_mode_too() -> None:
+    """Steady state of two masses in series on a moving base, in absolute motion."""
+    f, zeta, mass, drive_hz, amplitude = 9.0, 0.05, 0.3, 8.0, 1e-3
+    k, c, c0 = mass * (2 * np.pi * f) ** 2, 2 * zeta * mass * 2 * np.pi * f, 30.0
+    n_cycles, per_cycle = 60, 200
+    result = (
+        rig(c0)
+        .with_term(MISSING_MODE(frequency_hz=f, damping_ratio=zeta, participation=mass))
+        .simulate(harmonic(amplitude, drive_hz, n_cycles / drive_hz, per_cycle * drive_hz))
+    )
+    s = 2j * np.pi * drive_hz
+    own, tied = K + c0 * s, k + c * s
+    dynamic = np.array([[M * s**2 + own + tied, -tied], [-tied, mass * s**2 + tied]])
+    absolute = np.linalg.solve(dynamic, [own, 0.0])[0]
+    last = slice(-10 * per_cycle, None)
+    turned = np.exp(-s * result.time_s[last])
+    base, moved = (
+        np.mean(series * turned)
+        for series in (
+            result.base_motion[last, 0] - result.base_motion[last, 0].mean(),
+            result.displacement_m[last],
+        )
+    )
+    assert moved / base == pytest.approx(absolute, rel=1e-6)
+
+
 def test_stribeck_friction_holds_with_its_static_force_and_slides_with_its_curve() -> None:
     """Held below F_s/K; beyond, energy is lost to F(v) as the curve says, here by quadrature over each sample."""
     kinetic, static, v_s = 0.3, 0.9, 0.05
