@@ -120,6 +120,8 @@ class Screening:
                 starts = [Start({**base.values, **one}, is_near=True) for one in sets[:_MOST_STARTS]]
             else:
                 starts = self._from_afar(base, extended, looks, like, shares[0])
+                if by_force and by_force.share_left < _ALIKE:
+                    starts.append(Start({**base.values, **by_force.numbers}, is_near=True))
             gains_of = np.max([look.gains for look in looks], axis=0)
             promised.append(Promise(candidate, starts, gains_of, by_force.share_left if by_force else 1.0))
         return self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
