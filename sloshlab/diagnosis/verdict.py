@@ -14,6 +14,7 @@ import numpy as np
 
 from sloshlab.diagnosis.candidate import Candidate, channels_of, known_effects
 from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.force_surface import surface_effect
 from sloshlab.diagnosis.mismatch import mismatches, summary
 from sloshlab.diagnosis.units import named_and_units
 
@@ -29,6 +30,7 @@ LEAST_STRENGTH: Final = 0.5
 
 Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
 """
+_FITTED_WITHOUT_NAME: Final = 2.0
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LARGEST_REMAINDER: Final = 1.25
@@ -141,6 +143,8 @@ class _Scale:
     Attributes
     ----------
     fitting, held_out : float
+    judged : frozenset of str
+        Names of the held-out runs.
     per_number : float
         What a number more must gain (Schwarz 1978, doi:10.1214/aos/1176344136).
     """
@@ -148,6 +152,7 @@ class _Scale:
     fitting: float
     held_out: float
     per_number: float
+    judged: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, found: Findings) -> _Scale:
@@ -155,7 +160,8 @@ class _Scale:
         fitting = min(one.fit.misfit for one in described) / max(found.n_fitting, 1)
         held_out = min(one.held_out for one in described) / max(found.n_held_out, 1)
         n = max(found.n_fitting + found.n_held_out, 2)
-        return cls(2.0 * max(1.0, fitting), 2.0 * max(1.0, held_out), 0.5 * float(np.log(n)))
+        judged = frozenset(run.name for run in found.split.held_out)
+        return cls(2.0 * max(1.0, fitting), 2.0 * max(1.0, held_out), 0.5 * float(np.log(n)), judged)
 
     def fit_gain(self, before: Explanation, after: Explanation) -> float:
         """Of the cost on the runs that are fitted."""
@@ -199,8 +205,21 @@ def _is_clearly_better(more: Explanation, less: Explanation, scale: _Scale) -> b
 
 
 def _shows_more(more: Explanation, less: Explanation, scale: _Scale) -> bool:
-    """The same, with a size that is worth speaking of in any channel of any run, fitted ones too."""
-    return _gains(more, less, scale) and _largest_strength(less.by_run, more.by_run) >= LEAST_STRENGTH
+    """The same, with a size that is worth speaking of in any channel of any run, fitted ones too.
+
+    What has no name has two dozen numbers: from a run that it was fitted to it must remove twice as much.
+    """
+    if not _gains(more, less, scale):
+        return False
+    nameless = {surface_effect(block).name for block in ("structure", "tank")}
+    has_names = nameless.isdisjoint(one.effect.name for one in more.fit.candidates)
+    of_fitted = 1.0 if has_names else _FITTED_WITHOUT_NAME
+    judged = {place: left for place, left in more.by_run.items() if place[0] in scale.judged}
+    fitted = {place: left for place, left in more.by_run.items() if place[0] not in scale.judged}
+    return (
+        _largest_strength(less.by_run, judged) >= LEAST_STRENGTH
+        or _largest_strength(less.by_run, fitted) >= of_fitted * LEAST_STRENGTH
+    )
 
 
 def _gains(more: Explanation, less: Explanation, scale: _Scale) -> bool:

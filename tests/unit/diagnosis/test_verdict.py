@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.stats import norm
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings
-from sloshlab.diagnosis.case import Case
+from sloshlab.diagnosis.case import Case, CaseRun
 from sloshlab.diagnosis.examination import Examination, examination_facts
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.force_surface import surface_effect
@@ -89,6 +90,9 @@ def candidates_of(values: Mapping[str, float]) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
+SPLIT = Split((), (cast(CaseRun, SimpleNamespace(name="run_2")),), ())
+
+
 def left(
     fitted: float,
     held_out: float,
@@ -96,13 +100,14 @@ def left(
     *,
     squares: float | None = None,
     in_one_run: float | None = None,
+    in_fitted_run: float | None = None,
     rms: float = NOISE,
     surface: str = "",
 ) -> Explanation:
     """What leaves so much log-likelihood of the fitted and of the held-out runs unexplained.
 
     `squares` is the mean square of the one channel, ten for the baseline, one for the rest; `in_one_run` that of
-    one run where it differs.
+    the held-out run where it differs, `in_fitted_run` that of the fitted one.
     """
     candidates = (Candidate(surface_effect(surface), AT),) if surface else ()
     candidates += candidates_of(values or {})
@@ -112,7 +117,10 @@ def left(
         candidates, dict(values or {}), cost, cost, 1e-4 * np.eye(len(names)), names, np.ones(len(names))
     )
     squares = squares if squares is not None else NOISE if candidates else 10.0
-    by_run = {("run_1", TIP): squares, ("run_2", TIP): squares if in_one_run is None else in_one_run}
+    by_run = {
+        ("run_1", TIP): squares if in_fitted_run is None else in_fitted_run,
+        ("run_2", TIP): squares if in_one_run is None else in_one_run,
+    }
     return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run, rms)
 
 
@@ -125,7 +133,7 @@ def findings(
     repeats: bool = False,
 ) -> Findings:
     return HandMade(
-        cast(Case, None), cast(Any, None), Split((), (), ()), at, [], [],
+        cast(Case, None), cast(Any, None), SPLIT, at, [], [],
         left(9e4, 9e4), retuned, list(explanations), list(ceilings), dict(failed or {}), {}, repeats,
     )  # fmt: skip
 
@@ -310,6 +318,10 @@ def test_a_rival_of_two_directions_is_given_up_where_friction_of_one_is_clearly_
         pytest.param(left(40.0, 40.0, FRICTION, squares=1.2), "named", id="by too little to speak of"),
         pytest.param(left(40.0, 40.0, FRICTION, in_one_run=1.26), "unknown", id="clearly in one run"),
         pytest.param(left(40.0, 40.0, FRICTION, in_one_run=1.24), "named", id="in one run by too little"),
+        pytest.param(left(40.0, 40.0, FRICTION, in_fitted_run=2.1), "unknown", id="clearly in a fitted run"),
+        pytest.param(
+            left(40.0, 40.0, FRICTION, in_fitted_run=1.9), "named", id="in a fitted run by too little"
+        ),
         pytest.param(left(11.0, 40.0, FRICTION, squares=1.5), "named", id="on held-out runs alone"),
         pytest.param(left(40.0, 11.0, FRICTION, squares=1.5), "named", id="on fitted runs alone"),
         pytest.param(left(5.0, 5.0, FRICTION, rms=1.14), "named", id="within fifteen per cent"),
