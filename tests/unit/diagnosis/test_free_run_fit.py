@@ -269,3 +269,21 @@ def test_parameters_stay_within_their_bounds(tmp_path: Path) -> None:
     )
     fit = fit_of(problem)
     assert fit.values["structure.viscous_damping.damping_n_s_per_m"] == 0.0
+
+
+@pytest.mark.parametrize("place", ["acceleration_tip", "displacement_tank"])
+def test_what_one_channel_or_run_alone_shows_is_as_if_all_were_simulated(tmp_path: Path, place: str) -> None:
+    runs = decays(duration_s=1.5)
+    model = RigModel(rig(tmp_path), tmp_path, runs)
+    gain = Candidate(effect("sensor.sensor_gain"), surroundings(model), place)
+    problem = FreeRunProblem(model, [observations(run, model.compared(run)) for run in runs], [gain])
+    theta = problem.theta_of({f"{gain.key}.ratio": 0.02})
+    at = problem.residual(theta)
+    touched = 0
+    for column, name in enumerate(problem.names):
+        moved = theta.copy()
+        moved[column] += 0.3
+        found = problem._residual_moved(moved, column, at)
+        np.testing.assert_array_equal(found, problem.residual(moved), err_msg=name)
+        touched += int(0 < np.count_nonzero(found != at) < at.size)
+    assert touched >= 5  # two gains, two releases and this one

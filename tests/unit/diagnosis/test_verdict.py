@@ -319,9 +319,7 @@ def test_a_rival_of_two_directions_is_given_up_where_friction_of_one_is_clearly_
         pytest.param(left(40.0, 40.0, FRICTION, in_one_run=1.26), "unknown", id="clearly in one run"),
         pytest.param(left(40.0, 40.0, FRICTION, in_one_run=1.24), "named", id="in one run by too little"),
         pytest.param(left(40.0, 40.0, FRICTION, in_fitted_run=2.1), "unknown", id="clearly in a fitted run"),
-        pytest.param(
-            left(40.0, 40.0, FRICTION, in_fitted_run=1.9), "named", id="in a fitted run by too little"
-        ),
+        pytest.param(left(40.0, 40.0, FRICTION, in_fitted_run=1.9), "named", id="in a fitted run by too little"),
         pytest.param(left(11.0, 40.0, FRICTION, squares=1.5), "named", id="on held-out runs alone"),
         pytest.param(left(40.0, 11.0, FRICTION, squares=1.5), "named", id="on fitted runs alone"),
         pytest.param(left(5.0, 5.0, FRICTION, rms=1.14), "named", id="within fifteen per cent"),

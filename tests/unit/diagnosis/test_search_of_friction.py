@@ -1,0 +1,146 @@
+"""What the search does with explanations, on decays under dry friction that scipy made: 0.3 N up, 0.1 N down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from recorded_oscillators import decays, effect, rig, surroundings
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.free_run_fit import fitted
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
+from sloshlab.diagnosis.observations import observations
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.search.fits import Fits, cheapest
+from sloshlab.diagnosis.search.in_place import InPlace
+from sloshlab.diagnosis.search.refinement import Refinement
+from sloshlab.diagnosis.search.screening import Screening
+
+assert effects.__all__
+UP_N, DOWN_N = 0.3, 0.1
+COULOMB, ASYMMETRIC, STRIBECK, CUBIC = (
+    f"structure.{name}"
+    for name in ("coulomb_friction", "asymmetric_friction", "stribeck_friction", "cubic_stiffness")
+)
+COULOMB_N = f"{COULOMB}.force_n"
+
+
+class Decays:
+    """Two fitted decays and one that chooses nothing."""
+
+    def __init__(self, folder: Path) -> None:
+        runs = decays((0.006, 0.014, 0.01), duration_s=3.0, friction_n=(UP_N, DOWN_N))
+        model = RigModel(rig(folder), folder, runs)
+        observed = [observations(run, model.compared(run)) for run in runs]
+        self.fits = Fits(model, observed[:2], observed[2:], lambda what, done, of: None)
+        self.believed = model.believed
+        at = surroundings(model)
+        self.pool = {key: Candidate(effect(key), at) for key in (COULOMB, ASYMMETRIC, STRIBECK, CUBIC)}
+        self.baseline = fitted(self.fits.problem(), self.believed, n_iterations=6)[0]
+
+    def fit(self, *keys: str, n_iterations: int = 4, **numbers: float) -> Explanation:
+        candidates = [self.pool[key] for key in keys]
+        start = {**self.believed, **{name: value for one in candidates for name, value in one.starts()[0].items()}}
+        fit, _ = fitted(self.fits.problem(candidates), {**start, **numbers}, n_iterations=n_iterations)
+        return self.fits.judged(fit)
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> Decays:
+    return Decays(tmp_path_factory.mktemp("friction"))
+
+
+@pytest.fixture(scope="module")
+def coulomb(case: Decays) -> Explanation:
+    return case.fit(COULOMB)
+
+
+def test_friction_of_one_direction_is_fitted_from_that_of_both(case: Decays, coulomb: Explanation) -> None:
+    found = InPlace(case.fits).generalised(case.baseline, [coulomb], list(case.pool.values()), "")
+    best = cheapest([one for one in found if one.keys == (ASYMMETRIC,)])
+    assert best is not None
+    assert best.fit.cost <= coulomb.fit.cost
+    up, down = (best.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
+    assert up + down == pytest.approx(UP_N + DOWN_N, rel=0.05)
+
+
+def test_it_is_fitted_where_it_clearly_differs_too(case: Decays, coulomb: Explanation) -> None:
+    found = InPlace(case.fits).generalised(case.baseline, [coulomb], list(case.pool.values()), "")
+    size = coulomb.fit.values[COULOMB_N]
+    sides = [
+        sorted(one.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
+        for one in found
+        if one.keys == (ASYMMETRIC,)
+    ]
+    assert sum(less <= 0.66 * size and more >= 1.34 * size for less, more in sides) >= 1
+
+
+def test_a_general_form_is_left_out_where_it_is_known(case: Decays, coulomb: Explanation) -> None:
+    """Only the forms that clearly differ are fitted again."""
+    wide = case.fit(ASYMMETRIC)
+    found = InPlace(case.fits).generalised(case.baseline, [coulomb, wide], list(case.pool.values()), "")
+    assert len([one for one in found if one.keys == (ASYMMETRIC,)]) <= 2
+
+
+def test_the_special_case_takes_the_place_of_the_general_form_once(case: Decays, coulomb: Explanation) -> None:
+    stribeck = case.fit(STRIBECK)
+    pool = list(case.pool.values())
+    found = InPlace(case.fits).specialised(stribeck, [stribeck], pool)
+    assert [one.keys for one in found] == [(COULOMB,)]
+    assert found[0].fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.02)
+    assert InPlace(case.fits).specialised(stribeck, [stribeck, coulomb], pool) == []
+
+
+def test_polishing_takes_a_fit_to_its_end(case: Decays) -> None:
+    begun = case.fit(COULOMB, n_iterations=1)
+    found = Refinement(case.fits).polished([begun], [])
+    best = cheapest(found)
+    assert best is not None
+    assert best.fit.cost < begun.fit.cost
+    assert best.fit.values[COULOMB_N] == pytest.approx((UP_N + DOWN_N) / 2, rel=0.05)
+
+
+def test_each_of_a_pair_is_fitted_alone(case: Decays) -> None:
+    pair = case.fit(COULOMB, CUBIC)
+    alone = Refinement(case.fits).take_away([pair])
+    assert [one.keys for one in alone] == [(COULOMB,), (CUBIC,)]
+    assert alone[0].fit.cost < alone[1].fit.cost
+    assert Refinement(case.fits).take_away([]) == []
+
+
+def test_the_baseline_is_retuned_from_an_explanation_and_never_worse(case: Decays, coulomb: Explanation) -> None:
+    numbers = {name: value for name, value in case.believed.items()}
+    poor = FreeRunFit((), numbers, 1e12, 1e12)
+    before = case.fits.judged(poor)
+    after = Refinement(case.fits).retuned_from([coulomb], before)
+    assert after.keys == ()
+    assert after.fit.cost <= 1.001 * case.baseline.cost
+    assert Refinement(case.fits).retuned_from([], before) is before
+
+
+def test_numbers_at_their_bounds_are_eased_to_what_is_believed(case: Decays) -> None:
+    problem = case.fits.problem()
+    values = {**case.believed, "damping of mode 1": 1.25, "frequency of mode 1": 1.003}
+    fit = FreeRunFit((), problem.values(problem.theta_of(values)), 0.0, 0.0)
+    assert case.fits.is_strained(fit)
+    eased = case.fits.eased(fit)
+    assert eased["damping of mode 1"] == case.believed["damping of mode 1"]
+    assert eased["frequency of mode 1"] == pytest.approx(1.003)
+    assert not case.fits.is_strained(FreeRunFit((), case.believed, 0.0, 0.0))
+
+
+def test_screening_keeps_what_explains_and_begins_it_near(case: Decays) -> None:
+    problem = case.fits.problem()
+    theta = problem.theta_of(case.baseline.values)
+    jacobian = problem.jacobian(theta, problem.residual(theta), range(theta.size))
+    promises = Screening(case.fits).chosen(
+        case.baseline, jacobian, list(case.pool.values()), "", (0.3, 0.1, 0.03, 0.01, 0.0), is_near=False
+    )
+    keys = [one.candidate.key for one in promises]
+    assert COULOMB in keys
+    for one in promises:
+        assert any(start.is_near for start in one.starts)
+        assert (one.gains > 0).any()
