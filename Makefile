@@ -11,7 +11,7 @@ ROM := $(RESULTS)/rom/ROM.nc
 BALLS :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures trial test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial test test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -59,6 +59,9 @@ tank-campaign: setup  ## compute the recordings of raw_data/numerical_tank again
 
 pictures: setup  ## the snapshots and the film of the numerical tank in docs/images again (minutes)
 	$(BIN)/python -m pipelines.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml
+
+tank-diagnosis: setup  ## what twins with simpler liquids leave out of the numerical tank's recordings (minutes)
+	$(BIN)/python -m pipelines.tank_diagnosis raw_data/numerical_tank $(RESULTS)/tank_diagnosis
 
 trial: setup  ## a blind trial, sealed, diagnosed and scored (hours; goes on where it was stopped)
 	test -f $(RESULTS)/trial/commitments.json || $(BIN)/sloshlab trial seal -o $(RESULTS)/trial --seed $(TRIAL_SEED) --key $(TRIAL_KEY)
