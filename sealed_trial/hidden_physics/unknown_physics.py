@@ -33,16 +33,6 @@ def pumped_stiffness(scales: Scales, generator: np.random.Generator) -> DrawnEff
     )
 
 
-def grip_with_displacement(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
-    """Friction that grips more the further the guide is pushed out."""
-    unit, slope = 0.001 * scales.force_n, generator.uniform(6.0, 12.0) / scales.displacement_m
-
-    def change(m: float) -> Change:
-        return Change({}, {at.FRICTION_UP: m * unit, at.FRICTION_DOWN: m * unit, at.FRICTION_SLOPE: slope})
-
-    return _unknown("structure", "friction that grows with the displacement", change)
-
-
 def fractional(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Damping of fractional order, stronger than any tolerance of viscous damping."""
     exponent = generator.uniform(0.35, 0.6)
@@ -119,7 +109,6 @@ def crooked_sensor(scales: Scales, generator: np.random.Generator) -> DrawnEffec
 
 UNKNOWN_PHYSICS: Final = (
     HiddenEffect("pumped_stiffness", "structure", pumped_stiffness, _CARRIED),
-    HiddenEffect("grip_with_displacement", "structure", grip_with_displacement, _CARRIED, True, is_friction=True),
     HiddenEffect("fractional", "structure", fractional, ("sdof",), needs_frequencies=True),
     HiddenEffect("damping_with_displacement", "structure", damping_with_displacement, _CARRIED, True),
     HiddenEffect("loosening", "structure", loosening, _CARRIED),

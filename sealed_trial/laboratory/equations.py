@@ -139,12 +139,12 @@ def tank_extra_mass(t, state, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def friction_limit(direction, x, v, p):  # type: ignore[no-untyped-def]
+def friction_limit(direction, v, p):  # type: ignore[no-untyped-def]
     """What friction can hold or pulls against motion in `direction` [N]."""
     limit = p[at.FRICTION_UP] if direction > 0 else p[at.FRICTION_DOWN]
     if p[at.FRICTION_STATIC_EXTRA] != 0.0:
         limit += p[at.FRICTION_STATIC_EXTRA] * math.exp(-((v / p[at.FRICTION_STRIBECK]) ** 2))
-    return limit * (1.0 + p[at.FRICTION_SLOPE] * abs(x))
+    return limit
 
 
 @njit(cache=True)

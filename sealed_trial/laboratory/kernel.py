@@ -47,7 +47,7 @@ def evaluate(t, y, rates, seen, conditions, system):  # type: ignore[no-untyped-
     if n == 0:
         if sliding != 0.0:
             direction = 1 if sliding > 0 else -1
-            friction = -direction * friction_limit(direction, 0.0, sliding, p)
+            friction = -direction * friction_limit(direction, sliding, p)
         tank[1] = base[2]
     else:
         direct, accelerations, answer = np.empty(n), np.empty(n), np.empty(n)
@@ -69,7 +69,7 @@ def evaluate(t, y, rates, seen, conditions, system):  # type: ignore[no-untyped-
         hold = (-at_tank * base[2] * heavier - freely) / mobility
         side = conditions[at.D_FRICTION]
         if p[at.FRICTION_UP] != 0.0 or p[at.FRICTION_DOWN] != 0.0:
-            friction = hold if side == 0 else -side * friction_limit(side, x, sliding, p)
+            friction = hold if side == 0 else -side * friction_limit(side, sliding, p)
         correction = friction - moved * (freely + friction * mobility) / heavier
         tank[1] = base[2] + freely + correction * mobility
         loss = 0.0
@@ -90,8 +90,8 @@ def evaluate(t, y, rates, seen, conditions, system):  # type: ignore[no-untyped-
     seen[at.O_RELATIVE_DISPLACEMENT] = x
     seen[at.O_RELATIVE_VELOCITY] = v
     seen[at.N_OUTPUTS] = hold
-    seen[at.N_OUTPUTS + 1] = friction_limit(1, x, 0.0, p)
-    seen[at.N_OUTPUTS + 2] = friction_limit(-1, x, 0.0, p)
+    seen[at.N_OUTPUTS + 1] = friction_limit(1, 0.0, p)
+    seen[at.N_OUTPUTS + 2] = friction_limit(-1, 0.0, p)
     seen[at.N_OUTPUTS + 3] = sliding
 
 

@@ -32,7 +32,6 @@ FRICTION_DOWN: Final = 18  # [N]
 FRICTION_STATIC_EXTRA: Final = 19  # F_s − F_c [N]
 FRICTION_STRIBECK: Final = 20  # v_s [m/s]; must not be zero
 FRICTION_AT_TANK: Final = 21  # 1: of the absolute velocity of the tank
-FRICTION_SLOPE: Final = 22  # relative growth per metre of |x|
 
 # tank: forces of the absolute velocity
 TANK_VISCOUS: Final = 23  # c [N s/m]

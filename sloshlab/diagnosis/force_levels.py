@@ -16,6 +16,8 @@ from sloshlab.diagnosis.latent_force import LatentForce
 
 FloatArray = NDArray[np.float64]
 _CYCLES: Final = 3
+_FEWEST_SAMPLES: Final = 8
+"""In a window; what turns faster is not sampled."""
 _N_DRAWS: Final = 120
 _LEAST_SPAN: Final = 1.6
 _LEAST_FREQUENCY_SPAN: Final = 1.25
@@ -74,13 +76,12 @@ def windows(parts: Sequence[Stretch], forces: Sequence[FloatArray], own_damping:
     """
     rows = []
     for number, (one, beyond) in enumerate(zip(parts, forces, strict=True)):
-        step = float(one.time_s[1] - one.time_s[0])
-        cycle = 2 * np.pi / float(np.median(one.omega)) / step
-        n = max(1, int(one.time_s.size // (_CYCLES * cycle)))
+        cycles = float(one.time_s[-1] - one.time_s[0]) * float(np.median(one.omega)) / (2 * np.pi)
+        n = int(min(max(1.0, cycles / _CYCLES), max(1, one.time_s.size // _FEWEST_SAMPLES)))
         for piece in np.array_split(np.arange(one.time_s.size), n):
             v, a, force = one.v[piece], one.a[piece], one.force_n[piece]
             rms_v, rms_a = float(np.sqrt(np.mean(v**2))), float(np.sqrt(np.mean(a**2)))
-            omega = rms_a / max(rms_v, 1e-300)
+            omega = max(rms_a / max(rms_v, 1e-300), 1e-12)
             period = 2 * np.pi / omega
             power = float(np.mean(force * v))
             rows.append(
@@ -277,6 +278,8 @@ def _shares_of_orders(one: LatentForce, series: FloatArray) -> list[FloatArray] 
     rate = one.run.attributes.sampling_rate_hz
     omega = float(a.std() / max(v.std(), 1e-300))
     moves = np.flatnonzero(np.abs(v) > _AT_REST * np.abs(v).max())
+    if not moves.size:
+        return None
     v, series = v[: moves[-1] + 1], series[: moves[-1] + 1]
     main = omega / (2 * np.pi)
     if main < 4 * rate / v.size or 1.6 * main > 0.45 * rate:

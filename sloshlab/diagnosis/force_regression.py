@@ -73,7 +73,9 @@ def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
         rate = one.run.attributes.sampling_rate_hz
         omega = float(a.std() / max(v.std(), 1e-300))
         cycle = max(4, round(min(2 * np.pi / max(omega, 1e-300) * rate, x.size)))  # a run may not move at all
-        power_a, power_v = (uniform_filter1d(part**2, cycle, mode="nearest") for part in (a, v))
+        running = (uniform_filter1d(part**2, cycle, mode="nearest") for part in (a, v))
+        # sums that run round below zero after a motion has stopped
+        power_a, power_v = (np.maximum(power, 0.0) for power in running)
         level = np.sqrt(2 * power_a) / GRAVITY_M_PER_S2
         local = np.sqrt(power_a / np.maximum(power_v, 1e-300))
         played = np.stack([_play(x, share * largest) for share in _PLAYS], axis=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from recorded_oscillators import run_of
 
 from sloshlab.diagnosis import evidence
 from sloshlab.diagnosis.force_character import Answer, ForceCharacter, force_character
+from sloshlab.diagnosis.force_regression import stretches
 from sloshlab.diagnosis.latent_force import STRUCTURE, LatentForce
 
 RATE_HZ = 250.0
@@ -195,6 +197,29 @@ def test_blows() -> None:
     character = asked(lambda t, x, v, a: np.where(np.sin(25.0 * t) > 0.985, 1.0, 0.0), omegas=(25.0,))
     assert character.says[evidence.IMPULSIVE]
     assert not asked(viscous).says[evidence.IMPULSIVE]
+
+
+@pytest.mark.parametrize("left", [(0.0, 0.0), (1e-30, 1.0)], ids=["at rest", "no velocity, but an acceleration"])
+def test_a_run_in_which_the_place_rests_is_left_out(left: tuple[float, float]) -> None:
+    forces = [latent(viscous, amplitude, omega, 3) for amplitude in AMPLITUDES_M for omega in OMEGAS]
+    moving = forces[-1]
+    rest = moving.motion * 0.0
+    rest[:, 1], rest[:, 2] = left[0], left[1] * np.sign(moving.motion[:, 2])
+    resting = replace(moving, motion=rest, force_n=0.0 * moving.force_n)
+    character = force_character([resting, *forces], np.zeros(3))
+    assert character.size_n > 0
+    assert answer(character, "energy").finding == "takes energy"
+
+
+def test_a_motion_that_stops_dead_has_levels() -> None:
+    """Running sums over squares that end in zeros round below zero."""
+    one = latent(viscous, 0.004, 25.0, 3)
+    for seed in range(20):
+        motion = np.random.default_rng(seed).normal(size=one.motion.shape)
+        motion[one.time_s > 0.4 * DURATION_S] = 0.0
+        for part in stretches([replace(one, motion=motion)]):
+            assert np.isfinite(part.level_g).all()
+            assert np.isfinite(part.omega).all()
 
 
 def test_noise_is_asked_nothing() -> None:

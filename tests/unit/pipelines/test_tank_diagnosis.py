@@ -1,4 +1,4 @@
-"""Cases of the numerical tank: the belief of the liquid is in the rig, recordings are copied, nothing else is there."""
+"""Cases of the numerical tank: what is believed of the liquid is in the rig, recordings are copied."""
 
 from __future__ import annotations
 
