@@ -49,7 +49,9 @@ for effects whose work grows with the same power of the amplitude, which nothing
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
 """What it would have if it had a name."""
 _EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
-"""Explanations that are the same force."""
+"""Explanations that are the same force in the structure."""
+_EQUAL_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_error"}
+"""The same force in the tank, as long as the share of the liquid that does not follow is the same at all levels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -408,6 +410,10 @@ def equals_of(best: Explanation) -> list[tuple[str, ...]]:
             if set(this) <= set(in_structure):
                 others = [name for name in best.names if name not in this]
                 found.append(tuple(sorted((*others, *other))))
+    for one in best.fit.candidates:
+        if one.effect.block == "tank" and one.effect.name in _EQUAL_MASSES:
+            others = [each.effect.known_as for each in best.fit.candidates if each is not one]
+            found.append(tuple(sorted((*others, _EQUAL_MASSES[one.effect.name]))))
     return found
 
 

@@ -30,6 +30,10 @@ def explained_by(*keys: str) -> Explanation:
         ),
         (("structure.coulomb_friction",), []),
         (("tank.coulomb_friction", "structure.constant_force"), []),
+        (("tank.mass_error",), [("effective_mass",)]),
+        (("tank.effective_mass", "structure.cubic_stiffness"), [("cubic_stiffness", "mass_error")]),
+        (("structure.mass_error",), []),
+        (("tank.fading_mass",), []),
     ],
 )
 def test_equals(keys: tuple[str, ...], expected: list[tuple[str, ...]]) -> None:
