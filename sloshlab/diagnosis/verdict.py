@@ -51,7 +51,7 @@ _NUMBERS_OF_THE_UNKNOWN: Final = 3
 _EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure."""
 _EQUAL_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_error"}
-"""The same force in the tank, as long as the share of the liquid that does not follow is the same at all levels."""
+"""The same force in the tank, where the share of the liquid that does not follow is the same at all levels."""
 
 
 @dataclass(frozen=True, eq=False)
