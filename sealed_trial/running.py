@@ -165,7 +165,7 @@ def _diagnosed(
         status, code, usage = _waited(process.pid, started + time_limit_s, stopping)
         wall = time.monotonic() - started
         errors.seek(max(0, errors.tell() - 2000))
-        last = errors.read().decode(errors="replace").strip()[-500:]
+        last = (errors.read().decode(errors="replace").strip().splitlines() or [""])[-1][-500:]
     process.returncode = code  # was waited for by its number, for its use of processor and memory
     if status == "done" and (code not in (0, 3) or not (output / "verdict.json").is_file()):
         status = "crashed"
