@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,4 +52,6 @@ class FirstLook:
         followed = self._inverse @ touched
         size = float(direction @ direction - followed @ touched)
         along = float(direction @ self._left - followed @ self._gradient)
-        return (along**2 / size, -along / size) if size > 0 else (0.0, 0.0)
+        share = along / size if size > 0 else 0.0
+        gain = along * share
+        return (gain, -share) if isfinite(gain) else (0.0, 0.0)  # what explodes without a bound promises nothing

@@ -39,6 +39,21 @@ def least(columns: np.ndarray, residual: np.ndarray, prior: np.ndarray, theta: n
     return float(((matrix @ step - right) ** 2).sum())
 
 
+def test_the_gain_does_not_depend_on_the_size_of_a_change_however_large() -> None:
+    """What changes nothing promises nothing, and so does what explodes beyond all numbers."""
+    generator = np.random.default_rng(3)
+    jacobian, residual, change = (generator.standard_normal(shape) for shape in ((2, N), (N,), (N,)))
+    problem = cast(FreeRunProblem, cast(Any, Linear(np.zeros(2, bool))))
+    look = FirstLook(problem, np.zeros(2), 1e4 * residual, BlockJacobian.of_columns(list(jacobian), [N]), 0.1)
+    gain, factor = look.gain(change)
+    large, small = look.gain(1e153 * change)
+    assert large == pytest.approx(gain, rel=1e-9)
+    assert small * 1e153 == pytest.approx(factor, rel=1e-9)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for size in (0.0, 1e200):
+            assert look.gain(size * change)[0] == 0.0
+
+
 @pytest.mark.parametrize("soft", [1.0, 0.3])
 @pytest.mark.parametrize("fixed", [[False] * 4, [True, False, False, True]])
 def test_the_gain_is_that_of_least_squares_with_the_numbers_that_can_follow(
