@@ -410,10 +410,10 @@ def equals_of(best: Explanation) -> list[tuple[str, ...]]:
             if set(this) <= set(in_structure):
                 others = [name for name in best.names if name not in this]
                 found.append(tuple(sorted((*others, *other))))
-    for one in best.fit.candidates:
-        if one.effect.block == "tank" and one.effect.name in _EQUAL_MASSES:
-            others = [each.effect.known_as for each in best.fit.candidates if each is not one]
-            found.append(tuple(sorted((*others, _EQUAL_MASSES[one.effect.name]))))
+    for mass in best.fit.candidates:
+        if mass.effect.block == "tank" and mass.effect.name in _EQUAL_MASSES:
+            others = [each.effect.known_as for each in best.fit.candidates if each is not mass]
+            found.append(tuple(sorted((*others, _EQUAL_MASSES[mass.effect.name]))))
     return found
 
 
