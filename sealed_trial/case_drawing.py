@@ -245,7 +245,9 @@ def _scaled(
     rate = laboratory.plan.sampling_rate_hz
 
     def strength_of(magnitude: float) -> float:
-        change = effect.change(magnitude)
+        return strength_of_change(effect.change(magnitude))
+
+    def strength_of_change(change: Change) -> float:
         try:
             changed = laboratory.signals([change], relative_tolerance=QUICK) if effect.block != "sensor" else plain
         except ArithmeticError:
@@ -256,6 +258,8 @@ def _scaled(
         return floor.strength(changed, damping_is_known=effect.name in ONLY_DAMPING)
 
     magnitude, reached = magnitude_for(strength_of, wanted, effect.least, effect.most)
+    if effect.essential is not None and strength_of_change(effect.essential(magnitude)) < WEAKEST_CLEAR:
+        raise LookupError(f"{effect.name} does not show what makes it")
     return effect.change(magnitude), reached
 
 

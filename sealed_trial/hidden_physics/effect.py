@@ -97,6 +97,8 @@ class DrawnEffect:
         Of the magnitude.
     description : str
         Of physics outside the vocabulary.
+    essential : callable or None
+        The part without which it would be a simpler effect; it has to show alone too.
     """
 
     name: str
@@ -106,6 +108,7 @@ class DrawnEffect:
     least: float = 1e-4
     most: float = 1e3
     description: str = ""
+    essential: Callable[[float], Change] | None = None
 
 
 Draw = Callable[[Scales, np.random.Generator], DrawnEffect]

@@ -39,8 +39,10 @@ def _motions(scales: Scales, generator: np.random.Generator) -> str:
 
 
 def gain(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
-    """Gain beyond calibration."""
-    channel, sign = _motions(scales, generator), 1 if generator.random() < 0.5 else -1
+    """Gain beyond calibration, of a motion that others show too: of a force it would be a mass as well."""
+    forces = tuple(name for name in scales.rms if name.startswith("force"))
+    channel = _channel(scales, generator, without=(*forces, "acceleration_root"))
+    sign = 1 if generator.random() < 0.5 else -1
 
     def change(m: float) -> Change:
         ratio = 0.05 * m * sign

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -53,7 +54,10 @@ def asymmetric(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
         up, down = m * unit * math.sqrt(ratio), m * unit / math.sqrt(ratio)
         return Change({"force_up_n": up, "force_down_n": down}, {at.FRICTION_UP: up, at.FRICTION_DOWN: down})
 
-    return _effect("asymmetric_friction", change)
+    def asymmetry(m: float) -> Change:
+        return Change({}, {at.CONSTANT: 0.5 * m * unit * (1 / math.sqrt(ratio) - math.sqrt(ratio))})
+
+    return replace(_effect("asymmetric_friction", change), essential=asymmetry)
 
 
 def stribeck(scales: Scales, generator: np.random.Generator) -> DrawnEffect:

@@ -35,6 +35,8 @@ class Explanation:
         The same per run and channel, of fitted and held-out runs.
     rms_without_bursts : float
         As `held_out_rms`, of the quieter three quarters of the times of every channel and run.
+    repeating : float
+        Mean square of what repeats of held-out tests have in common of their residuals; NaN without repeats.
     """
 
     fit: FreeRunFit
@@ -43,6 +45,7 @@ class Explanation:
     by_channel: dict[str, float] = field(default_factory=dict)
     by_run: dict[tuple[str, str], float] = field(default_factory=dict)
     rms_without_bursts: float = 0.0
+    repeating: float = float("nan")
 
     @property
     def names(self) -> tuple[str, ...]:

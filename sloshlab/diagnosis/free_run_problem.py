@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Final, TypeVar
 
 import numpy as np
@@ -269,6 +270,39 @@ def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) ->
         for k in np.argsort(times)[: int(np.ceil(_QUIETER * len(times)))]:
             total, n = total + times[k] * counts[k], n + counts[k]
     return float(np.sqrt(total / n)) if n else 0.0
+
+
+def mean_square_that_repeats(
+    tests: Sequence[Sequence[str]], observed: Sequence[Observation], residual: FloatArray
+) -> float:
+    """Mean square of what the informative residuals of repeats of one test have in common; NaN without repeats.
+
+    What physics is missing is missing in each repeat alike, noise and a liquid's chaos are not: products of the
+    residuals of two repeats have the square of the common part as their mean. Large residuals are cut off.
+
+    Parameters
+    ----------
+    tests : sequence of sequences of str
+        Names of the runs of each test.
+    observed : sequence of Observation
+    residual : ndarray
+        Of all of them, one after another.
+    """
+    parts: dict[tuple[str, str], tuple[FloatArray, NDArray[np.bool_]]] = {}
+    first = 0
+    for one in observed:
+        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
+        first += one.spectra.size
+        parts[one.run.name, one.channel] = np.clip(own, -ROBUST, ROBUST), one.informative
+    total, n = 0.0, 0
+    for test in tests:
+        for name, other in combinations(test, 2):
+            for channel in [of for run, of in parts if run == name and (other, of) in parts]:
+                (one, shown), (two, shown_too) = parts[name, channel], parts[other, channel]
+                both = tuple(slice(0, min(sizes)) for sizes in zip(one.shape, two.shape, strict=True))
+                known = shown[both] & shown_too[both]
+                total, n = total + float(one[both][known] @ two[both][known]), n + int(known.sum())
+    return total / n if n else float("nan")
 
 
 def mean_squares_of_runs(observed: Sequence[Observation], residual: FloatArray) -> dict[tuple[str, str], float]:

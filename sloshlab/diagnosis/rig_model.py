@@ -33,9 +33,11 @@ from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
 STEPS_PER_PERIOD: Final = 12.0
+_STEPS_PER_PERIOD_OF_A_RELEASE: Final = 24.0
+"""Of the highest mode, which a release excites most; within longer steps friction may stop a place twice."""
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _MOST_KEPT_BYTES: Final = 3e8
-_RELEASE: Final = "release of "
+RELEASE: Final = "release of "
 _FLUCTUATION: Final = "damping of the liquid in "
 _TOLERANCE_OF_FLUCTUATION: Final = 0.05
 """By which a chaotic liquid damps more or less in one run than on average."""
@@ -124,7 +126,7 @@ class RigModel:
 
     def _belongs(self, parameter: str, run: CaseRun) -> bool:
         """Whether a number of the motion is of this run or of all."""
-        for beginning in (_RELEASE, _FLUCTUATION):
+        for beginning in (RELEASE, _FLUCTUATION):
             if parameter.startswith(beginning):
                 return parameter == beginning + run.name
         return True
@@ -234,9 +236,10 @@ class RigModel:
         drive = self._drive(run, tuple(undone))
         twin = self._varied(run, values, extension, fluctuation=values.get(_FLUCTUATION + run.name, 1.0))
         rate = drive.excitation.sampling_rate_hz
-        start = values.get(f"{_RELEASE}{run.name}", drive.initial_displacement_m)
+        start = values.get(f"{RELEASE}{run.name}", drive.initial_displacement_m)
+        per_period = _STEPS_PER_PERIOD_OF_A_RELEASE if run.is_free else STEPS_PER_PERIOD
         simulation = twin.simulate(
-            drive.excitation, initial_displacement_m=start, n_substeps=steps_per_sample(twin, rate)
+            drive.excitation, initial_displacement_m=start, n_substeps=steps_per_sample(twin, rate, per_period)
         )
         return simulation.require_done()
 
@@ -333,7 +336,7 @@ class RigModel:
                 found.append(BaselineParameter(_FLUCTUATION + run.name, 1.0, _TOLERANCE_OF_FLUCTUATION))
             if run.is_free:
                 start = self._drive(run, ()).initial_displacement_m
-                found.append(BaselineParameter(f"{_RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
+                found.append(BaselineParameter(f"{RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
             for name in self.compared(run):
                 if name.startswith("displacement"):
                     size = float(np.nanmax(np.abs(run.recording[name].values)))
@@ -362,12 +365,12 @@ def _relative_share(name: str, truth: Mapping[str, FloatArray], values: Mapping[
     return n * (shares[cells.index(name)] if name != cells[-1] else 1.0 - sum(shares))
 
 
-def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:
+def steps_per_sample(twin: Twin, sampling_rate_hz: float, per_period: float = STEPS_PER_PERIOD) -> int:
     """Integration steps that follow every mode within the band of a recording."""
     if twin.structure is None:
         return 1
     frequencies = twin.structure.frequencies_hz
-    needed = max(STEPS_PER_PERIOD * float(frequencies.max()), _STEPS_PER_FIRST_PERIOD * float(frequencies.min()))
+    needed = max(per_period * float(frequencies.max()), _STEPS_PER_FIRST_PERIOD * float(frequencies.min()))
     return max(1, min(1000, math.ceil(needed / sampling_rate_hz)))
 
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from sloshlab.diagnosis.candidate import Candidate, channels_of, known_effects
 from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.force_surface import surface_effect
 from sloshlab.diagnosis.mismatch import mismatches, summary
 from sloshlab.diagnosis.units import named_and_units
 
@@ -30,7 +29,8 @@ LEAST_STRENGTH: Final = 0.5
 
 Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
 """
-_FITTED_WITHOUT_NAME: Final = 2.0
+_ON_FITTED_RUNS: Final = 2.0
+"""The same on runs that were fitted, over that on others: what suits them may be theirs alone."""
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LARGEST_REMAINDER: Final = 1.25
@@ -41,6 +41,8 @@ _ERRORS_OVER_STANDARD_ERRORS: Final = 3.0
 """On cases whose truth was known."""
 _CALIBRATION: Final = 0.01
 _IN_UNITS_OF_THE_CHANNEL: Final = ("amplitude", "rate", "limit")
+_LEAST_SHARE: Final = 0.5
+"""Of the gain of the best that an alternative must have."""
 _LITTLE: Final = 0.05
 _LITTLE_OF_ONE_POWER: Final = 0.1
 """Of a mean square that an effect of one frequency explains, which may be in beginnings and ends; the second one
@@ -94,10 +96,10 @@ def verdict_of(found: Findings) -> Verdict:
     found : Findings
     """
     scale = _Scale.of(found)
-    described = [*found.explanations, *found.ceilings]
-    ceiling = min([*described, found.retuned], key=lambda one: one.held_out)
+    ceiling = min([*found.explanations, *found.ceilings, found.retuned], key=lambda one: one.held_out)
     gain = scale.held_out_gain(found.retuned, ceiling)
     probabilities = _probabilities(found, scale)
+    described = _in_need_of_all(found, scale)
     is_more = any(_shows_more(one, found.retuned, scale) for one in described)
     if not is_more and not leaves_more(found, found.retuned):
         certain = _certain(probabilities, "none")
@@ -109,7 +111,7 @@ def verdict_of(found: Findings) -> Verdict:
         or scale.held_out_gain(found.retuned, named) < LEAST_GAIN
         or adequacy > ADEQUATE
         or leaves_more(found, named)
-        or any(_shows_more(one, named, scale) for one in described)
+        or _is_bettered(found, named, described, scale)
     ):
         certain = _certain(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, _unknown(found, named), "", certain)
@@ -128,14 +130,15 @@ def verdict_of(found: Findings) -> Verdict:
 
 
 def leaves_more(found: Findings, one: Explanation) -> bool:
-    """Whether an explanation leaves more of the held-out runs than repeats of a test differ by.
+    """Whether an explanation leaves more of the held-out runs than repeats of a test differ by, alike in repeats.
 
     Parameters
     ----------
     found : Findings
     one : Explanation
     """
-    return found.has_repeats and one.rms_without_bursts > LARGEST_REMAINDER
+    is_large = found.has_repeats and one.rms_without_bursts > LARGEST_REMAINDER
+    return is_large and not one.repeating < LARGEST_REMAINDER**2 - 1.0
 
 
 @dataclass(frozen=True)
@@ -179,6 +182,21 @@ class _Scale:
         return likelihood - self.per_number * one.n_numbers
 
 
+def _in_need_of_all(found: Findings, scale: _Scale) -> list[Explanation]:
+    """What shows more than each of its parts: one effect may bring the gain of chance, another one the size."""
+    described = [*found.explanations, *found.ceilings]
+    parts = [(frozenset(one.keys), one) for one in found.explanations]
+    return [
+        one
+        for one in described
+        if all(
+            _shows_more(one, _at_its_best(found, part), scale)
+            for keys, part in parts
+            if keys < frozenset(one.keys)
+        )
+    ]
+
+
 def _shortest_sufficient(found: Findings, scale: _Scale) -> Explanation | None:
     """The best single effect, unless two are better by more than chance."""
     known = [one for one in found.explanations if np.isfinite(one.held_out) and not one.rests_on_a_bound]
@@ -207,21 +225,29 @@ def _is_clearly_better(more: Explanation, less: Explanation, scale: _Scale) -> b
 
 
 def _shows_more(more: Explanation, less: Explanation, scale: _Scale) -> bool:
-    """The same, with a size that is worth speaking of in any channel of any run, fitted ones too.
-
-    What has no name has two dozen numbers: from a run that it was fitted to it must remove twice as much.
-    """
+    """The same, with a size that is worth speaking of in any channel of any run, twice as large on fitted ones."""
     if not _gains(more, less, scale):
         return False
-    nameless = {surface_effect(block).name for block in ("structure", "tank")}
-    has_names = nameless.isdisjoint(one.effect.name for one in more.fit.candidates)
-    of_fitted = 1.0 if has_names else _FITTED_WITHOUT_NAME
     judged = {place: left for place, left in more.by_run.items() if place[0] in scale.judged}
     fitted = {place: left for place, left in more.by_run.items() if place[0] not in scale.judged}
     return (
         _largest_strength(less.by_run, judged) >= LEAST_STRENGTH
-        or _largest_strength(less.by_run, fitted) >= of_fitted * LEAST_STRENGTH
+        or _largest_strength(less.by_run, fitted) >= _ON_FITTED_RUNS * LEAST_STRENGTH
     )
+
+
+def _is_bettered(found: Findings, named: Explanation, others: Sequence[Explanation], scale: _Scale) -> bool:
+    """Whether another description shows more, unless repeats have too little in common of what is left to them."""
+    if named.repeating < LEAST_STRENGTH**2:
+        return False
+    return any(_shows_more(one, _at_its_best(found, named), scale) for one in others)
+
+
+def _at_its_best(found: Findings, one: Explanation) -> Explanation:
+    """With the least that any fit of the same effects leaves of each run; jumps of friction leave many valleys."""
+    alike = [one, *(other for other in found.explanations if set(other.keys) == set(one.keys))]
+    by_run = {place: min(other.by_run.get(place, left) for other in alike) for place, left in one.by_run.items()}
+    return replace(one, by_run=by_run, held_out=min(other.held_out for other in alike))
 
 
 def _gains(more: Explanation, less: Explanation, scale: _Scale) -> bool:
@@ -254,12 +280,20 @@ def _alternatives(found: Findings, best: Explanation, scale: _Scale) -> list[Exp
             continue
         if one.rests_on_a_bound or (_includes(one, best) and not _differs(one, best)):
             continue
+        if scale.held_out_gain(found.retuned, one) < _LEAST_SHARE * scale.held_out_gain(found.retuned, best):
+            continue
         is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
-        is_alike = is_alike or (_differs(one, best) and not _is_clearly_better(best, one, scale))
+        is_alike = is_alike or (_differs(one, best) and not _shows_less(one, best, scale))
         if is_alike or _is_alike_at_one_frequency(found, one, best):
             alike.append(one)
             seen.add(one.named_in_blocks)
     return alike
+
+
+def _shows_less(general: Explanation, special: Explanation, scale: _Scale) -> bool:
+    """Whether a general form with numbers of its own is worse than its special case, by half of what is clear."""
+    is_worse = _gains(special, general, scale)
+    return is_worse and _largest_strength(general.by_run, special.by_run) >= 0.5 * LEAST_STRENGTH
 
 
 def _is_alike_at_one_frequency(found: Findings, one: Explanation, best: Explanation) -> bool:

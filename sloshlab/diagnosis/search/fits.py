@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 import numpy as np
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import fitted
+from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest
 from sloshlab.diagnosis.free_run_problem import (
     FreeRunFit,
     FreeRunProblem,
     huber_cost,
+    mean_square_that_repeats,
     mean_squares,
     mean_squares_of_runs,
     rms_without_bursts,
     run_of,
 )
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.rig_model import RELEASE
 
+_WORSE_THAN_OTHERS: Final = 1.2
+_OTHER_RELEASES: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
+"""Dry friction stops a motion in jumps, and what follows a release has side valleys."""
 Told = Callable[[str, int, int], None]
 
 
@@ -34,6 +40,8 @@ class Fits:
         Runs that are fitted, and runs that choose nothing.
     told : callable
         Takes what is being done, how much of it is done, and how much there is.
+    tests : sequence of sequences of str
+        Names of the runs of every test.
 
     Attributes
     ----------
@@ -49,8 +57,11 @@ class Fits:
         fitting: list[list[Observation]],
         held_out: list[list[Observation]],
         told: Told,
+        tests: Sequence[Sequence[str]] = (),
     ) -> None:
         self.model, self.fitting, self.held_out, self.told = model, fitting, held_out, told
+        judged = {one.run.name for run in held_out for one in run}
+        self.tests = [test for test in tests if not judged.isdisjoint(test)]
         self.failed: dict[str, str] = {}
         self.screened: dict[str, float] = {}
 
@@ -66,11 +77,10 @@ class Fits:
         """A fit with its held-out residuals; only releases and offsets of those runs are fitted to them."""
         shared = {name: value for name, value in fit.values.items() if not run_of(name, self.model)}
         problem = _WithEffects(self.model, self.held_out, fit.candidates, shared)
-        theta = problem.theta_of(fit.values)
-        if theta.size:
-            own, _ = fitted(problem, problem.values(theta), n_iterations=3)
-            theta = problem.theta_of(own.values)
-        residual = problem.residual(theta)
+        own: dict[str, float] = {}
+        for run in self.held_out:
+            own |= self._of_run_alone(run, fit, shared)
+        residual = problem.residual(problem.theta_of({**fit.values, **own}))
         if not np.isfinite(residual).all():
             return Explanation(fit, np.inf, np.inf)
         observed = [one for run in problem.runs for one in run]
@@ -79,10 +89,35 @@ class Fits:
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
         fitted_to = self.problem_of(fit)
         at_fit = fitted_to.residual(fitted_to.theta_of(fit.values))
-        by_run = mean_squares_of_runs([one for run in fitted_to.runs for one in run], at_fit)
-        by_run |= mean_squares_of_runs(observed, residual)
-        quieter = rms_without_bursts(observed, residual)
-        return Explanation(fit, huber_cost(residual), rms, mean_squares(observed, residual), by_run, quieter)
+        observed_and_fitted = [*observed, *(one for run in fitted_to.runs for one in run)]
+        of_all = np.concatenate([residual, at_fit])
+        return Explanation(
+            fit,
+            huber_cost(residual),
+            rms,
+            mean_squares(observed, residual),
+            mean_squares_of_runs(observed_and_fitted, of_all),
+            rms_without_bursts(observed, residual),
+            mean_square_that_repeats(self.tests, observed_and_fitted, of_all),
+        )
+
+    def _of_run_alone(self, run: list[Observation], fit: FreeRunFit, shared: dict[str, float]) -> dict[str, float]:
+        """Release, offsets and the like of a held-out run; from more releases where it fits worse than others."""
+        problem = _WithEffects(self.model, [run], fit.candidates, shared)
+        if not problem.names:
+            return {}
+        start = problem.values(problem.theta_of(fit.values))
+        best, _ = fitted(problem, start, n_iterations=3)
+        usual = fit.misfit / max(sum(one.spectra.size for each in self.fitting for one in each), 1)
+        n = max(sum(one.spectra.size for one in run), 1)
+        releases = [name for name in problem.names if name == f"{RELEASE}{run[0].run.name}"]
+        if not releases or best.trouble or best.misfit / n < _WORSE_THAN_OTHERS * usual:
+            return best.values
+        [release] = releases
+        places = [{**best.values, release: best.values[release] * (1.0 + share)} for share in _OTHER_RELEASES]
+        near = nearest(problem, places, STAGES[-2])
+        other, _ = fitted(problem, near, n_iterations=3, shares=STAGES[-2:])
+        return best.values if other.trouble or other.cost > best.cost else other.values
 
     def is_strained(self, fit: FreeRunFit) -> bool:
         """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""

@@ -17,8 +17,11 @@ from sloshlab.diagnosis.search.start_numbers import as_its_general_form, as_its_
 
 LEAST_TO_BUILD_ON: Final = 24.0
 """Decrease of the cost by one effect, below which nobody looks for its look-alikes or a second one."""
+_AS_GOOD: Final = 2.0
+"""Of the cost: a general form that is worse than its special case has ended in a side valley."""
 _SOFT: Final = 0.03
 _MOST_LOOK_ALIKES: Final = 4
+_MOST_FOR_ALL: Final = 2
 Limits = Mapping[str, tuple[float, float]]
 
 
@@ -62,6 +65,39 @@ class InPlace:
                 found.append(self.fits.judged(fit))
         return found
 
+    def one_for_all(self, wider: FreeRunFit, base: FreeRunFit, pool: Sequence[Candidate]) -> list[Explanation]:
+        """One effect of several numbers in place of everything that a fit has beyond the baseline, from there.
+
+        Two effects that are simple may be what one of more numbers looks like, such as a softer spring and a loss
+        what is hysteresis; and what the baseline is beside them is nearer than what it is without any.
+
+        Parameters
+        ----------
+        wider : FreeRunFit
+            With effects, or with any force.
+        base : FreeRunFit
+            Without; an effect must lie nearer to `wider` than this before it is fitted.
+        pool : sequence of Candidate
+        """
+        most = 0.5 * sum(soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (wider, base))
+        near: list[tuple[float, FreeRunProblem, dict[str, float]]] = []
+        chosen = [one for one in pool if len(one.effect.parameters) > 1 and one.effect.block != "sensor"]
+        for i, candidate in enumerate(chosen):
+            self.fits.told(f"one effect in place of all: {candidate.key}", i, len(chosen))
+            problem = self.fits.problem((candidate,))
+            softness = problem.softness(_SOFT)
+            starts = [{**wider.values, **one} for one in of_many_sizes(candidate.starts())]
+            left = [softness * problem.residual(problem.theta_of(start)) for start in starts]
+            costs = [huber_cost(one) if np.isfinite(one).all() else np.inf for one in left]
+            if min(costs) < most:
+                near.append((min(costs), problem, starts[int(np.argmin(costs))]))
+        found = []
+        for _, problem, start in sorted(near, key=lambda one: one[0])[:_MOST_FOR_ALL]:
+            fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
+            if not fit.trouble:
+                found.append(self.fits.judged(fit))
+        return found
+
     def generalised(
         self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
@@ -73,7 +109,8 @@ class InPlace:
         specials = [one for one in kept if one is best or _is_special_case(one.fit.candidates[-1], last)]
         found = []
         for special in {one.keys[-1]: one for one in sorted(specials, key=lambda one: -one.fit.cost)}.values():
-            found += self._more_general(base, special, pool, {one.keys[-1] for one in specials}, what)
+            known = {one.keys[-1] for one in kept if one in specials or one.fit.cost < special.fit.cost + _AS_GOOD}
+            found += self._more_general(base, special, pool, known, what)
         return found
 
     def _more_general(
@@ -121,21 +158,24 @@ class InPlace:
     def specialised(
         self, wider: Explanation, known: Sequence[Explanation], pool: Sequence[Candidate]
     ) -> list[Explanation]:
-        """Special cases in place of the effects of an explanation that were not tried with the others."""
-        tried = {frozenset(one.keys) for one in known}
+        """Special cases in place of the effects of an explanation, unless they are known from a better place."""
+        tried: dict[frozenset[str], float] = {}
+        for one in known:
+            keys = frozenset(one.keys)
+            tried[keys] = min(one.fit.cost, tried.get(keys, np.inf))
         found = []
         for general in wider.fit.candidates:
             others = [one for one in wider.fit.candidates if one is not general]
             for special in pool:
-                if (
-                    not _is_special_case(special, general)
-                    or frozenset((special.key, *(one.key for one in others))) in tried
-                ):
+                if not _is_special_case(special, general):
                     continue
                 self.fits.told(f"polishing {special.key} in place of {general.effect.name}", 0, 1)
                 problem = self.fits.problem((*others, special))
                 sizes = as_its_general_form(special, general, wider.fit)
                 start = nearest(problem, [{**wider.fit.values, **one} for one in sizes], _SOFT)
+                at_start = huber_cost(problem.residual(problem.theta_of(start)))
+                if not at_start < tried.get(frozenset((special.key, *(one.key for one in others))), np.inf):
+                    continue
                 fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-2:])
                 if not fit.trouble:
                     found.append(self.fits.judged(fit))

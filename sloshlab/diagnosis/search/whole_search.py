@@ -17,7 +17,7 @@ from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search.any_force import ceilings
 from sloshlab.diagnosis.search.fits import Fits, Told, cheapest
-from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON
+from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
 from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
 from sloshlab.diagnosis.search.refinement import Refinement
 from sloshlab.diagnosis.split import split
@@ -51,7 +51,8 @@ def findings_of(
     weighted = weighted_observations(case, model)
     fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
     held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]]
-    fits = Fits(model, fitting, held_out, told)
+    tests = [[run.name for run in test] for test in case.tests()]
+    fits = Fits(model, fitting, held_out, told, tests)
     problem = fits.problem()
     believed_values = problem.values(problem.theta_of(model.believed))
     at_believed = huber_cost(problem.residual(problem.theta_of(believed_values)))
@@ -65,6 +66,10 @@ def findings_of(
     refinement = Refinement(fits)
     found += refinement.polished(found, pool)
     retuned = refinement.retuned_from(found, retuned)
+    any_force = ceilings(fits, surroundings, found, retuned_fit)
+    best, highest = cheapest(found), cheapest(any_force)
+    if best is not None and highest is not None and best.fit.cost - highest.fit.cost > LEAST_TO_BUILD_ON:
+        found += InPlace(fits).one_for_all(highest.fit, retuned_fit, pool)
     return Findings(
         case,
         model,
@@ -75,7 +80,7 @@ def findings_of(
         believed,
         retuned,
         found,
-        ceilings(fits, surroundings, found, retuned_fit),
+        any_force,
         fits.failed,
         fits.screened,
     )
@@ -95,7 +100,11 @@ def _second_effects(
     jacobian = problem.jacobian(theta, problem.residual(theta), range(theta.size))
     more = OneMoreEffect(fits)
     pairs = more.fitted(best.fit, jacobian, pool, "fitting a second effect")
-    alone = Refinement(fits).take_away([one for one in pairs if one.keys[:-1] == best.keys])
+    alone = []
+    pair = cheapest(pairs)
+    if pair is not None and best.fit.cost - pair.fit.cost > LEAST_TO_BUILD_ON:
+        alone += more.in_place.one_for_all(pair.fit, retuned, pool)
+    alone += Refinement(fits).take_away([one for one in pairs if one.keys[:-1] == best.keys])
     cost = min((one.fit.cost for one in alone), default=best.fit.cost)
     if cost < best.fit.cost:
         alone += more.in_place.look_alikes(retuned, alone, pool, "fitting one effect")

@@ -1,14 +1,21 @@
-"""A burst of noise is nothing that a simulation lacks; what lasts is."""
+"""A burst of noise is nothing that a simulation lacks, nor is what repeats do not share; what lasts is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from sloshlab.diagnosis.free_run_problem import rms_without_bursts
+from sloshlab.diagnosis.free_run_problem import mean_square_that_repeats, rms_without_bursts
+
+
+@dataclass
+class Run:
+    """A run with a name."""
+
+    name: str
 
 
 @dataclass
@@ -17,6 +24,8 @@ class Spectra:
 
     spectra: np.ndarray
     informative: np.ndarray
+    run: Run = field(default_factory=lambda: Run("run_1"))
+    channel: str = "force"
 
 
 def observed(n_times: int, n_bands: int = 30) -> Spectra:
@@ -44,3 +53,38 @@ def test_channels_have_their_own_quiet_times_and_bands_without_information_do_no
     one[0], other[5], other[:, 10:] = 9.0, 9.0, 9.0
     found = rms_without_bursts(cast(Any, [first, second]), np.concatenate([one.ravel(), other.ravel()]))
     assert found == pytest.approx(np.sqrt((6 * 30 * 4.0 + 6 * 10 * 1.0) / (6 * 40)))
+
+
+def of_run(name: str, shape: tuple[int, int], channel: str = "force") -> Spectra:
+    return Spectra(np.zeros(shape), np.ones(shape, bool), Run(name), channel)
+
+
+def test_what_repeats_share_is_told_from_noise() -> None:
+    """A common part of mean square 0.5 under noise of one in each run; lengths and bands differ."""
+    generator = np.random.default_rng(3)
+    common = np.sqrt(0.5) * generator.standard_normal((60, 40))
+    observed = [of_run("a", (60, 40)), of_run("b", (55, 37)), of_run("c", (60, 40))]
+    residual = np.concatenate(
+        [(common[:n, :m] + generator.standard_normal((n, m))).ravel() for n, m in ((60, 40), (55, 37))]
+        + [generator.standard_normal(60 * 40)]
+    )
+    assert mean_square_that_repeats([["a", "b"]], cast(Any, observed), residual) == pytest.approx(0.5, abs=0.1)
+    assert mean_square_that_repeats([["a", "c"]], cast(Any, observed), residual) == pytest.approx(0.0, abs=0.1)
+    assert np.isnan(mean_square_that_repeats([["a"], ["b"]], cast(Any, observed), residual))
+
+
+def test_only_the_same_channel_and_what_is_informative_is_shared() -> None:
+    first, other, second = (of_run(run, (8, 30), name) for run, name in (("a", "x"), ("a", "y"), ("b", "x")))
+    first.informative[:, 20:] = False
+    residual = np.concatenate([np.full(240, 2.0), np.full(240, 3.0), np.full(240, 2.0)])
+    residual[:240].reshape(8, 30)[:, 20:] = -3.0
+    assert mean_square_that_repeats([["a", "b"]], cast(Any, [first, other, second]), residual) == pytest.approx(
+        4.0
+    )
+
+
+def test_a_burst_is_cut_off_before_it_is_compared() -> None:
+    observed = [of_run("a", (10, 10)), of_run("b", (10, 10))]
+    residual = np.zeros(200)
+    residual[[0, 100]] = 50.0
+    assert mean_square_that_repeats([["a", "b"]], cast(Any, observed), residual) == pytest.approx(16.0 / 100)

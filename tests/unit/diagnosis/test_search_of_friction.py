@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,9 +22,15 @@ from sloshlab.diagnosis.search.screening import Screening
 
 assert effects.__all__
 UP_N, DOWN_N = 0.3, 0.1
-COULOMB, ASYMMETRIC, STRIBECK, CUBIC = (
+COULOMB, ASYMMETRIC, STRIBECK, CUBIC, CONSTANT = (
     f"structure.{name}"
-    for name in ("coulomb_friction", "asymmetric_friction", "stribeck_friction", "cubic_stiffness")
+    for name in (
+        "coulomb_friction",
+        "asymmetric_friction",
+        "stribeck_friction",
+        "cubic_stiffness",
+        "constant_force",
+    )
 )
 COULOMB_N = f"{COULOMB}.force_n"
 
@@ -38,7 +45,7 @@ class Decays:
         self.fits = Fits(model, observed[:2], observed[2:], lambda what, done, of: None)
         self.believed = model.believed
         at = surroundings(model)
-        self.pool = {key: Candidate(effect(key), at) for key in (COULOMB, ASYMMETRIC, STRIBECK, CUBIC)}
+        self.pool = {key: Candidate(effect(key), at) for key in (COULOMB, ASYMMETRIC, STRIBECK, CUBIC, CONSTANT)}
         self.baseline = fitted(self.fits.problem(), self.believed, n_iterations=6)[0]
 
     def fit(self, *keys: str, n_iterations: int = 4, **numbers: float) -> Explanation:
@@ -92,6 +99,37 @@ def test_the_special_case_takes_the_place_of_the_general_form_once(case: Decays,
     assert [one.keys for one in found] == [(COULOMB,)]
     assert found[0].fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.02)
     assert InPlace(case.fits).specialised(stribeck, [stribeck, coulomb], pool) == []
+
+
+def test_the_special_case_is_fitted_again_from_a_better_place(case: Decays, coulomb: Explanation) -> None:
+    stribeck, pool = case.fit(STRIBECK), list(case.pool.values())
+    stuck = replace(coulomb, fit=replace(coulomb.fit, cost=1e9))
+    [found] = InPlace(case.fits).specialised(stribeck, [stribeck, stuck], pool)
+    assert found.keys == (COULOMB,)
+    assert found.fit.cost == pytest.approx(coulomb.fit.cost, rel=0.02)
+
+
+def test_one_effect_takes_the_place_of_two(case: Decays, coulomb: Explanation) -> None:
+    """Friction of two directions is what friction and a constant force are together."""
+    both = case.fit(COULOMB, CONSTANT)
+    found = InPlace(case.fits).one_for_all(both.fit, case.baseline, list(case.pool.values()))
+    best = cheapest(found)
+    assert best is not None
+    assert best.keys == (ASYMMETRIC,)
+    assert best.fit.cost == pytest.approx(both.fit.cost, rel=0.02)
+    up, down = (best.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
+    assert up + down == pytest.approx(UP_N + DOWN_N, rel=0.05)
+
+
+def test_what_is_no_nearer_than_the_baseline_takes_no_place(case: Decays, coulomb: Explanation) -> None:
+    assert InPlace(case.fits).one_for_all(coulomb.fit, coulomb.fit, list(case.pool.values())) == []
+
+
+def test_a_held_out_run_is_tried_with_other_releases(case: Decays, coulomb: Explanation) -> None:
+    """Where the release that a fit begins with is off by more than a cycle's friction takes, it is found still."""
+    name = "release of " + case.fits.held_out[0][0].run.name
+    off = replace(coulomb.fit, values={**coulomb.fit.values, name: 0.97 * case.believed[name]})
+    assert case.fits.judged(off).held_out == pytest.approx(coulomb.held_out, rel=0.02)
 
 
 def test_polishing_takes_a_fit_to_its_end(case: Decays) -> None:

@@ -7,8 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sealed_trial.case_drawing import CaseDrawing, class_order
+from sealed_trial.case_drawing import CaseDrawing, _scaled, class_order
 from sealed_trial.composition import SINGLES, class_sizes, possible
+from sealed_trial.hidden_physics.effect import Change, DrawnEffect, Scales
+from sealed_trial.hidden_physics.sensor_effects import gain
+from sealed_trial.hidden_physics.structure_effects import asymmetric
 from sealed_trial.hidden_physics.unknown_physics import UNKNOWN_PHYSICS
 from sealed_trial.laboratory.hidden_rig import drawn_rig, rig_text
 from sealed_trial.laboratory.recording_file import run_attributes
@@ -125,6 +128,54 @@ def test_effects_that_cannot_be_as_strong_as_wanted_come_last_in_the_same_case()
     drawing._used.update({"b": 1, "c": 2})
     first = [drawing._chosen(effects, 1, np.random.default_rng(k))[0].name for k in range(5)]  # type: ignore[arg-type]
     assert first == ["b"] * 5
+
+
+def scales() -> Scales:
+    channels = (
+        "acceleration_control",
+        "acceleration_roof_1",
+        "acceleration_root",
+        "force_cell_1",
+        "force_interface",
+    )
+    return Scales(0.01, 0.5, 3.0, 900.0, 1.2, 30.0, 0.2, 0.02, 0.0, dict.fromkeys(channels, 1.0), {})
+
+
+def test_a_gain_is_never_that_of_a_force_which_a_mass_would_change_alike() -> None:
+    drawn = {gain(scales(), np.random.default_rng(k)).channel for k in range(60)}
+    assert drawn == {"acceleration_control", "acceleration_roof_1"}
+
+
+def test_what_makes_friction_asymmetric_is_half_of_what_it_differs_by() -> None:
+    effect = asymmetric(scales(), np.random.default_rng(2))
+    assert effect.essential is not None
+    up, down = (effect.change(3.0).parameters[f"force_{side}_n"] for side in ("up", "down"))
+    [constant] = effect.essential(3.0).kernel.values()
+    assert abs(constant) == pytest.approx(0.5 * abs(up - down))
+    # what drags more on the way up pulls down at the mean, as an equal friction with a constant force does
+    assert np.sign(constant) == np.sign(down - up)
+
+
+def test_an_effect_whose_essential_part_is_hidden_is_not_drawn() -> None:
+    laboratory = SimpleNamespace(
+        plan=SimpleNamespace(sampling_rate_hz=100.0), signals=lambda changes, relative_tolerance: changes
+    )
+    floor = SimpleNamespace(
+        start_anew=lambda: None, strength=lambda changed, damping_is_known: changed[0].parameters["size"]
+    )
+
+    def effect(share: float) -> DrawnEffect:
+        return DrawnEffect(
+            "asymmetric_friction",
+            "structure",
+            lambda m: Change({"size": 10.0 * m}),
+            essential=lambda m: Change({"size": 10.0 * share * m}),
+        )
+
+    _, reached = _scaled(effect(0.4), 10.0, laboratory, floor, [])  # type: ignore[arg-type]
+    assert reached == pytest.approx(10.0)
+    with pytest.raises(LookupError, match="does not show what makes it"):
+        _scaled(effect(0.3), 10.0, laboratory, floor, [])  # type: ignore[arg-type]
 
 
 def test_the_same_seed_draws_the_same_case() -> None:
