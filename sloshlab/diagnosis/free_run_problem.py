@@ -298,10 +298,11 @@ def mean_square_that_repeats(
     for test in tests:
         for name, other in combinations(test, 2):
             for channel in [of for run, of in parts if run == name and (other, of) in parts]:
-                (one, shown), (two, shown_too) = parts[name, channel], parts[other, channel]
-                both = tuple(slice(0, min(sizes)) for sizes in zip(one.shape, two.shape, strict=True))
+                (first_left, shown), (other_left, shown_too) = parts[name, channel], parts[other, channel]
+                both = tuple(slice(0, min(sizes)) for sizes in zip(shown.shape, shown_too.shape, strict=True))
                 known = shown[both] & shown_too[both]
-                total, n = total + float(one[both][known] @ two[both][known]), n + int(known.sum())
+                total += float(first_left[both][known] @ other_left[both][known])
+                n += int(known.sum())
     return total / n if n else float("nan")
 
 
