@@ -28,6 +28,8 @@ WEAKEST_CLEAR, STRONGEST_CLEAR = 3.5, 30.0
 WEAKEST_MASKED, STRONGEST_MASKED = 0.3, 3.0
 _HIDDEN_DRAWS = 8
 _LEFT_OPEN = 1.2
+_LEAST_MOTION = 0.2
+"""Of the motion without anything hidden; what is stuck is stuck by any friction, damper or spring alike."""
 
 
 @dataclass(frozen=True)
@@ -167,6 +169,8 @@ class CaseDrawing:
             if not all(map(math.isfinite, (reached, *change.parameters.values()))):
                 raise ArithmeticError(f"{effect.name} has no finite size")
         signals = laboratory.signals(changes) if changes else plain
+        if _motion(signals) < _LEAST_MOTION * _motion(plain):
+            raise LookupError("what is hidden leaves no motion to speak of")
         nuisance: dict[str, Any] = {}
         if kind == "nothing":
             signals, nuisance, extra = _with_nuisance(signals, sensors, laboratory, hidden)
@@ -218,6 +222,12 @@ class CaseDrawing:
         if not others:
             raise LookupError("no second block for this plan")
         return [first, others[0]]
+
+
+def _motion(signals: Sequence[Signals]) -> float:
+    """RMS acceleration of the tank relative to the base, where there is a structure between them."""
+    runs = [run["acceleration_tip"] - run["acceleration_root"] for run in signals if "acceleration_tip" in run]
+    return float(np.sqrt(np.mean(np.concatenate(runs) ** 2))) if runs else 1.0
 
 
 def _strengths_of(kind: str) -> tuple[float, float]:

@@ -124,6 +124,23 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
     return found
 
 
+def noise_of_sensor(run: CaseRun, name: str) -> float:
+    """Standard deviation of a channel's white noise in its unit: stated, or of its quietest high bands.
+
+    Parameters
+    ----------
+    run : CaseRun
+    name : str
+    """
+    variable = run.recording[name]
+    values = np.asarray(variable.values, np.float64)
+    n_bands = max(8, 2 * round(0.5 * BLOCK_S * run.attributes.sampling_rate_hz))
+    known = np.isfinite(values)
+    stated = float(variable.attrs.get("noise_std", 0.0)) ** 2
+    white = _white_level(_spectra(values, known, False, n_bands, run)) if known.sum() >= 2 * n_bands else 0.0
+    return float(np.sqrt(max(stated, white)))
+
+
 def _is_integrated(run: CaseRun, driving: Sequence[str]) -> bool:
     """Whether a simulation knows displacements of the base from accelerometers alone."""
     present = [run.recording[name] for name in driving if name in run.recording.data_vars]

@@ -24,17 +24,21 @@ LEAST_MORE: Final = 12.0
 """The same, by which a further effect must improve on fewer."""
 LEAST_SEPARATION: Final = 6.0
 """The same, by which an explanation must beat another to be the only one."""
-LEAST_STRENGTH: Final = 0.5
+LEAST_STRENGTH: Final = 0.7
 """What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of.
 
 Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
 """
+_LITTLE_IN_COMMON: Final = 0.25
+"""Mean square, in noise floors, of what repeats have in common of what is left."""
 _ON_FITTED_RUNS: Final = 2.0
 """The same on runs that were fitted, over that on others: what suits them may be theirs alone."""
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 LARGEST_REMAINDER: Final = 1.25
 """Held-out error in noise floors, as repeats tell it, beyond which something is left whatever was found."""
+_LARGEST_WITHOUT_REPEATS: Final = 3.0
+"""The same where no repeats tell it: what a sensor is said to be worth is hardly wrong by more than that."""
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
 _ERRORS_OVER_STANDARD_ERRORS: Final = 3.0
@@ -137,8 +141,9 @@ def leaves_more(found: Findings, one: Explanation) -> bool:
     found : Findings
     one : Explanation
     """
-    is_large = found.has_repeats and one.rms_without_bursts > LARGEST_REMAINDER
-    return is_large and not one.repeating < LARGEST_REMAINDER**2 - 1.0
+    if not found.has_repeats:
+        return one.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
+    return one.rms_without_bursts > LARGEST_REMAINDER and not one.repeating < LARGEST_REMAINDER**2 - 1.0
 
 
 @dataclass(frozen=True)
@@ -238,7 +243,7 @@ def _shows_more(more: Explanation, less: Explanation, scale: _Scale) -> bool:
 
 def _is_bettered(found: Findings, named: Explanation, others: Sequence[Explanation], scale: _Scale) -> bool:
     """Whether another description shows more, unless repeats have too little in common of what is left to them."""
-    if named.repeating < LEAST_STRENGTH**2:
+    if named.repeating < _LITTLE_IN_COMMON:
         return False
     return any(_shows_more(one, _at_its_best(found, named), scale) for one in others)
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sealed_trial.case_drawing import CaseDrawing, _scaled, class_order
+from sealed_trial.case_drawing import CaseDrawing, _motion, _scaled, class_order
 from sealed_trial.composition import SINGLES, class_sizes, possible
 from sealed_trial.hidden_physics.effect import Change, DrawnEffect, Scales
 from sealed_trial.hidden_physics.sensor_effects import gain
@@ -176,6 +176,16 @@ def test_an_effect_whose_essential_part_is_hidden_is_not_drawn() -> None:
     assert reached == pytest.approx(10.0)
     with pytest.raises(LookupError, match="does not show what makes it"):
         _scaled(effect(0.3), 10.0, laboratory, floor, [])  # type: ignore[arg-type]
+
+
+def test_what_is_stuck_is_not_drawn() -> None:
+    """Half of the motion relative to the base is a motion, a tenth of it is none; a shaker has no structure."""
+    base = np.sin(np.arange(200.0))
+    runs = [
+        {"acceleration_tip": base + size * np.cos(np.arange(200.0)), "acceleration_root": base} for size in (1, 3)
+    ]
+    assert _motion(runs) == pytest.approx(np.sqrt(5 / 2), rel=0.01)
+    assert _motion([{"acceleration_roof_1": base}]) == 1.0
 
 
 def test_the_same_seed_draws_the_same_case() -> None:

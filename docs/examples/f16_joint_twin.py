@@ -1,0 +1,37 @@
+"""A twin of one's own: what hangs under a wing, driven by the wing's measured motion. For ``sloshlab diagnose --twin``.
+
+The joint is cut open at the two accelerometers beside it. The payload follows the wing side by a spring and a damper,
+z̈ + 2ζω ż + ω² z = −a, with a the recorded acceleration of the wing side and z what the joint gives way, scaled so that
+the sensor on the payload side shows g a − z̈: it sits where the payload, turning about its joint, moves less than the wing.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sloshlab.diagnosis.user_twin import Compared, MechanicalTwin, Mechanism, Parameter, Reading, TwinRun
+
+
+def joint(run: TwinRun, values: Mapping[str, float]) -> Mechanism:
+    """The joint under its measured wing side; of unit mass, so that forces are accelerations."""
+    wing = run.channels["acceleration_wing"]
+    rate = 2 * np.pi * values["frequency of the joint"]
+    return Mechanism(
+        mass_kg=1.0,
+        stiffness_n_per_m=rate**2,
+        damping_n_s_per_m=2 * values["damping of the joint"] * rate,
+        base_acceleration_m_per_s2=wing,
+        readings={"acceleration_payload": Reading(acceleration=-1.0, plus=values["lever"] * wing)},
+    )
+
+
+TWIN = MechanicalTwin(
+    parameters=(
+        Parameter("frequency of the joint", 30.0, 5.0, "Hz"),
+        Parameter("damping of the joint", 0.05, 0.03),
+        Parameter("lever", 0.96, 0.03),
+    ),
+    driving=("acceleration_wing",),
+    compared={"acceleration_payload": Compared("m s-2", gain_tolerance=0.0)},
+    mechanism=joint,
+)
