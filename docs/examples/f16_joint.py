@@ -1,8 +1,8 @@
 """The joint between a wing and what hangs under it (F-16) diagnosed: ``f16_joint.py FOLDER CASE [LEVEL ...]``.
 
-Reads ``FOLDER/f16/F16Data_SineSw_Level*.mat``, writes the passage of each sweep through the torsion mode near 7.3 Hz as
-a run into CASE, and diagnoses them with `f16_joint_twin.py`: the payload side is simulated from the recorded motion of
-the wing side, so that whatever is missing lies between the two sensors.
+Reads ``FOLDER/f16/F16Data_SineSw_Level*.mat``, writes the passage of each sweep through the torsion mode near
+7.3 Hz as a run into CASE, and diagnoses them with `f16_joint_twin.py`: the payload side is simulated from the
+recorded motion of the wing side, so that whatever is missing lies between the two sensors.
 """
 
 from __future__ import annotations

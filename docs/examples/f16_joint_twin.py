@@ -1,8 +1,8 @@
-"""A twin of one's own: what hangs under a wing, driven by the wing's measured motion. For ``sloshlab diagnose --twin``.
+"""A twin of one's own: what hangs under a wing, driven by the wing's measured motion. For ``sloshlab diagnose``.
 
-The joint is cut open at the two accelerometers beside it. The payload follows the wing side by a spring and a damper,
-z̈ + 2ζω ż + ω² z = −a, with a the recorded acceleration of the wing side and z what the joint gives way, scaled so that
-the sensor on the payload side shows g a − z̈: it sits where the payload, turning about its joint, moves less than the wing.
+The joint is cut open at the two accelerometers beside it. The payload follows the wing side by a spring and a
+damper, z̈ + 2ζω ż + ω² z = −a, where a is the recorded acceleration of the wing side and z what the joint gives
+way; the sensor on the payload side shows g a + z̈, as it does not sit where the other one does.
 """
 
 from collections.abc import Mapping
@@ -21,15 +21,15 @@ def joint(run: TwinRun, values: Mapping[str, float]) -> Mechanism:
         stiffness_n_per_m=rate**2,
         damping_n_s_per_m=2 * values["damping of the joint"] * rate,
         base_acceleration_m_per_s2=wing,
-        readings={"acceleration_payload": Reading(acceleration=-1.0, plus=values["lever"] * wing)},
+        readings={"acceleration_payload": Reading(acceleration=1.0, plus=values["place of the sensor"] * wing)},
     )
 
 
 TWIN = MechanicalTwin(
     parameters=(
-        Parameter("frequency of the joint", 30.0, 5.0, "Hz"),
+        Parameter("frequency of the joint", 30.0, 6.0, "Hz"),
         Parameter("damping of the joint", 0.05, 0.03),
-        Parameter("lever", 0.96, 0.03),
+        Parameter("place of the sensor", 0.96, 0.03),
     ),
     driving=("acceleration_wing",),
     compared={"acceleration_payload": Compared("m s-2", gain_tolerance=0.0)},

@@ -1,8 +1,8 @@
 """A servo axis (EMPS) diagnosed with a twin of its own: ``servo_axis.py FOLDER CASE [NEWTONS]``.
 
 Reads ``FOLDER/emps/DATA_EMPS.mat``, writes four periods of the motion as recordings into CASE, and diagnoses them
-with `servo_axis_twin.py`, the force being known to some newtons. The motion repeats every 6.24 s, so that the periods are repeats of one test; of the
-samples every fourth is kept.
+with `servo_axis_twin.py`, the force being known to some newtons. The motion repeats every 6.24 s, so that the
+periods are repeats of one test; of the samples every fourth is kept.
 """
 
 from __future__ import annotations

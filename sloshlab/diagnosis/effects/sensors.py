@@ -147,7 +147,8 @@ def _high_passed(numbers: Numbers) -> Reading:
         passed = np.asarray(lfilter([b, -b], [1.0, -a], values))
         leaking = a ** np.arange(values.size)
         known = np.isfinite(recorded)
-        charge = float((recorded - passed)[known] @ leaking[known]) / float(leaking[known] @ leaking[known])
+        size = float(leaking[known] @ leaking[known])
+        charge = float((recorded - passed)[known] @ leaking[known]) / size if size > 0 else 0.0
         return np.asarray(passed + charge * leaking)
 
     return reading

@@ -73,6 +73,12 @@ def test_a_sensor_that_was_charged_before_the_run_is_no_misfit(model: RigModel, 
     np.testing.assert_allclose(read(one, SIGNAL, recorded), recorded, atol=4e-3 * AMPLITUDE)
 
 
+def test_a_charge_that_has_leaked_away_before_the_first_known_sample_is_none(model: RigModel) -> None:
+    one = fault(model, "sensor_high_pass", {"time_constant_s": 1.0 / RATE})
+    recorded = np.where(T < T[-1] - 4.0 / RATE, np.nan, SIGNAL)
+    assert np.isfinite(read(one, SIGNAL, recorded)).all()
+
+
 def test_clipping_stops_at_the_limit_of_the_channel(model: RigModel) -> None:
     one = fault(model, "sensor_clipping", {"limit": 2.5})
     reading = read(one, SIGNAL)
