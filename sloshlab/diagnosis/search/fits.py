@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.explanation import Explanation
@@ -72,6 +73,12 @@ class Fits:
     def problem_of(self, fit: FreeRunFit) -> FreeRunProblem:
         """The fitted runs with the effects of a fit."""
         return self.problem(fit.candidates)
+
+    def jacobian(self, fit: FreeRunFit) -> BlockJacobian:
+        """Derivatives by all parameters of a fit, where it is."""
+        problem = self.problem_of(fit)
+        theta = problem.theta_of(fit.values)
+        return problem.jacobian(theta, problem.residual(theta), range(theta.size))
 
     def judged(self, fit: FreeRunFit) -> Explanation:
         """A fit with its held-out residuals; only releases and offsets of those runs are fitted to them."""

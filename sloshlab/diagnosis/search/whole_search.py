@@ -22,6 +22,7 @@ from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
 from sloshlab.diagnosis.search.refinement import Refinement
 from sloshlab.diagnosis.split import split
 from sloshlab.diagnosis.surroundings import surroundings_of
+from sloshlab.diagnosis.verdict import LARGEST_REMAINDER
 from sloshlab.errors import InputError
 
 assert effects.__all__  # importing the vocabulary makes it known
@@ -89,17 +90,17 @@ def findings_of(
 def _second_effects(
     fits: Fits, known: Sequence[Explanation], retuned: FreeRunFit, pool: Sequence[Candidate]
 ) -> list[Explanation]:
-    """Pairs of the best first effect and another, and what is left of the best pair without either."""
+    """Pairs of the best first effect and another, and what is left of the best pair without either.
+
+    Where the best pair leaves too much, others are tried beside its second effect: the first was the best alone.
+    """
     best = cheapest(known)
     if best is None or retuned.cost - best.fit.cost < LEAST_TO_BUILD_ON:
         return []
-    problem = fits.problem_of(best.fit)
-    if problem.is_down_to_noise(best.fit):
+    if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
-    theta = problem.theta_of(best.fit.values)
-    jacobian = problem.jacobian(theta, problem.residual(theta), range(theta.size))
     more = OneMoreEffect(fits)
-    pairs = more.fitted(best.fit, jacobian, pool, "fitting a second effect")
+    pairs = more.fitted(best.fit, fits.jacobian(best.fit), pool, "fitting a second effect")
     alone = []
     pair = cheapest(pairs)
     if pair is not None and best.fit.cost - pair.fit.cost > LEAST_TO_BUILD_ON:
@@ -109,4 +110,8 @@ def _second_effects(
     if cost < best.fit.cost:
         alone += more.in_place.look_alikes(retuned, alone, pool, "fitting one effect")
         alone += more.in_place.generalised(retuned, alone, pool, "fitting one effect")
+    if pair is not None and pair.held_out_rms > LARGEST_REMAINDER:
+        second = cheapest([one for one in alone if one.keys == pair.keys[1:]])
+        if second is not None:
+            pairs += more.fitted(second.fit, fits.jacobian(second.fit), pool, "exchanging the first effect")
     return [*pairs, *alone]

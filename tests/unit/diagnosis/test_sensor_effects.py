@@ -75,7 +75,7 @@ def test_a_sensor_that_was_charged_before_the_run_is_no_misfit(model: RigModel, 
 
 def test_a_charge_that_has_leaked_away_before_the_first_known_sample_is_none(model: RigModel) -> None:
     one = fault(model, "sensor_high_pass", {"time_constant_s": 1.0 / RATE})
-    recorded = np.where(T < T[-1] - 4.0 / RATE, np.nan, SIGNAL)
+    recorded = np.where(T[-1] - 4.0 / RATE > T, np.nan, SIGNAL)
     assert np.isfinite(read(one, SIGNAL, recorded)).all()
 
 

@@ -1,0 +1,71 @@
+"""How pairs of effects are sought, with fits written by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from sloshlab.diagnosis.search import whole_search
+
+
+def explanation(cost: float, *keys: str, left: float = 2.0) -> Any:
+    return SimpleNamespace(fit=SimpleNamespace(cost=cost, keys=keys), keys=keys, held_out_rms=left)
+
+
+class Tried:
+    """Stands for the fits of one more effect; remembers beside what they were asked for."""
+
+    def __init__(self, pairs: dict[tuple[str, ...], list[Any]]) -> None:
+        self.pairs, self.beside, self.for_all = pairs, [], []
+        self.in_place = SimpleNamespace(
+            one_for_all=lambda wider, base, pool: self.for_all.append(wider.keys) or [],
+            look_alikes=lambda *all_: [],
+            generalised=lambda *all_: [],
+        )
+
+    def fitted(self, base: Any, jacobian: Any, pool: Any, what: str) -> list[Any]:
+        self.beside.append(base.keys)
+        return self.pairs.get(base.keys, [])
+
+
+RETUNED = SimpleNamespace(cost=5000.0)
+BEST, SECOND = explanation(3000.0, "stiffness_change"), explanation(4500.0, "hum")
+
+
+def sought(monkeypatch: pytest.MonkeyPatch, pair: Any, *, is_noise: bool = False) -> tuple[Tried, list[Any]]:
+    tried = Tried({BEST.keys: [pair], SECOND.keys: [explanation(1000.0, "hum", "missing_mode", left=0.9)]})
+    fits = SimpleNamespace(
+        problem_of=lambda fit: SimpleNamespace(is_down_to_noise=lambda fit: is_noise), jacobian=lambda fit: None
+    )
+    monkeypatch.setattr(whole_search, "OneMoreEffect", lambda fits: tried)
+    monkeypatch.setattr(
+        whole_search, "Refinement", lambda fits: SimpleNamespace(take_away=lambda pairs: [SECOND] if pairs else [])
+    )
+    return tried, whole_search._second_effects(fits, [BEST], RETUNED, [])  # type: ignore[arg-type]
+
+
+def test_where_the_best_pair_leaves_too_much_its_first_effect_is_exchanged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried, found = sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum"))
+    assert tried.beside == [("stiffness_change",), ("hum",)]
+    assert [one.keys for one in found] == [("stiffness_change", "hum"), ("hum", "missing_mode"), ("hum",)]
+
+
+def test_a_pair_that_leaves_little_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried, _ = sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum", left=1.2))
+    assert tried.beside == [("stiffness_change",)]
+
+
+def test_one_effect_is_sought_in_place_of_a_pair_that_gains(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum"))[0].for_all == [
+        ("stiffness_change", "hum")
+    ]
+    assert sought(monkeypatch, explanation(2990.0, "stiffness_change", "hum"))[0].for_all == []
+
+
+def test_nothing_is_sought_beside_what_leaves_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried, found = sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum"), is_noise=True)
+    assert (tried.beside, found) == ([], [])
