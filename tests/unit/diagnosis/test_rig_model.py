@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from recorded_oscillators import DAMPING, NOISE, decays, driven, motion, rig, run_of
 
-from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis import rig_model
+from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.rig import Rig
+from sloshlab.twin.structure_forces import COULOMB_FRICTION
 
 TANK_DAMPING = 1.5
 STARTS_M, DURATION_S = (0.006, 0.018), 3.0
@@ -106,3 +108,33 @@ def test_masses_frequencies_losses_and_gains_may_be_off_by_what_is_normal(damped
         assert len(of_one_run) >= 2
         assert {one.most_tolerances for one in of_one_run} == {4.0}
     assert found["damping of the liquid in decay_0"].tolerance == 0.05
+
+
+def test_steps_of_a_release_follow_friction_and_the_highest_mode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are off by a thousandth of the peak from eight times as many; half as many by five times that."""
+    file = tmp_path / "rig.toml"
+    file.write_text(BEAM, encoding="utf-8")
+    still = np.zeros(2048)
+    run = run_of(
+        "release",
+        {"acceleration_tip": still, "displacement_tank": still},
+        {},
+        1,
+        experiment="beam_free",
+        sampling_rate_hz=1024.0,
+        initial_displacement_m=0.01,
+    )
+    friction = COULOMB_FRICTION(force_n=1.8)
+
+    def released(per_period: float) -> np.ndarray:
+        monkeypatch.setattr(rig_model, "_STEPS_PER_PERIOD_OF_A_RELEASE", per_period)
+        model = RigModel(Rig.from_toml(file), tmp_path, [run])
+        return model.simulate(run, model.believed, Extension(terms=(friction,)))["acceleration_tip"]
+
+    default = rig_model._STEPS_PER_PERIOD_OF_A_RELEASE
+    found, fewer, truth = (released(steps) for steps in (default, 0.5 * default, 8 * default))
+    peak = np.abs(truth).max()
+    assert np.std(found - truth) < 1e-3 * peak
+    assert np.std(fewer - truth) > 5 * np.std(found - truth)
