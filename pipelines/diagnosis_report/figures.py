@@ -14,7 +14,7 @@ from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, WORK_COLOUR
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.mismatch import ChannelMismatch, mismatches
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.verdict import named_and_placed
+from sloshlab.diagnosis.verdict.wording import named_and_placed
 
 FloatArray = NDArray[np.float64]
 _MOST_ROWS = 14

@@ -16,7 +16,8 @@ from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.evidence import ALONE, CANNOT_TELL
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.units import named_and_units
-from sloshlab.diagnosis.verdict import interval, named_and_placed
+from sloshlab.diagnosis.verdict.interval import interval
+from sloshlab.diagnosis.verdict.wording import named_and_placed
 
 _MOST_EXPLANATIONS: Final = 14
 _MOST_LEFT_OUT: Final = 12

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.split import Split
 
 FloatArray = NDArray[np.float64]
+LARGEST_REMAINDER: Final = 1.25
+"""Held-out error in noise floors, as repeats tell it, beyond which something is left whatever was found."""
 
 
 @dataclass(frozen=True, eq=False)

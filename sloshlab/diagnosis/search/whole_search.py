@@ -9,7 +9,7 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, candidates
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
 from sloshlab.diagnosis.free_run_fit import fitted_baseline
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, huber_cost
 from sloshlab.diagnosis.noise_floor import weighted_observations
@@ -22,7 +22,6 @@ from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
 from sloshlab.diagnosis.search.refinement import Refinement
 from sloshlab.diagnosis.split import split
 from sloshlab.diagnosis.surroundings import surroundings_of
-from sloshlab.diagnosis.verdict import LARGEST_REMAINDER
 from sloshlab.errors import InputError
 
 assert effects.__all__  # importing the vocabulary makes it known

@@ -8,7 +8,7 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, known_effects
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
-from sloshlab.diagnosis.verdict import equals_of
+from sloshlab.diagnosis.verdict.alternatives import equals_of
 
 assert effects.__all__
 

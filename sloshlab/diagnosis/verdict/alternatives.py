@@ -1,0 +1,107 @@
+"""Explanations that cannot be told from the best one: by the recordings, or because they are the same force."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gained, largest_strength
+
+LEAST_SEPARATION: Final = 6.0
+"""The same, by which an explanation must beat another to be the only one."""
+_LEAST_SHARE: Final = 0.5
+"""Of the gain of the best that an alternative must have."""
+_LITTLE: Final = 0.05
+_LITTLE_OF_ONE_POWER: Final = 0.1
+"""Of a mean square that an effect of one frequency explains, which may be in beginnings and ends; the second one
+for effects whose work grows with the same power of the amplitude, which nothing else could tell apart.
+"""
+_EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
+"""Explanations that are the same force in the structure."""
+_EQUAL_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_error"}
+"""The same force in the tank, where the share of the liquid that does not follow is the same at all levels."""
+
+
+def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Explanation]:
+    """Explanations of at most as many effects that are as good within chance, the best first."""
+    alike = [best]
+    seen = {best.named_in_blocks}
+    for one in sorted(found.explanations, key=lambda one: -scale.evidence(one)):
+        if len(one.keys) > len(best.keys) or one.named_in_blocks in seen or not np.isfinite(one.held_out):
+            continue
+        if one.rests_on_a_bound or (includes(one, best) and not _differs(one, best)):
+            continue
+        if scale.held_out_gain(found.retuned, one) < _LEAST_SHARE * scale.held_out_gain(found.retuned, best):
+            continue
+        is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
+        is_alike = is_alike or (_differs(one, best) and not _shows_less(one, best, scale))
+        if is_alike or _is_alike_at_one_frequency(found, one, best):
+            alike.append(one)
+            seen.add(one.named_in_blocks)
+    return alike
+
+
+def _shows_less(general: Explanation, special: Explanation, scale: Scale) -> bool:
+    """Whether a general form with numbers of its own is worse than its special case, by half of what is clear."""
+    is_worse = has_gained(special, general, scale)
+    return is_worse and largest_strength(general.by_run, special.by_run) >= 0.5 * LEAST_STRENGTH
+
+
+def _is_alike_at_one_frequency(found: Findings, one: Explanation, best: Explanation) -> bool:
+    """Look-alikes of one frequency that differ by less than the noise floor, or by little of what they explain.
+
+    What tells them apart then are beginnings and ends of runs, on which no name should rest.
+    """
+    if not found.surroundings.has_one_frequency or len(one.keys) != 1 or len(best.keys) != 1:
+        return False
+    this, other = one.fit.candidates[0].effect, best.fit.candidates[0].effect
+    if this.name not in other.look_alikes and other.name not in this.look_alikes:
+        return False
+    powers = [{term for term in effect.spoken_for_by if term.startswith("work")} for effect in (this, other)]
+    little = _LITTLE_OF_ONE_POWER if powers[0] and powers[0] == powers[1] else _LITTLE
+    return all(
+        left - best.by_run[cell] < max(1.0, little * (found.retuned.by_run[cell] - best.by_run[cell]))
+        for cell, left in one.by_run.items()
+    )
+
+
+def includes(wider: Explanation, narrower: Explanation) -> bool:
+    """Whether every effect of the narrower is one of the wider, or a special case of one of them."""
+    held = {
+        f"{one.effect.block}.{name}"
+        for one in wider.fit.candidates
+        for name in (one.effect.known_as, *one.effect.includes)
+    }
+    return held >= set(narrower.named_in_blocks)
+
+
+def _differs(wider: Explanation, narrower: Explanation) -> bool:
+    """Whether a more general effect has numbers with which it is clearly not its special case."""
+    if len(wider.keys) != 1 or len(narrower.keys) != 1:
+        return False
+    general, special = wider.fit.candidates[0], narrower.fit.candidates[0]
+    if len(special.effect.parameters) != 1:
+        return False
+    size = narrower.fit.values[f"{special.key}.{special.effect.parameters[0].name}"]
+    return any(
+        all(low <= wider.fit.values[f"{general.key}.{name}"] <= high for name, (low, high) in limits.items())
+        for limits in general.effect.differs(size)
+    )
+
+
+def equals_of(best: Explanation) -> list[tuple[str, ...]]:
+    """Names of explanations that are the same force, alone or beside other effects."""
+    in_structure = [one.effect.name for one in best.fit.candidates if one.effect.block == "structure"]
+    found = []
+    for one, two in _EQUALS.items():
+        for this, other in ((one, two), (two, one)):
+            if set(this) <= set(in_structure):
+                others = [name for name in best.names if name not in this]
+                found.append(tuple(sorted((*others, *other))))
+    for mass in best.fit.candidates:
+        if mass.effect.block == "tank" and mass.effect.name in _EQUAL_MASSES:
+            others = [each.effect.known_as for each in best.fit.candidates if each is not mass]
+            found.append(tuple(sorted((*others, _EQUAL_MASSES[mass.effect.name]))))
+    return found

@@ -1,0 +1,112 @@
+"""How two explanations compare: gains in units of chance, and sizes in noise floors.
+
+A gain counts in units of what chance gives: the decrease of the sum of squares on runs that chose nothing, over
+twice the mean square that is left there by the best description (never less than one).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final, TypeVar
+
+import numpy as np
+
+from sloshlab.diagnosis.explanation import Explanation, Findings
+
+_Place = TypeVar("_Place")
+LEAST_MORE: Final = 12.0
+"""The same, by which a further effect must improve on fewer."""
+LEAST_STRENGTH: Final = 0.7
+"""What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of.
+
+Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
+"""
+_ON_FITTED_RUNS: Final = 2.0
+"""The same on runs that were fitted, over that on others: what suits them may be theirs alone."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Sums of squares as log-likelihoods: over twice the mean square that the best description leaves (≥ 1).
+
+    Attributes
+    ----------
+    fitting, held_out : float
+    judged : frozenset of str
+        Names of the held-out runs.
+    per_number : float
+        What a number more must gain (Schwarz 1978, doi:10.1214/aos/1176344136).
+    """
+
+    fitting: float
+    held_out: float
+    per_number: float
+    judged: frozenset[str] = frozenset()
+
+    @classmethod
+    def of(cls, found: Findings) -> Scale:
+        described = [*found.explanations, *found.ceilings, found.retuned]
+        fitting = min(one.fit.misfit for one in described) / max(found.n_fitting, 1)
+        held_out = min(one.held_out for one in described) / max(found.n_held_out, 1)
+        n = max(found.n_fitting + found.n_held_out, 2)
+        judged = frozenset(run.name for run in found.split.held_out)
+        return cls(2.0 * max(1.0, fitting), 2.0 * max(1.0, held_out), 0.5 * float(np.log(n)), judged)
+
+    def fit_gain(self, before: Explanation, after: Explanation) -> float:
+        """Of the cost on the runs that are fitted."""
+        return (before.fit.cost - after.fit.cost) / self.fitting
+
+    def held_out_gain(self, before: Explanation, after: Explanation) -> float:
+        """On runs that chose nothing."""
+        return (before.held_out - after.held_out) / self.held_out
+
+    def evidence(self, one: Explanation) -> float:
+        """Log-likelihood of both, less what its numbers cost."""
+        likelihood = -one.fit.cost / self.fitting - one.held_out / self.held_out
+        return likelihood - self.per_number * one.n_numbers
+
+
+def has_gained(more: Explanation, less: Explanation, scale: Scale) -> bool:
+    return scale.held_out_gain(less, more) > LEAST_MORE and scale.fit_gain(less, more) > LEAST_MORE
+
+
+def is_clearly_better(more: Explanation, less: Explanation, scale: Scale) -> bool:
+    """By more than chance on both kinds of runs, and on held-out runs by a size that is worth speaking of."""
+    return has_gained(more, less, scale) and strength(less, more) >= LEAST_STRENGTH
+
+
+def shows_more(more: Explanation, less: Explanation, scale: Scale) -> bool:
+    """The same, with a size that is worth speaking of in any channel of any run, twice as large on fitted ones."""
+    if not has_gained(more, less, scale):
+        return False
+    judged = {place: left for place, left in more.by_run.items() if place[0] in scale.judged}
+    fitted = {place: left for place, left in more.by_run.items() if place[0] not in scale.judged}
+    return (
+        largest_strength(less.by_run, judged) >= LEAST_STRENGTH
+        or largest_strength(less.by_run, fitted) >= _ON_FITTED_RUNS * LEAST_STRENGTH
+    )
+
+
+def at_its_best(found: Findings, one: Explanation) -> Explanation:
+    """With the least that any fit of the same effects leaves of each run; jumps of friction leave many valleys."""
+    alike = [one, *(other for other in found.explanations if set(other.keys) == set(one.keys))]
+    by_run = {place: min(other.by_run.get(place, left) for other in alike) for place, left in one.by_run.items()}
+    return replace(one, by_run=by_run, held_out=min(other.held_out for other in alike))
+
+
+def strength(before: Explanation, after: Explanation) -> float:
+    """What an explanation removes from the channel that shows it most, in noise floors.
+
+    Parameters
+    ----------
+    before, after : Explanation
+        With fewer and with more effects.
+    """
+    return largest_strength(before.by_channel, after.by_channel)
+
+
+def largest_strength(before: Mapping[_Place, float], after: Mapping[_Place, float]) -> float:
+    """Square root of the largest decrease of a mean square over what is left, both not below the noise floor."""
+    removed = [max(before[place], 1.0) / max(left, 1.0) - 1.0 for place, left in after.items() if place in before]
+    return float(np.sqrt(max([0.0, *removed])))

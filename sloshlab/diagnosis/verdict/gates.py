@@ -1,0 +1,212 @@
+"""What the findings amount to: nothing missing, named, indistinguishable, or unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
+from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equals_of, includes
+from sloshlab.diagnosis.verdict.comparison import Scale, at_its_best, is_clearly_better, shows_more
+from sloshlab.diagnosis.verdict.wording import (
+    nothing_statement,
+    separating_experiment_of,
+    statement_of,
+    unknown_statement,
+)
+
+LEAST_GAIN: Final = 12.0
+"""Held-out log-likelihood ratio from which something is missing."""
+ADEQUATE: Final = 1.15
+"""Held-out error over that of the best correction up to which an explanation is adequate."""
+_LARGEST_WITHOUT_REPEATS: Final = 3.0
+"""The same where no repeats tell it: what a sensor is said to be worth is hardly wrong by more than that."""
+_LITTLE_IN_COMMON: Final = 0.25
+"""Mean square, in noise floors, of what repeats have in common of what is left."""
+_NUMBERS_OF_THE_UNKNOWN: Final = 3
+"""What it would have if it had a name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """The answer.
+
+    Attributes
+    ----------
+    kind : {"nothing_missing", "named", "indistinguishable", "unknown"}
+    best : Explanation or None
+        The best explanation with a name; None where nothing is missing.
+    alternatives : list of Explanation
+        All that cannot be told from the best, itself first.
+    gain : float
+        Of the best over the retuned baseline, on held-out runs.
+    adequacy : float
+        Held-out error of the best over that of the ceiling.
+    statement, separating_experiment : str
+    probabilities : dict
+    block : str
+        Of what has no name, where the cut at measured interfaces tells it.
+    """
+
+    kind: str
+    best: Explanation | None
+    alternatives: list[Explanation]
+    gain: float
+    adequacy: float
+    statement: str
+    separating_experiment: str
+    probabilities: dict[str, float]
+    block: str = ""
+
+
+def verdict_of(found: Findings) -> Verdict:
+    """Judge the findings.
+
+    Parameters
+    ----------
+    found : Findings
+    """
+    scale = Scale.of(found)
+    ceiling = min([*found.explanations, *found.ceilings, found.retuned], key=lambda one: one.held_out)
+    gain = scale.held_out_gain(found.retuned, ceiling)
+    probabilities = _probabilities(found, scale)
+    described = _in_need_of_all(found, scale)
+    is_more = any(shows_more(one, found.retuned, scale) for one in described)
+    if not is_more and not leaves_more(found, found.retuned):
+        certain = _certain(probabilities, "none")
+        return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
+    named = _shortest_sufficient(found, scale)
+    adequacy = named.held_out_rms / max(ceiling.held_out_rms, 1e-300) if named else np.inf
+    if (
+        named is None
+        or scale.held_out_gain(found.retuned, named) < LEAST_GAIN
+        or adequacy > ADEQUATE
+        or leaves_more(found, named)
+        or _is_bettered(found, named, described, scale)
+    ):
+        certain = _certain(probabilities, "unknown")
+        return Verdict("unknown", named, [], gain, adequacy, unknown_statement(found, named), "", certain)
+    alternatives = alternatives_of(found, named, scale)
+    kind = "named" if len(alternatives) == 1 and not equals_of(named) else "indistinguishable"
+    return Verdict(
+        kind,
+        named,
+        alternatives,
+        scale.held_out_gain(found.retuned, named),
+        adequacy,
+        statement_of(found, named, alternatives, kind),
+        separating_experiment_of(alternatives) if kind == "indistinguishable" else "",
+        _certain(probabilities, *(label_of(one) for one in alternatives)),
+    )
+
+
+def leaves_more(found: Findings, one: Explanation) -> bool:
+    """Whether an explanation leaves more of the held-out runs than repeats of a test differ by, alike in repeats.
+
+    Parameters
+    ----------
+    found : Findings
+    one : Explanation
+    """
+    if not found.has_repeats:
+        return one.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
+    return one.rms_without_bursts > LARGEST_REMAINDER and not one.repeating < LARGEST_REMAINDER**2 - 1.0
+
+
+def _in_need_of_all(found: Findings, scale: Scale) -> list[Explanation]:
+    """What shows more than each of its parts: one effect may bring the gain of chance, another one the size."""
+    described = [*found.explanations, *found.ceilings]
+    parts = [(frozenset(one.keys), one) for one in found.explanations]
+    return [
+        one
+        for one in described
+        if all(
+            shows_more(one, at_its_best(found, part), scale) for keys, part in parts if keys < frozenset(one.keys)
+        )
+    ]
+
+
+def _shortest_sufficient(found: Findings, scale: Scale) -> Explanation | None:
+    """The best single effect, unless two are better by more than chance."""
+    known = [one for one in found.explanations if np.isfinite(one.held_out) and not one.rests_on_a_bound]
+    singles, pairs = ([one for one in known if len(one.keys) == n] for n in (1, 2))
+    if not singles:
+        return None
+    single = _without_excess(max(singles, key=scale.evidence), singles, scale)
+    if not pairs:
+        return single
+    pair = _without_excess(max(pairs, key=scale.evidence), pairs, scale)
+    return pair if is_clearly_better(pair, single, scale) else single
+
+
+def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scale) -> Explanation:
+    """A special case of effects in their place, unless the general form is better by a size worth speaking of."""
+    for special in sorted(alike, key=lambda one: -scale.evidence(one)):
+        is_special = special.n_numbers < best.n_numbers and includes(best, special)
+        if is_special and not is_clearly_better(best, special, scale):
+            return special
+    return best
+
+
+def _is_bettered(found: Findings, named: Explanation, others: Sequence[Explanation], scale: Scale) -> bool:
+    """Whether another description shows more, unless repeats have too little in common of what is left to them."""
+    if named.repeating < _LITTLE_IN_COMMON:
+        return False
+    return any(shows_more(one, at_its_best(found, named), scale) for one in others)
+
+
+def _probabilities(found: Findings, scale: Scale) -> dict[str, float]:
+    """Weights of the explanations by their likelihood on held-out runs and their number of parameters."""
+    scores: dict[str, float] = {"none": -found.retuned.held_out / scale.held_out}
+    for one in found.explanations:
+        if np.isfinite(one.held_out):
+            label = label_of(one)
+            score = -one.held_out / scale.held_out - scale.per_number * one.n_numbers
+            scores[label] = max(scores.get(label, -np.inf), score)
+    named = {key for one in found.explanations for key in one.keys}
+    for one in found.ceilings:
+        if np.isfinite(one.held_out):
+            beside = sum(len(each.effect.parameters) for each in one.fit.candidates if each.key in named)
+            score = -one.held_out / scale.held_out - scale.per_number * (_NUMBERS_OF_THE_UNKNOWN + beside)
+            scores["unknown"] = max(scores.get("unknown", -np.inf), score)
+    top = max(scores.values())
+    weights = {name: float(np.exp(max(score - top, -700.0))) for name, score in scores.items()}
+    total = sum(weights.values())
+    return {name: weight / total for name, weight in weights.items() if weight / total > 1e-4}
+
+
+def _certain(probabilities: dict[str, float], *decided: str) -> dict[str, float]:
+    """Probabilities after the gates: half of the weight to what they decided."""
+    shared = {key: 0.5 * value for key, value in probabilities.items()}
+    labels = tuple(dict.fromkeys(decided))
+    for label in labels:
+        shared[label] = shared.get(label, 0.0) + 0.5 / len(labels)
+    return shared
+
+
+def label_of(one: Explanation) -> str:
+    return " + ".join(one.names)
+
+
+def with_place(found: Findings, verdict: Verdict, seen: str = "", block: str = "") -> Verdict:
+    """The verdict with where it is: in its sentence, and the block of what has no name.
+
+    Parameters
+    ----------
+    found : Findings
+    verdict : Verdict
+    seen : str
+        Words such as "seen at velocity reversals below 1.5 g".
+    block : str
+        The block that owns the mismatch by the cut at measured interfaces; empty where that cannot tell.
+    """
+    if verdict.kind == "nothing_missing":
+        return verdict
+    if verdict.kind == "unknown" and block:
+        verdict = replace(verdict, block=block, statement=unknown_statement(found, verdict.best, block))
+    if not seen:
+        return verdict
+    return replace(verdict, statement=f"{verdict.statement.removesuffix('.')}; {seen}.")

@@ -1,0 +1,97 @@
+"""Verdicts in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.units import named_and_units
+from sloshlab.diagnosis.verdict.alternatives import equals_of
+from sloshlab.diagnosis.verdict.interval import interval
+
+
+def nothing_statement(found: Findings) -> str:
+    return (
+        "Nothing is missing: with its own parameters retuned the simulation describes the held-out runs to "
+        f"{found.retuned.held_out_rms:.2f} of the noise floor."
+    )
+
+
+def unknown_statement(found: Findings, named: Explanation | None, block: str = "") -> str:
+    where = block or where_of(found)
+    closest = ""
+    if named is not None:
+        nearest = " and ".join(named_and_placed(one) for one in named.fit.candidates)
+        same = "".join(f" (the same as {' with '.join(one).replace('_', ' ')})" for one in equals_of(named))
+        share = f"{100 * explained_share(found, named):.0f} % of what can be explained"
+        closest = f"; the nearest known effect is {nearest}{same}, which explains {share}"
+    return f"Something is missing that has no name here, most likely in the {where}{closest}."
+
+
+def statement_of(found: Findings, best: Explanation, alternatives: Sequence[Explanation], kind: str) -> str:
+    named = " and ".join(_described(best, candidate) for candidate in best.fit.candidates)
+    text = f"Left out: {named}; explains {100 * explained_share(found, best):.0f} % of what can be explained"
+    if kind == "indistinguishable":
+        others = [" + ".join(one.names).replace("_", " ") for one in alternatives[1:]]
+        others += [" + ".join(equal).replace("_", " ") for equal in equals_of(best)]
+        text += f"; cannot be told from {' or '.join(dict.fromkeys(others))}"
+    return text + "."
+
+
+def separating_experiment_of(alternatives: Sequence[Explanation]) -> str:
+    effects = [candidate.effect for one in alternatives for candidate in one.fit.candidates]
+    return "; or ".join(dict.fromkeys(effect.separated_by for effect in effects if effect.separated_by))
+
+
+def named_and_placed(candidate: Candidate) -> str:
+    """Words for an effect and for where it acts.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    """
+    name = candidate.effect.known_as.replace("_", " ")
+    place = candidate.channel.replace("+", " and ").replace("<", " from ")
+    return f"{name} of {place}" if place else f"{name} in the {candidate.effect.block}"
+
+
+def where_of(found: Findings) -> str:
+    """The block whose correction helps most."""
+    options = [one for one in (*found.ceilings, *found.explanations) if len(one.keys) == 1]
+    best = min(options, key=lambda one: one.held_out, default=None)
+    return best.fit.candidates[0].effect.block if best else "structure"
+
+
+def explained_share(found: Findings, best: Explanation) -> float:
+    """Share of what any description explains of the held-out runs beyond the retuned baseline."""
+    ceiling = min(one.held_out_rms for one in (*found.ceilings, *found.explanations, best))
+    possible = found.retuned.held_out_rms**2 - ceiling**2
+    gained = found.retuned.held_out_rms**2 - best.held_out_rms**2
+    return min(max(gained / possible, 0.0), 1.0) if possible > 0 else 0.0
+
+
+def _described(best: Explanation, candidate: Candidate) -> str:
+    numbers = []
+    for parameter in candidate.effect.parameters:
+        words, units = named_and_units(parameter.name)
+        estimate, low, high = _with_digits(*interval(best, candidate, parameter.name))
+        label = f"{words} " if len(candidate.effect.parameters) > 1 else ""
+        numbers.append(f"{label}{estimate}{units and ' ' + units} ({low} to {high})")
+    return f"{named_and_placed(candidate)}, {', '.join(numbers)}"
+
+
+def _with_digits(estimate: float, low: float, high: float) -> tuple[str, str, str]:
+    """Three digits, or as many as tell the interval from its middle.
+
+    Examples
+    --------
+    >>> _with_digits(39.0343, 39.0126, 39.056), _with_digits(-0.37, -0.41, -0.33)
+    (('39.03', '39.01', '39.06'), ('−0.37', '−0.41', '−0.33'))
+    """
+    width, size = high - low, max(abs(low), abs(high))
+    digits = 3 if width <= 0 or size <= 0 else min(max(3, 1 + int(np.ceil(np.log10(size / width)))), 8)
+    first, second, third = (f"{value:.{digits}g}".replace("-", "−") for value in (estimate, low, high))
+    return first, second, third
