@@ -22,8 +22,8 @@ LEAST_GAIN: Final = 12.0
 """Held-out log-likelihood ratio from which something is missing."""
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
-_LARGEST_WITHOUT_REPEATS: Final = 3.0
-"""The same where no repeats tell it: what a sensor is said to be worth is hardly wrong by more than that."""
+_LARGEST_WITHOUT_REPEATS: Final = 2.0
+"""What a retuned baseline may leave and still be called complete, where only what is said of sensors tells the noise."""
 _LITTLE_IN_COMMON: Final = 0.25
 """Mean square, in noise floors, of what repeats have in common of what is left."""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
@@ -75,7 +75,8 @@ def verdict_of(found: Findings) -> Verdict:
     probabilities = _probabilities(found, scale)
     described = _in_need_of_all(found, scale)
     is_more = any(shows_more(one, found.retuned, scale) for one in described)
-    if not is_more and not leaves_more(found, found.retuned):
+    is_guess = not found.has_repeats and found.retuned.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
+    if not (is_more or is_guess or leaves_more(found, found.retuned)):
         certain = _certain(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
     named = _shortest_sufficient(found, scale)
@@ -111,9 +112,8 @@ def leaves_more(found: Findings, one: Explanation) -> bool:
     found : Findings
     one : Explanation
     """
-    if not found.has_repeats:
-        return one.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
-    return one.rms_without_bursts > LARGEST_REMAINDER and not one.repeating < LARGEST_REMAINDER**2 - 1.0
+    is_large = found.has_repeats and one.rms_without_bursts > LARGEST_REMAINDER
+    return is_large and not one.repeating < LARGEST_REMAINDER**2 - 1.0
 
 
 def _in_need_of_all(found: Findings, scale: Scale) -> list[Explanation]:

@@ -344,8 +344,7 @@ def test_a_nameless_description_that_is_clearly_better_leaves_the_name_unknown(
     [
         pytest.param(True, 1.26, True, id="more than repeats differ by"),
         pytest.param(True, 1.24, False, id="as repeats differ"),
-        pytest.param(False, 2.9, False, id="without repeats the noise is a guess"),
-        pytest.param(False, 3.1, True, id="but not to a factor of three"),
+        pytest.param(False, 1.9, False, id="without repeats the noise is a guess"),
     ],
 )
 def test_what_leaves_more_than_repeats_differ_by_is_unknown(repeats: bool, rms: float, more: bool) -> None:
@@ -355,6 +354,12 @@ def test_what_leaves_more_than_repeats_differ_by_is_unknown(repeats: bool, rms: 
     assert named.adequacy == 1.0
     nothing = judged(left(0.0, 0.0, rms=rms), [left(0.0, 0.0, FRICTION)], repeats=repeats)
     assert nothing.kind == ("unknown" if more else "nothing_missing")
+
+
+@pytest.mark.parametrize(("rms", "kind"), [(1.9, "nothing_missing"), (2.1, "unknown")])
+def test_without_repeats_twice_the_noise_is_not_nothing_and_a_name_may_leave_it(rms: float, kind: str) -> None:
+    assert judged(left(0.0, 0.0, rms=rms), [left(0.0, 0.0, FRICTION)]).kind == kind
+    assert judged(BASELINE, [left(0.0, 0.0, FRICTION, rms=rms)]).kind == "named"
 
 
 @pytest.mark.parametrize(("repeating", "more"), [(0.55, False), (0.57, True)], ids=["noise", "common to repeats"])
