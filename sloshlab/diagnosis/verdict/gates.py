@@ -23,7 +23,7 @@ LEAST_GAIN: Final = 12.0
 ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction up to which an explanation is adequate."""
 _LARGEST_WITHOUT_REPEATS: Final = 2.0
-"""What a retuned baseline may leave and still be called complete, where only what is said of sensors tells the noise."""
+"""What a baseline may leave and be called complete where only what is said of sensors tells the noise."""
 _LITTLE_IN_COMMON: Final = 0.25
 """Mean square, in noise floors, of what repeats have in common of what is left."""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
