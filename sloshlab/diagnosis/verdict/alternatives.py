@@ -6,6 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gained, largest_strength
 
@@ -20,6 +22,7 @@ for effects whose work grows with the same power of the amplitude, which nothing
 """
 _EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure."""
+_BEYOND_ALL_LEVELS: Final = 5.0
 _EQUAL_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_error"}
 """The same force in the tank, where the share of the liquid that does not follow is the same at all levels."""
 
@@ -101,7 +104,13 @@ def equals_of(best: Explanation) -> list[tuple[str, ...]]:
                 others = [name for name in best.names if name not in this]
                 found.append(tuple(sorted((*others, *other))))
     for mass in best.fit.candidates:
-        if mass.effect.block == "tank" and mass.effect.name in _EQUAL_MASSES:
+        if mass.effect.block == "tank" and (mass.effect.name in _EQUAL_MASSES or _never_fades(best, mass)):
             others = [each.effect.known_as for each in best.fit.candidates if each is not mass]
-            found.append(tuple(sorted((*others, _EQUAL_MASSES[mass.effect.name]))))
+            found.append(tuple(sorted((*others, _EQUAL_MASSES[mass.effect.known_as]))))
     return found
+
+
+def _never_fades(best: Explanation, mass: Candidate) -> bool:
+    """Whether an effective mass fades only far beyond all levels that were recorded."""
+    fade_g = best.fit.values.get(f"{mass.key}.fade_g", 0.0)
+    return fade_g > _BEYOND_ALL_LEVELS * mass.surroundings.acceleration_m_per_s2 / GRAVITY_M_PER_S2

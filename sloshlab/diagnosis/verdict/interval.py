@@ -14,21 +14,22 @@ _NORMAL_90: Final = 1.6449
 _ERRORS_OVER_STANDARD_ERRORS: Final = 3.0
 """On cases whose truth was known."""
 _CALIBRATION: Final = 0.01
-_IN_UNITS_OF_THE_CHANNEL: Final = ("amplitude", "rate", "limit")
+_FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta")
+"""Ends of the names of numbers that no gain of a sensor and no mass changes."""
 
 
 def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[float, float, float]:
     """Estimate and 90 % interval of one parameter.
 
     The standard error of the fit knows noise alone; it is widened by what the fit leaves, by how far estimates
-    were off where the truth was known, and by the calibration of a channel in whose unit the number is.
+    were off where the truth was known, and, where gains or masses scale the number, by how well those are known.
     """
     name = f"{candidate.key}.{parameter}"
     estimate = best.fit.values[name]
     if name not in best.fit.names:
         return estimate, estimate, estimate
     scatter = _ERRORS_OVER_STANDARD_ERRORS * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
-    of_gain = _CALIBRATION * abs(estimate) if parameter in _IN_UNITS_OF_THE_CHANNEL else 0.0
+    of_gain = 0.0 if parameter.endswith(_FREE_OF_GAINS) else _CALIBRATION * abs(estimate)
     width = _NORMAL_90 * float(np.hypot(scatter, of_gain))
     chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
     lowest, highest = candidate.bounds(chosen)

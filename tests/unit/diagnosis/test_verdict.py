@@ -517,22 +517,43 @@ def interval_of(values: Mapping[str, float], rms: float = NOISE) -> dict[str, fl
 def test_intervals_are_as_wide_as_errors_were_and_wider_where_the_fit_leaves_more(
     rms: float, widened: float
 ) -> None:
-    """Three standard errors, twice that at two noise floors, at 90 %."""
+    """Three standard errors, twice that at two noise floors, at 90 %, beside one per cent of the size."""
     force = interval_of(FRICTION, rms)
-    width = 3.0 * 0.01 * widened * norm.ppf(0.95)
+    width = np.hypot(3.0 * 0.01 * widened, 0.0037) * norm.ppf(0.95)
     assert (force["estimate"], force["level"]) == (0.37, 0.9)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
     assert 0.37 - force["low"] == pytest.approx(width, rel=1e-4)
 
 
-def test_a_size_in_the_unit_of_a_channel_is_known_no_better_than_the_channel() -> None:
-    """One per cent of 4 m/s² beside three standard errors; a force is no reading."""
-    hum = interval_of({"sensor.mains_hum_60.acceleration_tip.amplitude": 4.0})
+@pytest.mark.parametrize(
+    "number", ["sensor.mains_hum_60.acceleration_tip.amplitude", "structure.coulomb_friction.force_n"]
+)
+def test_a_size_is_known_no_better_than_gains_and_masses(number: str) -> None:
+    """One per cent of 4 m/s², or of 4 N, beside three standard errors."""
+    size = interval_of({number: 4.0})
     width = norm.ppf(0.95) * np.sqrt(0.03**2 + 0.04**2)
-    assert hum["high"] - 4.0 == pytest.approx(width, rel=1e-4)
-    assert 4.0 - hum["low"] == pytest.approx(width, rel=1e-4)
-    force = interval_of({"structure.coulomb_friction.force_n": 4.0})
-    assert force["high"] - 4.0 == pytest.approx(0.03 * norm.ppf(0.95), rel=1e-4)
+    assert size["high"] - 4.0 == pytest.approx(width, rel=1e-4)
+    assert 4.0 - size["low"] == pytest.approx(width, rel=1e-4)
+
+
+def test_a_time_does_not_depend_on_gains() -> None:
+    leak = interval_of({"sensor.sensor_high_pass.acceleration_tip.time_constant_s": 4.0})
+    assert leak["high"] - 4.0 == pytest.approx(0.03 * norm.ppf(0.95), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("fade_g", "listed"), [(17.0, True), (16.0, False)], ids=["never", "at five times the level"]
+)
+def test_an_effective_mass_that_never_fades_is_a_mass(fade_g: float, listed: bool) -> None:
+    """The tank moves with 32 m/s², 3.26 g."""
+    fading = {
+        "tank.fading_mass.beta": -0.7,
+        "tank.fading_mass.fade_g": fade_g,
+        "tank.fading_mass.averaging_s": 1.0,
+    }
+    verdict = judged(BASELINE, [left(0.0, 0.0, fading)])
+    assert verdict.kind == ("indistinguishable" if listed else "named")
+    assert ("cannot be told from mass error" in verdict.statement) == listed
 
 
 def test_any_force_beside_a_name_makes_the_name_no_less_probable() -> None:
