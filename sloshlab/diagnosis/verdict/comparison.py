@@ -46,6 +46,7 @@ class Scale:
 
     @classmethod
     def of(cls, found: Findings) -> Scale:
+        """The scale of what one search has found."""
         described = [*found.explanations, *found.ceilings, found.retuned]
         fitting = min(one.fit.misfit for one in described) / max(found.n_fitting, 1)
         held_out = min(one.held_out for one in described) / max(found.n_held_out, 1)
@@ -68,6 +69,7 @@ class Scale:
 
 
 def has_gained(more: Explanation, less: Explanation, scale: Scale) -> bool:
+    """Whether an explanation gains more than chance gives over another, on fitted and on held-out runs."""
     return scale.held_out_gain(less, more) > LEAST_MORE and scale.fit_gain(less, more) > LEAST_MORE
 
 

@@ -188,6 +188,7 @@ def _certain(probabilities: dict[str, float], *decided: str) -> dict[str, float]
 
 
 def label_of(one: Explanation) -> str:
+    """Names of an explanation as one label."""
     return " + ".join(one.names)
 
 

@@ -14,6 +14,7 @@ from sloshlab.diagnosis.verdict.interval import interval
 
 
 def nothing_statement(found: Findings) -> str:
+    """What is said where nothing is missing."""
     return (
         "Nothing is missing: with its own parameters retuned the simulation describes the held-out runs to "
         f"{found.retuned.held_out_rms:.2f} of the noise floor."
@@ -21,6 +22,7 @@ def nothing_statement(found: Findings) -> str:
 
 
 def unknown_statement(found: Findings, named: Explanation | None, block: str = "") -> str:
+    """What is said of something without a name, in a block if that is known, and of what is nearest."""
     where = block or where_of(found)
     closest = ""
     if named is not None:
@@ -32,6 +34,7 @@ def unknown_statement(found: Findings, named: Explanation | None, block: str = "
 
 
 def statement_of(found: Findings, best: Explanation, alternatives: Sequence[Explanation], kind: str) -> str:
+    """What is said of effects with names, and of what cannot be told from them."""
     named = " and ".join(_described(best, candidate) for candidate in best.fit.candidates)
     text = f"Left out: {named}; explains {100 * explained_share(found, best):.0f} % of what can be explained"
     if kind == "indistinguishable":
@@ -42,6 +45,7 @@ def statement_of(found: Findings, best: Explanation, alternatives: Sequence[Expl
 
 
 def separating_experiment_of(alternatives: Sequence[Explanation]) -> str:
+    """Experiments that would tell explanations apart."""
     effects = [candidate.effect for one in alternatives for candidate in one.fit.candidates]
     return "; or ".join(dict.fromkeys(effect.separated_by for effect in effects if effect.separated_by))
 
