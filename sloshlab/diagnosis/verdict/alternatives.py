@@ -112,5 +112,7 @@ def equals_of(best: Explanation) -> list[tuple[str, ...]]:
 
 def _never_fades(best: Explanation, mass: Candidate) -> bool:
     """Whether an effective mass fades only far beyond all levels that were recorded."""
-    fade_g = best.fit.values.get(f"{mass.key}.fade_g", 0.0)
+    fade_g = best.fit.values.get(f"{mass.key}.fade_g")
+    if fade_g is None:
+        return False
     return fade_g > _BEYOND_ALL_LEVELS * mass.surroundings.acceleration_m_per_s2 / GRAVITY_M_PER_S2
