@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
@@ -103,7 +104,7 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
     displacements and velocities are lost with the drift that integration removes, and count for nothing.
     """
     rate = run.attributes.sampling_rate_hz
-    n_bands = max(8, 2 * round(0.5 * BLOCK_S * rate))
+    n_bands = _n_bands(run)
     found = []
     for name in names:
         variable = run.recording[name]
@@ -113,10 +114,8 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
             continue
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
         spectra = _spectra(values, known, keeps_mean, n_bands, run)
-        stated = float(variable.attrs.get("noise_std", 0.0)) ** 2
-        white = _white_level(spectra)
         least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
-        variance = np.full(spectra.shape, max(stated, white, least, 1e-300))
+        variance = np.full(spectra.shape, max(_stated(variable), _white_level(spectra), least, 1e-300))
         if variable.attrs["quantity"] in ("displacement", "velocity") and _is_integrated(run, driving):
             slow = band_frequencies_hz(n_bands, rate) < _SLOWEST_INTEGRATED_HZ
             variance[:, slow] += _FOR_NOTHING * (spectra[:, slow] ** 2).mean()
@@ -133,12 +132,19 @@ def noise_of_sensor(run: CaseRun, name: str) -> float:
     name : str
     """
     variable = run.recording[name]
-    values = np.asarray(variable.values, np.float64)
-    n_bands = max(8, 2 * round(0.5 * BLOCK_S * run.attributes.sampling_rate_hz))
+    values, n_bands = np.asarray(variable.values, np.float64), _n_bands(run)
     known = np.isfinite(values)
-    stated = float(variable.attrs.get("noise_std", 0.0)) ** 2
     white = _white_level(_spectra(values, known, False, n_bands, run)) if known.sum() >= 2 * n_bands else 0.0
-    return float(np.sqrt(max(stated, white)))
+    return float(np.sqrt(max(_stated(variable), white)))
+
+
+def _n_bands(run: CaseRun) -> int:
+    return max(8, 2 * round(0.5 * BLOCK_S * run.attributes.sampling_rate_hz))
+
+
+def _stated(variable: xr.DataArray) -> float:
+    """Variance of the noise as the recording states it; zero where it does not."""
+    return float(variable.attrs.get("noise_std", 0.0)) ** 2
 
 
 def _is_integrated(run: CaseRun, driving: Sequence[str]) -> bool:

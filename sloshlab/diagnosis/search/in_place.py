@@ -80,17 +80,16 @@ class InPlace:
         pool : sequence of Candidate
         """
         most = 0.5 * sum(soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (wider, base))
-        near: list[tuple[float, FreeRunProblem, dict[str, float]]] = []
+        near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
         chosen = [one for one in pool if len(one.effect.parameters) > 1 and one.effect.block != "sensor"]
         for i, candidate in enumerate(chosen):
             self.fits.told(f"one effect in place of all: {candidate.key}", i, len(chosen))
             problem = self.fits.problem((candidate,))
-            softness = problem.softness(_SOFT)
-            starts = [{**wider.values, **one} for one in of_many_sizes(candidate.starts())]
-            left = [softness * problem.residual(problem.theta_of(start)) for start in starts]
-            costs = [huber_cost(one) if np.isfinite(one).all() else np.inf for one in left]
-            if min(costs) < most:
-                near.append((min(costs), problem, starts[int(np.argmin(costs))]))
+            sizes = of_many_sizes(candidate.starts())
+            start = nearest(problem, [{**wider.values, **one} for one in sizes], _SOFT)
+            cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
+            if cost < most:
+                near.append((cost, problem, start))
         found = []
         for _, problem, start in sorted(near, key=lambda one: one[0])[:_MOST_FOR_ALL]:
             fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])

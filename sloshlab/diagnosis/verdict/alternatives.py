@@ -12,7 +12,7 @@ from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gained, largest_strength
 
 LEAST_SEPARATION: Final = 6.0
-"""The same, by which an explanation must beat another to be the only one."""
+"""Log-likelihood ratio, on all runs, by which an explanation must beat another to be the only one."""
 _LEAST_SHARE: Final = 0.5
 """Of the gain of the best that an alternative must have."""
 _LITTLE: Final = 0.05
@@ -23,6 +23,7 @@ for effects whose work grows with the same power of the amplitude, which nothing
 _EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure."""
 _BEYOND_ALL_LEVELS: Final = 5.0
+"""Of the largest acceleration: what fades there has hardly faded where it was seen."""
 _EQUAL_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_error"}
 """The same force in the tank, where the share of the liquid that does not follow is the same at all levels."""
 

@@ -16,7 +16,7 @@ from sloshlab.diagnosis.explanation import Explanation, Findings
 
 _Place = TypeVar("_Place")
 LEAST_MORE: Final = 12.0
-"""The same, by which a further effect must improve on fewer."""
+"""Log-likelihood ratio, on fitted and on held-out runs, by which a further effect must improve on fewer."""
 LEAST_STRENGTH: Final = 0.7
 """What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of.
 
@@ -79,7 +79,7 @@ def is_clearly_better(more: Explanation, less: Explanation, scale: Scale) -> boo
 
 
 def shows_more(more: Explanation, less: Explanation, scale: Scale) -> bool:
-    """The same, with a size that is worth speaking of in any channel of any run, twice as large on fitted ones."""
+    """By more than chance, with a size worth speaking of in a channel of a run, twice as large on fitted ones."""
     if not has_gained(more, less, scale):
         return False
     judged = {place: left for place, left in more.by_run.items() if place[0] in scale.judged}

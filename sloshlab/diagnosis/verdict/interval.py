@@ -15,7 +15,7 @@ _ERRORS_OVER_STANDARD_ERRORS: Final = 3.0
 """On cases whose truth was known."""
 _CALIBRATION: Final = 0.01
 _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta")
-"""Ends of the names of numbers that no gain of a sensor and no mass changes."""
+"""Ends of the names of numbers that no gain of a sensor and no mass changes, but for so much per second."""
 
 
 def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[float, float, float]:
@@ -29,7 +29,8 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
     if name not in best.fit.names:
         return estimate, estimate, estimate
     scatter = _ERRORS_OVER_STANDARD_ERRORS * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
-    of_gain = 0.0 if parameter.endswith(_FREE_OF_GAINS) else _CALIBRATION * abs(estimate)
+    is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s")
+    of_gain = 0.0 if is_free else _CALIBRATION * abs(estimate)
     width = _NORMAL_90 * float(np.hypot(scatter, of_gain))
     chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
     lowest, highest = candidate.bounds(chosen)

@@ -75,9 +75,10 @@ def test_what_repeats_share_is_told_from_noise() -> None:
 
 def test_only_the_same_channel_and_what_is_informative_is_shared() -> None:
     first, other, second = (of_run(run, (8, 30), name) for run, name in (("a", "x"), ("a", "y"), ("b", "x")))
-    first.informative[:, 20:] = False
+    first.informative[:, 20:], second.informative[:, :5] = False, False
     residual = np.concatenate([np.full(240, 2.0), np.full(240, 3.0), np.full(240, 2.0)])
     residual[:240].reshape(8, 30)[:, 20:] = -3.0
+    residual[480:].reshape(8, 30)[:, :5] = -3.0
     assert mean_square_that_repeats([["a", "b"]], cast(Any, [first, other, second]), residual) == pytest.approx(
         4.0
     )

@@ -401,8 +401,12 @@ def test_of_each_run_counts_what_the_best_fit_of_the_same_effects_leaves() -> No
     first = left(0.0, 0.0, FRICTION, squares=1.0, in_one_run=2.0)
     second = left(30.0, 30.0, FRICTION, squares=1.0, in_fitted_run=3.0, in_one_run=1.0)
     more = left(-40.0, -40.0, {**FRICTION, **OFFSET}, squares=1.0, in_one_run=1.0)
-    assert judged(BASELINE, [first, second, more]).best is first
+    found = judged(BASELINE, [first, second, more])
+    assert (found.kind, found.best) == ("named", first)
     assert judged(BASELINE, [first, more]).kind == "unknown"
+    any_force = left(-40.0, -40.0, surface="structure")
+    assert judged(BASELINE, [first, second], [any_force]).kind == "named"
+    assert judged(BASELINE, [first], [any_force]).kind == "unknown"
 
 
 def test_what_has_no_name_at_all_is_unknown_in_the_block_that_a_force_helps() -> None:
@@ -534,6 +538,11 @@ def test_a_size_is_known_no_better_than_gains_and_masses(number: str) -> None:
     width = norm.ppf(0.95) * np.sqrt(0.03**2 + 0.04**2)
     assert size["high"] - 4.0 == pytest.approx(width, rel=1e-4)
     assert 4.0 - size["low"] == pytest.approx(width, rel=1e-4)
+
+
+def test_a_loss_per_second_is_a_size() -> None:
+    loss = interval_of({"tank.liquid_loss.rate_kg_per_s": 0.5})
+    assert loss["high"] - 0.5 == pytest.approx(norm.ppf(0.95) * np.hypot(0.03, 0.005), rel=1e-4)
 
 
 def test_a_time_does_not_depend_on_gains() -> None:

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sealed_trial import case_drawing
 from sealed_trial.case_drawing import CaseDrawing, _motion, _scaled, class_order
 from sealed_trial.composition import SINGLES, class_sizes, possible
 from sealed_trial.hidden_physics.effect import Change, DrawnEffect, Scales
@@ -178,14 +179,28 @@ def test_an_effect_whose_essential_part_is_hidden_is_not_drawn() -> None:
         _scaled(effect(0.3), 10.0, laboratory, floor, [])  # type: ignore[arg-type]
 
 
-def test_what_is_stuck_is_not_drawn() -> None:
-    """Half of the motion relative to the base is a motion, a tenth of it is none; a shaker has no structure."""
+def test_the_motion_of_a_tank_is_relative_to_its_base() -> None:
+    """A shaker has no structure between the two."""
     base = np.sin(np.arange(200.0))
     runs = [
         {"acceleration_tip": base + size * np.cos(np.arange(200.0)), "acceleration_root": base} for size in (1, 3)
     ]
     assert _motion(runs) == pytest.approx(np.sqrt(5 / 2), rel=0.01)
     assert _motion([{"acceleration_roof_1": base}]) == 1.0
+
+
+@pytest.mark.parametrize(("least", "stuck"), [(0.99, False), (1.01, True)])
+def test_what_moves_less_than_it_must_is_not_drawn(
+    least: float, stuck: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is hidden, so that the motion is that without anything hidden."""
+    monkeypatch.setattr(case_drawing, "_LEAST_MOTION", least)
+    drawn = CaseDrawing([5])
+    if stuck:
+        with pytest.raises(LookupError, match="no motion to speak of"):
+            drawn._attempted(0, 0, "case_001", "nothing", "sdof_one_frequency")
+    else:
+        assert drawn._attempted(0, 0, "case_001", "nothing", "sdof_one_frequency").truth.effects == []
 
 
 def test_the_same_seed_draws_the_same_case() -> None:
