@@ -38,7 +38,7 @@ _THINNED = 3
 _LEAST_DAMPING, _MOST_DAMPING = 0.05, 7.0
 _STAYS_LINEAR, _STAYS_LINEAR_IN_FREQUENCY = 0.2, 0.004
 _RELINEARISED_AT_ONCE, _SCANNED = 3, 13
-_MOST_BASELINES: Final = {"sdof": 7, "beam": 2, "shaker": 4}
+_MOST_BASELINES: Final = {"sdof": 7, "beam": 5, "shaker": 4}
 """Of an effect; a beam's are costly."""
 _HIDDEN, _WORTHWHILE = 0.25, 0.9
 QUICK = 1e-7

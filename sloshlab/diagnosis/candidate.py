@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from sloshlab.diagnosis.extension import Extension
+from sloshlab.diagnosis.units import named_and_units
 from sloshlab.errors import InputError, SloshlabError
 from sloshlab.rig import Rig
 from sloshlab.twin.twin import Twin
@@ -182,6 +183,8 @@ class Effect:
         case; where it describes as much there, the two cannot be told apart.
     variant_of : str
         Name of the effect of which this is another form; answers have that name.
+    size : tuple of str
+        Numbers that grow with it and without which it is nothing; if none, the first and all of its unit.
     """
 
     name: str
@@ -199,6 +202,7 @@ class Effect:
     limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = _its_own_limits
     differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = nowhere
     variant_of: str = ""
+    size: tuple[str, ...] = ()
 
     @property
     def known_as(self) -> str:
@@ -233,6 +237,14 @@ class Candidate:
             {f"{self.key}.{name}": value for name, value in numbers.items()}
             for numbers in self.effect.starts(replace(self.surroundings, channel=self.channel))
         ]
+
+    def sized(self, start: Numbers, factor: float) -> dict[str, float]:
+        """Numbers, named as in a fit, of the same effect larger by a factor."""
+        names = [parameter.name for parameter in self.effect.parameters]
+        unit = named_and_units(names[0])[1]
+        size = self.effect.size or [name for name in names if named_and_units(name)[1] == unit]
+        grown = {f"{self.key}.{name}" for name in size}
+        return {name: value * (factor if name in grown else 1.0) for name, value in start.items()}
 
     def bounds(self, parameter: EffectParameter) -> tuple[float, float]:
         """Smallest and largest value of a parameter here."""

@@ -38,8 +38,11 @@ class Explanation:
         The same per run and channel, of fitted and held-out runs.
     rms_without_bursts : float
         As `held_out_rms`, of the quieter three quarters of the times of every channel and run.
-    repeating : float
-        Mean square of what repeats of held-out tests have in common of their residuals; NaN without repeats.
+    repeating : dict
+        Mean square of what repeats of a test have in common of their residuals, per name of the test's first run
+        and channel.
+    spread : dict
+        Of the effects' numbers over fits about other baselines that could be believed; empty where none were made.
     """
 
     fit: FreeRunFit
@@ -48,7 +51,8 @@ class Explanation:
     by_channel: dict[str, float] = field(default_factory=dict)
     by_run: dict[tuple[str, str], float] = field(default_factory=dict)
     rms_without_bursts: float = 0.0
-    repeating: float = float("nan")
+    repeating: dict[tuple[str, str], float] = field(default_factory=dict)
+    spread: dict[str, float] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -133,6 +137,13 @@ class Findings:
     def has_repeats(self) -> bool:
         """Whether runs of one test tell what the recordings' scatter is."""
         return any(len(test) > 1 for test in self.case.tests())
+
+    @property
+    def judged_tests(self) -> frozenset[str]:
+        """Names of the first runs of tests of which runs are held out."""
+        judged = {run.name for run in self.split.held_out}
+        tests = ([run.name for run in test] for test in self.case.tests())
+        return frozenset(test[0] for test in tests if not judged.isdisjoint(test))
 
     @property
     def n_fitting(self) -> int:

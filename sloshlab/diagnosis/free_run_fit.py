@@ -8,6 +8,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import lsq_linear
 from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
@@ -24,6 +26,8 @@ _LEFT_BEHIND: Final = 1.02
 """Cost after the first stages, over the best one so far, beyond which another start is given up."""
 _SHOWN: Final = 1.5
 """How much softer than the largest relative residual a stage may be to be of use."""
+_LEAST_ROOM: Final = 1e-12
+"""Between a lower and an upper bound of a step, in scaled values; bounds that coincide leave none."""
 _CAME_BACK: Final = 0.02
 """Of a number, within which a fit from elsewhere has found the same place."""
 STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
@@ -123,17 +127,18 @@ class _Descent:
         weights = softness * robust_weights(softness * residual, limit)
         weighted = self.jacobian.weighted(weights)
         self.hessian = weighted.normal() + np.diag(prior)
-        gradient = weighted.transposed_times(weights * residual) + prior * theta
+        expected = self.problem.expected
+        gradient = weighted.transposed_times(weights * residual) + prior * (theta - expected)
 
         def cost(at: FloatArray, r: FloatArray) -> float:
             if not np.isfinite(r).all():
                 return np.inf
-            return huber_cost(softness * r, limit) + float((prior * at**2).sum())
+            return huber_cost(softness * r, limit) + float((prior * (at - expected) ** 2).sum())
 
         before = cost(theta, residual)
         while damping < _LARGEST_DAMPING:
             lift = np.diag(damping * np.maximum(np.diag(self.hessian), 1e-12))
-            tried = _within(self.problem, theta - np.linalg.solve(self.hessian + lift, gradient))
+            tried = _step_within_bounds(self.problem, theta, self.hessian + lift, gradient)
             new = self.problem.residual(tried)
             after = cost(tried, new)
             if after < before:
@@ -151,7 +156,7 @@ class _Descent:
         return FreeRunFit(
             self.problem.candidates,
             self.problem.values(self.theta),
-            misfit + float((self.prior * self.theta**2).sum()),
+            misfit + float((self.prior * (self.theta - self.problem.expected) ** 2).sum()),
             misfit,
             np.asarray(np.linalg.pinv(self.hessian), np.float64),
             self.problem.names,
@@ -377,7 +382,20 @@ def scanned(
     return best
 
 
-def _within(problem: FreeRunProblem, theta: FloatArray) -> FloatArray:
+def _step_within_bounds(
+    problem: FreeRunProblem, theta: FloatArray, hessian: FloatArray, gradient: FloatArray
+) -> FloatArray:
+    """Where the quadratic model is least within the bounds.
+
+    A step cut off at a bound would point elsewhere than down, where parameters trade against each other.
+    """
     low = (problem.low - problem.centres) / problem.scales
     high = (problem.high - problem.centres) / problem.scales
-    return np.asarray(np.clip(theta, low, high))
+    tried = theta - np.linalg.solve(hessian, gradient)
+    if bool(np.all((low <= tried) & (tried <= high))):
+        return np.asarray(tried)
+    upper = cholesky(hessian)
+    target = solve_triangular(upper, -gradient, trans="T")
+    room = np.maximum(high - theta, 0.0) + _LEAST_ROOM, np.minimum(low - theta, 0.0) - _LEAST_ROOM
+    step = lsq_linear(upper, target, (room[1], room[0]), method="bvls").x
+    return np.asarray(np.clip(theta + step, low, high))

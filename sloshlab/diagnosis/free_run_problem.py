@@ -84,6 +84,8 @@ class FreeRunProblem:
     candidates : sequence of Candidate
     fixed : mapping, optional
         Baseline parameters that are not free.
+    expected : mapping, optional
+        What is believed of baseline parameters, where it is not what the model believes.
     """
 
     def __init__(
@@ -92,6 +94,7 @@ class FreeRunProblem:
         runs: Sequence[Sequence[Observation]],
         candidates: Sequence[Candidate] = (),
         fixed: Mapping[str, float] | None = None,
+        expected: Mapping[str, float] | None = None,
     ) -> None:
         self.model, self.runs, self.candidates = model, [run for run in runs if run], tuple(candidates)
         self.fixed = dict(fixed or {})
@@ -113,6 +116,13 @@ class FreeRunProblem:
             [parameter.believed for parameter in self._baseline] + [0.0] * (len(self.names) - len(self._baseline))
         )
         self.n_baseline = len(self._baseline)
+        self.expected = np.array(
+            [
+                ((expected or {}).get(one.name, one.believed) - one.believed) / one.tolerance
+                for one in self._baseline
+            ]
+            + [0.0] * (len(self.names) - self.n_baseline)
+        )
         driving = {name for run in self.runs for name in model.driving(run[0].run)}
         self._seen_by = [(one.channel,) if one.channel else () for one in self._baseline] + [
             _only_channels(one, driving) for one in self.candidates for _ in one.effect.parameters
@@ -272,10 +282,10 @@ def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) ->
     return float(np.sqrt(total / n)) if n else 0.0
 
 
-def mean_square_that_repeats(
+def mean_squares_that_repeat(
     tests: Sequence[Sequence[str]], observed: Sequence[Observation], residual: FloatArray
-) -> float:
-    """Mean square of what the informative residuals of repeats of one test have in common; NaN without repeats.
+) -> dict[tuple[str, str], float]:
+    """Mean square of what the informative residuals of repeats of one test have in common.
 
     What physics is missing is missing in each repeat alike, noise and a liquid's chaos are not: products of the
     residuals of two repeats have the square of the common part as their mean. Large residuals are cut off.
@@ -287,6 +297,11 @@ def mean_square_that_repeats(
     observed : sequence of Observation
     residual : ndarray
         Of all of them, one after another.
+
+    Returns
+    -------
+    dict
+        Per name of a test's first run, and channel, where repeats show enough of it together.
     """
     parts: dict[tuple[str, str], tuple[FloatArray, NDArray[np.bool_]]] = {}
     first = 0
@@ -294,16 +309,19 @@ def mean_square_that_repeats(
         own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
         first += one.spectra.size
         parts[one.run.name, one.channel] = np.clip(own, -ROBUST, ROBUST), one.informative
-    total, n = 0.0, 0
+    found = {}
     for test in tests:
-        for name, other in combinations(test, 2):
-            for channel in [of for run, of in parts if run == name and (other, of) in parts]:
+        for channel in dict.fromkeys(of for run, of in parts if run in test):
+            total, n = 0.0, 0
+            for name, other in combinations([run for run in test if (run, channel) in parts], 2):
                 (first_left, shown), (other_left, shown_too) = parts[name, channel], parts[other, channel]
                 both = tuple(slice(0, min(sizes)) for sizes in zip(shown.shape, shown_too.shape, strict=True))
                 known = shown[both] & shown_too[both]
                 total += float(first_left[both][known] @ other_left[both][known])
                 n += int(known.sum())
-    return total / n if n else float("nan")
+            if n >= _FEWEST_IN_A_RUN:
+                found[test[0], channel] = total / n
+    return found
 
 
 def mean_squares_of_runs(observed: Sequence[Observation], residual: FloatArray) -> dict[tuple[str, str], float]:

@@ -41,6 +41,7 @@ def force_effect(
     includes: tuple[str, ...] = (),
     differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = nowhere,
     variant_of: str = "",
+    size: tuple[str, ...] = (),
 ) -> Effect:
     """Register a force of the twin as an effect.
 
@@ -60,7 +61,7 @@ def force_effect(
         Narrower ones than those of the kind.
     may_rest : tuple of str
         Names of numbers that may be at a bound in earnest.
-    look_alikes, separated_by, needs, spoken_for_by, includes, differs, variant_of
+    look_alikes, separated_by, needs, spoken_for_by, includes, differs, variant_of, size
         As of `Effect`.
 
     Examples
@@ -100,5 +101,6 @@ def force_effect(
             includes=includes,
             variant_of=variant_of,
             differs=differs,
+            size=size,
         )
     )

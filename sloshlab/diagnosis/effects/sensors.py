@@ -287,15 +287,25 @@ CLOCK = _sensor_effect(
 
 
 def _pairs(at: Surroundings) -> list[str]:
-    """Channel and source, of the same quantity first; at one frequency a leak is a gain, but into what rests."""
+    """Channel and source, of the same quantity first; at one frequency a leak is a gain, but into what rests.
+
+    On a shaker all of one quantity read one motion or one force, and a leak from each other is a gain, too.
+    """
+    is_shaker = at.twin.structure is None
     pairs = [
         (to, source)
         for to in at.channels
         for source in at.channels
         if source != to and (to.endswith("_root") or not at.has_one_frequency)
+        if not (is_shaker and _are_alike(to, source))
     ]
-    pairs.sort(key=lambda pair: pair[0].partition("_")[0] != pair[1].partition("_")[0])
+    pairs.sort(key=lambda pair: not _are_alike(*pair))
     return [f"{to}<{source}" for to, source in pairs[:_MOST_PAIRS]]
+
+
+def _are_alike(one: str, other: str) -> bool:
+    """Whether two channels read the same quantity."""
+    return one.partition("_")[0] == other.partition("_")[0]
 
 
 def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:

@@ -209,6 +209,7 @@ GAP = force_effect(
     separated_by="amplitudes just below and above the gap",
     spoken_for_by=("does no work", "odd in displacement", "function of the state", "onset", "third order"),
     includes=("stiffness_change",),
+    size=("stiffness_n_per_m",),
 )
 MODE = force_effect(
     MISSING_MODE,
@@ -226,6 +227,7 @@ MODE = force_effect(
     separated_by="a sweep over the missing mode's frequency",
     spoken_for_by=("memory",),
     includes=("mass_error", "stiffness_change", "viscous_damping"),
+    size=("participation",),
 )
 MASS = force_effect(
     MASS_ERROR,

@@ -142,6 +142,7 @@ SLOSHING = register(
         ("viscous_damping", "quadratic_drag"),
         _LEVELS,
         spoken_for_by=("takes energy", "odd in velocity", "onset"),
+        size=("peak_w_bar",),
     )
 )
 
@@ -261,6 +262,7 @@ IMPACT = register(
         ("liquid_sloshing", "clearance"),
         "accelerations below and above 1 g, forces sampled fast",
         spoken_for_by=("takes energy", "impulsive", "onset", "memory"),
+        size=("stiffness_n_per_m", "damping_kg_per_s", "share"),
     )
 )
 LATERAL = force_effect(
@@ -276,6 +278,7 @@ LATERAL = force_effect(
     needs=rocks,
     spoken_for_by=("memory",),
     includes=("mass_error", "effective_mass"),
+    size=("mass_kg",),
 )
 FARADAY = force_effect(
     FARADAY_WAVE,
@@ -292,6 +295,7 @@ FARADAY = force_effect(
     bounds={"growth": (1e-3, 100.0), "damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     separated_by="spectra at half the frequency below and above the threshold",
     spoken_for_by=("half order", "memory", "onset"),
+    size=("force_n",),
 )
 LOSS = force_effect(
     LIQUID_LOSS,
@@ -318,4 +322,5 @@ CUSHION = force_effect(
     separated_by="two pressures of the gas",
     spoken_for_by=("does no work", "odd in displacement"),
     includes=("mass_error", "effective_mass", "lateral_mode"),
+    size=("stiffness_n_per_m", "mass_kg"),
 )

@@ -52,7 +52,7 @@ class InPlace:
             self.fits.told(f"{what}: {candidate.key} in place of {special.effect.name}", 0, 1)
             problem = self.fits.problem((*base.candidates, candidate))
             softness = problem.softness(_SOFT)
-            sizes = of_many_sizes(candidate.starts())
+            sizes = of_many_sizes(candidate)
             starts = [{**at, **one} for at in (best.fit.values, self.fits.eased(base)) for one in sizes]
             costs = [huber_cost(softness * problem.residual(problem.theta_of(start))) for start in starts]
             name = f"{candidate.effect.block}.{candidate.effect.name}"
@@ -85,7 +85,7 @@ class InPlace:
         for i, candidate in enumerate(chosen):
             self.fits.told(f"one effect in place of all: {candidate.key}", i, len(chosen))
             problem = self.fits.problem((candidate,))
-            sizes = of_many_sizes(candidate.starts())
+            sizes = of_many_sizes(candidate)
             start = nearest(problem, [{**wider.values, **one} for one in sizes], _SOFT)
             cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
             if cost < most:

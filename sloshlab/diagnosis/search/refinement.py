@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted
+from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.search.fits import Fits, cheapest
-from sloshlab.diagnosis.search.in_place import InPlace
+from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
+
+_MOST_ANEW: Final = 3
+_OTHER_SIZES: Final = (1.0, 2.0, 4.0)
+"""Of what was found: beside a baseline that hides a part of an effect the rest of it is left."""
 
 
 class Refinement:
@@ -22,6 +28,40 @@ class Refinement:
     def __init__(self, fits: Fits) -> None:
         self.fits = fits
         self.in_place = InPlace(fits)
+
+    def anew(self, base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
+        """The best effects, fitted again from what is believed of the baseline.
+
+        A baseline that was retuned alone hides as much of an effect as it can; from there the effect takes the
+        rest, and the way back is barred by the side valleys that dry friction makes.
+
+        Parameters
+        ----------
+        base : FreeRunFit
+            The retuned baseline.
+        known : sequence of Explanation
+            With one effect each.
+        """
+        by_key: dict[str, Explanation] = {}
+        for one in sorted(known, key=lambda one: one.fit.cost):
+            by_key.setdefault(one.keys[-1], one)
+        found: list[Explanation] = []
+        for key, one in list(by_key.items())[:_MOST_ANEW]:
+            if base.cost - one.fit.cost < LEAST_TO_BUILD_ON:
+                break
+            problem = self.fits.problem_of(one.fit)
+            if problem.is_down_to_noise(one.fit):
+                break
+            self.fits.told(f"fitting {key} from what is believed", len(found), _MOST_ANEW)
+            effect = {
+                name: value for name, value in one.fit.values.items() if name not in self.fits.model.believed
+            }
+            sizes = [one.fit.candidates[-1].sized(effect, factor) for factor in _OTHER_SIZES]
+            starts = [{**self.fits.model.believed, **numbers} for numbers in sizes]
+            fit, _ = fitted(problem, nearest(problem, starts, STAGES[0]))
+            if not fit.trouble and fit.cost < one.fit.cost:
+                found.append(self.fits.judged(fit))
+        return found
 
     def polished(self, known: Sequence[Explanation], pool: Sequence[Candidate]) -> list[Explanation]:
         """The best of one and of two effects to where they converge, special cases in their place, each alone."""

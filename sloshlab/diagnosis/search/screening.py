@@ -103,12 +103,14 @@ class Screening:
             by_force = None if forces is None else forces.of(candidate)
             extended = self.fits.problem((*base.candidates, candidate))
             looks = []
-            for start in [*with_smaller_ones(candidate.starts()), *([by_force.numbers] if by_force else [])]:
+            for start in [*with_smaller_ones(candidate), *([by_force.numbers] if by_force else [])]:
                 moved = extended.residual(extended.theta_of({**base.values, **start}))
                 if np.isfinite(moved).all():
                     gains = [look.gain(moved - residual) for look in looks_at]
                     looks.append(
-                        _Look(np.array([gain for gain, _ in gains]), start, resized(start, max(gains)[1]))
+                        _Look(
+                            np.array([gain for gain, _ in gains]), start, resized(candidate, start, max(gains)[1])
+                        )
                     )
             if not looks:
                 self.fits.failed[candidate.key] = "does not run from any start"

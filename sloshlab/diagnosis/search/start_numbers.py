@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -37,27 +36,20 @@ def as_its_general_form(special: Candidate, general: Candidate, fit: FreeRunFit)
     return starts
 
 
-def of_many_sizes(starts: Sequence[dict[str, float]]) -> list[dict[str, float]]:
-    """Starts with their first number, or all of one unit, at several sizes."""
-    found = []
-    for start in starts:
-        unit = _unit(next(iter(start)))
-        for factor in _SIZES:
-            found.append({name: value * (factor if _unit(name) == unit else 1.0) for name, value in start.items()})
-    return found
+def of_many_sizes(candidate: Candidate) -> list[dict[str, float]]:
+    """Starts of an effect, each at several sizes."""
+    return [candidate.sized(start, factor) for start in candidate.starts() for factor in _SIZES]
 
 
-def with_smaller_ones(starts: Sequence[dict[str, float]]) -> list[dict[str, float]]:
-    """Effects of one number at a tenth of their size too: the step from the full one may lead nowhere."""
-    smaller = [{name: 0.1 * size for name, size in one.items()} for one in starts if len(one) == 1]
-    return [*starts, *smaller]
+def with_smaller_ones(candidate: Candidate) -> list[dict[str, float]]:
+    """Starts of an effect, and at a tenth of their size too: the step from the full one may lead nowhere."""
+    starts = candidate.starts()
+    return [*starts, *(candidate.sized(one, 0.1) for one in starts)]
 
 
-def resized(start: dict[str, float], factor: float) -> dict[str, float]:
-    """A start whose only number, the size of the effect, is as large as the first step says."""
-    first = next(iter(start))
-    factor = min(max(factor, 0.1), 10.0)
-    return {**start, first: start[first] * factor} if len(start) == 1 else start
+def resized(candidate: Candidate, start: dict[str, float], factor: float) -> dict[str, float]:
+    """A start whose size is what the first step says, a tenth to ten times of it."""
+    return candidate.sized(start, min(max(factor, 0.1), 10.0))
 
 
 def _unit(number: str) -> str:

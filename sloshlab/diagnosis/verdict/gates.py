@@ -25,7 +25,9 @@ ADEQUATE: Final = 1.15
 _LARGEST_WITHOUT_REPEATS: Final = 2.0
 """What a baseline may leave and be called complete where only what is said of sensors tells the noise."""
 _LITTLE_IN_COMMON: Final = 0.25
-"""Mean square, in noise floors, of what repeats have in common of what is left."""
+_MOST_IN_COMMON: Final = 0.5
+_MOST_IN_A_CHANNEL: Final = 1.0
+"""Mean squares, in noise floors, of what repeats of a test have in common of what is left."""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
 """What it would have if it had a name."""
 
@@ -105,15 +107,26 @@ def verdict_of(found: Findings) -> Verdict:
 
 
 def leaves_more(found: Findings, one: Explanation) -> bool:
-    """Whether an explanation leaves more of the held-out runs than repeats of a test differ by, alike in repeats.
+    """Whether an explanation leaves what repeats of a test have in common, or too much where none tell.
 
     Parameters
     ----------
     found : Findings
     one : Explanation
     """
-    is_large = found.has_repeats and one.rms_without_bursts > LARGEST_REMAINDER
-    return is_large and not one.repeating < LARGEST_REMAINDER**2 - 1.0
+    by_test: dict[str, list[float]] = {}
+    for (test, _), in_common in one.repeating.items():
+        by_test.setdefault(test, []).append(in_common)
+    if any(max(left) > _MOST_IN_A_CHANNEL or float(np.mean(left)) > _MOST_IN_COMMON for left in by_test.values()):
+        return True
+    is_told = not np.isnan(_in_common_where_judged(found, one))
+    return found.has_repeats and not is_told and one.rms_without_bursts > LARGEST_REMAINDER
+
+
+def _in_common_where_judged(found: Findings, one: Explanation) -> float:
+    """Mean of what repeats of held-out tests have in common; NaN where none of them is repeated."""
+    left = [in_common for (test, _), in_common in one.repeating.items() if test in found.judged_tests]
+    return float(np.mean(left)) if left else float("nan")
 
 
 def _in_need_of_all(found: Findings, scale: Scale) -> list[Explanation]:
@@ -153,7 +166,7 @@ def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scal
 
 def _is_bettered(found: Findings, named: Explanation, others: Sequence[Explanation], scale: Scale) -> bool:
     """Whether another description shows more, unless repeats have too little in common of what is left to them."""
-    if named.repeating < _LITTLE_IN_COMMON:
+    if _in_common_where_judged(found, named) < _LITTLE_IN_COMMON:
         return False
     return any(shows_more(one, at_its_best(found, named), scale) for one in others)
 

@@ -22,7 +22,8 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
     """Estimate and 90 % interval of one parameter.
 
     The standard error of the fit knows noise alone; it is widened by what the fit leaves, by how far estimates
-    were off where the truth was known, and, where gains or masses scale the number, by how well those are known.
+    were off where the truth was known, by how far fits about other baselines end elsewhere, and, where gains or
+    masses scale the number, by how well those are known.
     """
     name = f"{candidate.key}.{parameter}"
     estimate = best.fit.values[name]
@@ -31,7 +32,7 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
     scatter = _ERRORS_OVER_STANDARD_ERRORS * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
     is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s")
     of_gain = 0.0 if is_free else _CALIBRATION * abs(estimate)
-    width = _NORMAL_90 * float(np.hypot(scatter, of_gain))
+    width = _NORMAL_90 * float(np.linalg.norm([scatter, of_gain, best.spread.get(name, 0.0)]))
     chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
     lowest, highest = candidate.bounds(chosen)
     return estimate, max(estimate - width, lowest), min(estimate + width, highest)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -27,7 +29,7 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Effect, EffectParameter
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import Extension
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted, fitted_from
+from sloshlab.diagnosis.free_run_fit import STAGES, _step_within_bounds, fitted, fitted_from
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost, robust_weights
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
@@ -269,6 +271,34 @@ def test_parameters_stay_within_their_bounds(tmp_path: Path) -> None:
     )
     fit = fit_of(problem)
     assert fit.values["structure.viscous_damping.damping_n_s_per_m"] == 0.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_step_goes_where_the_model_is_least_within_the_bounds(seed: int) -> None:
+    """Of every way in which parameters may rest at a bound the best one, tried one by one."""
+    generator = np.random.default_rng(seed)
+    root = generator.standard_normal((3, 3))
+    hessian, gradient = root @ root.T + 0.01 * np.eye(3), 5.0 * generator.standard_normal(3)
+    theta, scales = np.array([0.5, -0.2, 0.0]), np.array([2.0, 1.0, 0.1])
+    low, high = np.array([-1.0, -1.0, 0.0]), np.array([1.0, 1.0, 0.8])
+    bounded = SimpleNamespace(low=low * scales, high=high * scales, centres=np.zeros(3), scales=scales)
+
+    def model(at: np.ndarray) -> float:
+        return float(gradient @ (at - theta) + 0.5 * (at - theta) @ hessian @ (at - theta))
+
+    least = np.inf
+    for rests in product((None, low, high), repeat=3):
+        held = np.array([one is not None for one in rests])
+        at = np.array([theta[i] if one is None else one[i] for i, one in enumerate(rests)])
+        free = ~held
+        if free.any():
+            left = gradient[free] + hessian[np.ix_(free, held)] @ (at - theta)[held]
+            at[free] = theta[free] - np.linalg.solve(hessian[np.ix_(free, free)], left)
+        if np.all((low - 1e-12 <= at) & (at <= high + 1e-12)):
+            least = min(least, model(at))
+    found = _step_within_bounds(cast(Any, bounded), theta, hessian, gradient)
+    assert np.all((low - 1e-12 <= found) & (found <= high + 1e-12))
+    assert model(found) == pytest.approx(least, abs=1e-8)
 
 
 @pytest.mark.parametrize("place", ["acceleration_tip", "displacement_tank"])

@@ -5,22 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from recorded_oscillators import decays, effect, rig, surroundings
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.case import Case
+from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.free_run_fit import fitted
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import fits
+from sloshlab.diagnosis.search import fits, redrawn, refinement
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import InPlace
 from sloshlab.diagnosis.search.refinement import Refinement
 from sloshlab.diagnosis.search.screening import Screening
+from sloshlab.diagnosis.split import Split
 
 assert effects.__all__
 UP_N, DOWN_N = 0.3, 0.1
@@ -147,6 +151,64 @@ def test_a_held_out_run_is_tried_with_other_releases(
     monkeypatch.setattr(fits, "_OTHER_RELEASES", (0.0,))
     alone = replace(coulomb.fit, values={**coulomb.fit.values, release: believed / 1.02})
     assert case.fits.judged(alone).held_out > 2 * right.held_out
+
+
+def strained(case: Decays, coulomb: Explanation) -> Explanation:
+    """Half of the friction, and a baseline that hides the rest as well as it can."""
+    baseline = {**coulomb.fit.values, "damping of mode 1": 1.25, "modal mass of mode 1": 1.0125}
+    values = {**baseline, COULOMB_N: 0.5 * coulomb.fit.values[COULOMB_N]}
+    return replace(coulomb, fit=replace(coulomb.fit, values=values, cost=case.baseline.cost - 100.0))
+
+
+def test_an_effect_is_fitted_again_from_what_is_believed(
+    case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[Mapping[str, float]] = []
+
+    def watched(problem: FreeRunProblem, start: Mapping[str, float]) -> Any:
+        begun.append(start)
+        return fitted(problem, start)
+
+    monkeypatch.setattr(refinement, "fitted", watched)
+    [found] = Refinement(case.fits).anew(case.baseline, [strained(case, coulomb)])
+    assert found.keys == (COULOMB,)
+    assert found.fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
+    [start] = begun
+    assert {name: value for name, value in start.items() if name in case.believed} == case.believed
+    assert start[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N])
+
+
+def test_what_gains_nothing_is_not_fitted_again(case: Decays, coulomb: Explanation) -> None:
+    no_gain = replace(coulomb, fit=replace(coulomb.fit, cost=case.baseline.cost - 10.0))
+    assert Refinement(case.fits).anew(case.baseline, [no_gain]) == []
+
+
+def findings(case: Decays, *explanations: Explanation) -> Findings:
+    baseline = case.fits.judged(case.baseline)
+    return Findings(
+        cast(Case, SimpleNamespace(tests=list)), case.fits.model, Split((), (), ()), cast(Any, None),
+        case.fits.fitting, case.fits.held_out, baseline, baseline, list(explanations), [], {}, {},
+    )  # fmt: skip
+
+
+def test_numbers_spread_as_far_as_what_is_believed_leaves_them(case: Decays, coulomb: Explanation) -> None:
+    """Friction is known to the modal mass and the gains, a per cent each, but not to a tenth of that."""
+    other = case.fit(CUBIC)
+    found = redrawn(findings(case, other, coulomb), coulomb).explanations
+    assert [one.keys for one in found] == [(COULOMB,), (CUBIC,)]
+    assert found[1].spread == {}
+    assert 6e-3 < found[0].spread[COULOMB_N] / coulomb.fit.values[COULOMB_N] < 2.5e-2
+
+
+def test_a_better_place_takes_the_place_of_what_was_found(case: Decays, coulomb: Explanation) -> None:
+    worse = case.fits.judged(strained(case, coulomb).fit)
+    at_worse = huber_cost(
+        case.fits.problem_of(worse.fit).residual(case.fits.problem_of(worse.fit).theta_of(worse.fit.values))
+    )
+    worse = replace(worse, fit=replace(worse.fit, misfit=at_worse, cost=at_worse + 4.0))
+    [found] = redrawn(findings(case, worse), worse).explanations
+    assert found.fit.cost < 0.5 * at_worse
+    assert found.fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
 
 
 def test_polishing_takes_a_fit_to_its_end(case: Decays) -> None:

@@ -3,41 +3,72 @@
 from __future__ import annotations
 
 import pytest
+from recorded_oscillators import decays, effect, rig, surroundings
 
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, Surroundings
+from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search import start_numbers
 
-FRICTION = {"structure.coulomb_friction.force_n": 2.0}
-TWO_FRICTIONS = {
-    "structure.asymmetric_friction.force_up_n": 1.0,
-    "structure.asymmetric_friction.force_down_n": 3.0,
-}
-LEAK = {"sensor.cross_talk.acceleration_tip<acceleration_root.ratio": 0.1}
-STOP = {"structure.clearance.gap_m": 0.01, "structure.clearance.stiffness_n_per_m": 500.0}
+assert effects.__all__
 
 
-def test_an_effect_of_one_number_is_looked_at_a_tenth_of_its_size_too() -> None:
-    found = start_numbers.with_smaller_ones([FRICTION, STOP, LEAK])
-    assert found[:3] == [FRICTION, STOP, LEAK]
-    small = [value for start in found[3:] for value in start.values()]
-    assert [list(start) for start in found[3:]] == [list(FRICTION), list(LEAK)]
-    assert small == pytest.approx([0.2, 0.01])
+@pytest.fixture(scope="module")
+def at(tmp_path_factory: pytest.TempPathFactory) -> Surroundings:
+    folder = tmp_path_factory.mktemp("rig")
+    return surroundings(RigModel(rig(folder), folder, decays()))
 
 
-def test_a_look_alike_starts_from_a_thirtieth_to_three_times_its_size() -> None:
-    found = start_numbers.of_many_sizes([FRICTION, LEAK])
-    assert [list(start) for start in found] == [list(FRICTION)] * 5 + [list(LEAK)] * 5
-    sizes = [value for start in found for value in start.values()]
-    assert sizes == pytest.approx([0.06, 0.2, 0.6, 2.0, 6.0, 0.003, 0.01, 0.03, 0.1, 0.3])
+def numbers(start: dict[str, float]) -> dict[str, float]:
+    return {name.rpartition(".")[2]: value for name, value in start.items()}
 
 
-def test_a_number_of_another_unit_keeps_its_size() -> None:
-    stops = start_numbers.of_many_sizes([STOP])
-    assert [start["structure.clearance.stiffness_n_per_m"] for start in stops] == [500.0] * 5
-    gaps = [start["structure.clearance.gap_m"] for start in stops]
-    assert gaps == pytest.approx([0.0003, 0.001, 0.003, 0.01, 0.03])
+@pytest.mark.parametrize(
+    ("key", "grown"),
+    [
+        ("structure.coulomb_friction", {"force_n"}),
+        ("structure.asymmetric_friction", {"force_up_n", "force_down_n"}),
+        ("structure.stribeck_friction", {"coulomb_n", "static_n"}),
+        ("structure.clearance", {"stiffness_n_per_m"}),
+        ("structure.missing_mode", {"participation"}),
+        ("tank.fading_mass", {"beta"}),
+        ("tank.liquid_sloshing", {"peak_w_bar"}),
+        ("tank.ceiling_impact", {"stiffness_n_per_m", "damping_kg_per_s", "share"}),
+        ("tank.faraday_wave", {"force_n"}),
+        ("tank.air_cushion", {"stiffness_n_per_m", "mass_kg"}),
+    ],
+)
+def test_an_effect_grows_by_the_numbers_without_which_it_is_nothing(
+    at: Surroundings, key: str, grown: set[str]
+) -> None:
+    candidate = Candidate(effect(key), at)
+    for start in candidate.starts():
+        larger = numbers(candidate.sized(start, 3.0))
+        for name, value in numbers(start).items():
+            assert larger[name] == pytest.approx(value * (3.0 if name in grown else 1.0))
 
 
-def test_two_forces_keep_their_ratio() -> None:
-    for one in start_numbers.of_many_sizes([TWO_FRICTIONS]):
-        up, down = one.values()
-        assert down / up == pytest.approx(3.0)
+def test_an_effect_is_looked_at_a_tenth_of_its_size_too(at: Surroundings) -> None:
+    candidate = Candidate(effect("tank.fading_mass"), at)
+    found = start_numbers.with_smaller_ones(candidate)
+    assert found[:2] == candidate.starts()
+    assert [numbers(start)["beta"] for start in found] == pytest.approx([0.1, -0.1, 0.01, -0.01])
+    assert len({numbers(start)["fade_g"] for start in found}) == 1
+
+
+def test_a_look_alike_starts_from_a_thirtieth_to_three_times_its_size(at: Surroundings) -> None:
+    candidate = Candidate(effect("structure.coulomb_friction"), at)
+    sizes = [numbers(start)["force_n"] for start in candidate.starts()]
+    found = [numbers(start)["force_n"] for start in start_numbers.of_many_sizes(candidate)]
+    assert found == pytest.approx([size * factor for size in sizes for factor in (0.03, 0.1, 0.3, 1.0, 3.0)])
+
+
+@pytest.mark.parametrize(("promised", "factor"), [(2.0, 2.0), (0.001, 0.1), (300.0, 10.0)])
+def test_a_start_is_as_large_as_a_first_step_says_within_a_decade(
+    at: Surroundings, promised: float, factor: float
+) -> None:
+    candidate = Candidate(effect("tank.fading_mass"), at)
+    start = candidate.starts()[0]
+    found = numbers(start_numbers.resized(candidate, start, promised))
+    assert found["beta"] == pytest.approx(0.1 * factor)
+    assert found["fade_g"] == numbers(start)["fade_g"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +133,21 @@ def test_cross_talk_adds_a_share_of_the_other_channel(model: RigModel) -> None:
     assert one.undone is not None
     back = one.undone(SIGNAL + 0.25 * other, RATE, {"acceleration_root": other}, SIGNAL)
     np.testing.assert_allclose(back, SIGNAL)
+
+
+def test_a_leak_from_what_moves_alike_is_a_gain_and_is_not_sought(model: RigModel) -> None:
+    """On a shaker all accelerometers read one motion and all cells one force; on a structure they do not."""
+    channels = {"acceleration_roof_1": 9.0, "acceleration_roof_2": 9.0, "force_cell_1": 4.0, "force_cell_2": 4.0}
+    carried = replace(surroundings(model), channels=channels)
+    shaken = replace(carried, twin=replace(carried.twin, structure=None))
+    leaks = effect("sensor.cross_talk")
+    assert "acceleration_roof_1<acceleration_roof_2" in leaks.places(carried)
+    assert sorted(leaks.places(shaken)) == sorted(
+        f"{to}<{source}"
+        for motion in ("acceleration_roof_1", "acceleration_roof_2")
+        for force in ("force_cell_1", "force_cell_2")
+        for to, source in ((motion, force), (force, motion))
+    )
 
 
 def test_a_leak_of_the_base_shows_in_the_readings_of_the_tip(model: RigModel) -> None:

@@ -70,6 +70,10 @@ class HandMade(Findings):
         return self.repeats
 
     @property
+    def judged_tests(self) -> frozenset[str]:
+        return frozenset({"run_2"})
+
+    @property
     def n_fitting(self) -> int:
         return N
 
@@ -103,7 +107,7 @@ def left(
     in_fitted_run: float | None = None,
     rms: float = NOISE,
     surface: str = "",
-    repeating: float = float("nan"),
+    repeating: Mapping[tuple[str, str], float] | None = None,
 ) -> Explanation:
     """What leaves so much log-likelihood of the fitted and of the held-out runs unexplained.
 
@@ -122,7 +126,7 @@ def left(
         ("run_1", TIP): squares if in_fitted_run is None else in_fitted_run,
         ("run_2", TIP): squares if in_one_run is None else in_one_run,
     }
-    return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run, rms, repeating)
+    return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run, rms, dict(repeating or {}))
 
 
 def findings(
@@ -362,17 +366,42 @@ def test_without_repeats_twice_the_noise_is_not_nothing_and_a_name_may_leave_it(
     assert judged(BASELINE, [left(0.0, 0.0, FRICTION, rms=rms)]).kind == "named"
 
 
-@pytest.mark.parametrize(("repeating", "more"), [(0.55, False), (0.57, True)], ids=["noise", "common to repeats"])
-def test_a_remainder_that_repeats_do_not_share_is_not_something_missing(repeating: float, more: bool) -> None:
+@pytest.mark.parametrize(
+    ("repeating", "more"),
+    [
+        pytest.param({("run_2", TIP): 0.49}, False, id="noise of the held-out test"),
+        pytest.param({("run_2", TIP): 0.51}, True, id="common to its repeats"),
+        pytest.param({("run_1", TIP): 0.51}, True, id="common to repeats of a fitted test"),
+        pytest.param({("run_1", TIP): 0.98, ("run_1", "force"): -0.1}, False, id="in one channel of two"),
+        pytest.param({("run_1", TIP): 1.02, ("run_1", "force"): -0.1}, True, id="much in one channel of two"),
+        pytest.param({("run_1", TIP): 0.9, ("run_2", TIP): 0.0, ("run_2", "force"): 0.0}, True, id="by test"),
+    ],
+)
+@pytest.mark.parametrize("rms", [1.0, 1.45])
+def test_what_repeats_share_of_a_remainder_is_missing_and_nothing_else(
+    repeating: dict[tuple[str, str], float], more: bool, rms: float
+) -> None:
     """A sensor that stands in for a quieter one leaves more noise; physics is missing alike each time."""
-    loud = left(0.0, 0.0, FRICTION, rms=1.45, repeating=repeating)
+    if not any(test == "run_2" for test, _ in repeating):
+        repeating = {**repeating, ("run_2", TIP): 0.0}
+    loud = left(0.0, 0.0, FRICTION, rms=rms, repeating=repeating)
     assert judged(BASELINE, [loud], repeats=True).kind == ("unknown" if more else "named")
-    quiet = left(0.0, 0.0, rms=1.45, repeating=repeating)
+    quiet = left(0.0, 0.0, rms=rms, repeating=repeating)
     assert judged(quiet, [], repeats=True).kind == ("unknown" if more else "nothing_missing")
 
 
-@pytest.mark.parametrize(("repeating", "kind"), [(0.24, "named"), (0.26, "unknown"), (float("nan"), "unknown")])
-def test_what_any_force_adds_to_a_name_must_be_left_to_repeats_alike(repeating: float, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("repeating", "kind"),
+    [
+        ({("run_2", TIP): 0.24}, "named"),
+        ({("run_2", TIP): 0.26}, "unknown"),
+        ({("run_1", TIP): 0.0}, "unknown"),
+        ({}, "unknown"),
+    ],
+)
+def test_what_any_force_adds_to_a_name_must_be_left_to_repeats_alike(
+    repeating: dict[tuple[str, str], float], kind: str
+) -> None:
     friction = left(40.0, 40.0, FRICTION, squares=2.0, repeating=repeating)
     assert judged(BASELINE, [friction], [ANY_FORCE]).kind == kind
 
@@ -527,6 +556,14 @@ def test_intervals_are_as_wide_as_errors_were_and_wider_where_the_fit_leaves_mor
     assert (force["estimate"], force["level"]) == (0.37, 0.9)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
     assert 0.37 - force["low"] == pytest.approx(width, rel=1e-4)
+
+
+def test_an_interval_is_as_wide_as_fits_about_other_baselines_end_elsewhere() -> None:
+    spread = replace(left(0.0, 0.0, FRICTION), spread={"structure.coulomb_friction.force_n": 0.04})
+    facts = verdict_facts(findings(BASELINE, [spread]), judged(BASELINE, [spread]))
+    [force] = [one["parameters"]["force_n"] for one in facts["effects"]]
+    width = np.linalg.norm([0.03, 0.0037, 0.04]) * norm.ppf(0.95)
+    assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
 
 
 @pytest.mark.parametrize(

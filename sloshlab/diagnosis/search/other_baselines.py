@@ -1,0 +1,80 @@
+"""How far numbers of an explanation could be elsewhere: fits about other baselines that a laboratory may have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from scipy.stats import norm, qmc, t
+
+from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.free_run_fit import STAGES, fitted
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
+from sloshlab.diagnosis.search.fits import Fits, Told
+
+_N_DRAWN: Final = 8
+_MOST_TOLERANCES: Final = 1.25
+_OF_A_NUMBER: Final = 0.3
+"""Standard deviation of the logarithm of an effect's numbers where the fits begin."""
+_AS_GOOD: Final = 0.32
+"""Of the misfit: fits whose error is 1.15 times the least are adequate, too, where friction makes side valleys."""
+_CHANCE: Final = 12.0
+"""The same, at least."""
+
+
+def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, of: None) -> Findings:
+    """Findings with the spread of the numbers of one explanation, and with a better place of it if one is found.
+
+    What is believed of the baseline is drawn anew several times, as it could have been believed, and everything is
+    fitted from there: where the recordings do not tell a gain or a mass from an effect, the fits end elsewhere as
+    well as before, as they do in side valleys (randomised maximum likelihood: Oliver, He and Reynolds 1996).
+
+    Parameters
+    ----------
+    found : Findings
+    best : Explanation
+        One of them, with effects.
+    told : callable, optional
+        Takes what is being done, how much of it is done, and how much there is.
+    """
+    candidates = best.fit.candidates
+    tests = [[run.name for run in test] for test in found.case.tests()]
+    fits = Fits(found.model, found.fitting, found.held_out, told, tests)
+    plain = fits.problem(candidates)
+    draws = norm.ppf(qmc.Halton(len(plain.names), seed=0).random(_N_DRAWN))
+    at_best, is_baseline = plain.theta_of(best.fit.values), np.arange(len(plain.names)) < plain.n_baseline
+    ends = [best.fit]
+    for i, draw in enumerate(np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)):
+        told("fitting about other baselines", i, _N_DRAWN)
+        expected = plain.values(np.where(is_baseline, draw, 0.0))
+        far = (i + 1) / _N_DRAWN
+        start = np.where(is_baseline, at_best + far * draw, at_best * np.exp(far * _OF_A_NUMBER * draw))
+        problem = FreeRunProblem(found.model, found.fitting, candidates, expected=expected)
+        fit, _ = fitted(problem, plain.values(start), n_iterations=6, shares=STAGES[-4:])
+        if not fit.trouble:
+            ends.append(fit)
+    lowest = min(ends, key=lambda one: one.misfit)
+    better = best
+    if lowest.misfit < best.fit.misfit - _CHANCE:
+        fit, _ = fitted(plain, lowest.values, n_iterations=6, shares=STAGES[-2:])
+        if not fit.trouble and fit.cost < best.fit.cost - _CHANCE:
+            better = fits.judged(fit)
+            ends.append(fit)
+    most = max((1 + _AS_GOOD) * lowest.misfit, lowest.misfit + _CHANCE)
+    spread = _spread([one for one in ends if one.misfit < most], better)
+    described = [replace(better, spread=spread), *(one for one in found.explanations if one is not best)]
+    return replace(found, explanations=described)
+
+
+def _spread(ends: list[FreeRunFit], best: Explanation) -> dict[str, float]:
+    """Root mean square distance of the effects' numbers from those of the best, larger where few fits tell it."""
+    others = [one for one in ends if one is not best.fit]
+    if not others:
+        return {}
+    few = float(t.ppf(0.95, len(others)) / norm.ppf(0.95))
+    names = [f"{one.key}.{number.name}" for one in best.fit.candidates for number in one.effect.parameters]
+    return {
+        name: few * float(np.sqrt(np.mean([(one.values[name] - best.fit.values[name]) ** 2 for one in others])))
+        for name in names
+    }
