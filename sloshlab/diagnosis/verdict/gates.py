@@ -26,7 +26,7 @@ _LARGEST_WITHOUT_REPEATS: Final = 2.0
 """What a baseline may leave and be called complete where only what is said of sensors tells the noise."""
 _LITTLE_IN_COMMON: Final = 0.25
 _MOST_IN_COMMON: Final = 0.5
-_MOST_IN_A_CHANNEL: Final = 1.0
+_MOST_IN_A_CHANNEL: Final = 1.5
 """Mean squares, in noise floors, of what repeats of a test have in common of what is left."""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
 """What it would have if it had a name."""

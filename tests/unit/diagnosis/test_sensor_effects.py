@@ -135,6 +135,18 @@ def test_cross_talk_adds_a_share_of_the_other_channel(model: RigModel) -> None:
     np.testing.assert_allclose(back, SIGNAL)
 
 
+def test_a_fast_clock_keeps_the_size_of_what_has_seven_samples_per_cycle(model: RigModel) -> None:
+    """Straight lines between samples would take a tenth of it; a lost sample loses its neighbours only."""
+    fast = np.cos(2 * np.pi * 150.0 * T)
+    one = fault(model, "clock_skew", {"ratio": 8e-4})
+    expected = np.cos(2 * np.pi * 150.0 * (1 + 8e-4) * T)
+    np.testing.assert_allclose(read(one, fast)[10:-20], expected[10:-20], atol=5e-3)
+    gappy = np.where(T == T[2000], np.nan, fast)
+    found = read(one, gappy)
+    assert 1 <= np.isnan(found).sum() <= 2
+    np.testing.assert_array_equal(np.isnan(read(one, np.full(N, np.nan))), True)
+
+
 def test_a_leak_from_what_moves_alike_is_a_gain_and_is_not_sought(model: RigModel) -> None:
     """On a shaker all accelerometers read one motion and all cells one force; on a structure they do not."""
     channels = {"acceleration_roof_1": 9.0, "acceleration_roof_2": 9.0, "force_cell_1": 4.0, "force_cell_2": 4.0}

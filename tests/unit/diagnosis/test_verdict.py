@@ -372,8 +372,8 @@ def test_without_repeats_twice_the_noise_is_not_nothing_and_a_name_may_leave_it(
         pytest.param({("run_2", TIP): 0.49}, False, id="noise of the held-out test"),
         pytest.param({("run_2", TIP): 0.51}, True, id="common to its repeats"),
         pytest.param({("run_1", TIP): 0.51}, True, id="common to repeats of a fitted test"),
-        pytest.param({("run_1", TIP): 0.98, ("run_1", "force"): -0.1}, False, id="in one channel of two"),
-        pytest.param({("run_1", TIP): 1.02, ("run_1", "force"): -0.1}, True, id="much in one channel of two"),
+        pytest.param({("run_1", TIP): 1.48, ("run_1", "force"): -0.5}, False, id="in one channel of two"),
+        pytest.param({("run_1", TIP): 1.52, ("run_1", "force"): -0.54}, True, id="much in one channel of two"),
         pytest.param({("run_1", TIP): 0.9, ("run_2", TIP): 0.0, ("run_2", "force"): 0.0}, True, id="by test"),
     ],
 )
