@@ -54,23 +54,30 @@ def _surface(motion, parameters, memory, rates):
 _POLYNOMIALS = tuple(f"c_{i}{j}" for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i) if i + j > 0)
 NAMES = ("sharp", *(f"remembered_{k + 1}" for k in range(_N_REMEMBERED)), *_POLYNOMIALS)
 
-FORCE_SURFACE = register(
-    ForceKind(
-        "force_surface",
-        ("structure", "tank"),
-        (
-            Parameter("largest_first", "1", 1e-12, 1e12),
-            Parameter("largest_velocity_m_per_s", "m s-1", 1e-12, 1e6),
-            Parameter("first_is_acceleration", "1", 0.0, 1.0),
-            Parameter("rate_rad_per_s", "rad s-1", 1e-3, 1e6),
-            *(Parameter(name, "N", -1e6, 1e6) for name in NAMES),
-        ),
-        _surface,
-        memory=lambda values, table: (0.0,) * _N_REMEMBERED,
-        uses_acceleration=True,
-        equation="−Σ c_ij T_i(p) T_j(v) − Σ m_k z_k, ż_k = r_k (v − z_k), p = x or a",
+
+def _kind(block: str) -> ForceKind:
+    """Of the motions that a block's forces depend on: a law of the acceleration is solved for in every step."""
+    in_tank = block == "tank"
+    return register(
+        ForceKind(
+            f"force_surface_of_{block}",
+            (block,),
+            (
+                Parameter("largest_first", "1", 1e-12, 1e12),
+                Parameter("largest_velocity_m_per_s", "m s-1", 1e-12, 1e6),
+                Parameter("first_is_acceleration", "1", 0.0, 1.0),
+                Parameter("rate_rad_per_s", "rad s-1", 1e-3, 1e6),
+                *(Parameter(name, "N", -1e6, 1e6) for name in NAMES),
+            ),
+            _surface,
+            memory=lambda values, table: (0.0,) * _N_REMEMBERED,
+            uses_acceleration=in_tank,
+            equation=f"−Σ c_ij T_i(p) T_j(v) − Σ m_k z_k, ż_k = r_k (v − z_k), p = {'a' if in_tank else 'x'}",
+        )
     )
-)
+
+
+_KINDS = {block: _kind(block) for block in ("structure", "tank")}
 
 
 def surface_effect(block: str) -> Effect:
@@ -82,7 +89,7 @@ def surface_effect(block: str) -> Effect:
         first = at.acceleration_m_per_s2 if in_tank else at.displacement_m
         return Extension(
             terms=(
-                FORCE_SURFACE(
+                _KINDS[block](
                     place=block,
                     largest_first=1.1 * first,
                     largest_velocity_m_per_s=1.1 * at.velocity_m_per_s,
@@ -96,7 +103,7 @@ def surface_effect(block: str) -> Effect:
     return Effect(
         f"any force of {'a and v' if in_tank else 'x and v'}",
         block,
-        FORCE_SURFACE.equation,
+        _KINDS[block].equation,
         tuple(EffectParameter(name, -1e6, 1e6) for name in NAMES),
         lambda at: [dict.fromkeys(NAMES, 1e-4 * at.force_n)],
         extension,
