@@ -47,6 +47,8 @@ class Surroundings:
         Whether the tank moves at one frequency, the same in all runs.
     missed_hz : tuple of float
         Frequencies about which the retuned baseline misses the recordings most: there a mode may be missing.
+    n_modes : int
+        Of the structure.
     """
 
     rig: Rig
@@ -65,6 +67,7 @@ class Surroundings:
     channel: str = ""
     has_one_frequency: bool = False
     missed_hz: tuple[float, ...] = ()
+    n_modes: int = 1
 
     @property
     def reading(self) -> float:

@@ -57,6 +57,7 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
         blocks=model.blocks,
         peaks=_sizes(fitting, model, lambda values: np.nanmax(np.abs(values))),
         missed_hz=_most_missed_hz(fitting, problem.residual(problem.theta_of(fit.values))),
+        n_modes=0 if model.twin.structure is None else model.twin.structure.masses_kg.size,
         has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
     )
 

@@ -56,9 +56,11 @@ def _shows_less(general: Explanation, special: Explanation, scale: Scale) -> boo
 def _is_alike_at_one_frequency(found: Findings, one: Explanation, best: Explanation) -> bool:
     """Look-alikes of one frequency that differ by less than the noise floor, or by little of what they explain.
 
-    What tells them apart then are beginnings and ends of runs, on which no name should rest.
+    What tells them apart then are beginnings and ends of runs, on which no name should rest; a structure with more
+    modes tells them apart at the frequencies of the others.
     """
-    if not found.surroundings.has_one_frequency or len(one.keys) != 1 or len(best.keys) != 1:
+    at = found.surroundings
+    if not at.has_one_frequency or at.n_modes > 1 or len(one.keys) != 1 or len(best.keys) != 1:
         return False
     this, other = one.fit.candidates[0].effect, best.fit.candidates[0].effect
     if this.name not in other.look_alikes and other.name not in this.look_alikes:

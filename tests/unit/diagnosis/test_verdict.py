@@ -232,6 +232,7 @@ LIGHTER = {"structure.mass_error.mass_kg": 0.05}
         pytest.param(AT_ONE_FREQUENCY, LIGHTER, 1.9, "indistinguishable", id="look-alikes"),
         pytest.param(AT_ONE_FREQUENCY, LIGHTER, 2.1, "named", id="told by more than the noise in one run"),
         pytest.param(AT_ONE_FREQUENCY, DRAG, 1.0, "named", id="strangers"),
+        pytest.param(replace(AT_ONE_FREQUENCY, n_modes=2), LIGHTER, 1.9, "named", id="told by another mode"),
         pytest.param(AT, LIGHTER, 1.0, "named", id="several frequencies"),
     ],
 )
