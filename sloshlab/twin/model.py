@@ -75,6 +75,7 @@ class Scratch(NamedTuple):
     force: FloatArray  # (n_terms,)
     residual: FloatArray  # (n_modes,) r
     inputs: FloatArray  # (len(INPUTS),)
+    slope: FloatArray  # (1,) of the forces over the acceleration, where it was solved for last; NaN at first
     values: FloatArray  # (largest number of events of a term,)
     slopes: FloatArray  # (5, n_states)
     powers: FloatArray  # (5, n_works)
@@ -120,6 +121,7 @@ def scratch(model: Model, state: FloatArray, n_event_functions: int) -> Scratch:
     return Scratch(
         state, np.zeros(n_works), np.zeros(n_terms), friction,
         np.zeros(2 * N_MOTION), np.zeros(n_terms), np.zeros(n_modes),
-        np.zeros(len(INPUTS)), np.zeros(max(n_event_functions, 1)), np.zeros((5, state.size)),
+        np.zeros(len(INPUTS)), np.full(1, np.nan), np.zeros(max(n_event_functions, 1)),
+        np.zeros((5, state.size)),
         np.zeros((5, n_works)), np.zeros(state.size), np.zeros(n_works),
     )  # fmt: skip

@@ -30,6 +30,8 @@ from sloshlab.twin.model import (
 )
 
 _MOST_ITERATIONS = 30
+_MOST_SECANTS = 6
+_LEAST_CHORD = 1e-6
 _ACCELERATION_TOLERANCE = 1e-12
 
 
@@ -95,9 +97,26 @@ def _forces_at(m: Model, a: float, y: FloatArray, dy: FloatArray, s: Scratch) ->
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
-    """Newton's method for the relative acceleration under forces that depend on it; NaN if there is none."""
+    """The relative acceleration under forces that depend on it; NaN if there is none.
+
+    Secants from the slope of the last time, which most laws keep, or else Newton's method.
+    """
     inertia = 1.0 + m.added_mass * m.mobility
-    a = (free + m.mobility * known) * m.inverse_inertia
+    start = (free + m.mobility * known) * m.inverse_inertia
+    a, slope, before, force_before = start, s.slope[0], np.nan, 0.0
+    for _ in range(_MOST_SECANTS):
+        there = _forces_at(m, a, y, dy, s)
+        if abs(a - before) > _LEAST_CHORD * (1.0 + abs(a)):
+            slope = (there - force_before) / (a - before)
+        correction = (free + m.mobility * (known + there) - inertia * a) / (inertia - m.mobility * slope)
+        if not np.isfinite(correction):
+            break
+        before, force_before = a, there
+        a += correction
+        if abs(correction) <= _ACCELERATION_TOLERANCE * (1.0 + abs(a)):
+            s.slope[0] = slope
+            return a
+    a = start
     for _ in range(_MOST_ITERATIONS):
         nearby = a + 1e-3 * (1.0 + abs(a))
         slope = _forces_at(m, nearby, y, dy, s)
@@ -109,7 +128,8 @@ def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: 
             break
         a += correction
         if abs(correction) <= _ACCELERATION_TOLERANCE * (1.0 + abs(a)):
-            return a  # type: ignore[no-any-return]
+            s.slope[0] = slope
+            return a
     return np.nan
 
 

@@ -13,7 +13,7 @@ from sloshlab.diagnosis.free_run_fit import STAGES, fitted
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.search.fits import Fits, Told
 
-_N_DRAWN: Final = 8
+_N_DRAWN: Final = 6
 _MOST_TOLERANCES: Final = 1.25
 _OF_A_NUMBER: Final = 0.3
 """Standard deviation of the logarithm of an effect's numbers where the fits begin."""
@@ -51,7 +51,7 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
         far = (i + 1) / _N_DRAWN
         start = np.where(is_baseline, at_best + far * draw, at_best * np.exp(far * _OF_A_NUMBER * draw))
         problem = FreeRunProblem(found.model, found.fitting, candidates, expected=expected)
-        fit, _ = fitted(problem, plain.values(start), n_iterations=6, shares=STAGES[-4:])
+        fit, _ = fitted(problem, plain.values(start), n_iterations=6, shares=STAGES[-3:])
         if not fit.trouble:
             ends.append(fit)
     lowest = min(ends, key=lambda one: one.misfit)
