@@ -196,12 +196,12 @@ class NoiseFloor:
         return best
 
     def _nearest_frequency(self, target: FloatArray) -> HiddenRig | None:
-        """The rig with the possible frequency whose signals are nearest, where it has one mode.
+        """The rig with the possible frequency of its first mode whose signals are nearest, where it has modes.
 
         From elsewhere no step finds a phase that is off by more than a radian.
         """
         rig = self._laboratory.rig
-        if rig.kind != "sdof":
+        if rig.kind == "shaker":
             return None
         if not self._frequencies:
             for change in np.linspace(*_about_belief(FREQUENCY_TOLERANCE, rig.factor("frequency_1")), _SCANNED):

@@ -80,17 +80,6 @@ def one_sided_damping(scales: Scales, generator: np.random.Generator) -> DrawnEf
     return _unknown("tank", "damping of downward motion only", lambda m: Change({}, {at.TANK_ONE_SIDED: m * unit}))
 
 
-def heavier_when_violent(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
-    """A liquid whose inertia grows with the violence of the motion."""
-    unit = 0.3 / scales.acceleration_g
-    return _unknown(
-        "tank",
-        "inertia that grows with the level",
-        lambda m: Change({}, {at.TANK_SQUARE_INERTIA: m * unit}),
-        most=10.0,
-    )
-
-
 def crooked_sensor(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """A sensor whose characteristic is curved."""
     names = [name for name in sorted(scales.rms) if name not in ("force_interface", "acceleration_root")]
@@ -114,6 +103,5 @@ UNKNOWN_PHYSICS: Final = (
     HiddenEffect("loosening", "structure", loosening, _CARRIED),
     HiddenEffect("machine", "structure", machine, _CARRIED),
     HiddenEffect("one_sided_damping", "tank", one_sided_damping, _ALL),
-    HiddenEffect("heavier_when_violent", "tank", heavier_when_violent, _ALL, True),
     HiddenEffect("crooked_sensor", "sensor", crooked_sensor, _ALL, True),
 )

@@ -133,8 +133,6 @@ def tank_extra_mass(t, state, p):  # type: ignore[no-untyped-def]
     if p[at.EFFECTIVE_MASS] != 0.0:
         faded = 1.0 + (amplitude_g(state) / p[at.EFFECTIVE_MASS_FADE]) ** 2
         extra += p[at.EFFECTIVE_MASS] * p[at.LIQUID_MASS] / faded
-    if p[at.TANK_SQUARE_INERTIA] != 0.0:
-        extra += p[at.TANK_SQUARE_INERTIA] * p[at.LIQUID_MASS] * amplitude_g(state)
     return extra
 
 

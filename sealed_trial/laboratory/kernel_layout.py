@@ -60,19 +60,18 @@ LOOSE_STIFFNESS: Final = 45  # of floor and ceiling [N/m]
 LOOSE_DAMPING: Final = 46  # [N s/m]
 LOSS_RATE: Final = 47  # [kg/s]
 TANK_ONE_SIDED: Final = 48  # c for downward motion only [N s/m]
-TANK_SQUARE_INERTIA: Final = 49  # ε of −ε m_l |a| a/g
 
 # outside the vocabulary, structure
-STIFFNESS_MODULATION: Final = 50  # [N/m]
-STIFFNESS_MODULATION_RATE: Final = 51  # [rad/s]
-DAMPING_OF_DISPLACEMENT: Final = 52  # c x² v [N s/m³]
-STIFFNESS_STEP: Final = 53  # [N/m] from an instant on
-STIFFNESS_STEP_TIME: Final = 54  # [s]
-TONE_FORCE: Final = 55  # [N]
-TONE_RATE: Final = 56  # [rad/s]
+STIFFNESS_MODULATION: Final = 49  # [N/m]
+STIFFNESS_MODULATION_RATE: Final = 50  # [rad/s]
+DAMPING_OF_DISPLACEMENT: Final = 51  # c x² v [N s/m³]
+STIFFNESS_STEP: Final = 52  # [N/m] from an instant on
+STIFFNESS_STEP_TIME: Final = 53  # [s]
+TONE_FORCE: Final = 54  # [N]
+TONE_RATE: Final = 55  # [rad/s]
 
-CARRIED_MASS: Final = 57  # M_dry + m_l [kg]
-N_PARAMETERS: Final = 58
+CARRIED_MASS: Final = 56  # M_dry + m_l [kg]
+N_PARAMETERS: Final = 57
 
 # states beyond the coordinates and their velocities
 S_HYSTERESIS: Final = 0  # [N]
