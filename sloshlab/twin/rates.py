@@ -115,7 +115,7 @@ def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: 
         a += correction
         if abs(correction) <= _ACCELERATION_TOLERANCE * (1.0 + abs(a)):
             s.slope[0] = slope
-            return a
+            return a  # type: ignore[no-any-return]
     a = start
     for _ in range(_MOST_ITERATIONS):
         nearby = a + 1e-3 * (1.0 + abs(a))
@@ -129,7 +129,7 @@ def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: 
         a += correction
         if abs(correction) <= _ACCELERATION_TOLERANCE * (1.0 + abs(a)):
             s.slope[0] = slope
-            return a
+            return a  # type: ignore[no-any-return]
     return np.nan
 
 

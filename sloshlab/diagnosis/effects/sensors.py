@@ -267,7 +267,7 @@ def _stretched(sign: float) -> Callable[[Numbers], Reading]:
     def of(numbers: Numbers) -> Reading:
         def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
             del rate, others, recorded
-            return _between(values, np.arange(values.size) * (1 + sign * numbers["ratio"]))
+            return _between(values, np.arange(values.size, dtype=np.float64) * (1 + sign * numbers["ratio"]))
 
         return reading
 

@@ -28,6 +28,10 @@ from sloshlab.diagnosis.rig_model import RELEASE
 _WORSE_THAN_OTHERS: Final = 1.2
 _OTHER_RELEASES: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
 """Dry friction stops a motion in jumps, and what follows a release has side valleys."""
+_LITTLE_IN_COMMON: Final = 0.25
+_LITTLE_IN_A_CHANNEL: Final = 0.5
+_LITTLE_ALONE: Final = 1.5
+"""Mean squares, in noise floors: what repeats of a test share, in all channels and in one; what one run leaves."""
 Told = Callable[[str, int, int], None]
 
 
@@ -124,6 +128,22 @@ class Fits:
         near = nearest(problem, places, STAGES[-2])
         other, _ = fitted(problem, near, n_iterations=3, shares=STAGES[-2:])
         return best.values if other.trouble or other.cost > best.cost else other.values
+
+    def is_complete(self, one: Explanation) -> bool:
+        """Whether repeats have next to nothing in common of what is left, and what was not repeated leaves little.
+
+        Then nothing more can be found, and nothing without a name is better. False where no test was repeated.
+        """
+        by_test: dict[str, list[float]] = {}
+        for (test, _), in_common in one.repeating.items():
+            by_test.setdefault(test, []).append(in_common)
+        repeated = {run for test in self.tests if len(test) > 1 for run in test}
+        alone = [left for (run, _), left in one.by_run.items() if run not in repeated]
+        return bool(by_test) and (
+            all(max(left) < _LITTLE_IN_A_CHANNEL for left in by_test.values())
+            and all(float(np.mean(left)) < _LITTLE_IN_COMMON for left in by_test.values())
+            and max(alone, default=0.0) < _LITTLE_ALONE
+        )
 
     def is_strained(self, fit: FreeRunFit) -> bool:
         """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""

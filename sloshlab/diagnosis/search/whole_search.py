@@ -62,12 +62,14 @@ def findings_of(
     surroundings = surroundings_of(problem, retuned_fit, case.rig)
     pool = candidates(surroundings)
     found = OneMoreEffect(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
-    refinement = Refinement(fits)
-    found += refinement.anew(retuned_fit, found)
-    found += _second_effects(fits, found, retuned_fit, pool)
+    refinement, best = Refinement(fits), cheapest(found)
+    is_complete = fits.is_complete(best or retuned)
+    if not is_complete:
+        found += refinement.anew(retuned_fit, found)
+        found += _second_effects(fits, found, retuned_fit, pool)
     found += refinement.polished(found, pool)
     retuned = refinement.retuned_from(found, retuned)
-    any_force = ceilings(fits, surroundings, found, retuned_fit)
+    any_force = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
     best, highest = cheapest(found), cheapest(any_force)
     if best is not None and highest is not None and best.fit.cost - highest.fit.cost > LEAST_TO_BUILD_ON:
         found += InPlace(fits).one_for_all(highest.fit, retuned_fit, pool)

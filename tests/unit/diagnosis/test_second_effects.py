@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from sloshlab.diagnosis.search import whole_search
+from sloshlab.diagnosis.search.fits import Fits
 
 
 def explanation(cost: float, *keys: str, left: float = 2.0) -> Any:
@@ -69,3 +70,27 @@ def test_one_effect_is_sought_in_place_of_a_pair_that_gains(monkeypatch: pytest.
 def test_nothing_is_sought_beside_what_leaves_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     tried, found = sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum"), is_noise=True)
     assert (tried.beside, found) == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("shared", "alone", "is_complete"),
+    [
+        pytest.param((0.2, 0.2), 1.4, True, id="little is left"),
+        pytest.param((0.3, 0.3), 1.4, False, id="all channels share it"),
+        pytest.param((0.45, -0.1), 1.4, True, id="one channel shares a little"),
+        pytest.param((0.55, -0.1), 1.4, False, id="one channel shares more"),
+        pytest.param((0.2, 0.2), 1.6, False, id="a run alone shows more"),
+    ],
+)
+def test_nothing_more_is_sought_where_repeats_share_nothing_more(
+    shared: tuple[float, float], alone: float, is_complete: bool
+) -> None:
+    tests = [["a", "b"], ["c"]]
+    fits = Fits(cast(Any, None), [], [], lambda what, done, of: None, tests)
+    left = SimpleNamespace(
+        repeating={("a", "tip"): shared[0], ("a", "force"): shared[1]},
+        by_run={("a", "tip"): 9.0, ("b", "tip"): 9.0, ("c", "tip"): alone},
+    )
+    assert fits.is_complete(cast(Any, left)) is is_complete
+    left.repeating = {}
+    assert not fits.is_complete(cast(Any, left))
