@@ -11,9 +11,11 @@ from sloshlab.diagnosis.explanation import Explanation
 
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
-_ERRORS_OVER_STANDARD_ERRORS: Final = 3.0
+_ERRORS_OVER_STANDARD_ERRORS: Final = 2.0
 """On cases whose truth was known."""
 _CALIBRATION: Final = 0.01
+_LENGTHS: Final = {"_n_per_m3": 3, "_n_per_m2": 2, "_n_s2_per_m2": 2, "_n_per_m": 1, "_n_s_per_m": 1}
+"""Power of a length, or of a length per time, by which a force of the unit is divided: its gain counts as often."""
 _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta")
 """Ends of the names of numbers that no gain of a sensor and no mass changes, but for so much per second."""
 
@@ -23,7 +25,8 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
 
     The standard error of the fit knows noise alone; it is widened by what the fit leaves, by how far estimates
     were off where the truth was known, by how far fits about other baselines end elsewhere, and, where gains or
-    masses scale the number, by how well those are known.
+    masses scale the number, by how well those are known: a cubic spring by the gain of a force and three times by
+    that of a displacement.
     """
     name = f"{candidate.key}.{parameter}"
     estimate = best.fit.values[name]
@@ -31,7 +34,8 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
         return estimate, estimate, estimate
     scatter = _ERRORS_OVER_STANDARD_ERRORS * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
     is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s")
-    of_gain = 0.0 if is_free else _CALIBRATION * abs(estimate)
+    power = next((power for ending, power in _LENGTHS.items() if parameter.endswith(ending)), 0)
+    of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(estimate)
     width = _NORMAL_90 * float(np.linalg.norm([scatter, of_gain, best.spread.get(name, 0.0)]))
     chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
     lowest, highest = candidate.bounds(chosen)
