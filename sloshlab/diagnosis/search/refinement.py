@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+from scipy.stats import norm, qmc
+
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest
@@ -13,6 +16,9 @@ from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
 
 _MOST_ANEW: Final = 3
+_MOST_THROWS, _MOST_IN_VAIN, _N_PLACES = 24, 5, 48
+_OF_A_NUMBER: Final = (0.4, 0.15)
+"""Standard deviations of the logarithm of a number over places about one, in turns."""
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)
 """Of what was found: beside a baseline that hides a part of an effect the rest of it is left."""
 
@@ -63,6 +69,37 @@ class Refinement:
                 found.append(self.fits.judged(fit))
         return found
 
+    def climbed(self, known: Sequence[Explanation]) -> list[Explanation]:
+        """The best effect of several numbers from the nearest of many places about it, time and again.
+
+        Contacts and friction make ridges along which steps are short: a throw goes further, and what has led to a
+        better place is done once more from there (Hooke and Jeeves 1961, doi:10.1145/321062.321069).
+
+        Parameters
+        ----------
+        known : sequence of Explanation
+        """
+        best = cheapest(known)
+        if best is None or len(best.fit.candidates[-1].effect.parameters) < 2 or len(best.keys) > 1:
+            return []
+        names = [f"{best.keys[-1]}.{one.name}" for one in best.fit.candidates[-1].effect.parameters]
+        problem, fit, n_in_vain = self.fits.problem_of(best.fit), best.fit, 0
+        further: dict[str, float] | None = None
+        for i in range(_MOST_THROWS):
+            if n_in_vain == _MOST_IN_VAIN:
+                break
+            self.fits.told(f"fitting {best.keys[-1]} from places about it", i, _MOST_THROWS)
+            start = further or nearest(problem, _places_about(fit, names, i), STAGES[2])
+            other, _ = fitted(problem, start, n_iterations=6, shares=STAGES[1:])
+            if other.trouble or other.cost >= fit.cost:
+                n_in_vain += further is None
+                further = None
+                continue
+            n_in_vain = 0
+            further = {name: value + (value - fit.values[name]) for name, value in other.values.items()}
+            fit = other
+        return [self.fits.judged(fit)] if fit is not best.fit else []
+
     def polished(self, known: Sequence[Explanation], pool: Sequence[Candidate]) -> list[Explanation]:
         """The best of one and of two effects to where they converge, special cases in their place, each alone."""
         found: list[Explanation] = []
@@ -107,3 +144,13 @@ class Refinement:
             if not fit.trouble and fit.cost < best.fit.cost:
                 best = self.fits.judged(fit)
         return best
+
+
+def _places_about(fit: FreeRunFit, names: Sequence[str], turn: int) -> list[dict[str, float]]:
+    """Values of a fit, some numbers larger or smaller by factors drawn evenly; others at every turn."""
+    spread = _OF_A_NUMBER[turn % len(_OF_A_NUMBER)]
+    thrown = np.exp(spread * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PLACES)))
+    return [
+        {**fit.values, **{name: fit.values[name] * float(factor) for name, factor in zip(names, row, strict=True)}}
+        for row in thrown
+    ]

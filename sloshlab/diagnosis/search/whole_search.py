@@ -66,6 +66,7 @@ def findings_of(
     is_complete = fits.is_complete(best or retuned)
     if not is_complete:
         found += refinement.anew(retuned_fit, found)
+        found += refinement.climbed(found)
         found += _second_effects(fits, found, retuned_fit, pool)
     found += refinement.polished(found, pool)
     retuned = refinement.retuned_from(found, retuned)

@@ -15,7 +15,7 @@ _ERRORS_OVER_STANDARD_ERRORS: Final = 2.0
 """On cases whose truth was known."""
 _CALIBRATION: Final = 0.01
 _LENGTHS: Final = {"_n_per_m3": 3, "_n_per_m2": 2, "_n_s2_per_m2": 2, "_n_per_m": 1, "_n_s_per_m": 1}
-"""Power of a length, or of a length per time, by which a force of the unit is divided: its gain counts as often."""
+"""Power of a length, or of one per time, by which a force of the unit is divided: its gain counts as often."""
 _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta")
 """Ends of the names of numbers that no gain of a sensor and no mass changes, but for so much per second."""
 

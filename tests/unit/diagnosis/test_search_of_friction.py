@@ -183,6 +183,32 @@ def test_what_gains_nothing_is_not_fitted_again(case: Decays, coulomb: Explanati
     assert Refinement(case.fits).anew(case.baseline, [no_gain]) == []
 
 
+def test_an_effect_of_several_numbers_climbs_along_a_ridge(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fit that stays where it begins: throws find a better place, and what has led there is done again."""
+    begun: list[dict[str, float]] = []
+
+    def stays(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
+        begun.append(dict(start))
+        cost = huber_cost(problem.residual(problem.theta_of(start)))
+        return FreeRunFit(problem.candidates, dict(start), cost, cost), None
+
+    wide = case.fit(ASYMMETRIC)
+    names = [f"{ASYMMETRIC}.force_{side}_n" for side in ("up", "down")]
+    off = {**wide.fit.values, **{name: 0.3 * wide.fit.values[name] for name in names}}
+    problem = case.fits.problem_of(wide.fit)
+    at_off = huber_cost(problem.residual(problem.theta_of(off)))
+    monkeypatch.setattr(refinement, "fitted", stays)
+    start = replace(wide, fit=replace(wide.fit, values=off, cost=at_off))
+    [found] = Refinement(case.fits).climbed([start])
+    assert found.fit.cost < 0.5 * at_off
+    first, second = begun[:2]
+    assert second == {name: pytest.approx(2 * value - off[name]) for name, value in first.items()}
+
+
+def test_an_effect_of_one_number_does_not_climb(case: Decays, coulomb: Explanation) -> None:
+    assert Refinement(case.fits).climbed([coulomb]) == []
+
+
 def findings(case: Decays, *explanations: Explanation) -> Findings:
     baseline = case.fits.judged(case.baseline)
     return Findings(
