@@ -55,6 +55,14 @@ class Explanation:
     spread: dict[str, float] = field(default_factory=dict)
 
     @property
+    def shared_by_repeats(self) -> list[list[float]]:
+        """`repeating` of every test, one number per channel."""
+        by_test: dict[str, list[float]] = {}
+        for (test, _), in_common in self.repeating.items():
+            by_test.setdefault(test, []).append(in_common)
+        return list(by_test.values())
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of its effects, sorted."""
         return tuple(sorted(one.effect.known_as for one in self.fit.candidates))

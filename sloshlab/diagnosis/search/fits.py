@@ -134,16 +134,13 @@ class Fits:
 
         Then nothing more can be found, and nothing without a name is better. False where no test was repeated.
         """
-        by_test: dict[str, list[float]] = {}
-        for (test, _), in_common in one.repeating.items():
-            by_test.setdefault(test, []).append(in_common)
         repeated = {run for test in self.tests if len(test) > 1 for run in test}
         alone = [left for (run, _), left in one.by_run.items() if run not in repeated]
-        return bool(by_test) and (
-            all(max(left) < _LITTLE_IN_A_CHANNEL for left in by_test.values())
-            and all(float(np.mean(left)) < _LITTLE_IN_COMMON for left in by_test.values())
-            and max(alone, default=0.0) < _LITTLE_ALONE
+        shared = one.shared_by_repeats
+        is_little = all(
+            max(left) < _LITTLE_IN_A_CHANNEL and float(np.mean(left)) < _LITTLE_IN_COMMON for left in shared
         )
+        return bool(shared) and is_little and max(alone, default=0.0) < _LITTLE_ALONE
 
     def is_strained(self, fit: FreeRunFit) -> bool:
         """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""

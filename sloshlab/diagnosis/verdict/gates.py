@@ -114,10 +114,8 @@ def leaves_more(found: Findings, one: Explanation) -> bool:
     found : Findings
     one : Explanation
     """
-    by_test: dict[str, list[float]] = {}
-    for (test, _), in_common in one.repeating.items():
-        by_test.setdefault(test, []).append(in_common)
-    if any(max(left) > _MOST_IN_A_CHANNEL or float(np.mean(left)) > _MOST_IN_COMMON for left in by_test.values()):
+    shared = one.shared_by_repeats
+    if any(max(left) > _MOST_IN_A_CHANNEL or float(np.mean(left)) > _MOST_IN_COMMON for left in shared):
         return True
     is_told = not np.isnan(_in_common_where_judged(found, one))
     return found.has_repeats and not is_told and one.rms_without_bursts > LARGEST_REMAINDER

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.search import whole_search
 from sloshlab.diagnosis.search.fits import Fits
 
@@ -87,10 +90,12 @@ def test_nothing_more_is_sought_where_repeats_share_nothing_more(
 ) -> None:
     tests = [["a", "b"], ["c"]]
     fits = Fits(cast(Any, None), [], [], lambda what, done, of: None, tests)
-    left = SimpleNamespace(
-        repeating={("a", "tip"): shared[0], ("a", "force"): shared[1]},
+    left = Explanation(
+        FreeRunFit((), {}, 0.0, 0.0),
+        held_out=0.0,
+        held_out_rms=1.0,
         by_run={("a", "tip"): 9.0, ("b", "tip"): 9.0, ("c", "tip"): alone},
+        repeating={("a", "tip"): shared[0], ("a", "force"): shared[1]},
     )
-    assert fits.is_complete(cast(Any, left)) is is_complete
-    left.repeating = {}
-    assert not fits.is_complete(cast(Any, left))
+    assert fits.is_complete(left) is is_complete
+    assert not fits.is_complete(replace(left, repeating={}))
