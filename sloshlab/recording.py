@@ -106,11 +106,12 @@ class ChannelAttributes(BaseModel):
     range_min: FiniteFloat | None = None
     range_max: FiniteFloat | None = None
     noise_std: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    known_to: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
 
 
 M = TypeVar("M", bound=BaseModel)
 
-_SCALED_ATTRIBUTES = ("range_min", "range_max", "noise_std")
+_SCALED_ATTRIBUTES = ("range_min", "range_max", "noise_std", "known_to")
 _STORAGE_ATTRIBUTES = ("scale_factor", "add_offset", "_FillValue", "missing_value")
 
 

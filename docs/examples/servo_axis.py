@@ -38,7 +38,7 @@ def write_case(folder: Path, case: Path, force_known_to_n: float = FORCE_KNOWN_T
     for repeat in range(4):
         part = slice(repeat * PERIOD, repeat * PERIOD + LENGTH, EVERY)
         run = recording(reference[part], position[part], force[part], repeat)
-        run["force_motor"].attrs["noise_std"] = force_known_to_n
+        run["force_motor"].attrs["known_to"] = force_known_to_n
         write_recording(run, case / "recordings" / f"period_{repeat}.nc")
     return case
 

@@ -301,14 +301,16 @@ def mean_squares_that_repeat(
     Returns
     -------
     dict
-        Per name of a test's first run, and channel, where repeats show enough of it together.
+        Per name of a test's first run, and channel, where repeats show enough of it together; none of a channel
+        that need not be described to its noise.
     """
     parts: dict[tuple[str, str], tuple[FloatArray, NDArray[np.bool_]]] = {}
     first = 0
     for one in observed:
         own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
         first += one.spectra.size
-        parts[one.run.name, one.channel] = np.clip(own, -ROBUST, ROBUST), one.informative
+        if not one.is_rough:
+            parts[one.run.name, one.channel] = np.clip(own, -ROBUST, ROBUST), one.informative
     found = {}
     for test in tests:
         for channel in dict.fromkeys(of for run, of in parts if run in test):

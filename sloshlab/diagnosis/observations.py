@@ -46,6 +46,8 @@ class Observation:
         Of each coefficient, by what does not repeat.
     n_transformed : int
         Bands of the transform, if not all of them are kept.
+    is_rough : bool
+        Whether some of the channel need not be described, though repeats may share it.
     """
 
     run: CaseRun
@@ -55,6 +57,7 @@ class Observation:
     spectra: FloatArray
     variance: FloatArray
     n_transformed: int = 0
+    is_rough: bool = False
 
     @property
     def n_bands(self) -> int:
@@ -99,9 +102,10 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
 
     Notes
     -----
-    The noise of a sensor is `noise_std` where the recording states it, or what the quietest of bands near the
-    end of its spectrum shows; never less than 10⁻⁴ of the channel. Where accelerometers drive the simulation, slow
-    displacements and velocities are lost with the drift that integration removes, and count for nothing.
+    The noise of a sensor is `noise_std`, and in squares beside it what no model need describe (`known_to`), where
+    the recording states them, or what the quietest of bands near the end of its spectrum shows; never less than
+    10⁻⁴ of the channel. Where accelerometers drive the simulation, slow displacements and velocities are lost with
+    the drift that integration removes, and count for nothing.
     """
     rate = run.attributes.sampling_rate_hz
     n_bands = _n_bands(run)
@@ -119,7 +123,8 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
         if variable.attrs["quantity"] in ("displacement", "velocity") and _is_integrated(run, driving):
             slow = band_frequencies_hz(n_bands, rate) < _SLOWEST_INTEGRATED_HZ
             variance[:, slow] += _FOR_NOTHING * (spectra[:, slow] ** 2).mean()
-        found.append(Observation(run, name, keeps_mean, known, spectra, variance))
+        is_rough = float(variable.attrs.get("known_to", 0.0)) > 0.0
+        found.append(Observation(run, name, keeps_mean, known, spectra, variance, is_rough=is_rough))
     return found
 
 
@@ -143,8 +148,8 @@ def _n_bands(run: CaseRun) -> int:
 
 
 def _stated(variable: xr.DataArray) -> float:
-    """Variance of the noise as the recording states it; zero where it does not."""
-    return float(variable.attrs.get("noise_std", 0.0)) ** 2
+    """Variance of the noise and of what no model need describe, as the recording states them; zero where not."""
+    return float(variable.attrs.get("noise_std", 0.0)) ** 2 + float(variable.attrs.get("known_to", 0.0)) ** 2
 
 
 def _is_integrated(run: CaseRun, driving: Sequence[str]) -> bool:

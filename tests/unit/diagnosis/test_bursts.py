@@ -26,6 +26,7 @@ class Spectra:
     informative: np.ndarray
     run: Run = field(default_factory=lambda: Run("run_1"))
     channel: str = "force"
+    is_rough: bool = False
 
 
 def observed(n_times: int, n_bands: int = 30) -> Spectra:
@@ -83,6 +84,14 @@ def test_only_the_same_channel_and_what_is_informative_is_shared() -> None:
     residual[480:].reshape(8, 30)[:, :5] = -3.0
     shared = mean_squares_that_repeat([["a", "b"]], cast(Any, [first, other, second]), residual)
     assert shared == {("a", "x"): pytest.approx(4.0)}
+
+
+def test_a_channel_that_need_not_be_described_is_not_asked() -> None:
+    observed = [of_run("a", (10, 10)), of_run("b", (10, 10))]
+    assert mean_squares_that_repeat([["a", "b"]], cast(Any, observed), np.ones(200)) != {}
+    for one in observed:
+        one.is_rough = True
+    assert mean_squares_that_repeat([["a", "b"]], cast(Any, observed), np.ones(200)) == {}
 
 
 def test_what_few_coefficients_show_is_not_told() -> None:

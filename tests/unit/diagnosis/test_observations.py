@@ -29,6 +29,14 @@ def test_the_stated_noise_is_the_variance() -> None:
     assert one.variance.min() >= 0.05**2
 
 
+def test_what_no_model_need_describe_is_added_in_squares() -> None:
+    [one] = observations(run(TONE, noise=0.03, known_to=0.04), ["acceleration_tip"])
+    np.testing.assert_allclose(one.variance, 0.05**2, rtol=1e-6)
+    assert one.is_rough
+    [other] = observations(run(TONE, noise=0.03), ["acceleration_tip"])
+    assert not other.is_rough
+
+
 def test_noise_that_nobody_stated_is_read_from_the_quiet_end_of_the_spectrum() -> None:
     noisy = TONE + 0.05 * np.random.default_rng(1).normal(size=N)
     [one] = observations(run(noisy), ["acceleration_tip"])
