@@ -10,7 +10,7 @@ import numpy as np
 
 from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
 from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equals_of, includes
-from sloshlab.diagnosis.verdict.comparison import Scale, at_its_best, is_clearly_better, shows_more
+from sloshlab.diagnosis.verdict.comparison import Scale, at_its_best, has_gained, is_clearly_better, shows_more
 from sloshlab.diagnosis.verdict.wording import (
     nothing_statement,
     separating_experiment_of,
@@ -81,7 +81,7 @@ def verdict_of(found: Findings) -> Verdict:
     if not (is_more or is_guess or leaves_more(found, found.retuned)):
         certain = _certain(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
-    named = _shortest_sufficient(found, scale)
+    named = _shortest_sufficient(found, scale, ADEQUATE * ceiling.held_out_rms)
     adequacy = named.held_out_rms / max(ceiling.held_out_rms, 1e-300) if named else np.inf
     if (
         named is None
@@ -140,8 +140,11 @@ def _in_need_of_all(found: Findings, scale: Scale) -> list[Explanation]:
     ]
 
 
-def _shortest_sufficient(found: Findings, scale: Scale) -> Explanation | None:
-    """The best single effect, unless two are better by more than chance."""
+def _shortest_sufficient(found: Findings, scale: Scale, adequate_rms: float) -> Explanation | None:
+    """The best single effect, unless two are clearly better, or it is not adequate and two add what is lacking.
+
+    What is lacking is added by two that are adequate and leave less than half of the retuned mean square.
+    """
     known = [one for one in found.explanations if np.isfinite(one.held_out) and not one.rests_on_a_bound]
     singles, pairs = ([one for one in known if len(one.keys) == n] for n in (1, 2))
     if not singles:
@@ -150,7 +153,9 @@ def _shortest_sufficient(found: Findings, scale: Scale) -> Explanation | None:
     if not pairs:
         return single
     pair = _without_excess(max(pairs, key=scale.evidence), pairs, scale)
-    return pair if is_clearly_better(pair, single, scale) else single
+    adds = pair.held_out_rms <= adequate_rms < single.held_out_rms and has_gained(pair, single, scale)
+    adds = adds and pair.held_out_rms**2 < 0.5 * found.retuned.held_out_rms**2
+    return pair if adds or is_clearly_better(pair, single, scale) else single
 
 
 def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scale) -> Explanation:

@@ -392,6 +392,29 @@ def test_what_repeats_share_of_a_remainder_is_missing_and_nothing_else(
 
 
 @pytest.mark.parametrize(
+    ("single_rms", "pair_rms", "gain", "baseline_rms", "named"),
+    [
+        pytest.param(
+            1.16, 1.14, 30.0, 2.0, ("coulomb_friction", "mains_hum"), id="two reach the ceiling, one not"
+        ),
+        pytest.param(1.14, 1.0, 30.0, 2.0, ("coulomb_friction",), id="one reaches it"),
+        pytest.param(1.16, 1.14, 11.0, 2.0, (), id="two gain no more than chance"),
+        pytest.param(1.2, 1.16, 30.0, 2.0, (), id="neither reaches it"),
+        pytest.param(1.16, 1.14, 30.0, 1.6, (), id="two explain less than half"),
+    ],
+)
+def test_two_effects_are_named_where_one_does_not_reach_the_ceiling(
+    single_rms: float, pair_rms: float, gain: float, baseline_rms: float, named: tuple[str, ...]
+) -> None:
+    """The second effect removes too little to be clear by itself."""
+    single = left(20.0 + gain, 20.0 + gain, FRICTION, squares=1.1, rms=single_rms)
+    both = left(20.0, 20.0, {**FRICTION, **HUM}, rms=pair_rms)
+    baseline = replace(BASELINE, held_out_rms=baseline_rms)
+    verdict = judged(baseline, [single, both], [left(19.0, 19.0, surface="structure")])
+    assert (verdict.best.names if verdict.best and verdict.kind == "named" else ()) == named
+
+
+@pytest.mark.parametrize(
     ("repeating", "kind"),
     [
         ({("run_2", TIP): 0.24}, "named"),
