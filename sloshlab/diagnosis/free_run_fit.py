@@ -387,15 +387,20 @@ def _step_within_bounds(
 ) -> FloatArray:
     """Where the quadratic model is least within the bounds.
 
-    A step cut off at a bound would point elsewhere than down, where parameters trade against each other.
+    A step cut off at a bound would point elsewhere than down, where parameters trade against each other. It is cut
+    off nevertheless where the model is none: not finite, or flat to rounding.
     """
     low = (problem.low - problem.centres) / problem.scales
     high = (problem.high - problem.centres) / problem.scales
     tried = theta - np.linalg.solve(hessian, gradient)
-    if bool(np.all((low <= tried) & (tried <= high))):
+    if not np.isfinite(tried).all() or bool(np.all((low <= tried) & (tried <= high))):
         return np.asarray(tried)
-    upper = cholesky(hessian)
+    try:
+        upper = cholesky(hessian)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.clip(tried, low, high))
     target = solve_triangular(upper, -gradient, trans="T")
-    room = np.maximum(high - theta, 0.0) + _LEAST_ROOM, np.minimum(low - theta, 0.0) - _LEAST_ROOM
-    step = lsq_linear(upper, target, (room[1], room[0]), method="bvls").x
+    down = np.minimum(low - theta, 0.0) - _LEAST_ROOM
+    up = np.maximum(high - theta, 0.0) + _LEAST_ROOM
+    step = lsq_linear(upper, target, (down, up), method="bvls").x
     return np.asarray(np.clip(theta + step, low, high))

@@ -301,6 +301,16 @@ def test_a_step_goes_where_the_model_is_least_within_the_bounds(seed: int) -> No
     assert model(found) == pytest.approx(least, abs=1e-8)
 
 
+def test_a_step_without_a_model_ends_within_the_bounds_or_nowhere() -> None:
+    """What explodes gives no step, and is refused as such; what is not convex is cut off."""
+    bounded = cast(Any, SimpleNamespace(low=-np.ones(2), high=np.ones(2), centres=np.zeros(2), scales=np.ones(2)))
+    exploded = _step_within_bounds(bounded, np.zeros(2), np.eye(2), np.array([np.nan, 1.0]))
+    assert np.isnan(exploded).any()
+    saddle = np.array([[1.0, 0.0], [0.0, -1e-9]])
+    found = _step_within_bounds(bounded, np.zeros(2), saddle, np.array([-3.0, 1.0]))
+    np.testing.assert_array_equal(found, [1.0, 1.0])
+
+
 @pytest.mark.parametrize("place", ["acceleration_tip", "displacement_tank"])
 def test_what_one_channel_or_run_alone_shows_is_as_if_all_were_simulated(tmp_path: Path, place: str) -> None:
     runs = decays(duration_s=1.5)
