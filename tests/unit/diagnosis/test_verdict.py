@@ -3,156 +3,35 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import log
-from types import SimpleNamespace
-from typing import Any, cast
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from recorded_oscillators import effect
-from scipy.stats import norm
-
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, Surroundings
-from sloshlab.diagnosis.case import Case, CaseRun
-from sloshlab.diagnosis.examination import Examination, examination_facts
-from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.force_surface import surface_effect
-from sloshlab.diagnosis.free_run_problem import FreeRunFit
-from sloshlab.diagnosis.split import Split
-from sloshlab.diagnosis.verdict import Verdict, verdict_facts, verdict_of, with_place
-
-assert effects.__all__
-N = 10_000
-"""Coefficients of the fitted runs, and of the held-out ones."""
-PER_NUMBER = 0.5 * log(2 * N)
-FRICTION = {"structure.coulomb_friction.force_n": 0.37}
-STRIBECK = {
-    "structure.stribeck_friction.coulomb_n": 0.3,
-    "structure.stribeck_friction.static_n": 0.5,
-    "structure.stribeck_friction.stribeck_velocity_m_per_s": 0.02,
-}
-DRAG = {"structure.quadratic_drag.drag_n_s2_per_m2": 0.8}
-OFFSET = {"structure.constant_force.force_n": -0.2}
-BOTH_SIDES = {
-    "structure.asymmetric_friction.force_up_n": 0.5,
-    "structure.asymmetric_friction.force_down_n": 0.2,
-}
-HUM = {"sensor.mains_hum_60.acceleration_tip.amplitude": 0.25}
-NOISE = 1.0
-TIP = "acceleration_tip"
-AT = Surroundings(
-    rig=cast(Any, None),
-    twin=cast(Any, None),
-    displacement_m=0.02,
-    velocity_m_per_s=0.8,
-    acceleration_m_per_s2=32.0,
-    frequency_hz=6.4,
-    force_n=70.0,
-    channels={TIP: 16.0, "force_interface": 35.0},
-    driving=(),
-    sampling_rate_hz=250.0,
-    longest_run_s=4.0,
+from hand_made_findings import (
+    ANY_FORCE,
+    AT,
+    AT_ONE_FREQUENCY,
+    BASELINE,
+    BOTH_SIDES,
+    DRAG,
+    FRICTION,
+    HUM,
+    OFFSET,
+    PER_NUMBER,
+    STRIBECK,
+    TIP,
+    N,
+    findings,
+    judged,
+    left,
+    names,
 )
-AT_ONE_FREQUENCY = replace(AT, has_one_frequency=True)
 
-
-@dataclass(frozen=True, eq=False)
-class HandMade(Findings):
-    """Findings without recordings."""
-
-    repeats: bool = False
-
-    @property
-    def has_repeats(self) -> bool:
-        return self.repeats
-
-    @property
-    def judged_tests(self) -> frozenset[str]:
-        return frozenset({"run_2"})
-
-    @property
-    def n_fitting(self) -> int:
-        return N
-
-    @property
-    def n_held_out(self) -> int:
-        return N
-
-    def readings(self, explanation: Explanation) -> dict[str, Any]:
-        return {}
-
-
-def candidates_of(values: Mapping[str, float]) -> tuple[Candidate, ...]:
-    """Those whose numbers these are, ``block.name[.channel].parameter``."""
-    found = []
-    for key in dict.fromkeys(name.rpartition(".")[0] for name in values):
-        block, name, *channel = key.split(".", 2)
-        found.append(Candidate(effect(f"{block}.{name}"), AT, *channel))
-    return tuple(found)
-
-
-SPLIT = Split((), (cast(CaseRun, SimpleNamespace(name="run_2")),), ())
-
-
-def left(
-    fitted: float,
-    held_out: float,
-    values: Mapping[str, float] | None = None,
-    *,
-    squares: float | None = None,
-    in_one_run: float | None = None,
-    in_fitted_run: float | None = None,
-    rms: float = NOISE,
-    surface: str = "",
-    repeating: Mapping[tuple[str, str], float] | None = None,
-) -> Explanation:
-    """What leaves so much log-likelihood of the fitted and of the held-out runs unexplained.
-
-    `squares` is the mean square of the one channel, ten for the baseline, one for the rest; `in_one_run` that of
-    the held-out run where it differs, `in_fitted_run` that of the fitted one.
-    """
-    candidates = (Candidate(surface_effect(surface), AT),) if surface else ()
-    candidates += candidates_of(values or {})
-    names = tuple(values or {})
-    cost = N + 2 * fitted
-    fit = FreeRunFit(
-        candidates, dict(values or {}), cost, cost, 1e-4 * np.eye(len(names)), names, np.ones(len(names))
-    )
-    squares = squares if squares is not None else NOISE if candidates else 10.0
-    by_run = {
-        ("run_1", TIP): squares if in_fitted_run is None else in_fitted_run,
-        ("run_2", TIP): squares if in_one_run is None else in_one_run,
-    }
-    return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run, rms, dict(repeating or {}))
-
-
-def findings(
-    retuned: Explanation,
-    explanations: Sequence[Explanation] = (),
-    ceilings: Sequence[Explanation] = (),
-    failed: Mapping[str, str] | None = None,
-    at: Surroundings = AT,
-    repeats: bool = False,
-) -> Findings:
-    return HandMade(
-        cast(Case, None), cast(Any, None), SPLIT, at, [], [],
-        left(9e4, 9e4), retuned, list(explanations), list(ceilings), dict(failed or {}), {}, repeats,
-    )  # fmt: skip
-
-
-def judged(*parts: Any, **more: Any) -> Verdict:
-    return verdict_of(findings(*parts, **more))
-
-
-def names(verdict: Verdict) -> list[tuple[str, ...]]:
-    return [one.names for one in verdict.alternatives]
-
-
-BASELINE = left(500.0, 500.0)
-ANY_FORCE = left(0.0, 0.0, surface="structure")
+from sloshlab.diagnosis.candidate import Surroundings
+from sloshlab.diagnosis.examination import Examination, examination_facts
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.verdict import verdict_facts, verdict_of, with_place
 
 
 @pytest.mark.parametrize(
@@ -560,70 +439,6 @@ def test_probabilities_sum_to_one_and_follow_the_held_out_runs() -> None:
     friction, drag = (shares[name] - 0.25 for name in ("coulomb_friction", "quadratic_drag"))
     assert friction / drag == pytest.approx(np.exp(2.0))
     assert friction / shares["unknown"] == pytest.approx(np.exp(2 * PER_NUMBER - 5.0))
-
-
-def interval_of(values: Mapping[str, float], rms: float = NOISE) -> dict[str, float]:
-    """What is told of the only number of an effect; its standard error is 0.01 at the noise floor."""
-    found = findings(BASELINE, [left(0.0, 0.0, values, rms=rms)])
-    [told] = verdict_facts(found, verdict_of(found))["effects"]
-    [number] = told["parameters"].values()
-    return dict(number)
-
-
-@pytest.mark.parametrize(("rms", "widened"), [(0.9, 1.0), (2.0, 2.0)])
-def test_intervals_are_as_wide_as_errors_were_and_wider_where_the_fit_leaves_more(
-    rms: float, widened: float
-) -> None:
-    """Two standard errors, twice that at two noise floors, at 90 %, beside one per cent of the size."""
-    force = interval_of(FRICTION, rms)
-    width = np.hypot(2.0 * 0.01 * widened, 0.0037) * norm.ppf(0.95)
-    assert (force["estimate"], force["level"]) == (0.37, 0.9)
-    assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
-    assert 0.37 - force["low"] == pytest.approx(width, rel=1e-4)
-
-
-def test_an_interval_is_as_wide_as_fits_about_other_baselines_end_elsewhere() -> None:
-    spread = replace(left(0.0, 0.0, FRICTION), spread={"structure.coulomb_friction.force_n": 0.04})
-    facts = verdict_facts(findings(BASELINE, [spread]), judged(BASELINE, [spread]))
-    [force] = [one["parameters"]["force_n"] for one in facts["effects"]]
-    width = np.linalg.norm([0.02, 0.0037, 0.04]) * norm.ppf(0.95)
-    assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
-
-
-@pytest.mark.parametrize(
-    "number", ["sensor.mains_hum_60.acceleration_tip.amplitude", "structure.coulomb_friction.force_n"]
-)
-def test_a_size_is_known_no_better_than_gains_and_masses(number: str) -> None:
-    """One per cent of 4 m/s², or of 4 N, beside two standard errors."""
-    size = interval_of({number: 4.0})
-    width = norm.ppf(0.95) * np.hypot(0.02, 0.04)
-    assert size["high"] - 4.0 == pytest.approx(width, rel=1e-4)
-    assert 4.0 - size["low"] == pytest.approx(width, rel=1e-4)
-
-
-def test_a_loss_per_second_is_a_size() -> None:
-    loss = interval_of({"tank.liquid_loss.rate_kg_per_s": 0.5})
-    assert loss["high"] - 0.5 == pytest.approx(norm.ppf(0.95) * np.hypot(0.02, 0.005), rel=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("number", "gains"),
-    [
-        ("structure.stiffness_change.stiffness_n_per_m", np.sqrt(2)),
-        ("tank.viscous_damping.damping_n_s_per_m", np.sqrt(2)),
-        ("structure.quadratic_stiffness.stiffness_n_per_m2", np.sqrt(5)),
-        ("structure.quadratic_drag.drag_n_s2_per_m2", np.sqrt(5)),
-        ("structure.cubic_stiffness.stiffness_n_per_m3", np.sqrt(10)),
-    ],
-)
-def test_the_gain_of_a_displacement_counts_with_its_power(number: str, gains: float) -> None:
-    size = interval_of({number: 4.0})
-    assert size["high"] - 4.0 == pytest.approx(norm.ppf(0.95) * np.hypot(0.02, 0.04 * gains), rel=1e-4)
-
-
-def test_a_time_does_not_depend_on_gains() -> None:
-    leak = interval_of({"sensor.sensor_high_pass.acceleration_tip.time_constant_s": 4.0})
-    assert leak["high"] - 4.0 == pytest.approx(0.02 * norm.ppf(0.95), rel=1e-4)
 
 
 @pytest.mark.parametrize(
