@@ -26,7 +26,9 @@ def _liquid_damping(motion, parameters, memory, rates):
     rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / parameters[9]
     rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / parameters[9]
     size = sqrt(2.0 * max(memory[1], 0.0)) / _G
-    rates[2] = ((1.0 if size > parameters[8] else 0.0) - memory[2]) / parameters[5]
+    violent = 1.0 / (1.0 + (parameters[8] / max(size, 1e-3 * parameters[8])) ** parameters[11])
+    calming = parameters[10] if parameters[10] > 0.0 else parameters[5]
+    rates[2] = violent * (1.0 - memory[2]) / parameters[5] - (1.0 - violent) * memory[2] / calming
     built = memory[2] if parameters[5] > 1e-3 else 1.0
     damping = parameters[0]
     if size > parameters[4]:
@@ -52,6 +54,8 @@ LIQUID_DAMPING = register(
             Parameter("rise", "1", 1e-3, 1e3, 1.0),
             Parameter("agitated_g", "1", 1e-3, 1e6, 1.0),
             Parameter("averaging_s", "s", 1e-3, 100.0, 0.2),
+            Parameter("calming_s", "s", 0.0, 1e9, 0.0),
+            Parameter("sharpness", "1", 1.0, 100.0, 30.0),
         ),
         _liquid_damping,
         memory=lambda values, table: (
@@ -61,7 +65,7 @@ LIQUID_DAMPING = register(
         ),
         uses_acceleration=True,
         equation="−s [c (a_s/â)² beyond a_s + (m_l/π) Ω W̄_peak 2b/(1 + b²)] v, b = (â/a_t − 1)/rise beyond a_t, "
-        "ṡ = (1 − s)/τ while agitated; â from the running mean square of a",
+        "ṡ = p (1 − s)/τ − (1 − p) s/τ_calm, p = rⁿ/(1 + rⁿ), r = â/a_agitated; â from the mean square of a",
     )
 )
 

@@ -180,22 +180,34 @@ def _damps(at: Surroundings) -> bool:
     return any(term.place == "tank" and term.name == "viscous_damping" for term in at.twin.terms)
 
 
+_NEVER_CALM_S: Final = 1e9
 DELAY = register(
     Effect(
         "breakup_delay",
         "tank",
-        "the damping of the liquid times s, ṡ = (1 − s)/τ while it is shaken beyond some g",
-        (EffectParameter("time_constant_s", 2e-3, 20.0), EffectParameter("agitated_g", 0.02, 20.0)),
+        "the damping of the liquid times s, ṡ = p (1 − s)/τ, p = rⁿ/(1 + rⁿ), r = â/a_agitated; s stays",
+        (
+            EffectParameter("time_constant_s", 2e-3, 20.0),
+            EffectParameter("agitated_g", 0.02, 20.0),
+            EffectParameter("averaging_s", 0.01, 5.0),
+            EffectParameter("sharpness", 2.0, 50.0, may_rest=True),
+        ),
         lambda at: [
-            {"time_constant_s": n / at.frequency_hz, "agitated_g": share * _largest_g(at)}
+            {
+                "time_constant_s": n / at.frequency_hz,
+                "agitated_g": share * _largest_g(at),
+                "averaging_s": 2 / at.frequency_hz,
+                "sharpness": 4.0,
+            }
             for n in (1.0, 5.0)
             for share in (0.1, 0.4)
         ],
-        _changed_damping(lambda term, numbers, at: term.changed(**numbers)),
+        _changed_damping(lambda term, numbers, at: term.changed(**numbers, calming_s=_NEVER_CALM_S)),
         ("high_g_saturation",),
         "a sudden start at constant amplitude",
         _damps,
         spoken_for_by=("memory", "odd in velocity"),
+        size=("time_constant_s",),
     )
 )
 SATURATION = register(

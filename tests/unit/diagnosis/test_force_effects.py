@@ -21,6 +21,7 @@ from sloshlab.diagnosis.candidate import Candidate, candidates, known_effects
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.rig import Structure
+from sloshlab.twin.liquid_effects import LIQUID_DAMPING
 from sloshlab.twin.tank_forces import FADING_MASS
 
 assert effects.__all__
@@ -309,18 +310,41 @@ def test_saturation_makes_the_damping_of_the_liquid_fall_with_the_square(damped:
     assert (level[known & (m["t"] > 1.0)] < 2.1).any()
 
 
-def test_a_delayed_break_up_builds_the_damping_of_the_liquid_up(damped: RigModel) -> None:
-    """ṡ = (1 − s)/τ while the level of the motion exceeds 2 g, −s/τ below."""
-    m = moved(damped, "tank.breakup_delay", {"time_constant_s": 0.4, "agitated_g": 2.0})
-    over = (level_g(m) > 2.0).astype(float)
-    built = np.zeros(over.size)
-    for i in range(1, over.size):
-        built[i] = over[i - 1] + (built[i - 1] - over[i - 1]) * np.exp(-1 / (0.4 * RATE_HZ))
+def built_up(level: np.ndarray, agitated_g: float, time_constant_s: float, calming_s: float) -> np.ndarray:
+    """ṡ = p (1 − s)/τ − (1 − p) s/τ_calm, p = r⁴/(1 + r⁴), r the level over that which agitates."""
+    violent = 1.0 / (1.0 + (agitated_g / np.maximum(level, 1e-3)) ** 4)
+    built = np.zeros(level.size)
+    for i in range(1, level.size):
+        p = violent[i - 1]
+        rate = p / time_constant_s + (1.0 - p) / calming_s
+        rest = p / time_constant_s / rate
+        built[i] = rest + (built[i - 1] - rest) * np.exp(-rate / RATE_HZ)
+    return built
+
+
+def test_a_delayed_break_up_builds_the_damping_of_the_liquid_up_and_it_stays(damped: RigModel) -> None:
+    numbers = {"time_constant_s": 0.4, "agitated_g": 2.0, "averaging_s": 0.12, "sharpness": 4.0}
+    m = moved(damped, "tank.breakup_delay", numbers)
+    built = built_up(level_g(m, 0.12), 2.0, 0.4, np.inf)
     known = smooth(m)
     expected = -TANK_DAMPING * built * m["v"]
     assert np.abs(added(m) - expected)[known].max() < 0.03 * np.abs(expected).max()
-    assert built.max() > 0.5
-    assert built[-1] < 0.5 * built.max()
+    assert built[0] < 0.1
+    assert built[-1] > 0.5
+
+
+def test_a_liquid_may_calm_down_as_fast_as_it_breaks_up(frozen: RigModel) -> None:
+    """A time of calming of its own, or that of the break-up where none is stated."""
+    for stated, acting in ((0.0, 0.4), (0.1, 0.1)):
+        term = LIQUID_DAMPING(
+            damping_n_s_per_m=TANK_DAMPING, liquid_mass_kg=LIQUID_KG, time_constant_s=0.4, agitated_g=2.0,
+            averaging_s=0.12, calming_s=stated, sharpness=4.0,
+        )  # fmt: skip
+        m = moved_by(frozen, Extension(terms=(term,), key=tuple(term.values.items())))
+        built = built_up(level_g(m, 0.12), 2.0, 0.4, acting)
+        expected = -TANK_DAMPING * built * m["v"]
+        assert np.abs(added(m) - expected)[smooth(m)].max() < 0.03 * np.abs(expected).max()
+        assert built[-1] < 0.7 * built.max()
 
 
 def test_the_damper_of_the_baseline_is_there_without_an_effect(damped: RigModel) -> None:
