@@ -273,8 +273,8 @@ def nearest(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], shar
     if len(starts) == 1:
         return starts[0]
     softness = problem.softness(share)
-    left = [softness * problem.residual(problem.theta_of(start)) for start in starts]
-    costs = [huber_cost(one) if np.isfinite(one).all() else np.inf for one in left]
+    left = problem.residuals([problem.theta_of(start) for start in starts])
+    costs = [huber_cost(softness * one) if np.isfinite(one).all() else np.inf for one in left]
     return starts[int(np.argmin(costs))]
 
 

@@ -166,10 +166,20 @@ class FreeRunProblem:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
-        values = self.values(theta)
         if N_THREADS == 1 or len(self.runs) == 1:
-            return np.concatenate([self._of_run(run, values) for run in self.runs])
+            return self._of_runs_in_turn(theta)
+        values = self.values(theta)
         return np.concatenate(list(_POOL.map(lambda run: self._of_run(run, values), self.runs)))
+
+    def residuals(self, thetas: Sequence[FloatArray]) -> list[FloatArray]:
+        """Residuals of several sets of parameters, of as many at a time as there are threads."""
+        if N_THREADS == 1 or len(thetas) == 1:
+            return [self.residual(theta) for theta in thetas]
+        return list(_POOL.map(self._of_runs_in_turn, thetas))
+
+    def _of_runs_in_turn(self, theta: FloatArray) -> FloatArray:
+        values = self.values(theta)
+        return np.concatenate([self._of_run(run, values) for run in self.runs])
 
     def _of_run(self, run: Sequence[Observation], values: Mapping[str, float]) -> FloatArray:
         self.n_simulations += 1
@@ -196,7 +206,7 @@ class FreeRunProblem:
 
         Coarse ones look further, past the jags that dry friction and contacts give a residual.
         """
-        found = []
+        places = []
         for column in columns:
             is_effect, is_damping = column >= self.n_baseline, self.names[column].startswith("damping")
             step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
@@ -207,15 +217,20 @@ class FreeRunProblem:
             moved = theta.copy()
             physical = self.centres[column] + (theta[column] + step) * self.scales[column]
             moved[column] += step if physical <= self.high[column] else -step
-            difference = (self._residual_moved(moved, column, at) - at) / (moved[column] - theta[column])
-            found.append(difference if np.isfinite(difference).all() else np.zeros(at.size))
+            places.append(moved)
+
+        def derivative(place: FloatArray, column: int) -> FloatArray:
+            difference = (self._residual_moved(place, column, at) - at) / (place[column] - theta[column])
+            return difference if np.isfinite(difference).all() else np.zeros(at.size)
+
+        found = list((map if N_THREADS == 1 else _POOL.map)(derivative, places, columns))
         return BlockJacobian.of_columns(found, [one.spectra.size for run in self.runs for one in run])
 
     def _residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
         """Residuals after one parameter was moved; unchanged in other runs and channels where it has its own."""
         owner, seen_by = run_of(self.names[column], self.model), self._seen_by[column]
         if not owner and not seen_by:
-            return self.residual(theta)
+            return self._of_runs_in_turn(theta)
         moved, first, values = at.copy(), 0, self.values(theta)
         for run in self.runs:
             parts = [one for one in run if not seen_by or one.channel in seen_by]

@@ -103,8 +103,9 @@ class Screening:
             by_force = None if forces is None else forces.of(candidate)
             extended = self.fits.problem((*base.candidates, candidate))
             looks = []
-            for start in [*with_smaller_ones(candidate), *([by_force.numbers] if by_force else [])]:
-                moved = extended.residual(extended.theta_of({**base.values, **start}))
+            sets = [*with_smaller_ones(candidate), *([by_force.numbers] if by_force else [])]
+            at_starts = extended.residuals([extended.theta_of({**base.values, **start}) for start in sets])
+            for start, moved in zip(sets, at_starts, strict=True):
                 if np.isfinite(moved).all():
                     gains = [look.gain(moved - residual) for look in looks_at]
                     looks.append(
