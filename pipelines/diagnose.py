@@ -12,14 +12,15 @@ from pipelines.free_place import require_free_folder
 from pipelines.outputs import sha256_of, versions
 from pipelines.progress import amounts
 from sloshlab import atomic_file
+from sloshlab.diagnosis.answer import answered
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.examination import examination_facts, examined, owning_block, seen_at
 from sloshlab.diagnosis.explanation import explained_extension
 from sloshlab.diagnosis.extension import NOTHING
-from sloshlab.diagnosis.search import findings_of, redrawn
+from sloshlab.diagnosis.search import findings_of
 from sloshlab.diagnosis.user_effects import load_user_effects
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
-from sloshlab.diagnosis.verdict import verdict_facts, verdict_of, with_place
+from sloshlab.diagnosis.verdict import verdict_facts, with_place
 
 
 def diagnose_case(
@@ -54,10 +55,7 @@ def diagnose_case(
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
         found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
-        verdict = verdict_of(found)
-        if verdict.best is not None and verdict.kind != "unknown":
-            found = redrawn(found, verdict.best, lambda what, done, of: advance(done, max(of, 1)))
-            verdict = verdict_of(found)
+        found, verdict = answered(found, lambda what, done, of: advance(done, max(of, 1)))
     examination = examined(found)
     verdict = with_place(found, verdict, seen_at(examination, verdict.best), owning_block(examination))
     facts = {**verdict_facts(found, verdict), **examination_facts(examination, found)}

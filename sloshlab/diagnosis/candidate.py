@@ -241,12 +241,16 @@ class Candidate:
             for numbers in self.effect.starts(replace(self.surroundings, channel=self.channel))
         ]
 
-    def sized(self, start: Numbers, factor: float) -> dict[str, float]:
-        """Numbers, named as in a fit, of the same effect larger by a factor."""
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """Numbers that grow with the effect, as the effect says or the first and all of its unit."""
         names = [parameter.name for parameter in self.effect.parameters]
         unit = named_and_units(names[0])[1]
-        size = self.effect.size or [name for name in names if named_and_units(name)[1] == unit]
-        grown = {f"{self.key}.{name}" for name in size}
+        return self.effect.size or tuple(name for name in names if named_and_units(name)[1] == unit)
+
+    def sized(self, start: Numbers, factor: float) -> dict[str, float]:
+        """Numbers, named as in a fit, of the same effect larger by a factor."""
+        grown = {f"{self.key}.{name}" for name in self.sizes}
         return {name: value * (factor if name in grown else 1.0) for name, value in start.items()}
 
     def bounds(self, parameter: EffectParameter) -> tuple[float, float]:

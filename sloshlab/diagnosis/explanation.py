@@ -115,6 +115,7 @@ class Findings:
     explanations : list of Explanation
         With one effect or more, in the order in which they were tried.
     ceilings : list of Explanation
+        What a name is held against: any force, and two effects of which one is not told from nothing.
     failed : dict
         Candidates that could not be fitted, and why.
     screened : dict

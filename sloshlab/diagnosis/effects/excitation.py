@@ -37,7 +37,7 @@ ROCKING = register(
         (EffectParameter("compliance_rad_per_n_m", 0.0, 1.0),),
         _compliance,
         _rocks,
-        ("stiffness_change", "mass_error"),
+        ("stiffness_change", "mass_error", "missing_mode"),
         "two accelerometers on the base, one before and one behind the root, in a decay",
         _has_root_moment,
         spoken_for_by=("does no work", "odd in displacement", "no onset"),

@@ -31,7 +31,8 @@ _OTHER_RELEASES: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
 _LITTLE_IN_COMMON: Final = 0.25
 _LITTLE_IN_A_CHANNEL: Final = 0.5
 _LITTLE_ALONE: Final = 1.5
-"""Mean squares, in noise floors: what repeats of a test share, in all channels and in one; what one run leaves."""
+"""Mean squares, in noise floors: what repeats of a test share, in all channels and in one; what one run leaves in
+most channels."""
 Told = Callable[[str, int, int], None]
 
 
@@ -132,15 +133,21 @@ class Fits:
     def is_complete(self, one: Explanation) -> bool:
         """Whether repeats have next to nothing in common of what is left, and what was not repeated leaves little.
 
-        Then nothing more can be found, and nothing without a name is better. False where no test was repeated.
+        Of a run without a repeat half of its channels tell: what moves shows in most of them, what is wrong with a
+        sensor shows in the repeated runs, too, and a burst of noise in one channel is neither. Then nothing more
+        can be found, and nothing without a name is better. False where no test was repeated.
         """
         repeated = {run for test in self.tests if len(test) > 1 for run in test}
-        alone = [left for (run, _), left in one.by_run.items() if run not in repeated]
+        alone: dict[str, list[float]] = {}
+        for (run, _), left in one.by_run.items():
+            if run not in repeated:
+                alone.setdefault(run, []).append(left)
         shared = one.shared_by_repeats
         is_little = all(
             max(left) < _LITTLE_IN_A_CHANNEL and float(np.mean(left)) < _LITTLE_IN_COMMON for left in shared
         )
-        return bool(shared) and is_little and max(alone, default=0.0) < _LITTLE_ALONE
+        is_little = is_little and all(float(np.median(left)) < _LITTLE_ALONE for left in alone.values())
+        return bool(shared) and is_little
 
     def is_strained(self, fit: FreeRunFit) -> bool:
         """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""

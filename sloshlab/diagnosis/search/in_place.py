@@ -54,7 +54,8 @@ class InPlace:
             softness = problem.softness(_SOFT)
             sizes = of_many_sizes(candidate)
             starts = [{**at, **one} for at in (best.fit.values, self.fits.eased(base)) for one in sizes]
-            costs = [huber_cost(softness * problem.residual(problem.theta_of(start))) for start in starts]
+            left = problem.residuals([problem.theta_of(start) for start in starts])
+            costs = [huber_cost(softness * one) for one in left]
             name = f"{candidate.effect.block}.{candidate.effect.name}"
             if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
                 nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
@@ -63,6 +64,47 @@ class InPlace:
             fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
             if not fit.trouble:
                 found.append(self.fits.judged(fit))
+        return found
+
+    def exchanged(
+        self, pair: Explanation, base: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
+    ) -> list[Explanation]:
+        """Look-alikes in the place of each effect of a pair, from its numbers.
+
+        The first effect of a pair was chosen while the second one was hidden in it, and may be a look-alike of
+        what is there.
+
+        Parameters
+        ----------
+        pair : Explanation
+        base : FreeRunFit
+            The retuned baseline; an effect must be nearer to the recordings than this before it is fitted.
+        known : sequence of Explanation
+            Whose effects are not tried again.
+        pool : sequence of Candidate
+        """
+        most = soft_cost(self.fits.problem_of(base), base, _SOFT)
+        tried = {frozenset(one.keys) for one in known}
+        found = []
+        for replaced in pair.fit.candidates:
+            others = tuple(one for one in pair.fit.candidates if one is not replaced)
+            near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
+            for candidate in pool:
+                keys = frozenset((candidate.key, *(one.key for one in others)))
+                if keys in tried or len(keys) < len(pair.keys) or not _look_alike(candidate, replaced):
+                    continue
+                self.fits.told(f"exchanging {replaced.key} for {candidate.key}", 0, 1)
+                problem = self.fits.problem((*others, candidate))
+                sizes = of_many_sizes(candidate)
+                places = [pair.fit.values, {**pair.fit.values, **self.fits.model.believed}]
+                start = nearest(problem, [{**at, **one} for at in places for one in sizes], _SOFT)
+                cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
+                if cost < most:
+                    near.append((cost, problem, start))
+            for _, problem, start in sorted(near, key=lambda one: one[0])[:_MOST_LOOK_ALIKES]:
+                fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
+                if not fit.trouble:
+                    found.append(self.fits.judged(fit))
         return found
 
     def one_for_all(self, wider: FreeRunFit, base: FreeRunFit, pool: Sequence[Candidate]) -> list[Explanation]:

@@ -16,7 +16,9 @@ from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
 
 _MOST_ANEW: Final = 3
-_MOST_THROWS, _MOST_IN_VAIN, _N_PLACES = 24, 5, 48
+_MOST_THROWS, _MOST_IN_VAIN, _N_PLACES = 16, 4, 48
+_LEAST_SHARE: Final = 0.01
+"""Of the cost: a throw that gains less is in vain, as crumbs lead nowhere."""
 _OF_A_NUMBER: Final = (0.4, 0.15)
 """Standard deviations of the logarithm of a number over places about one, in turns."""
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)
@@ -86,7 +88,7 @@ class Refinement:
         problem, fit, n_in_vain = self.fits.problem_of(best.fit), best.fit, 0
         further: dict[str, float] | None = None
         for i in range(_MOST_THROWS):
-            if n_in_vain == _MOST_IN_VAIN:
+            if n_in_vain >= _MOST_IN_VAIN:
                 break
             self.fits.told(f"fitting {best.keys[-1]} from places about it", i, _MOST_THROWS)
             start = further or nearest(problem, _places_about(fit, names, i), STAGES[2])
@@ -95,13 +97,25 @@ class Refinement:
                 n_in_vain += further is None
                 further = None
                 continue
-            n_in_vain = 0
+            n_in_vain = 0 if fit.cost - other.cost > _LEAST_SHARE * fit.cost else n_in_vain + 1
             further = {name: value + (value - fit.values[name]) for name, value in other.values.items()}
             fit = other
         return [self.fits.judged(fit)] if fit is not best.fit else []
 
-    def polished(self, known: Sequence[Explanation], pool: Sequence[Candidate]) -> list[Explanation]:
-        """The best of one and of two effects to where they converge, special cases in their place, each alone."""
+    def polished(
+        self, base: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
+    ) -> list[Explanation]:
+        """The best of one and of two effects to where they converge, special cases in their place, each alone.
+
+        Look-alikes of each of two effects are tried in its place, too.
+
+        Parameters
+        ----------
+        base : FreeRunFit
+            The retuned baseline.
+        known : sequence of Explanation
+        pool : sequence of Candidate
+        """
         found: list[Explanation] = []
         for n in (2, 1):
             best = cheapest([one for one in (*known, *found) if len(one.keys) == n])
@@ -114,6 +128,9 @@ class Refinement:
                 found.append(best)
             found += self.in_place.specialised(best, [*known, *found], pool)
             if n > 1:
+                single = cheapest([one for one in known if len(one.keys) == 1])
+                if single is None or single.fit.cost - best.fit.cost > LEAST_TO_BUILD_ON:
+                    found += self.in_place.exchanged(best, base, [*known, *found], pool)
                 found += self.take_away([best])
         return found
 

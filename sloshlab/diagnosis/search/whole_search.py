@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from typing import Final, cast
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, candidates
@@ -25,6 +25,9 @@ from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import InputError
 
 assert effects.__all__  # importing the vocabulary makes it known
+
+_SHARE_LEFT_BY_A_PAIR: Final = 0.8
+"""Of what its first effect leaves; a second one that gains less does not tell that the first one is wrong."""
 
 
 def findings_of(
@@ -67,8 +70,11 @@ def findings_of(
     if not is_complete:
         found += refinement.anew(retuned_fit, found)
         found += refinement.climbed(found)
+        best = cheapest(found)
+        is_complete = best is not None and fits.is_complete(best)
+    if not is_complete:
         found += _second_effects(fits, found, retuned_fit, pool)
-    found += refinement.polished(found, pool)
+    found += refinement.polished(retuned_fit, found, pool)
     retuned = refinement.retuned_from(found, retuned)
     any_force = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
     best, highest = cheapest(found), cheapest(any_force)
@@ -113,7 +119,9 @@ def _second_effects(
     if cost < best.fit.cost:
         alone += more.in_place.look_alikes(retuned, alone, pool, "fitting one effect")
         alone += more.in_place.generalised(retuned, alone, pool, "fitting one effect")
-    if pair is not None and pair.held_out_rms > LARGEST_REMAINDER:
+    if pair is None or pair.fit.cost > _SHARE_LEFT_BY_A_PAIR * best.fit.cost:
+        return [*pairs, *alone]
+    if pair.held_out_rms > LARGEST_REMAINDER:
         second = cheapest([one for one in alone if one.keys == pair.keys[1:]])
         if second is not None:
             pairs += more.fitted(second.fit, fits.jacobian(second.fit), pool, "exchanging the first effect")

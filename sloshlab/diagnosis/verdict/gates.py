@@ -92,6 +92,9 @@ def verdict_of(found: Findings) -> Verdict:
     ):
         certain = _certain(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, unknown_statement(found, named), "", certain)
+    if not shows_more(at_its_best(found, named), found.retuned, scale):
+        certain = _certain(probabilities, "none")
+        return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
     alternatives = alternatives_of(found, named, scale)
     kind = "named" if len(alternatives) == 1 and not equals_of(named) else "indistinguishable"
     return Verdict(

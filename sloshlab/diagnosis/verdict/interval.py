@@ -28,15 +28,37 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
     masses scale the number, by how well those are known: a cubic spring by the gain of a force and three times by
     that of a displacement.
     """
-    name = f"{candidate.key}.{parameter}"
-    estimate = best.fit.values[name]
-    if name not in best.fit.names:
+    estimate = best.fit.values[f"{candidate.key}.{parameter}"]
+    width = _half_width(best, candidate, parameter)
+    if width == 0:
         return estimate, estimate, estimate
-    scatter = _ERRORS_OVER_STANDARD_ERRORS * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
-    is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s")
-    power = next((power for ending, power in _LENGTHS.items() if parameter.endswith(ending)), 0)
-    of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(estimate)
-    width = _NORMAL_90 * float(np.linalg.norm([scatter, of_gain, best.spread.get(name, 0.0)]))
     chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
     lowest, highest = candidate.bounds(chosen)
     return estimate, max(estimate - width, lowest), min(estimate + width, highest)
+
+
+def is_told_from_nothing(best: Explanation, candidate: Candidate) -> bool:
+    """Whether the interval of a number that grows with an effect, bounds aside, does not hold zero.
+
+    Parameters
+    ----------
+    best : Explanation
+    candidate : Candidate
+        One of its effects.
+    """
+    return any(
+        abs(best.fit.values[f"{candidate.key}.{name}"]) > _half_width(best, candidate, name)
+        for name in candidate.sizes
+    )
+
+
+def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> float:
+    """Of the 90 % interval, bounds aside; zero of a number that was not fitted."""
+    name = f"{candidate.key}.{parameter}"
+    if name not in best.fit.names:
+        return 0.0
+    scatter = _ERRORS_OVER_STANDARD_ERRORS * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
+    is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s")
+    power = next((power for ending, power in _LENGTHS.items() if parameter.endswith(ending)), 0)
+    of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(best.fit.values[name])
+    return _NORMAL_90 * float(np.linalg.norm([scatter, of_gain, best.spread.get(name, 0.0)]))

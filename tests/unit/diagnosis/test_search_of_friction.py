@@ -239,7 +239,7 @@ def test_a_better_place_takes_the_place_of_what_was_found(case: Decays, coulomb:
 
 def test_polishing_takes_a_fit_to_its_end(case: Decays) -> None:
     begun = case.fit(COULOMB, n_iterations=1)
-    found = Refinement(case.fits).polished([begun], [])
+    found = Refinement(case.fits).polished(begun.fit, [begun], [])
     best = cheapest(found)
     assert best is not None
     assert best.fit.cost < begun.fit.cost

@@ -70,6 +70,24 @@ def test_one_effect_is_sought_in_place_of_a_pair_that_gains(monkeypatch: pytest.
     assert sought(monkeypatch, explanation(2990.0, "stiffness_change", "hum"))[0].for_all == []
 
 
+@pytest.mark.parametrize(
+    ("cost", "beside"), [(2390.0, [("stiffness_change",), ("hum",)]), (2410.0, [("stiffness_change",)])]
+)
+def test_only_a_pair_that_gains_a_fifth_tells_that_its_first_effect_is_wrong(
+    monkeypatch: pytest.MonkeyPatch, cost: float, beside: list[tuple[str, ...]]
+) -> None:
+    tried, _ = sought(monkeypatch, explanation(cost, "stiffness_change", "hum"))
+    assert tried.beside == beside
+
+
+def test_a_burst_in_one_channel_of_a_run_alone_is_no_physics() -> None:
+    fits = Fits(cast(Any, None), [], [], lambda what, done, of: None, [["a", "b"], ["c"]])
+    places = {("c", "tip"): 0.9, ("c", "force"): 0.9, ("c", "root"): 15.0}
+    one = Explanation(FreeRunFit((), {}, 0.0, 0.0), 0.0, 1.0, by_run=places, repeating={("a", "tip"): 0.1})
+    assert fits.is_complete(one)
+    assert not fits.is_complete(replace(one, by_run={**places, ("c", "force"): 15.0}))
+
+
 def test_nothing_is_sought_beside_what_leaves_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     tried, found = sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum"), is_noise=True)
     assert (tried.beside, found) == ([], [])

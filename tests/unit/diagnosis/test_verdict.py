@@ -52,6 +52,14 @@ def test_something_is_missing_where_both_kinds_of_runs_ask_for_it_and_it_is_wort
     assert (verdict.best is None) == (kind == "nothing_missing")
 
 
+@pytest.mark.parametrize(("squares", "kind"), [(1.07, "named"), (1.08, "nothing_missing")])
+def test_a_name_must_itself_remove_what_is_worth_a_word(squares: float, kind: str) -> None:
+    """√(1.6/1.07 − 1) = 0.704 noise floors; any force removes √0.6 = 0.77."""
+    friction = left(20.0, 20.0, FRICTION, squares=squares, rms=1.1)
+    verdict = judged(left(500.0, 500.0, squares=1.6), [friction], [ANY_FORCE])
+    assert verdict.kind == kind
+
+
 @pytest.mark.parametrize("which", ["fitted", "held_out"])
 def test_gains_count_in_units_of_what_the_best_description_leaves(which: str) -> None:
     """Four times the noise is left by the best: twelve units are 48 of noise."""

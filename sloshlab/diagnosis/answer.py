@@ -1,0 +1,64 @@
+"""From findings to the answer: intervals of what was named, and no name for what is not told from nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.search import redrawn
+from sloshlab.diagnosis.search.fits import Told
+from sloshlab.diagnosis.verdict import Verdict, verdict_of
+from sloshlab.diagnosis.verdict.interval import is_told_from_nothing
+
+_MOST_ROUNDS: Final = 5
+"""Each fits one explanation about other baselines, or gives one up."""
+
+
+def answered(found: Findings, told: Told = lambda what, done, of: None) -> tuple[Findings, Verdict]:
+    """Judge findings, until what is named has numbers with intervals and each of two effects has a size.
+
+    One effect alone is held against the retuned baseline by the gates. Of two, the other one may have the gain:
+    where fits about other baselines find one of them as large as nothing, two are too many.
+
+    Parameters
+    ----------
+    found : Findings
+    told : callable, optional
+        Takes what is being done, how much of it is done, and how much there is.
+
+    Returns
+    -------
+    found : Findings
+        With the spread of the numbers of what is named, without pairs where these were given up.
+    verdict : Verdict
+    """
+    verdict = verdict_of(found)
+    for _ in range(_MOST_ROUNDS):
+        best = verdict.best
+        if best is None or verdict.kind == "unknown":
+            break
+        if not best.spread:
+            found = redrawn(found, best, told)
+        elif len(best.keys) > 1 and not all(is_told_from_nothing(best, one) for one in best.fit.candidates):
+            found = _without(found, best)
+        else:
+            break
+        verdict = verdict_of(found)
+    return found, verdict
+
+
+def _without(found: Findings, pair: Explanation) -> Findings:
+    """Findings in which two effects are no answer, as one of the best two is not told from nothing.
+
+    The others are not tried one after another: what is worse may only hide the same better. What they describe is
+    still what one effect alone is held against.
+    """
+    nothing = [one.key for one in pair.fit.candidates if not is_told_from_nothing(pair, one)]
+    why = f"fitted, but the size of {' and of '.join(nothing)} is not told from nothing"
+    return replace(
+        found,
+        explanations=[one for one in found.explanations if len(one.keys) < len(pair.keys)],
+        ceilings=found.ceilings + [one for one in found.explanations if len(one.keys) >= len(pair.keys)],
+        failed={**found.failed, " + ".join(pair.keys): why},
+    )

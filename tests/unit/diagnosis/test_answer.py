@@ -1,0 +1,90 @@
+"""The answer after fits about other baselines: a pair stands only where each of its effects has a size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
+from hand_made_findings import BASELINE, DRAG, FRICTION, STRIBECK, TIP, findings, left
+
+from sloshlab.diagnosis import answer
+from sloshlab.diagnosis.answer import answered
+from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.verdict.interval import is_told_from_nothing
+
+DRAG_NUMBER, FRICTION_NUMBER = (*DRAG, *FRICTION)
+PAIR = left(0.0, 0.0, {**FRICTION, **DRAG})
+
+
+def drawn(monkeypatch: pytest.MonkeyPatch, spread: Mapping[str, float]) -> list[tuple[str, ...]]:
+    """Let fits about other baselines spread by so much; what was drawn is kept."""
+    asked: list[tuple[str, ...]] = []
+
+    def redrawn(found: Findings, best: Explanation, told: object) -> Findings:
+        asked.append(best.keys)
+        own = {name: spread.get(name, 1e-3) for name in best.fit.names}
+        return replace(
+            found, explanations=[replace(one, spread=own) if one is best else one for one in found.explanations]
+        )
+
+    monkeypatch.setattr(answer, "redrawn", redrawn)
+    return asked
+
+
+def test_two_effects_with_sizes_are_named_after_one_draw(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = drawn(monkeypatch, {})
+    found, verdict = answered(findings(BASELINE, [PAIR, left(200.0, 200.0, FRICTION, squares=3.0)]))
+    assert verdict.kind == "named"
+    assert verdict.best is not None
+    assert verdict.best.keys == PAIR.keys
+    assert verdict.best.spread
+    assert asked == [PAIR.keys]
+    assert found.failed == {}
+
+
+@pytest.mark.parametrize(
+    ("in_common", "kind"),
+    [pytest.param(0.2, "named", id="one is enough"), pytest.param(0.3, "unknown", id="it is not")],
+)
+def test_where_one_of_two_may_be_nothing_all_pairs_are_given_up(
+    monkeypatch: pytest.MonkeyPatch, in_common: float, kind: str
+) -> None:
+    """1.645 × 0.5 is more than 0.8 N s²/m², so that the drag may be nothing; the other pair is not tried.
+
+    What the pairs describe better still speaks against one effect, unless repeats share less than 0.25.
+    """
+    asked = drawn(monkeypatch, {DRAG_NUMBER: 0.5})
+    single = left(200.0, 200.0, FRICTION, squares=1.9, rms=1.1, repeating={("run_2", TIP): in_common})
+    other = left(30.0, 30.0, {**STRIBECK, **DRAG})
+    found, verdict = answered(findings(BASELINE, [PAIR, other, single]))
+    assert verdict.kind == kind
+    assert asked == ([PAIR.keys, single.keys] if kind == "named" else [PAIR.keys])
+    assert [one.keys for one in found.explanations] == [single.keys]
+    [(pair, why)] = found.failed.items()
+    assert pair == " + ".join(PAIR.keys)
+    assert "structure.quadratic_drag is not told from nothing" in why
+
+
+def test_one_effect_alone_is_held_against_the_baseline_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn(monkeypatch, {FRICTION_NUMBER: 1.0})
+    _, verdict = answered(findings(BASELINE, [left(0.0, 0.0, FRICTION)]))
+    assert verdict.kind == "named"
+
+
+def test_nothing_is_drawn_where_nothing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = drawn(monkeypatch, {})
+    assert answered(findings(BASELINE, [left(499.0, 499.0, FRICTION)]))[1].kind == "nothing_missing"
+    assert asked == []
+
+
+@pytest.mark.parametrize(
+    ("spread", "is_told"),
+    [(0.37 / 1.65, True), (0.37 / 1.64, False), (0.0, True)],
+    ids=["just", "just not", "sure"],
+)
+def test_a_size_is_told_from_nothing_by_its_interval(spread: float, is_told: bool) -> None:
+    """90 % are 1.645 standard deviations; two standard errors of 0.01 and one per cent are beside the spread."""
+    own = (spread**2 - 0.02**2 - 0.0037**2) ** 0.5 if spread else 0.0
+    one = replace(left(0.0, 0.0, FRICTION), spread={FRICTION_NUMBER: own})
+    assert is_told_from_nothing(one, one.fit.candidates[0]) is is_told
