@@ -22,6 +22,11 @@ class Split:
     held_out: tuple[CaseRun, ...]
     limits: tuple[str, ...]
 
+    @property
+    def has_held_out(self) -> bool:
+        """Whether there are runs that chose nothing; one run alone is fitted and held out at once."""
+        return self.held_out != self.fitting
+
 
 def split(case: Case) -> Split:
     """Hold out whole tests, from the middle of each experiment's levels; the smallest and the largest are fitted.

@@ -85,6 +85,7 @@ def verdict_of(found: Findings) -> Verdict:
     adequacy = named.held_out_rms / max(ceiling.held_out_rms, 1e-300) if named else np.inf
     if (
         named is None
+        or not found.split.has_held_out
         or scale.held_out_gain(found.retuned, named) < LEAST_GAIN
         or adequacy > ADEQUATE
         or leaves_more(found, named)

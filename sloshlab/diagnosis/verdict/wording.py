@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.units import named_and_units
 from sloshlab.diagnosis.verdict.alternatives import equals_of
 from sloshlab.diagnosis.verdict.interval import interval
+
+_LEAST_SHARE: Final = 0.1
+"""Of what can be explained; what explains less is near to nothing."""
 
 
 def nothing_statement(found: Findings) -> str:
@@ -25,12 +29,13 @@ def unknown_statement(found: Findings, named: Explanation | None, block: str = "
     """What is said of something without a name, in a block if that is known, and of what is nearest."""
     where = block or where_of(found)
     closest = ""
-    if named is not None:
+    if named is not None and explained_share(found, named) >= _LEAST_SHARE:
         nearest = " and ".join(named_and_placed(one) for one in named.fit.candidates)
         same = "".join(f" (the same as {' with '.join(one).replace('_', ' ')})" for one in equals_of(named))
         share = f"{100 * explained_share(found, named):.0f} % of what can be explained"
         closest = f"; the nearest known effect is {nearest}{same}, which explains {share}"
-    return f"Something is missing that has no name here, most likely in the {where}{closest}."
+    why = "that has no name here" if found.split.has_held_out else "that one run alone does not tell"
+    return f"Something is missing {why}, most likely in the {where}{closest}."
 
 
 def statement_of(found: Findings, best: Explanation, alternatives: Sequence[Explanation], kind: str) -> str:

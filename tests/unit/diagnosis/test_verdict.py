@@ -52,6 +52,29 @@ def test_something_is_missing_where_both_kinds_of_runs_ask_for_it_and_it_is_wort
     assert (verdict.best is None) == (kind == "nothing_missing")
 
 
+def test_one_run_alone_names_nothing() -> None:
+    """It would be judged by the run that chose it."""
+    found = findings(left(500.0, 500.0, rms=2.0), [left(0.0, 0.0, FRICTION)])
+    assert verdict_of(found).kind == "named"
+    alone = replace(found, split=replace(found.split, fitting=found.split.held_out))
+    verdict = verdict_of(alone)
+    assert verdict.kind == "unknown"
+    assert verdict.statement.startswith("Something is missing that one run alone does not tell, most likely in")
+    assert "the nearest known effect is coulomb friction" in verdict.statement
+    assert [one["name"] for one in verdict_facts(alone, verdict)["effects"]] == ["unknown"]
+
+
+@pytest.mark.parametrize(("rms", "is_near"), [(1.91, True), (1.93, False)])
+def test_what_explains_next_to_nothing_is_not_called_near(rms: float, is_near: bool) -> None:
+    """Of 2² − 1², (2² − 1.91²)/3 is 12 %, (2² − 1.93²)/3 is 9 %; ten are needed."""
+    any_force = left(0.0, 0.0, surface="structure")
+    verdict = judged(
+        left(500.0, 500.0, rms=2.0), [left(450.0, 450.0, FRICTION, squares=9.0, rms=rms)], [any_force]
+    )
+    assert verdict.kind == "unknown"
+    assert ("nearest" in verdict.statement) is is_near
+
+
 @pytest.mark.parametrize(("squares", "kind"), [(1.07, "named"), (1.08, "nothing_missing")])
 def test_a_name_must_itself_remove_what_is_worth_a_word(squares: float, kind: str) -> None:
     """√(1.6/1.07 − 1) = 0.704 noise floors; any force removes √0.6 = 0.77."""
@@ -428,7 +451,8 @@ def test_two_lines_of_the_mains_are_one_name_for_programs() -> None:
     """Whatever the verdict: what is tried at 50 and at 60 Hz is called mains_hum in every place."""
     cell = "sensor.mains_hum_60.force_interface"
     for ceilings, kind in (([], "named"), ([left(-500.0, -500.0, surface="structure", squares=0.1)], "unknown")):
-        found = findings(BASELINE, [left(0.0, 0.0, HUM, squares=1.5)], ceilings, {cell: "does not run"})
+        baseline = left(500.0, 500.0, rms=2.0)
+        found = findings(baseline, [left(0.0, 0.0, HUM, squares=1.5)], ceilings, {cell: "does not run"})
         verdict = verdict_of(found)
         assert verdict.kind == kind
         examination = Examination(None, {}, (), [], {"channels": ["acceleration_tip"]})
