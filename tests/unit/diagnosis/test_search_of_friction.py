@@ -127,6 +127,20 @@ def test_one_effect_takes_the_place_of_two(case: Decays, coulomb: Explanation) -
     assert up + down == pytest.approx(UP_N + DOWN_N, rel=0.05)
 
 
+def test_a_look_alike_takes_the_place_of_one_of_two_effects(case: Decays) -> None:
+    """A damper looks like friction; the constant force beside it stays. What is known is not tried again."""
+    viscous = Candidate(effect("structure.viscous_damping"), case.pool[CUBIC].surroundings)
+    candidates = (viscous, case.pool[CONSTANT])
+    start = {**case.believed, **viscous.starts()[0], **case.pool[CONSTANT].starts()[0]}
+    pair = case.fits.judged(fitted(case.fits.problem(candidates), start, n_iterations=6)[0])
+    pool = [viscous, *(case.pool[key] for key in (COULOMB, CUBIC, CONSTANT))]
+    [found] = InPlace(case.fits).exchanged(pair, case.baseline, [pair], pool)
+    assert set(found.keys) == {CONSTANT, COULOMB}
+    assert found.fit.cost < 0.5 * pair.fit.cost
+    assert found.fit.values[COULOMB_N] == pytest.approx((UP_N + DOWN_N) / 2, rel=0.03)
+    assert InPlace(case.fits).exchanged(pair, case.baseline, [pair, found], pool) == []
+
+
 def test_what_is_no_nearer_than_the_baseline_takes_no_place(case: Decays, coulomb: Explanation) -> None:
     assert InPlace(case.fits).one_for_all(coulomb.fit, coulomb.fit, list(case.pool.values())) == []
 
