@@ -8,10 +8,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 from recorded_oscillators import decays, effect, rig, surroundings
 
-from sloshlab.diagnosis import effects
+from sloshlab.diagnosis import effects, free_run_problem
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.explanation import Explanation, Findings
@@ -249,6 +250,27 @@ def test_a_better_place_takes_the_place_of_what_was_found(case: Decays, coulomb:
     [found] = redrawn(findings(case, worse), worse).explanations
     assert found.fit.cost < 0.5 * at_worse
     assert found.fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
+
+
+def test_derivatives_and_places_are_the_same_on_one_core_and_on_two(
+    case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = case.fits.problem_of(coulomb.fit)
+    at_fit = problem.theta_of(coulomb.fit.values)
+    places = [at_fit + shift for shift in (0.0, 0.3, -0.2, 0.1)]
+    units = np.eye(at_fit.size)
+
+    def found() -> tuple[Any, ...]:
+        residuals = problem.residuals(places)
+        jacobian = problem.jacobian(at_fit, residuals[0], range(at_fit.size))
+        return np.array(residuals), np.array([jacobian.times(unit) for unit in units])
+
+    on_two = found()
+    monkeypatch.setattr(free_run_problem, "N_THREADS", 1)
+    for one, other in zip(found(), on_two, strict=True):
+        np.testing.assert_array_equal(one, other)
+    for residual, place in zip(on_two[0], places, strict=True):
+        np.testing.assert_array_equal(residual, problem.residual(place))
 
 
 def test_polishing_takes_a_fit_to_its_end(case: Decays) -> None:
