@@ -18,8 +18,8 @@ _MOST_ROUNDS: Final = 5
 def answered(found: Findings, told: Told = lambda what, done, of: None) -> tuple[Findings, Verdict]:
     """Judge findings, until what is named has numbers with intervals and each of two effects has a size.
 
-    One effect alone is held against the retuned baseline by the gates. Of two, the other one may have the gain:
-    where fits about other baselines find one of them as large as nothing, two are too many.
+    One effect alone is held against nothing by the gates. Of two, the other one may have the gain: where fits
+    about other baselines find one of them as large as nothing, two are too many.
 
     Parameters
     ----------

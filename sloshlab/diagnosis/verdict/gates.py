@@ -10,7 +10,15 @@ import numpy as np
 
 from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
 from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equals_of, includes
-from sloshlab.diagnosis.verdict.comparison import Scale, at_its_best, has_gained, is_clearly_better, shows_more
+from sloshlab.diagnosis.verdict.comparison import (
+    Scale,
+    at_its_best,
+    has_gained,
+    is_clearly_better,
+    largest_strength,
+    shows_more,
+)
+from sloshlab.diagnosis.verdict.interval import is_told_from_nothing
 from sloshlab.diagnosis.verdict.wording import (
     nothing_statement,
     separating_experiment_of,
@@ -28,6 +36,8 @@ _LITTLE_IN_COMMON: Final = 0.25
 _MOST_IN_COMMON: Final = 0.5
 _MOST_IN_A_CHANNEL: Final = 1.5
 """Mean squares, in noise floors, of what repeats of a test have in common of what is left."""
+_CLEAR: Final = 3.0
+"""Noise floors that an effect removes, from which it is there whatever its size is told from."""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
 """What it would have if it had a name."""
 
@@ -89,6 +99,7 @@ def verdict_of(found: Findings) -> Verdict:
         or scale.held_out_gain(found.retuned, named) < LEAST_GAIN
         or adequacy > ADEQUATE
         or leaves_more(found, named)
+        or _may_be_nothing(found, named)
         or _is_bettered(found, named, described, scale)
     ):
         certain = _certain(probabilities, "unknown")
@@ -169,6 +180,17 @@ def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scal
         if is_special and not is_clearly_better(best, special, scale):
             return special
     return best
+
+
+def _may_be_nothing(found: Findings, named: Explanation) -> bool:
+    """Whether one effect is not told from nothing, and removes little enough for that to be so.
+
+    Where masses and gains trade against an effect its interval may hold zero although no baseline describes the
+    recordings without it; what removes more than what is clear is there.
+    """
+    if len(named.keys) > 1 or largest_strength(found.retuned.by_run, named.by_run) >= _CLEAR:
+        return False
+    return not is_told_from_nothing(named, named.fit.candidates[0])
 
 
 def _is_bettered(found: Findings, named: Explanation, others: Sequence[Explanation], scale: Scale) -> bool:

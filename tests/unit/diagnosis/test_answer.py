@@ -66,10 +66,21 @@ def test_where_one_of_two_may_be_nothing_all_pairs_are_given_up(
     assert "structure.quadratic_drag is not told from nothing" in why
 
 
-def test_one_effect_alone_is_held_against_the_baseline_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn(monkeypatch, {FRICTION_NUMBER: 1.0})
-    _, verdict = answered(findings(BASELINE, [left(0.0, 0.0, FRICTION)]))
-    assert verdict.kind == "named"
+@pytest.mark.parametrize(
+    ("spread", "squares", "kind"),
+    [
+        pytest.param(1.0, 9.9, "unknown", id="it may be nothing"),
+        pytest.param(1.0, 10.1, "named", id="it removes what is clear"),
+        pytest.param(0.1, 9.9, "named", id="it has a size"),
+    ],
+)
+def test_one_effect_that_may_be_nothing_is_named_only_where_it_removes_what_is_clear(
+    monkeypatch: pytest.MonkeyPatch, spread: float, squares: float, kind: str
+) -> None:
+    """√(10 − 1) is three noise floors."""
+    drawn(monkeypatch, {FRICTION_NUMBER: spread})
+    _, verdict = answered(findings(left(500.0, 500.0, squares=squares), [left(0.0, 0.0, FRICTION)]))
+    assert verdict.kind == kind
 
 
 def test_nothing_is_drawn_where_nothing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

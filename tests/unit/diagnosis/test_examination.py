@@ -33,6 +33,7 @@ def friction(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Examination
     model = RigModel(rig(folder), folder, runs)
     retuned = SimpleNamespace(fit=SimpleNamespace(values=model.believed))
     found: Any = SimpleNamespace(
+        split=SimpleNamespace(has_held_out=True),
         model=model,
         fitting=[observations(run, list(run.recording.data_vars)) for run in runs],
         retuned=retuned,
