@@ -33,7 +33,7 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
     if diagnosis.verdict.best is not None:
         rows.append((words(diagnosis.verdict.best, "\n+ "), diagnosis.verdict.best, REFERENCE_COLOUR))
     if found.ceilings:
-        rows.append(("any force (ceiling)", min(found.ceilings, key=lambda one: one.held_out), FAINT_COLOUR))
+        rows.append(("ceiling", min(found.ceilings, key=lambda one: one.held_out), FAINT_COLOUR))
     values = [one.held_out_rms for _, one, _ in rows]
     figure = new_figure(0.6 + 0.36 * len(rows))
     axes = figure.subplots()

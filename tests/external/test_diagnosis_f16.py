@@ -5,7 +5,7 @@ Its authors take level 1 as linear and expect clearance and friction in the join
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -15,14 +15,8 @@ pytestmark = [pytest.mark.external, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def example(repository: Path) -> ModuleType:
-    file = repository / "docs/examples/f16_joint.py"
-    specification = importlib.util.spec_from_file_location("f16_joint", file)
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+def example(load_example: Callable[[str], ModuleType]) -> ModuleType:
+    return load_example("f16_joint")
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ Published by its authors: M 95.11 kg, F_v 203.5 N s/m, F_c 20.39 N, offset 3.16 
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -31,15 +31,8 @@ FRICTION = "structure.asymmetric_friction."
 
 
 @pytest.fixture(scope="module")
-def example(repository: Path) -> ModuleType:
-    specification = importlib.util.spec_from_file_location(
-        "servo_axis", repository / "docs/examples/servo_axis.py"
-    )
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+def example(load_example: Callable[[str], ModuleType]) -> ModuleType:
+    return load_example("servo_axis")
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ Published errors of free runs: linear 6.96 mV on the multisine and 14.4 mV on th
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -21,14 +21,8 @@ pytestmark = [pytest.mark.external, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def example(repository: Path) -> ModuleType:
-    file = repository / "docs/examples/silverbox_diagnosis.py"
-    specification = importlib.util.spec_from_file_location("silverbox_diagnosis", file)
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+def example(load_example: Callable[[str], ModuleType]) -> ModuleType:
+    return load_example("silverbox_diagnosis")
 
 
 @pytest.fixture(scope="module")

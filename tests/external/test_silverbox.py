@@ -5,7 +5,7 @@ Split, training and score are those of the documentation's example `docs/example
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -19,13 +19,8 @@ Signals = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 @pytest.fixture(scope="module")
-def example(repository: Path) -> ModuleType:
-    specification = importlib.util.spec_from_file_location("silverbox", repository / "docs/examples/silverbox.py")
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+def example(load_example: Callable[[str], ModuleType]) -> ModuleType:
+    return load_example("silverbox")
 
 
 @pytest.fixture(scope="module")
