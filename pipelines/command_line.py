@@ -32,6 +32,7 @@ from pipelines.commands import laboratory
 
 # isort: split
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, app
+from sloshlab import interrupt
 from sloshlab.errors import RecordingInterruptedError, SloshlabError
 
 __all__ = [
@@ -70,7 +71,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except _UsageError as error:
         error.show()
         return USAGE
-    except (KeyboardInterrupt, typer.Abort):
+    except (KeyboardInterrupt, typer.Abort, SystemError) as error:
+        if isinstance(error, SystemError) and not isinstance(error.__cause__, KeyboardInterrupt):
+            raise  # compiled code that was interrupted at its arguments says SystemError
         print("sloshlab: interrupted; nothing half-written", file=sys.stderr)  # noqa: T201
         return INTERRUPTED
     except OSError as error:
@@ -82,7 +85,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def main() -> NoReturn:
     """Entry point of the ``sloshlab`` command."""
-    sys.exit(run())
+    with interrupt.never_lost():
+        sys.exit(run())
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from pipelines.results import SweepExperiment
-from sloshlab import atomic_file
+from sloshlab import atomic_file, interrupt
 from sloshlab.netcdf_lock import NETCDF_LOCK
 
 _HASH_BLOCK = 1 << 20
@@ -30,7 +30,7 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
             encoding[str(name)] = {"dtype": "S1", "char_dim_name": f"{name}_length"}
         elif variable.size >= _SMALLEST_COMPRESSED_SIZE and variable.dtype.kind == "f":
             encoding[str(name)] = {"zlib": True, "complevel": 4, "shuffle": True, "_FillValue": np.nan}
-    with atomic_file.replaced(path) as temporary, NETCDF_LOCK:
+    with atomic_file.replaced(path) as temporary, NETCDF_LOCK, interrupt.held():
         stored.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
 
 

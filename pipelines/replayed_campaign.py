@@ -22,6 +22,7 @@ import numpy as np
 import xarray as xr
 
 from pipelines.progress import progress
+from sloshlab import interrupt
 from sloshlab.errors import RecordingError, SourceError
 from sloshlab.netcdf_lock import NETCDF_LOCK
 
@@ -280,5 +281,5 @@ def _analysed(recordings: Path, rigs: Path, output: Path) -> xr.Dataset:
     code = run([*shaker_arguments(recordings, output, rigs), "--no-report"])
     if code not in (0, DONE_BUT_FLAGGED):
         raise RecordingError(f"analysis of {recordings}", got=f"exit code {code}", allowed="0 or 3")
-    with NETCDF_LOCK, xr.open_dataset(output / "windows.nc", engine="netcdf4", decode_times=False) as windows:
-        return windows.load()
+    with NETCDF_LOCK, interrupt.held():
+        return xr.load_dataset(output / "windows.nc", engine="netcdf4", decode_times=False)

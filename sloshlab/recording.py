@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from sloshlab import atomic_file
+from sloshlab import atomic_file, interrupt
 from sloshlab.errors import RecordingError, UnitsError
 from sloshlab.file_structure import require_sound_structure
 from sloshlab.netcdf_lock import NETCDF_LOCK
@@ -248,7 +248,7 @@ def write_recording(
         if variable.dtype.kind not in "fiu":
             compressed = {}
         chosen[str(name)] = {**compressed, **(encoding or {}).get(str(name), {})}
-    with atomic_file.replaced(path) as temporary, NETCDF_LOCK:
+    with atomic_file.replaced(path) as temporary, NETCDF_LOCK, interrupt.held():
         recording.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=chosen)
 
 

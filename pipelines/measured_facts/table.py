@@ -28,6 +28,7 @@ from pipelines.measured_facts.published import (
     THRESHOLD_G,
     WEAKEST_G,
 )
+from sloshlab import interrupt
 from sloshlab.errors import InputError
 
 FloatArray = npt.NDArray[np.float64]
@@ -86,7 +87,8 @@ class Results:
                 raise InputError(
                     f"{folder / name}", got="no such file", remedy="run sloshlab shaker -o there first"
                 )
-            found.append(xr.load_dataset(folder / name, decode_times=False))
+            with interrupt.held():
+                found.append(xr.load_dataset(folder / name, decode_times=False))
             if "w_bar" not in found[-1]:
                 raise InputError(f"{folder / name}", got="no w_bar", allowed="results of sloshlab shaker")
         return cls(*found)

@@ -22,7 +22,7 @@ from pipelines.numerical_tank_figures.snapshots import (
     snapshots,
 )
 from pipelines.progress import progress
-from sloshlab import atomic_file
+from sloshlab import atomic_file, interrupt
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
 
@@ -112,7 +112,7 @@ def _read_maps(path: Path | None) -> xr.Dataset:
     if path is None:
         raise InputError("maps", got="no file", allowed="maps.nc of `sloshlab shaker`", remedy="give --maps")
     try:
-        with xr.open_dataset(path, engine="netcdf4") as maps:
+        with interrupt.held(), xr.open_dataset(path, engine="netcdf4") as maps:
             return maps.load()
     except (OSError, ValueError) as error:
         raise InputError(f"{path}", got=f"{error}", allowed="maps.nc of `sloshlab shaker`") from error

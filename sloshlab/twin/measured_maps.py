@@ -22,7 +22,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.ndimage import distance_transform_edt
 
-from sloshlab import viscous_equivalent
+from sloshlab import interrupt, viscous_equivalent
 from sloshlab.errors import InputError
 from sloshlab.netcdf_lock import NETCDF_LOCK
 from sloshlab.rig import Rig
@@ -85,7 +85,7 @@ def read_maps(path: Path, *, fill_level: float) -> xr.Dataset:
     try:
         if path.stat().st_size > _LARGEST_FILE_BYTES:
             raise InputError(what, got=f"{path.stat().st_size} bytes", allowed=f"≤ {_LARGEST_FILE_BYTES}")
-        with NETCDF_LOCK, xr.open_dataset(path, engine="netcdf4", decode_times=False) as source:
+        with NETCDF_LOCK, interrupt.held(), xr.open_dataset(path, engine="netcdf4", decode_times=False) as source:
             missing = [name for name in ("w_bar", "beta") if name not in source]
             if missing or max(source[name].size for name in ("w_bar", "beta")) > _LARGEST_GRID:
                 raise InputError(what, got=f"without {', '.join(missing) or 'bounds'}", allowed="a maps.nc")

@@ -57,6 +57,20 @@ def test_interrupted_at_a_known_place(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("cause", [KeyboardInterrupt(), ValueError("a defect")])
+def test_only_an_interrupt_in_compiled_code_is_one(cause, laboratory: Path, tmp_path: Path, monkeypatch) -> None:
+    def failing(*arguments: Any, **options: Any) -> None:
+        raise SystemError("returned a result with an exception set") from cause
+
+    monkeypatch.setattr(pipelines.sweep_stages, "evaluate_windows", failing)
+    if isinstance(cause, KeyboardInterrupt):
+        assert run(arguments_for(laboratory, tmp_path / "out")) == INTERRUPTED
+    else:
+        with pytest.raises(SystemError):
+            run(arguments_for(laboratory, tmp_path / "out"))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_interrupt_leaves_earlier_results_alone(laboratory: Path, tmp_path: Path, monkeypatch: Any) -> None:
     out = tmp_path / "out"
     out.mkdir()

@@ -1,0 +1,57 @@
+"""Ctrl-C where Python alone would hang on it, or lose it.
+
+The interrupt is an exception that may be raised between any two steps of any library. One that has just taken a
+lock and has not yet noted so never gives it back: closing the file then waits for ever. And one raised in the
+clean-up of a dead object is printed and forgotten: the command goes on as if nobody had asked it to stop.
+"""
+
+from __future__ import annotations
+
+import _thread
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+_AFTER_THE_CLEAN_UP_S = 0.02
+
+
+@contextlib.contextmanager
+def held() -> Iterator[None]:
+    """Keep Ctrl-C back until the block is left, however it is left; then it arrives as it would have.
+
+    For calls of seconds into libraries that do not bear it halfway (xarray's netCDF files). Blocks may be nested.
+    Outside the main thread, where no interrupt arrives, and where Ctrl-C is ignored it does nothing.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    arrived: list[tuple[Any, ...]] = []
+    signal.signal(signal.SIGINT, lambda *told: arrived.append(told))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if arrived:
+            before(*arrived[0])
+
+
+@contextlib.contextmanager
+def never_lost() -> Iterator[None]:
+    """Send Ctrl-C again where it fell into the clean-up of an object, whose exceptions Python drops."""
+    before = sys.unraisablehook
+
+    def told(dropped: Any) -> None:
+        if issubclass(dropped.exc_type, KeyboardInterrupt):
+            threading.Timer(_AFTER_THE_CLEAN_UP_S, _thread.interrupt_main).start()
+        else:
+            before(dropped)
+
+    sys.unraisablehook = told
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before

@@ -1,0 +1,63 @@
+"""Ctrl-C arrives once, after a held block, and is not lost in the clean-up of an object."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+
+import pytest
+
+from sloshlab import interrupt
+
+
+def test_a_held_block_is_done_before_the_interrupt_arrives() -> None:
+    steps = []
+
+    def work() -> None:
+        with interrupt.held():
+            with interrupt.held():
+                signal.raise_signal(signal.SIGINT)
+                steps.append("inner")
+            steps.append("outer")
+        steps.append("never")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert steps == ["inner", "outer"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_held_block_without_interrupt_changes_nothing() -> None:
+    with interrupt.held():
+        pass
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with pytest.raises(OSError, match="its own"), interrupt.held():
+        raise OSError("its own")
+
+
+def test_another_thread_holds_nothing() -> None:
+    seen = []
+
+    def work() -> None:
+        with interrupt.held():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [signal.default_int_handler]
+
+
+def test_an_interrupt_in_the_clean_up_of_an_object_arrives_after_it() -> None:
+    class Dying:
+        def __del__(self) -> None:
+            raise KeyboardInterrupt
+
+    def work() -> None:
+        Dying()
+        for _ in range(5000):
+            time.sleep(0.001)
+
+    with pytest.raises(KeyboardInterrupt), interrupt.never_lost():
+        work()
