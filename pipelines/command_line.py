@@ -58,7 +58,8 @@ _UsageError = next(base for base in typer.BadParameter.__mro__ if base.__name__ 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
-        code = int(app(args=list(arguments) if arguments is not None else None, standalone_mode=False) or 0)
+        with interrupt.never_lost():
+            code = int(app(args=list(arguments) if arguments is not None else None, standalone_mode=False) or 0)
         if code == INTERRUPTED:  # some versions of typer turn Ctrl-C into this code without a word
             raise KeyboardInterrupt
         return code
@@ -71,9 +72,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except _UsageError as error:
         error.show()
         return USAGE
-    except (KeyboardInterrupt, typer.Abort, SystemError) as error:
-        if isinstance(error, SystemError) and not isinstance(error.__cause__, KeyboardInterrupt):
-            raise  # compiled code that was interrupted at its arguments says SystemError
+    except (KeyboardInterrupt, typer.Abort):
         print("sloshlab: interrupted; nothing half-written", file=sys.stderr)  # noqa: T201
         return INTERRUPTED
     except OSError as error:
@@ -85,8 +84,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def main() -> NoReturn:
     """Entry point of the ``sloshlab`` command."""
-    with interrupt.never_lost():
-        sys.exit(run())
+    sys.exit(run())
 
 
 if __name__ == "__main__":

@@ -41,17 +41,41 @@ def held() -> Iterator[None]:
 
 @contextlib.contextmanager
 def never_lost() -> Iterator[None]:
-    """Send Ctrl-C again where it fell into the clean-up of an object, whose exceptions Python drops."""
-    before = sys.unraisablehook
+    """Let Ctrl-C end the block as KeyboardInterrupt, whatever a library makes of it.
 
-    def told(dropped: Any) -> None:
+    Where it fell into the clean-up of an object, whose exceptions Python drops, it is sent again; where it came up
+    as another error (compiled code that was looking at its arguments, a library that was being loaded) that error
+    is its cause.
+
+    Raises
+    ------
+    KeyboardInterrupt
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    dropped_before, before = sys.unraisablehook, signal.getsignal(signal.SIGINT)
+    arrived: list[int] = []
+
+    def noted(number: int, frame: Any) -> None:
+        arrived.append(number)
+        signal.default_int_handler(number, frame)
+
+    def sent_again(dropped: Any) -> None:
         if issubclass(dropped.exc_type, KeyboardInterrupt):
             threading.Timer(_AFTER_THE_CLEAN_UP_S, _thread.interrupt_main).start()
         else:
-            before(dropped)
+            dropped_before(dropped)
 
-    sys.unraisablehook = told
+    sys.unraisablehook = sent_again
+    if before is signal.default_int_handler:
+        signal.signal(signal.SIGINT, noted)
     try:
         yield
+    except (SystemError, ImportError) as error:
+        if not arrived:
+            raise
+        raise KeyboardInterrupt from error
     finally:
-        sys.unraisablehook = before
+        sys.unraisablehook = dropped_before
+        signal.signal(signal.SIGINT, before)
