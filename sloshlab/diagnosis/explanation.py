@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.split import Split
 
 FloatArray = NDArray[np.float64]
+_Place = TypeVar("_Place")
 LARGEST_REMAINDER: Final = 1.25
 """Held-out error in noise floors, as repeats tell it, beyond which something is left whatever was found."""
 
@@ -168,3 +170,9 @@ class Findings:
 def explained_extension(explanation: Explanation) -> Extension:
     """What an explanation adds to the baseline."""
     return extension_of(explanation.fit.candidates, explanation.fit.values)
+
+
+def largest_strength(before: Mapping[_Place, float], after: Mapping[_Place, float]) -> float:
+    """Square root of the largest decrease of a mean square over what is left, both not below the noise floor."""
+    removed = [max(before[place], 1.0) / max(left, 1.0) - 1.0 for place, left in after.items() if place in before]
+    return float(np.sqrt(max([0.0, *removed])))

@@ -69,8 +69,18 @@ class FreeRunFit:
 
     def standard_error(self, name: str) -> float:
         """Standard error of a parameter in its own unit."""
+        return float(np.hypot(*self.standard_errors(name)))
+
+    def standard_errors(self, name: str) -> tuple[float, float]:
+        """Standard errors of a parameter in its own unit: by noise, and by what is not known of the baseline.
+
+        The covariance C = (JᵀJ + P)⁻¹, P one for each number of the baseline, is C JᵀJ C + C P C.
+        """
         i = self.names.index(name)
-        return float(np.sqrt(max(self.covariance[i, i], 0.0)) * self.scales[i])
+        n_baseline = len(self.names) - sum(len(one.effect.parameters) for one in self.candidates)
+        of_belief = float((self.covariance[i, :n_baseline] ** 2).sum())
+        of_noise = max(float(self.covariance[i, i]) - of_belief, 0.0)
+        return float(np.sqrt(of_noise) * self.scales[i]), float(np.sqrt(of_belief) * self.scales[i])
 
 
 class FreeRunProblem:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
+from scipy.signal import welch
 
 from sloshlab.diagnosis.case import Case, CaseRun
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
@@ -29,6 +31,10 @@ from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
 _N_NOISY: Final = 4
+_MOST_OF_STATED: Final = 2.0
+"""Of a sensor's noise: drives of repeats that differ by more were not the same."""
+_SECONDS_OF_A_SPECTRUM: Final = 4.0
+_FEWEST_LINES: Final = 3
 
 
 def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[Observation]]:
@@ -72,19 +78,21 @@ def _with_noise_of_drives(
     """Observations with what the noise of driving accelerometers makes of the simulation added to their variance.
 
     At a resonance it is narrow: two repeats alone tell its size to a factor of two or three. It is measured by
-    simulations whose drive has as much noise once more. Of several that drive together each may have to do so
-    alone, beside an effect on the others, and the noisiest counts.
+    simulations whose drive has as much noise once more, of the colour that repeats tell (`_colour`). Of several
+    that drive together each may have to do so alone, beside an effect on the others, and the noisiest counts.
     """
     if not isinstance(model, RigModel) or case.rig is None:
         return plain
     found: dict[tuple[str, str], FloatArray] = {}
+    colours = {name: _colour(case, name) for run in case.runs for name in model.driving(run) if not run.is_free}
     for run in case.runs:
         driving = model.driving(run)
         if run.is_free or not plain[run.name]:
             continue
         for kept in driving:
             recording = run.recording.drop_vars([name for name in driving if name != kept])
-            for place, noise in _noise_through(case, replace(run, recording=recording), kept, plain, fit).items():
+            kept_alone, colour = replace(run, recording=recording), colours[kept]
+            for place, noise in _noise_through(case, kept_alone, kept, colour, plain, fit).items():
                 found[place] = np.maximum(found.get(place, 0.0), noise)
     return {
         name: [replace(one, variance=one.variance + found.get((name, one.channel), 0.0)) for one in observed]
@@ -92,8 +100,63 @@ def _with_noise_of_drives(
     }
 
 
+@dataclass(frozen=True, eq=False)
+class _Colour:
+    """Spectrum of a sensor's noise over that of white noise of the same sensor, at least one.
+
+    Attributes
+    ----------
+    frequencies_hz, ratios : array, shape (n,)
+    """
+
+    frequencies_hz: FloatArray
+    ratios: FloatArray
+
+    def of_white(self, white: FloatArray, rate_hz: float) -> FloatArray:
+        """White noise with this spectrum instead, shape (n,)."""
+        at = np.interp(np.fft.rfftfreq(white.size, 1 / rate_hz), self.frequencies_hz, self.ratios)
+        return np.asarray(np.fft.irfft(np.fft.rfft(white) * np.sqrt(at), white.size))
+
+
+_WHITE: Final = _Colour(np.zeros(1), np.ones(1))
+
+
+def _colour(case: Case, name: str) -> _Colour:
+    """Spectrum of a driving sensor's noise, from repeats whose drives differ by no more than noise can.
+
+    What accelerometers and their amplifiers add grows towards low frequencies, where structures resonate; the
+    noise that is stated, or seen in the quietest bands, is that of high frequencies.
+    """
+    ratios: list[FloatArray] = []
+    frequencies: FloatArray = np.zeros(1)
+    for test in case.tests():
+        for one, other in itertools.pairwise(run for run in test if name in run.recording and not run.is_free):
+            rate = one.attributes.sampling_rate_hz
+            a, b = (np.asarray(run.recording[name].values, np.float64) for run in (one, other))
+            std = max(noise_of_sensor(one, name), noise_of_sensor(other, name))
+            if a.size != b.size or rate != other.attributes.sampling_rate_hz or not std > 0:
+                continue
+            difference = (a - b) / np.sqrt(2)
+            if not np.isfinite(difference).all() or difference.std() > _MOST_OF_STATED * std:
+                continue
+            n = min(a.size, round(_SECONDS_OF_A_SPECTRUM * rate))
+            frequency, density = welch(difference, rate, nperseg=n)
+            if ratios and density.shape != ratios[0].shape:
+                continue
+            frequencies = frequency
+            ratios.append(density / (2 * std**2 / rate))
+    if not ratios:
+        return _WHITE
+    mean = np.mean(ratios, axis=0)
+    low = np.minimum(np.searchsorted(frequencies, frequencies / np.sqrt(2)), frequencies.size - _FEWEST_LINES)
+    high = np.maximum(np.searchsorted(frequencies, frequencies * np.sqrt(2)), low + _FEWEST_LINES)
+    sums = np.concatenate([[0.0], np.cumsum(mean)])
+    high = np.minimum(high, mean.size)
+    return _Colour(frequencies, np.maximum((sums[high] - sums[low]) / (high - low), 1.0))
+
+
 def _noise_through(
-    case: Case, run: CaseRun, driving: str, plain: dict[str, list[Observation]], fit: FreeRunFit
+    case: Case, run: CaseRun, driving: str, colour: _Colour, plain: dict[str, list[Observation]], fit: FreeRunFit
 ) -> dict[tuple[str, str], FloatArray]:
     """Mean square that the noise of one driving accelerometer adds to each coefficient of every other channel."""
     variable = run.recording[driving]
@@ -104,7 +167,8 @@ def _noise_through(
     with suppress(SloshlabError):
         quiet = _readings(case, run, fit)
         for seed in range(_N_NOISY):
-            noise = std * np.random.default_rng(seed).standard_normal(values.size)
+            white = std * np.random.default_rng(seed).standard_normal(values.size)
+            noise = colour.of_white(white, run.attributes.sampling_rate_hz)
             louder = run.recording.assign({driving: variable.copy(data=values + noise)})
             loud = _readings(case, replace(run, recording=louder), fit)
             for one in plain[run.name]:

@@ -235,13 +235,21 @@ class RigModel:
     ) -> Simulation:
         drive = self._drive(run, tuple(undone))
         twin = self._varied(run, values, extension, fluctuation=values.get(_FLUCTUATION + run.name, 1.0))
+        gains = [values.get(f"gain of {name}", 1.0) for name in self._trusted(run, undone)]
+        excitation = drive.excitation.scaled(1.0 / float(np.mean(gains))) if gains else drive.excitation
         rate = drive.excitation.sampling_rate_hz
         start = values.get(f"{RELEASE}{run.name}", drive.initial_displacement_m)
         per_period = _STEPS_PER_PERIOD_OF_A_RELEASE if run.is_free else STEPS_PER_PERIOD
         simulation = twin.simulate(
-            drive.excitation, initial_displacement_m=start, n_substeps=steps_per_sample(twin, rate, per_period)
+            excitation, initial_displacement_m=start, n_substeps=steps_per_sample(twin, rate, per_period)
         )
         return simulation.require_done()
+
+    def _trusted(self, run: CaseRun, undone: Sequence[SensorFault] = ()) -> list[str]:
+        """Channels whose mean moves the tank, and which are compared, too: their gains say how far it moved."""
+        faulty = {fault.channel for fault in undone}
+        compared = self._channels[run.name].compared
+        return [name for name in self.driving(run) if name in compared and name not in faulty and not run.is_free]
 
     def extended_twin(self, values: Mapping[str, float], extension: Extension) -> Twin:
         """The twin with retuned numbers and the forces of an extension, for runs with moving liquid.
@@ -313,9 +321,15 @@ class RigModel:
         names = sorted({name for run in self.runs for name in self.compared(run)})
         if any(name.startswith("force") for name in names):
             found.append(BaselineParameter("carried mass", 1.0, 0.01, most_tolerances=_AS_NORMAL))
+        moving = {name for run in self.runs for name in self._trusted(run)}
         found += [
             BaselineParameter(
-                f"gain of {name}", 1.0, 0.01, is_reading=True, most_tolerances=_AS_NORMAL, channel=name
+                f"gain of {name}",
+                1.0,
+                0.01,
+                is_reading=name not in moving,
+                most_tolerances=_AS_NORMAL,
+                channel="" if name in moving else name,
             )
             for name in names
             if not name.endswith("_root")  # a base at rest has none to tell, and participations hold it otherwise

@@ -7,7 +7,7 @@ recording is interpolated band-limited. Velocity and displacement of the same mo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -59,6 +59,19 @@ class Excitation:
             return np.empty((0, len(INPUTS)))
         last = 2 * (self.n_samples - 1) * n_substeps + 1 if stop is None else stop
         return np.ascontiguousarray(self.inputs(np.arange(first, last) / (2 * n_substeps * self.sampling_rate_hz)))
+
+    def scaled(self, factor: float) -> Excitation:
+        """The same with the motion of the base times a factor: what a sensor of another gain would have told."""
+        inputs = self.inputs
+        if inputs is None or factor == 1.0:
+            return self
+
+        def of(time: FloatArray) -> FloatArray:
+            table = inputs(time).copy()
+            table[:, : _ACCELERATION + 1] *= factor
+            return table
+
+        return replace(self, inputs=of)
 
     def at_start(self) -> FloatArray:
         """Inputs at the first sample, shape (6,)."""

@@ -142,12 +142,14 @@ class Fits:
         for (run, _), left in one.by_run.items():
             if run not in repeated:
                 alone.setdefault(run, []).append(left)
+        return self.shares_little(one) and all(float(np.median(left)) < _LITTLE_ALONE for left in alone.values())
+
+    def shares_little(self, one: Explanation) -> bool:
+        """Whether repeats have next to nothing in common of what is left; False where no test was repeated."""
         shared = one.shared_by_repeats
-        is_little = all(
+        return bool(shared) and all(
             max(left) < _LITTLE_IN_A_CHANNEL and float(np.mean(left)) < _LITTLE_IN_COMMON for left in shared
         )
-        is_little = is_little and all(float(np.median(left)) < _LITTLE_ALONE for left in alone.values())
-        return bool(shared) and is_little
 
     def is_strained(self, fit: FreeRunFit) -> bool:
         """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""

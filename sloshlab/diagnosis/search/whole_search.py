@@ -9,7 +9,7 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, candidates
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
+from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings, largest_strength
 from sloshlab.diagnosis.free_run_fit import fitted_baseline
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, huber_cost
 from sloshlab.diagnosis.noise_floor import weighted_observations
@@ -26,6 +26,8 @@ from sloshlab.errors import InputError
 
 assert effects.__all__  # importing the vocabulary makes it known
 
+_NOTHING_TO_SPEAK_OF: Final = 0.5
+"""Noise floors that single effects remove at most where pairs are not tried: below what a verdict speaks of."""
 _SHARE_LEFT_BY_A_PAIR: Final = 0.8
 """Of what its first effect leaves; a second one that gains less does not tell that the first one is wrong."""
 
@@ -73,7 +75,7 @@ def findings_of(
         best = cheapest(found)
         is_complete = best is not None and fits.is_complete(best)
     if not is_complete:
-        found += _second_effects(fits, found, retuned_fit, pool)
+        found += _second_effects(fits, found, retuned, pool)
     found += refinement.polished(retuned_fit, found, pool)
     retuned = refinement.retuned_from(found, retuned)
     any_force = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
@@ -97,14 +99,19 @@ def findings_of(
 
 
 def _second_effects(
-    fits: Fits, known: Sequence[Explanation], retuned: FreeRunFit, pool: Sequence[Candidate]
+    fits: Fits, known: Sequence[Explanation], retuned: Explanation, pool: Sequence[Candidate]
 ) -> list[Explanation]:
     """Pairs of the best first effect and another, and what is left of the best pair without either.
 
-    Where the best pair leaves too much, others are tried beside its second effect: the first was the best alone.
+    None where no effect removes anything to speak of and repeats have next to nothing in common: what other runs
+    leave is noise then. Where the best pair leaves too much, others are tried beside its second effect: the first
+    was the best alone.
     """
     best = cheapest(known)
-    if best is None or retuned.cost - best.fit.cost < LEAST_TO_BUILD_ON:
+    if best is None or retuned.fit.cost - best.fit.cost < LEAST_TO_BUILD_ON:
+        return []
+    largest = max(largest_strength(retuned.by_run, one.by_run) for one in known)
+    if largest < _NOTHING_TO_SPEAK_OF and fits.shares_little(retuned):
         return []
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
@@ -113,12 +120,12 @@ def _second_effects(
     alone = []
     pair = cheapest(pairs)
     if pair is not None and best.fit.cost - pair.fit.cost > LEAST_TO_BUILD_ON:
-        alone += more.in_place.one_for_all(pair.fit, retuned, pool)
+        alone += more.in_place.one_for_all(pair.fit, retuned.fit, pool)
     alone += Refinement(fits).take_away([one for one in pairs if one.keys[:-1] == best.keys])
     cost = min((one.fit.cost for one in alone), default=best.fit.cost)
     if cost < best.fit.cost:
-        alone += more.in_place.look_alikes(retuned, alone, pool, "fitting one effect")
-        alone += more.in_place.generalised(retuned, alone, pool, "fitting one effect")
+        alone += more.in_place.look_alikes(retuned.fit, alone, pool, "fitting one effect")
+        alone += more.in_place.generalised(retuned.fit, alone, pool, "fitting one effect")
     if pair is None or pair.fit.cost > _SHARE_LEFT_BY_A_PAIR * best.fit.cost:
         return [*pairs, *alone]
     if pair.held_out_rms > LARGEST_REMAINDER:

@@ -8,8 +8,8 @@ import numpy as np
 
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gained, largest_strength
+from sloshlab.diagnosis.explanation import Explanation, Findings, largest_strength
+from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gained
 
 LEAST_SEPARATION: Final = 6.0
 """Log-likelihood ratio, on all runs, by which an explanation must beat another to be the only one."""

@@ -6,15 +6,13 @@ twice the mean square that is left there by the best description (never less tha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.explanation import Explanation, Findings, largest_strength
 
-_Place = TypeVar("_Place")
 LEAST_MORE: Final = 12.0
 """Log-likelihood ratio, on fitted and on held-out runs, by which a further effect must improve on fewer."""
 LEAST_STRENGTH: Final = 0.7
@@ -106,9 +104,3 @@ def strength(before: Explanation, after: Explanation) -> float:
         With fewer and with more effects.
     """
     return largest_strength(before.by_channel, after.by_channel)
-
-
-def largest_strength(before: Mapping[_Place, float], after: Mapping[_Place, float]) -> float:
-    """Square root of the largest decrease of a mean square over what is left, both not below the noise floor."""
-    removed = [max(before[place], 1.0) / max(left, 1.0) - 1.0 for place, left in after.items() if place in before]
-    return float(np.sqrt(max([0.0, *removed])))

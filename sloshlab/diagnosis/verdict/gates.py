@@ -8,14 +8,13 @@ from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
+from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings, largest_strength
 from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equals_of, includes
 from sloshlab.diagnosis.verdict.comparison import (
     Scale,
     at_its_best,
     has_gained,
     is_clearly_better,
-    largest_strength,
     shows_more,
 )
 from sloshlab.diagnosis.verdict.interval import is_told_from_nothing

@@ -23,10 +23,10 @@ _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta"
 def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[float, float, float]:
     """Estimate and 90 % interval of one parameter.
 
-    The standard error of the fit knows noise alone; it is widened by what the fit leaves, by how far estimates
-    were off where the truth was known, by how far fits about other baselines end elsewhere, and, where gains or
-    masses scale the number, by how well those are known: a cubic spring by the gain of a force and three times by
-    that of a displacement.
+    What noise does is widened by what the fit leaves and by how far estimates were off where the truth was known.
+    What is not known of the baseline counts once, as its standard error or as how far fits about other baselines
+    end elsewhere, whichever is more. Where gains or masses scale the number, it is known no better than those: a
+    cubic spring by the gain of a force and three times by that of a displacement.
     """
     estimate = best.fit.values[f"{candidate.key}.{parameter}"]
     width = _half_width(best, candidate, parameter)
@@ -57,8 +57,10 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
     name = f"{candidate.key}.{parameter}"
     if name not in best.fit.names:
         return 0.0
-    scatter = _ERRORS_OVER_STANDARD_ERRORS * best.fit.standard_error(name) * max(1.0, best.held_out_rms)
+    of_noise, of_belief = best.fit.standard_errors(name)
+    scatter = _ERRORS_OVER_STANDARD_ERRORS * of_noise * max(1.0, best.held_out_rms)
     is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s")
     power = next((power for ending, power in _LENGTHS.items() if parameter.endswith(ending)), 0)
     of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(best.fit.values[name])
-    return _NORMAL_90 * float(np.linalg.norm([scatter, of_gain, best.spread.get(name, 0.0)]))
+    elsewhere = max(best.spread.get(name, 0.0), of_belief)
+    return _NORMAL_90 * float(np.linalg.norm([scatter, of_gain, elsewhere]))

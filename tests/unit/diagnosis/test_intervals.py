@@ -17,6 +17,7 @@ from hand_made_findings import (
 )
 from scipy.stats import norm
 
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 
 
@@ -45,6 +46,32 @@ def test_an_interval_is_as_wide_as_fits_about_other_baselines_end_elsewhere() ->
     facts = verdict_facts(findings(BASELINE, [spread]), judged(BASELINE, [spread]))
     [force] = [one["parameters"]["force_n"] for one in facts["effects"]]
     width = np.linalg.norm([0.02, 0.0037, 0.04]) * norm.ppf(0.95)
+    assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
+
+
+def beside_a_gain(n: float) -> FreeRunFit:
+    """An effect of size 0.37 that reads as a gain does, known to 1 from elsewhere, from n values of unit noise."""
+    fit = left(0.0, 0.0, FRICTION).fit
+    covariance = np.linalg.inv([[n + 1.0, n], [n, n]])
+    return replace(fit, covariance=covariance, names=("gain", *fit.names), scales=np.array([0.01, 0.01]))
+
+
+@pytest.mark.parametrize("n", [0.5, 4.0, 1e4])
+def test_standard_errors_by_noise_and_by_what_is_believed_are_told_apart(n: float) -> None:
+    """The mean of the values knows the sum to 1/√n; the effect is it less the gain, which is known to 1."""
+    fit = beside_a_gain(n)
+    assert fit.standard_errors(fit.names[1]) == pytest.approx((0.01 / np.sqrt(n), 0.01))
+    assert fit.standard_error(fit.names[1]) == pytest.approx(0.01 * np.sqrt(1 + 1 / n))
+
+
+@pytest.mark.parametrize(("elsewhere", "of_belief"), [(0.003, 0.01), (0.04, 0.04)])
+def test_what_is_not_known_of_the_baseline_counts_once(elsewhere: float, of_belief: float) -> None:
+    one = replace(
+        left(0.0, 0.0, FRICTION), fit=beside_a_gain(4.0), spread={"structure.coulomb_friction.force_n": elsewhere}
+    )
+    facts = verdict_facts(findings(BASELINE, [one]), judged(BASELINE, [one]))
+    [force] = [part["parameters"]["force_n"] for part in facts["effects"]]
+    width = np.linalg.norm([2 * 0.005, 0.0037, of_belief]) * norm.ppf(0.95)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
 
 

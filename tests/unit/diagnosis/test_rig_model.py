@@ -9,7 +9,7 @@ import pytest
 from recorded_oscillators import DAMPING, NOISE, decays, driven, motion, rig, run_of
 
 from sloshlab.diagnosis import rig_model
-from sloshlab.diagnosis.extension import NOTHING, Extension
+from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.rig import Rig
 from sloshlab.twin.structure_forces import COULOMB_FRICTION
@@ -138,3 +138,35 @@ def test_steps_of_a_release_follow_friction_and_the_highest_mode(
     peak = np.abs(truth).max()
     assert np.std(found - truth) < 1e-3 * peak
     assert np.std(fewer - truth) > 5 * np.std(found - truth)
+
+
+SENSORS = {"acceleration_roof_1": 1.01, "acceleration_roof_2": 0.98, "acceleration_control": 0.99}
+"""Gains of the sensors of a shaker."""
+
+
+def shaken(folder: Path) -> RigModel:
+    """A tank that is moved by 20 sin ωt; its sensors have gains, and no noise."""
+    (folder / "shaker.toml").write_text(BEAM.partition("[structure]")[0] + '[twin]\ntank_model = "frozen"\n')
+    moved = 20.0 * np.sin(2 * np.pi * 10.0 * np.arange(1000) / 250.0)
+    channels = {name: gain * moved for name, gain in SENSORS.items()}
+    run = run_of("shaken", channels, {}, 1, experiment="shaker_sweep", acceleration_g=2.0)
+    return RigModel(Rig.from_toml(folder / "shaker.toml"), folder, [run])
+
+
+@pytest.mark.parametrize("faulty", ["", "acceleration_roof_1", "acceleration_control"])
+def test_gains_of_the_sensors_that_drive_say_how_far_the_tank_moved(tmp_path: Path, faulty: str) -> None:
+    """With all of them, and where one has a fault of its own and the others drive: what is read is what was."""
+    model = shaken(tmp_path)
+    [run] = model.runs
+    values = {f"gain of {name}": gain for name, gain in SENSORS.items()}
+    fault = SensorFault(faulty, lambda read, *_: 3.0 * read, None, ("sensor.tripled", faulty))
+    extension = Extension(faults=(fault,)) if faulty else NOTHING
+    read = model.simulate(run, values, extension)
+    for name in SENSORS:
+        expected = run.recording[name].values * (3.0 if name == faulty else 1.0)
+        assert np.abs(read[name] - expected)[100:-100].max() < 1e-3 * np.abs(expected).max()
+    assert not any(one.is_reading for one in model.parameters if one.name in values and one.name in driving(model))
+
+
+def driving(model: RigModel) -> list[str]:
+    return [f"gain of {name}" for name in model.driving(model.runs[0])]

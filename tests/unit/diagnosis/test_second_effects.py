@@ -14,8 +14,9 @@ from sloshlab.diagnosis.search import whole_search
 from sloshlab.diagnosis.search.fits import Fits
 
 
-def explanation(cost: float, *keys: str, left: float = 2.0) -> Any:
-    return SimpleNamespace(fit=SimpleNamespace(cost=cost, keys=keys), keys=keys, held_out_rms=left)
+def explanation(cost: float, *keys: str, left: float = 2.0, in_a_channel: float = 1.0) -> Any:
+    by_run = {("run", "channel"): in_a_channel}
+    return SimpleNamespace(fit=SimpleNamespace(cost=cost, keys=keys), keys=keys, held_out_rms=left, by_run=by_run)
 
 
 class Tried:
@@ -34,20 +35,29 @@ class Tried:
         return self.pairs.get(base.keys, [])
 
 
-RETUNED = SimpleNamespace(cost=5000.0)
+RETUNED = explanation(5000.0, in_a_channel=9.0)
 BEST, SECOND = explanation(3000.0, "stiffness_change"), explanation(4500.0, "hum")
 
 
-def sought(monkeypatch: pytest.MonkeyPatch, pair: Any, *, is_noise: bool = False) -> tuple[Tried, list[Any]]:
+def sought(
+    monkeypatch: pytest.MonkeyPatch,
+    pair: Any,
+    *,
+    is_noise: bool = False,
+    retuned: Any = RETUNED,
+    shares_little: bool = True,
+) -> tuple[Tried, list[Any]]:
     tried = Tried({BEST.keys: [pair], SECOND.keys: [explanation(1000.0, "hum", "missing_mode", left=0.9)]})
     fits = SimpleNamespace(
-        problem_of=lambda fit: SimpleNamespace(is_down_to_noise=lambda fit: is_noise), jacobian=lambda fit: None
+        problem_of=lambda fit: SimpleNamespace(is_down_to_noise=lambda fit: is_noise),
+        jacobian=lambda fit: None,
+        shares_little=lambda one: shares_little,
     )
     monkeypatch.setattr(whole_search, "OneMoreEffect", lambda fits: tried)
     monkeypatch.setattr(
         whole_search, "Refinement", lambda fits: SimpleNamespace(take_away=lambda pairs: [SECOND] if pairs else [])
     )
-    return tried, whole_search._second_effects(fits, [BEST], RETUNED, [])  # type: ignore[arg-type]
+    return tried, whole_search._second_effects(fits, [BEST], retuned, [])  # type: ignore[arg-type]
 
 
 def test_where_the_best_pair_leaves_too_much_its_first_effect_is_exchanged(
@@ -117,3 +127,16 @@ def test_nothing_more_is_sought_where_repeats_share_nothing_more(
     )
     assert fits.is_complete(left) is is_complete
     assert not fits.is_complete(replace(left, repeating={}))
+
+
+@pytest.mark.parametrize(("removed", "is_tried"), [(0.4, False), (0.6, True)])
+def test_pairs_are_not_tried_where_no_effect_removes_anything_to_speak_of(
+    monkeypatch: pytest.MonkeyPatch, removed: float, is_tried: bool
+) -> None:
+    """Noise floors removed: root of the mean square before over that after, less one."""
+    pair, retuned = (
+        explanation(2000.0, "stiffness_change", "hum"),
+        explanation(5000.0, in_a_channel=1 + removed**2),
+    )
+    assert bool(sought(monkeypatch, pair, retuned=retuned)[0].beside) == is_tried
+    assert sought(monkeypatch, pair, retuned=retuned, shares_little=False)[0].beside
