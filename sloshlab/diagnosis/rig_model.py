@@ -36,6 +36,8 @@ STEPS_PER_PERIOD: Final = 12.0
 _STEPS_PER_PERIOD_OF_A_RELEASE: Final = 24.0
 """Of the highest mode, which a release excites most; within longer steps friction may stop a place twice."""
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
+_LEAST_STEPS_PER_S: Final = 500.0
+"""Of a tank that follows its measured motion: forces that average over a cycle need some tens of steps in it."""
 _MOST_KEPT_BYTES: Final = 3e8
 RELEASE: Final = "release of "
 _FLUCTUATION: Final = "damping of the liquid in "
@@ -380,9 +382,9 @@ def _relative_share(name: str, truth: Mapping[str, FloatArray], values: Mapping[
 
 
 def steps_per_sample(twin: Twin, sampling_rate_hz: float, per_period: float = STEPS_PER_PERIOD) -> int:
-    """Integration steps that follow every mode within the band of a recording."""
+    """Integration steps that follow every mode within the band of a recording, and forces with memory."""
     if twin.structure is None:
-        return 1
+        return math.ceil(_LEAST_STEPS_PER_S / sampling_rate_hz)
     frequencies = twin.structure.frequencies_hz
     needed = max(per_period * float(frequencies.max()), _STEPS_PER_FIRST_PERIOD * float(frequencies.min()))
     return max(1, min(1000, math.ceil(needed / sampling_rate_hz)))

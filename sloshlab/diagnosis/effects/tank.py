@@ -125,7 +125,7 @@ SLOSHING = register(
         (
             EffectParameter("threshold_g", 0.02, 20.0),
             EffectParameter("peak_w_bar", 0.0, 20.0),
-            EffectParameter("rise", 0.05, 20.0),
+            EffectParameter("rise", 0.05, 20.0, may_rest=True),  # a peak beyond all levels
             EffectParameter("averaging_s", 0.01, 5.0),
         ),
         lambda at: [

@@ -170,3 +170,11 @@ def test_gains_of_the_sensors_that_drive_say_how_far_the_tank_moved(tmp_path: Pa
 
 def driving(model: RigModel) -> list[str]:
     return [f"gain of {name}" for name in model.driving(model.runs[0])]
+
+
+@pytest.mark.parametrize(("rate_hz", "n"), [(64.0, 8), (400.0, 2), (512.0, 1)])
+def test_forces_that_average_over_a_cycle_have_steps_enough_at_low_rates(
+    tmp_path: Path, rate_hz: float, n: int
+) -> None:
+    model = shaken(tmp_path)
+    assert rig_model.steps_per_sample(model.twin, rate_hz) == n
