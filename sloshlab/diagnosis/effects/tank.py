@@ -126,7 +126,7 @@ SLOSHING = register(
             EffectParameter("threshold_g", 0.02, 20.0),
             EffectParameter("peak_w_bar", 0.0, 20.0),
             EffectParameter("rise", 0.05, 20.0, may_rest=True),  # a peak beyond all levels
-            EffectParameter("averaging_s", 0.01, 5.0),
+            EffectParameter("averaging_s", 0.01, 5.0, may_rest=True),  # levels that hardly change do not tell it
         ),
         lambda at: [
             {
@@ -215,7 +215,10 @@ SATURATION = register(
         "high_g_saturation",
         "tank",
         "the damping of the liquid times (a_s/â)² beyond a_s: work per cycle stops growing",
-        (EffectParameter("threshold_g", 0.02, 50.0), EffectParameter("averaging_s", 0.01, 5.0)),
+        (
+            EffectParameter("threshold_g", 0.02, 50.0),
+            EffectParameter("averaging_s", 0.01, 5.0, may_rest=True),
+        ),
         lambda at: [
             {"threshold_g": share * _largest_g(at), "averaging_s": 2 / at.frequency_hz}
             for share in (0.3, 0.5, 0.7)
