@@ -45,16 +45,17 @@ def never_lost() -> Iterator[None]:
 
     Where it fell into the clean-up of an object, whose exceptions Python drops, it is sent again; where it came up
     as another error (compiled code that was looking at its arguments, a library that was being loaded) that error
-    is its cause.
+    is its cause. Where somebody else handles Ctrl-C, and outside the main thread, it does nothing.
 
     Raises
     ------
     KeyboardInterrupt
     """
-    if threading.current_thread() is not threading.main_thread():
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is not signal.default_int_handler:
         yield
         return
-    dropped_before, before = sys.unraisablehook, signal.getsignal(signal.SIGINT)
+    dropped_before = sys.unraisablehook
     arrived: list[int] = []
 
     def noted(number: int, frame: Any) -> None:
@@ -68,8 +69,7 @@ def never_lost() -> Iterator[None]:
             dropped_before(dropped)
 
     sys.unraisablehook = sent_again
-    if before is signal.default_int_handler:
-        signal.signal(signal.SIGINT, noted)
+    signal.signal(signal.SIGINT, noted)
     try:
         yield
     except (SystemError, ImportError) as error:

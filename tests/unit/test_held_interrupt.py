@@ -61,3 +61,16 @@ def test_an_interrupt_in_the_clean_up_of_an_object_arrives_after_it() -> None:
 
     with pytest.raises(KeyboardInterrupt), interrupt.never_lost():
         work()
+
+
+def test_whoever_handles_the_interrupt_already_goes_on_doing_so() -> None:
+    """A command may run within a program that has its own handler, or ignores Ctrl-C."""
+    for handler in (signal.SIG_IGN, lambda *told: None):
+        before = signal.signal(signal.SIGINT, handler)
+        try:
+            with interrupt.never_lost():
+                assert signal.getsignal(signal.SIGINT) is handler
+                signal.raise_signal(signal.SIGINT)
+            assert signal.getsignal(signal.SIGINT) is handler
+        finally:
+            signal.signal(signal.SIGINT, before)
