@@ -96,12 +96,15 @@ class EffectParameter:
     low, high : float
     may_rest : bool
         Whether it may be as small or as large as that in earnest; other effects at a bound are no answer.
+    is_between_readings : bool
+        Whether it is a share of what another channel reads: the gains of both are in it.
     """
 
     name: str
     low: float
     high: float
     may_rest: bool = False
+    is_between_readings: bool = False
 
 
 Numbers = Mapping[str, float]

@@ -45,6 +45,8 @@ class Explanation:
         and channel.
     spread : dict
         Of the effects' numbers over fits about other baselines that could be believed; empty where none were made.
+    scatter : dict
+        Standard errors of the same from how much runs and parts of runs disagree; empty where that is not known.
     """
 
     fit: FreeRunFit
@@ -55,6 +57,7 @@ class Explanation:
     rms_without_bursts: float = 0.0
     repeating: dict[tuple[str, str], float] = field(default_factory=dict)
     spread: dict[str, float] = field(default_factory=dict)
+    scatter: dict[str, float] = field(default_factory=dict)
 
     @property
     def shared_by_repeats(self) -> list[list[float]]:

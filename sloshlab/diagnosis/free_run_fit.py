@@ -30,6 +30,8 @@ _LEAST_ROOM: Final = 1e-12
 """Between a lower and an upper bound of a step, in scaled values; bounds that coincide leave none."""
 _CAME_BACK: Final = 0.02
 """Of a number, within which a fit from elsewhere has found the same place."""
+_PATIENCE: Final = 15
+"""Steps of a stage at most: where an effect and the baseline share a motion, the way leads along a valley."""
 STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
 SCANNED: Final = (0.75, 0.9, 1.1, 1.3)
 
@@ -278,7 +280,9 @@ def nearest(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], shar
     return starts[int(np.argmin(costs))]
 
 
-def finished(begun_fit: BegunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = 6) -> FreeRunFit:
+def finished(
+    begun_fit: BegunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = _PATIENCE
+) -> FreeRunFit:
     """The remaining stages of a fit that was begun; the last one in any case."""
     rest = shares[2:] or shares[-1:]
     values, known = begun_fit.fit.values, begun_fit.jacobian

@@ -17,6 +17,8 @@ from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
 _MOST_PEAKS: Final = 3
+ACROSS_A_BAND: Final = (0.0, -0.4, 0.4, -0.8, 0.8)
+"""Of half its width, from its middle: a resonance may be narrower."""
 _ONE_FREQUENCY: Final = 1.1
 """Of x_rms a_rms/v_rms², which is one for a harmonic motion, times the ratio of the frequencies of runs."""
 
@@ -56,14 +58,30 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
         longest_run_s=max(observed[0].run.duration_s for observed in fitting),
         blocks=model.blocks,
         peaks=_sizes(fitting, model, lambda values: np.nanmax(np.abs(values))),
-        missed_hz=_most_missed_hz(fitting, problem.residual(problem.theta_of(fit.values))),
+        missed_hz=most_missed_hz(fitting, problem.residual(problem.theta_of(fit.values))),
         n_modes=0 if model.twin.structure is None else model.twin.structure.masses_kg.size,
         has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
     )
 
 
-def _most_missed_hz(fitting: Sequence[Sequence[Observation]], residual: FloatArray) -> tuple[float, ...]:
-    """Frequencies of the highest peaks of weighted residuals, all runs and channels together."""
+def most_missed_hz(
+    fitting: Sequence[Sequence[Observation]], residual: FloatArray, places: Sequence[float] = (0.0,)
+) -> tuple[float, ...]:
+    """Frequencies of the highest peaks of weighted residuals, all runs and channels together.
+
+    Parameters
+    ----------
+    fitting : sequence of sequences of Observation
+    residual : ndarray, shape (n,)
+        Of their coefficients.
+    places : sequence of float
+        In the band of each peak, in halves of its width from its middle.
+
+    Returns
+    -------
+    tuple of float
+        Hz, places of the highest peak first.
+    """
     n_bands = max(one.spectra.shape[1] for run in fitting for one in run)
     power, count, first = np.zeros(n_bands), np.full(n_bands, 1e-300), 0
     frequencies = np.zeros(n_bands)
@@ -78,7 +96,8 @@ def _most_missed_hz(fitting: Sequence[Sequence[Observation]], residual: FloatArr
     beside = np.pad(mean, 1)
     peaks = np.flatnonzero((mean >= beside[:-2]) & (mean >= beside[2:]) & (frequencies > 0))
     highest = peaks[np.argsort(-mean[peaks])][:_MOST_PEAKS]
-    return tuple(float(frequencies[k]) for k in highest)
+    half = 0.5 * float(frequencies[1] - frequencies[0]) if n_bands > 1 else 0.0
+    return tuple(float(frequencies[k] + share * half) for k in highest for share in places)
 
 
 def _sizes(

@@ -362,7 +362,7 @@ CROSS_TALK = register(
         "cross_talk",
         "sensor",
         "y₁ → y₁ + r y₂, r in the unit of the one channel over that of the other",
-        (EffectParameter("ratio", -1e6, 1e6),),
+        (EffectParameter("ratio", -1e6, 1e6, is_between_readings=True),),
         _leaks,
         _cross_talk,
         ("mass_error", "sensor_gain"),

@@ -9,22 +9,25 @@ import numpy as np
 from scipy.stats import norm, qmc, t
 
 from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted
+from sloshlab.diagnosis.free_run_fit import STAGES, fitted, soft_cost
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.search.fits import Fits, Told
+from sloshlab.diagnosis.search.scatter_of_runs import scatter_of_runs
 
 _N_DRAWN: Final = 6
 _MOST_TOLERANCES: Final = 1.25
 _OF_A_NUMBER: Final = 0.3
 """Standard deviation of the logarithm of an effect's numbers where the fits begin."""
-_AS_GOOD: Final = 0.32
-"""Of the misfit: fits whose error is 1.15 times the least are adequate, too, where friction makes side valleys."""
+_AS_GOOD: Final = 0.1
+"""Of the misfit: fits whose error is 1.05 times the least are as good, where friction makes side valleys."""
+_LEFT_BEHIND: Final = 2.0
+"""Cost after the first stage, over that of the best, beyond which a fit has gone astray."""
 _CHANCE: Final = 12.0
 """The same, at least."""
 
 
 def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, of: None) -> Findings:
-    """Findings with the spread of the numbers of one explanation, and with a better place of it if one is found.
+    """Findings with spread and scatter of the numbers of one explanation, and a better place if one is found.
 
     What is believed of the baseline is drawn anew several times, as it could have been believed, and everything is
     fitted from there: where the recordings do not tell a gain or a mass from an effect, the fits end elsewhere as
@@ -44,6 +47,7 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
     plain = fits.problem(candidates)
     draws = norm.ppf(qmc.Halton(len(plain.names), seed=0).random(_N_DRAWN))
     at_best, is_baseline = plain.theta_of(best.fit.values), np.arange(len(plain.names)) < plain.n_baseline
+    at_best_softly = soft_cost(plain, best.fit, STAGES[-3])
     ends = [best.fit]
     for i, draw in enumerate(np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)):
         told("fitting about other baselines", i, _N_DRAWN)
@@ -51,7 +55,10 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
         far = (i + 1) / _N_DRAWN
         start = np.where(is_baseline, at_best + far * draw, at_best * np.exp(far * _OF_A_NUMBER * draw))
         problem = FreeRunProblem(found.model, found.fitting, candidates, expected=expected)
-        fit, _ = fitted(problem, plain.values(start), n_iterations=6, shares=STAGES[-3:])
+        fit, jacobian = fitted(problem, plain.values(start), n_iterations=6, shares=STAGES[-3:-2], is_last=False)
+        if fit.trouble or soft_cost(plain, fit, STAGES[-3]) > _LEFT_BEHIND * at_best_softly:
+            continue
+        fit, _ = fitted(problem, fit.values, n_iterations=6, shares=STAGES[-2:], known=jacobian)
         if not fit.trouble:
             ends.append(fit)
     lowest = min(ends, key=lambda one: one.misfit)
@@ -63,8 +70,10 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
             ends.append(fit)
     most = max((1 + _AS_GOOD) * lowest.misfit, lowest.misfit + _CHANCE)
     spread = _spread([one for one in ends if one.misfit < most], better)
-    described = [replace(better, spread=spread), *(one for one in found.explanations if one is not best)]
-    return replace(found, explanations=described)
+    problem = fits.problem_of(better.fit)
+    scatter = scatter_of_runs(problem, better.fit, fits.jacobian(better.fit))
+    others = [one for one in found.explanations if one is not best]
+    return replace(found, explanations=[replace(better, spread=spread, scatter=scatter), *others])
 
 
 def _spread(ends: list[FreeRunFit], best: Explanation) -> dict[str, float]:

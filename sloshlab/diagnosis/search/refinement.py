@@ -16,6 +16,8 @@ from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
 
 _MOST_ANEW: Final = 3
+_LEAST_SHARE_OF_GAIN: Final = 0.5
+"""Of that of the best, by which an effect is worth another beginning."""
 _MOST_THROWS, _MOST_IN_VAIN, _N_PLACES = 16, 4, 48
 _LEAST_SHARE: Final = 0.01
 """Of the cost: a throw that gains less is in vain, as crumbs lead nowhere."""
@@ -54,8 +56,10 @@ class Refinement:
         for one in sorted(known, key=lambda one: one.fit.cost):
             by_key.setdefault(one.keys[-1], one)
         found: list[Explanation] = []
+        lowest = min((one.fit.cost for one in known), default=base.cost)
         for key, one in list(by_key.items())[:_MOST_ANEW]:
-            if base.cost - one.fit.cost < LEAST_TO_BUILD_ON:
+            gain = base.cost - one.fit.cost
+            if gain < max(LEAST_TO_BUILD_ON, _LEAST_SHARE_OF_GAIN * (base.cost - lowest)):
                 break
             problem = self.fits.problem_of(one.fit)
             if problem.is_down_to_noise(one.fit):

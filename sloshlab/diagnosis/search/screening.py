@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -18,6 +18,7 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, exte
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search.fits import Fits
 from sloshlab.diagnosis.search.start_numbers import resized, with_smaller_ones
+from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, most_missed_hz
 
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
@@ -95,6 +96,7 @@ class Screening:
             FirstLook(problem, theta, residual, jacobian, share)
             for share in dict.fromkeys((shares[min(1, len(shares) - 1)], shares[-1]))
         ]
+        missed_hz = most_missed_hz(problem.runs, residual, ACROSS_A_BAND)
         promised = []
         for i, candidate in enumerate(pool):
             self.fits.told(f"{what}: first look", i, len(pool))
@@ -103,7 +105,8 @@ class Screening:
             by_force = None if forces is None else forces.of(candidate)
             extended = self.fits.problem((*base.candidates, candidate))
             looks = []
-            sets = [*with_smaller_ones(candidate), *([by_force.numbers] if by_force else [])]
+            here = replace(candidate, surroundings=replace(candidate.surroundings, missed_hz=missed_hz))
+            sets = [*with_smaller_ones(here), *([by_force.numbers] if by_force else [])]
             at_starts = extended.residuals([extended.theta_of({**base.values, **start}) for start in sets])
             for start, moved in zip(sets, at_starts, strict=True):
                 if np.isfinite(moved).all():

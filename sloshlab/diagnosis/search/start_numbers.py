@@ -23,7 +23,10 @@ def as_its_special_case(wider: Candidate, special: Candidate, fit: FreeRunFit) -
 
 
 def as_its_general_form(special: Candidate, general: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
-    """Starts of a special case, and one with its number as large as those of one unit of the general form."""
+    """Starts of a special case, and some with its number as large as those of one unit of the general form.
+
+    Of either sign: a mass that moves by itself is one that the tank lacks.
+    """
     starts = special.starts()
     [*names] = starts[0]
     alike = [
@@ -32,7 +35,7 @@ def as_its_general_form(special: Candidate, general: Candidate, fit: FreeRunFit)
         if _unit(one.name) == _unit(names[0])
     ]
     if len(names) == 1 and alike:
-        starts.append({names[0]: float(np.mean(alike))})
+        starts += [{names[0]: sign * float(np.mean(alike))} for sign in (1.0, -1.0)]
     return starts
 
 

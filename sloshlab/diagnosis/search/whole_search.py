@@ -69,6 +69,10 @@ def findings_of(
     found = OneMoreEffect(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
     refinement, best = Refinement(fits), cheapest(found)
     is_complete = fits.is_complete(best or retuned)
+    if not is_complete and best is not None:
+        found += InPlace(fits).specialised(best, found, pool)
+        best = cheapest(found)
+        is_complete = best is not None and fits.is_complete(best)
     if not is_complete:
         found += refinement.anew(retuned_fit, found)
         found += refinement.climbed(found)

@@ -9,7 +9,7 @@ import numpy as np
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation, Findings, largest_strength
-from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gained
+from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gained, is_clearly_better
 
 LEAST_SEPARATION: Final = 6.0
 """Log-likelihood ratio, on all runs, by which an explanation must beat another to be the only one."""
@@ -29,7 +29,11 @@ _EQUAL_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_
 
 
 def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Explanation]:
-    """Explanations of at most as many effects that are as good within chance, the best first."""
+    """Explanations of at most as many effects that are as good within chance, the best first.
+
+    Special cases that are clearly worse are none, not even at one frequency: a general form such as a mode that is
+    missing shows something that they cannot. Nor are general forms that are: other numbers make them so.
+    """
     alike = [best]
     seen = {best.named_in_blocks}
     for one in sorted(found.explanations, key=lambda one: -scale.evidence(one)):
@@ -41,7 +45,9 @@ def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Ex
             continue
         is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
         is_alike = is_alike or (_differs(one, best) and not _shows_less(one, best, scale))
-        if is_alike or _is_alike_at_one_frequency(found, one, best):
+        is_kin = _is_case_of(one, best) or _is_case_of(best, one)
+        is_less = is_kin and is_clearly_better(best, one, scale)
+        if is_alike or (not is_less and _is_alike_at_one_frequency(found, one, best)):
             alike.append(one)
             seen.add(one.named_in_blocks)
     return alike
@@ -81,6 +87,11 @@ def includes(wider: Explanation, narrower: Explanation) -> bool:
         for name in (one.effect.known_as, *one.effect.includes)
     }
     return held >= set(narrower.named_in_blocks)
+
+
+def _is_case_of(narrower: Explanation, wider: Explanation) -> bool:
+    """Whether every effect of the narrower, in whatever block, is a special case of one of the wider."""
+    return set(narrower.names) <= {name for one in wider.fit.candidates for name in one.effect.includes}
 
 
 def _differs(wider: Explanation, narrower: Explanation) -> bool:

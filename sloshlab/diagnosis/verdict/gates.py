@@ -90,17 +90,9 @@ def verdict_of(found: Findings) -> Verdict:
     if not (is_more or is_guess or leaves_more(found, found.retuned)):
         certain = _certain(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
-    named = _shortest_sufficient(found, scale, ADEQUATE * ceiling.held_out_rms)
+    named, is_answer = _shortest_that_holds(found, scale, described, ceiling)
     adequacy = named.held_out_rms / max(ceiling.held_out_rms, 1e-300) if named else np.inf
-    if (
-        named is None
-        or not found.split.has_held_out
-        or scale.held_out_gain(found.retuned, named) < LEAST_GAIN
-        or adequacy > ADEQUATE
-        or leaves_more(found, named)
-        or _may_be_nothing(found, named)
-        or _is_bettered(found, named, described, scale)
-    ):
+    if named is None or not is_answer:
         certain = _certain(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, unknown_statement(found, named), "", certain)
     if not shows_more(at_its_best(found, named), found.retuned, scale):
@@ -154,22 +146,64 @@ def _in_need_of_all(found: Findings, scale: Scale) -> list[Explanation]:
     ]
 
 
+def _shortest_that_holds(
+    found: Findings, scale: Scale, described: Sequence[Explanation], ceiling: Explanation
+) -> tuple[Explanation | None, bool]:
+    """The shortest sufficient explanation, and whether it passes the gates.
+
+    Where a single effect does not, two that do are the answer, if they gain on it and explain half of everything.
+    """
+    named = _shortest_sufficient(found, scale, ADEQUATE * ceiling.held_out_rms)
+    if named is None or _holds(found, scale, named, described, ceiling):
+        return named, named is not None
+    if len(named.keys) == 1:
+        wider = _best_of(found, scale, 2)
+        if (
+            wider is not None
+            and _explains_half(found, wider)
+            and has_gained(wider, at_its_best(found, named), scale)
+            and _holds(found, scale, wider, described, ceiling)
+        ):
+            return wider, True
+    return named, False
+
+
+def _holds(
+    found: Findings, scale: Scale, named: Explanation, described: Sequence[Explanation], ceiling: Explanation
+) -> bool:
+    """Whether an explanation passes the gates on held-out runs."""
+    return (
+        found.split.has_held_out
+        and scale.held_out_gain(found.retuned, named) >= LEAST_GAIN
+        and not leaves_more(found, named)
+        and not _may_be_nothing(found, named)
+        and not _is_bettered(found, named, described, ceiling, scale)
+    )
+
+
 def _shortest_sufficient(found: Findings, scale: Scale, adequate_rms: float) -> Explanation | None:
     """The best single effect, unless two are clearly better, or it is not adequate and two add what is lacking.
 
     What is lacking is added by two that are adequate and leave less than half of the retuned mean square.
     """
-    known = [one for one in found.explanations if np.isfinite(one.held_out) and not one.rests_on_a_bound]
-    singles, pairs = ([one for one in known if len(one.keys) == n] for n in (1, 2))
-    if not singles:
-        return None
-    single = _without_excess(max(singles, key=scale.evidence), singles, scale)
-    if not pairs:
+    single, pair = _best_of(found, scale, 1), _best_of(found, scale, 2)
+    if single is None or pair is None:
         return single
-    pair = _without_excess(max(pairs, key=scale.evidence), pairs, scale)
     adds = pair.held_out_rms <= adequate_rms < single.held_out_rms and has_gained(pair, single, scale)
-    adds = adds and pair.held_out_rms**2 < 0.5 * found.retuned.held_out_rms**2
+    adds = adds and _explains_half(found, pair)
     return pair if adds or is_clearly_better(pair, single, scale) else single
+
+
+def _explains_half(found: Findings, one: Explanation) -> bool:
+    """Whether an explanation leaves less than half of the mean square that the retuned baseline does."""
+    return one.held_out_rms**2 < 0.5 * found.retuned.held_out_rms**2
+
+
+def _best_of(found: Findings, scale: Scale, n: int) -> Explanation | None:
+    """The best explanation of so many effects, special cases in their place; None of none."""
+    known = [one for one in found.explanations if np.isfinite(one.held_out) and not one.rests_on_a_bound]
+    alike = [one for one in known if len(one.keys) == n]
+    return _without_excess(max(alike, key=scale.evidence), alike, scale) if alike else None
 
 
 def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scale) -> Explanation:
@@ -192,10 +226,17 @@ def _may_be_nothing(found: Findings, named: Explanation) -> bool:
     return not is_told_from_nothing(named, named.fit.candidates[0])
 
 
-def _is_bettered(found: Findings, named: Explanation, others: Sequence[Explanation], scale: Scale) -> bool:
-    """Whether another description shows more, unless repeats have too little in common of what is left to them."""
+def _is_bettered(
+    found: Findings, named: Explanation, others: Sequence[Explanation], ceiling: Explanation, scale: Scale
+) -> bool:
+    """Whether another description shows more, unless repeats have too little in common of what is left to them.
+
+    What they do not have in common is what one run happened to have, such as a liquid that damps more for a while.
+    """
     if _in_common_where_judged(found, named) < _LITTLE_IN_COMMON:
         return False
+    if named.held_out_rms > ADEQUATE * ceiling.held_out_rms:
+        return True
     return any(shows_more(one, at_its_best(found, named), scale) for one in others)
 
 

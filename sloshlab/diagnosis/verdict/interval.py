@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.candidate import Candidate, EffectParameter
 from sloshlab.diagnosis.explanation import Explanation
 
 LEVEL: Final = 0.90
@@ -23,7 +23,8 @@ _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta"
 def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[float, float, float]:
     """Estimate and 90 % interval of one parameter.
 
-    What noise does is widened by what the fit leaves and by how far estimates were off where the truth was known.
+    What noise does is widened by what the fit leaves and by how far estimates were off where the truth was known,
+    or it is what runs and parts of runs disagree by, whichever is more.
     What is not known of the baseline counts once, as its standard error or as how far fits about other baselines
     end elsewhere, whichever is more. Where gains or masses scale the number, it is known no better than those: a
     cubic spring by the gain of a force and three times by that of a displacement.
@@ -32,8 +33,7 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
     width = _half_width(best, candidate, parameter)
     if width == 0:
         return estimate, estimate, estimate
-    chosen = next(one for one in candidate.effect.parameters if one.name == parameter)
-    lowest, highest = candidate.bounds(chosen)
+    lowest, highest = candidate.bounds(_named(candidate, parameter))
     return estimate, max(estimate - width, lowest), min(estimate + width, highest)
 
 
@@ -59,8 +59,14 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
         return 0.0
     of_noise, of_belief = best.fit.standard_errors(name)
     scatter = _ERRORS_OVER_STANDARD_ERRORS * of_noise * max(1.0, best.held_out_rms)
-    is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s")
-    power = next((power for ending, power in _LENGTHS.items() if parameter.endswith(ending)), 0)
+    scatter = max(scatter, best.scatter.get(name, 0.0))
+    is_between = _named(candidate, parameter).is_between_readings
+    is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s") and not is_between
+    power = next((power for ending, power in _LENGTHS.items() if parameter.endswith(ending)), int(is_between))
     of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(best.fit.values[name])
     elsewhere = max(best.spread.get(name, 0.0), of_belief)
     return _NORMAL_90 * float(np.linalg.norm([scatter, of_gain, elsewhere]))
+
+
+def _named(candidate: Candidate, parameter: str) -> EffectParameter:
+    return next(one for one in candidate.effect.parameters if one.name == parameter)

@@ -99,5 +99,7 @@ def test_modes_are_sought_at_the_highest_peaks_of_all_channels_together() -> Non
     loud[:, 21] = 4.5  # a shoulder, no peak of its own
     runs = [[Spectra(quiet, frequencies)], [Spectra(loud, frequencies)]]
     residual = np.concatenate([quiet.ravel(), loud.ravel()])
-    found = surroundings._most_missed_hz(cast(Any, runs), residual)
+    found = surroundings.most_missed_hz(cast(Any, runs), residual)
     assert found == (10.0, 15.0, 3.5)
+    across = surroundings.most_missed_hz(cast(Any, runs), residual, (0.0, -0.8, 0.8))
+    assert across == pytest.approx((10.0, 9.8, 10.2, 15.0, 14.8, 15.2, 3.5, 3.3, 3.7))

@@ -49,6 +49,16 @@ def test_an_interval_is_as_wide_as_fits_about_other_baselines_end_elsewhere() ->
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
 
 
+@pytest.mark.parametrize(("disagree", "counts"), [(0.05, 0.05), (0.01, 0.02)])
+def test_an_interval_is_as_wide_as_runs_disagree(disagree: float, counts: float) -> None:
+    """Instead of twice the standard error that noise alone would give, where it is more."""
+    scatter = replace(left(0.0, 0.0, FRICTION), scatter={"structure.coulomb_friction.force_n": disagree})
+    facts = verdict_facts(findings(BASELINE, [scatter]), judged(BASELINE, [scatter]))
+    [force] = [one["parameters"]["force_n"] for one in facts["effects"]]
+    width = np.hypot(counts, 0.0037) * norm.ppf(0.95)
+    assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
+
+
 def beside_a_gain(n: float) -> FreeRunFit:
     """An effect of size 0.37 that reads as a gain does, known to 1 from elsewhere, from n values of unit noise."""
     fit = left(0.0, 0.0, FRICTION).fit
@@ -104,6 +114,13 @@ def test_a_loss_per_second_is_a_size() -> None:
 def test_the_gain_of_a_displacement_counts_with_its_power(number: str, gains: float) -> None:
     size = interval_of({number: 4.0})
     assert size["high"] - 4.0 == pytest.approx(norm.ppf(0.95) * np.hypot(0.02, 0.04 * gains), rel=1e-4)
+
+
+def test_a_leak_has_the_gains_of_two_sensors_in_it_and_a_gain_has_none() -> None:
+    leak = interval_of({"sensor.cross_talk.acceleration_tip<acceleration_root.ratio": 1.0})
+    assert leak["high"] - 1.0 == pytest.approx(norm.ppf(0.95) * np.hypot(0.02, 0.01 * np.sqrt(2)), rel=1e-4)
+    gain = interval_of({"sensor.sensor_gain.acceleration_tip.ratio": 4.0})
+    assert gain["high"] - 4.0 == pytest.approx(norm.ppf(0.95) * 0.02, rel=1e-4)
 
 
 def test_a_time_does_not_depend_on_gains() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import pytest
 from recorded_oscillators import decays, effect, rig, surroundings
 
@@ -72,3 +75,10 @@ def test_a_start_is_as_large_as_a_first_step_says_within_a_decade(
     found = numbers(start_numbers.resized(candidate, start, promised))
     assert found["beta"] == pytest.approx(0.1 * factor)
     assert found["fade_g"] == numbers(start)["fade_g"]
+
+
+def test_a_mass_that_moves_by_itself_is_one_that_the_tank_may_lack(at: Surroundings) -> None:
+    mass, cushion = Candidate(effect("tank.mass_error"), at), Candidate(effect("tank.air_cushion"), at)
+    fit = SimpleNamespace(values={**cushion.starts()[0], "tank.air_cushion.mass_kg": 0.18})
+    found = start_numbers.as_its_general_form(mass, cushion, cast(Any, fit))
+    assert [numbers(start)["mass_kg"] for start in found[len(mass.starts()) :]] == [0.18, -0.18]

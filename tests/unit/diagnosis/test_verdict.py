@@ -166,6 +166,25 @@ def test_nor_does_a_twentieth_of_what_they_explain(in_one_run: float, kind: str)
     assert verdict_of(findings(baseline, described, at=AT_ONE_FREQUENCY)).kind == kind
 
 
+@pytest.mark.parametrize(("squares", "kind"), [(1.4, "indistinguishable"), (1.6, "named")])
+def test_a_special_case_that_is_clearly_worse_is_no_rival_at_one_frequency(squares: float, kind: str) -> None:
+    """A mode that is missing moves by itself, whichever block the mass is in that would stand in for it."""
+    mode = {
+        "structure.missing_mode.frequency_hz": 9.0,
+        "structure.missing_mode.damping_ratio": 0.02,
+        "structure.missing_mode.participation": 0.1,
+    }
+    described = [left(0.0, 0.0, mode), left(50.0, 50.0, {"tank.mass_error.mass_kg": -0.1}, squares=squares)]
+    assert verdict_of(findings(BASELINE, described, at=AT_ONE_FREQUENCY)).kind == kind
+
+
+@pytest.mark.parametrize(("squares", "kind"), [(1.4, "indistinguishable"), (1.6, "named")])
+def test_nor_is_a_general_form_that_is_clearly_worse_than_its_special_case(squares: float, kind: str) -> None:
+    """Friction that is made to differ by direction, at one amplitude of one frequency."""
+    described = [left(0.0, 0.0, FRICTION), left(50.0, 50.0, BOTH_SIDES, squares=squares)]
+    assert verdict_of(findings(BASELINE, described, at=AT_ONE_FREQUENCY)).kind == kind
+
+
 def test_one_name_in_two_blocks_is_two_explanations() -> None:
     damper = [{f"{block}.viscous_damping.damping_n_s_per_m": 0.6} for block in ("structure", "tank")]
     found = findings(BASELINE, [left(0.0, 0.0, damper[0]), left(1.0, 1.0, damper[1])])
@@ -322,6 +341,33 @@ def test_two_effects_are_named_where_one_does_not_reach_the_ceiling(
     baseline = replace(BASELINE, held_out_rms=baseline_rms)
     verdict = judged(baseline, [single, both], [left(19.0, 19.0, surface="structure")])
     assert (verdict.best.names if verdict.best and verdict.kind == "named" else ()) == named
+
+
+@pytest.mark.parametrize(
+    ("left_by_pair", "gain", "baseline_rms", "named"),
+    [
+        pytest.param(0.0, 200.0, 2.0, ("coulomb_friction", "mains_hum"), id="what one leaves, two explain"),
+        pytest.param(0.6, 200.0, 2.0, (), id="two leave as much"),
+        pytest.param(0.0, 11.0, 2.0, (), id="two gain no more than chance"),
+        pytest.param(0.0, 200.0, 1.5, (), id="two explain less than half"),
+    ],
+)
+def test_two_effects_are_named_where_one_does_not_pass_the_gates(
+    left_by_pair: float, gain: float, baseline_rms: float, named: tuple[str, ...]
+) -> None:
+    """One is as good on held-out runs as any force, but leaves what repeats have in common."""
+    single = left(gain, gain, FRICTION, squares=1.2, rms=1.14, repeating={("run_1", TIP): 0.6})
+    both = left(0.0, 0.0, {**FRICTION, **HUM}, rms=1.1, repeating={("run_1", TIP): left_by_pair})
+    baseline = replace(BASELINE, held_out_rms=baseline_rms)
+    verdict = judged(baseline, [single, both], repeats=True)
+    assert (verdict.best.names if verdict.best and verdict.kind == "named" else ()) == named
+
+
+@pytest.mark.parametrize(("in_common", "kind"), [(0.24, "named"), (0.26, "unknown")])
+def test_what_the_best_description_adds_must_be_left_to_repeats_alike(in_common: float, kind: str) -> None:
+    """A fifth more error than the best description leaves, which only one run of two happened to have."""
+    friction = left(20.0, 20.0, FRICTION, squares=1.1, rms=1.2, repeating={("run_2", TIP): in_common})
+    assert judged(BASELINE, [friction], [left(19.0, 19.0, surface="structure")], repeats=True).kind == kind
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,85 @@
+"""Standard errors from how much runs, and parts of runs, disagree about a number."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm, t
+
+from sloshlab.diagnosis.block_jacobian import BlockJacobian
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, robust_weights
+
+FloatArray = NDArray[np.float64]
+_PARTS_OF_A_RUN: Final = (1, 4)
+_QUANTILE: Final = 0.95
+
+
+def scatter_of_runs(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJacobian) -> dict[str, float]:
+    """Standard errors of the effects' numbers if what is left belongs to runs, or parts of runs, as a whole.
+
+    Residuals of one stretch of a run are not independent: a chaotic liquid damps more for a while than it does on
+    average. Whole runs, and quarters of runs, are taken for independent instead, and the larger error counts.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    fit : FreeRunFit
+        Its optimum.
+    jacobian : BlockJacobian
+        There.
+
+    Returns
+    -------
+    dict of float
+        Per number of an effect, in its own unit, larger where few runs tell it; empty with a single run.
+
+    Notes
+    -----
+    C (Σ gᵢ gᵢᵀ) C n/(n − 1) with the gradients gᵢ of the n parts about their mean and C the covariance of the fit
+    (Liang and Zeger 1986, doi:10.1093/biomet/73.1.13), times the quantile of Student's t over that of the normal
+    distribution at as many runs.
+    """
+    if len(problem.runs) < 2:
+        return {}
+    theta = problem.theta_of(fit.values)
+    residual = problem.residual(theta)
+    weights = robust_weights(residual)
+    weighted, pull = jacobian.weighted(weights), weights * residual
+    prior = np.diag((np.arange(theta.size) < problem.n_baseline).astype(np.float64))
+    covariance = np.linalg.pinv(weighted.normal() + prior)
+    error = np.zeros(theta.size)
+    for n in _PARTS_OF_A_RUN:
+        gradients = _gradients_of_parts(weighted, pull, _parts(problem, n))
+        about_mean = gradients - gradients.mean(axis=0)
+        square = about_mean.T @ about_mean * len(gradients) / (len(gradients) - 1)
+        error = np.maximum(error, np.sqrt(np.maximum(np.diag(covariance @ square @ covariance), 0.0)))
+    few = float(t.ppf(_QUANTILE, len(problem.runs) - 1) / norm.ppf(_QUANTILE))
+    return {
+        name: few * float(error[i] * problem.scales[i])
+        for i, name in enumerate(problem.names)
+        if i >= problem.n_baseline
+    }
+
+
+def _parts(problem: FreeRunProblem, n: int) -> NDArray[np.intp]:
+    """Number of the part of a run that each residual belongs to, shape (n_residuals,)."""
+    found = []
+    for i, run in enumerate(problem.runs):
+        for one in run:
+            n_times, n_bands = one.spectra.shape
+            of_times = i * n + np.arange(n_times) * n // n_times
+            found.append(np.repeat(of_times, n_bands))
+    return np.concatenate(found)
+
+
+def _gradients_of_parts(weighted: BlockJacobian, pull: FloatArray, parts: NDArray[np.intp]) -> FloatArray:
+    """Half the gradient of the sum of squares of each part, shape (n_parts, n_columns)."""
+    gradients = np.zeros((int(parts.max()) + 1, weighted.n_columns))
+    for block in weighted.blocks:
+        of_block = parts[block.rows]
+        for part in np.unique(of_block):
+            chosen = of_block == part
+            gradients[part, block.columns] += block.values[chosen].T @ pull[block.rows][chosen]
+    return gradients
