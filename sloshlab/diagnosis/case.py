@@ -88,6 +88,10 @@ class Case:
                 groups.append([run])
         return [tuple(group) for group in groups]
 
+    def names_by_test(self) -> list[list[str]]:
+        """Names of the runs of every test."""
+        return [[run.name for run in test] for test in self.tests()]
+
 
 def read_case(folder: str | Path, *, with_rig: bool = True) -> Case:
     """Read ``rig.toml`` and ``recordings/*.nc`` of a case folder.

@@ -156,7 +156,7 @@ class Findings:
     def judged_tests(self) -> frozenset[str]:
         """Names of the first runs of tests of which runs are held out."""
         judged = {run.name for run in self.split.held_out}
-        tests = ([run.name for run in test] for test in self.case.tests())
+        tests = self.case.names_by_test()
         return frozenset(test[0] for test in tests if not judged.isdisjoint(test))
 
     @property

@@ -42,8 +42,7 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
         Takes what is being done, how much of it is done, and how much there is.
     """
     candidates = best.fit.candidates
-    tests = [[run.name for run in test] for test in found.case.tests()]
-    fits = Fits(found.model, found.fitting, found.held_out, told, tests)
+    fits = Fits(found.model, found.fitting, found.held_out, told, found.case.names_by_test())
     plain = fits.problem(candidates)
     draws = norm.ppf(qmc.Halton(len(plain.names), seed=0).random(_N_DRAWN))
     at_best, is_baseline = plain.theta_of(best.fit.values), np.arange(len(plain.names)) < plain.n_baseline

@@ -56,8 +56,7 @@ def findings_of(
     weighted = weighted_observations(case, model)
     fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
     held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]]
-    tests = [[run.name for run in test] for test in case.tests()]
-    fits = Fits(model, fitting, held_out, told, tests)
+    fits = Fits(model, fitting, held_out, told, case.names_by_test())
     problem = fits.problem()
     believed_values = problem.values(problem.theta_of(model.believed))
     at_believed = huber_cost(problem.residual(problem.theta_of(believed_values)))
