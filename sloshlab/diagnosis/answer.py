@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.free_run_problem import FreeRunProblem, huber_cost
 from sloshlab.diagnosis.search import redrawn
 from sloshlab.diagnosis.search.fits import Told
 from sloshlab.diagnosis.verdict import Verdict, verdict_of
+from sloshlab.diagnosis.verdict.comparison import LEAST_MORE, Scale
 from sloshlab.diagnosis.verdict.interval import is_told_from_nothing
 
 _MOST_ROUNDS: Final = 5
@@ -40,21 +45,37 @@ def answered(found: Findings, told: Told = lambda what, done, of: None) -> tuple
             break
         if not best.spread:
             found = redrawn(found, best, told)
-        elif len(best.keys) > 1 and not all(is_told_from_nothing(best, one) for one in best.fit.candidates):
-            found = _without(found, best)
+        elif len(best.keys) > 1 and (nothing := _as_large_as_nothing(found, best)):
+            found = _without(found, best, nothing)
         else:
             break
         verdict = verdict_of(found)
     return found, verdict
 
 
-def _without(found: Findings, pair: Explanation) -> Findings:
+def _as_large_as_nothing(found: Findings, pair: Explanation) -> list[str]:
+    """Which of two effects have no size: by their intervals, or as nothing changes where it is taken to be zero.
+
+    An effect on one of several sensors that drive together leaves the drive to the others, and may gain by that
+    whatever its size is.
+    """
+    problem, scale = FreeRunProblem(found.model, found.fitting, pair.fit.candidates), Scale.of(found)
+    nothing = []
+    for one in pair.fit.candidates:
+        without = {**pair.fit.values, **{f"{one.key}.{name}": 0.0 for name in one.sizes}}
+        residual = problem.residual(problem.theta_of(without))
+        lost = (huber_cost(residual) - pair.fit.misfit) / scale.fitting if np.isfinite(residual).all() else np.inf
+        if lost < LEAST_MORE or not is_told_from_nothing(pair, one):
+            nothing.append(one.key)
+    return nothing
+
+
+def _without(found: Findings, pair: Explanation, nothing: Sequence[str]) -> Findings:
     """Findings in which two effects are no answer, as one of the best two is not told from nothing.
 
     The others are not tried one after another: what is worse may only hide the same better. What they describe is
     still what one effect alone is held against.
     """
-    nothing = [one.key for one in pair.fit.candidates if not is_told_from_nothing(pair, one)]
     why = f"fitted, but the size of {' and of '.join(nothing)} is not told from nothing"
     return replace(
         found,

@@ -151,7 +151,7 @@ def _shortest_that_holds(
 ) -> tuple[Explanation | None, bool]:
     """The shortest sufficient explanation, and whether it passes the gates.
 
-    Where a single effect does not, two that do are the answer, if they gain on it and explain half of everything.
+    Where a single effect does not, two that do are the answer, if they show more than it and explain half.
     """
     named = _shortest_sufficient(found, scale, ADEQUATE * ceiling.held_out_rms)
     if named is None or _holds(found, scale, named, described, ceiling):
@@ -161,7 +161,7 @@ def _shortest_that_holds(
         if (
             wider is not None
             and _explains_half(found, wider)
-            and has_gained(wider, at_its_best(found, named), scale)
+            and shows_more(wider, at_its_best(found, named), scale)
             and _holds(found, scale, wider, described, ceiling)
         ):
             return wider, True

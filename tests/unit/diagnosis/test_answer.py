@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import ClassVar
 
+import numpy as np
 import pytest
-from hand_made_findings import BASELINE, DRAG, FRICTION, STRIBECK, TIP, findings, left
+from hand_made_findings import BASELINE, DRAG, FRICTION, STRIBECK, TIP, N, findings, left
 
 from sloshlab.diagnosis import answer
 from sloshlab.diagnosis.answer import answered
@@ -17,8 +19,28 @@ DRAG_NUMBER, FRICTION_NUMBER = (*DRAG, *FRICTION)
 PAIR = left(0.0, 0.0, {**FRICTION, **DRAG})
 
 
-def drawn(monkeypatch: pytest.MonkeyPatch, spread: Mapping[str, float]) -> list[tuple[str, ...]]:
+class Without:
+    """Runs of which so much log-likelihood is lost, per number that is zero, of effects without their size."""
+
+    lost: ClassVar[Mapping[str, float]] = {}
+
+    def __init__(self, *parts: object) -> None:
+        del parts
+
+    def theta_of(self, values: Mapping[str, float]) -> Mapping[str, float]:
+        return values
+
+    def residual(self, values: Mapping[str, float]) -> np.ndarray:
+        lost = sum(self.lost.get(name, 500.0) for name, value in values.items() if value == 0)
+        return np.full(N, np.sqrt(1 + 2 * lost / N))
+
+
+def drawn(
+    monkeypatch: pytest.MonkeyPatch, spread: Mapping[str, float], lost: Mapping[str, float] | None = None
+) -> list[tuple[str, ...]]:
     """Let fits about other baselines spread by so much; what was drawn is kept."""
+    monkeypatch.setattr(Without, "lost", lost or {})
+    monkeypatch.setattr(answer, "FreeRunProblem", Without)
     asked: list[tuple[str, ...]] = []
 
     def redrawn(found: Findings, best: Explanation, told: object) -> Findings:
@@ -41,6 +63,19 @@ def test_two_effects_with_sizes_are_named_after_one_draw(monkeypatch: pytest.Mon
     assert verdict.best.spread
     assert asked == [PAIR.keys]
     assert found.failed == {}
+
+
+@pytest.mark.parametrize(("lost", "named"), [(12.1, PAIR.keys), (11.9, ("structure.coulomb_friction",))])
+def test_an_effect_without_which_nothing_changes_has_no_size(
+    monkeypatch: pytest.MonkeyPatch, lost: float, named: tuple[str, ...]
+) -> None:
+    """An effect on one of two sensors that drive gains by leaving the drive to the other one."""
+    drawn(monkeypatch, {}, {DRAG_NUMBER: lost})
+    single = left(200.0, 200.0, FRICTION, squares=1.9, rms=1.1, repeating={("run_2", TIP): 0.2})
+    _, verdict = answered(findings(BASELINE, [PAIR, single]))
+    assert verdict.kind == "named"
+    assert verdict.best is not None
+    assert verdict.best.keys == named
 
 
 @pytest.mark.parametrize(
