@@ -227,7 +227,7 @@ def test_an_effect_of_one_number_does_not_climb(case: Decays, coulomb: Explanati
 def findings(case: Decays, *explanations: Explanation) -> Findings:
     baseline = case.fits.judged(case.baseline)
     return Findings(
-        cast(Case, SimpleNamespace(tests=list)), case.fits.model, Split((), (), ()), cast(Any, None),
+        cast(Case, SimpleNamespace(names_by_test=list)), case.fits.model, Split((), (), ()), cast(Any, None),
         case.fits.fitting, case.fits.held_out, baseline, baseline, list(explanations), [], {}, {},
     )  # fmt: skip
 
