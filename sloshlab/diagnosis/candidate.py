@@ -49,6 +49,8 @@ class Surroundings:
         Frequencies about which the retuned baseline misses the recordings most: there a mode may be missing.
     n_modes : int
         Of the structure.
+    unlike_base : frozenset of str
+        Channels that do not read the base's motion times a gain, with a delay.
     """
 
     rig: Rig
@@ -68,6 +70,7 @@ class Surroundings:
     has_one_frequency: bool = False
     missed_hz: tuple[float, ...] = ()
     n_modes: int = 1
+    unlike_base: frozenset[str] = frozenset()
 
     @property
     def reading(self) -> float:

@@ -301,7 +301,7 @@ CLOCK = _sensor_effect(
 
 
 def _pairs(at: Surroundings) -> list[str]:
-    """Channel and source, of the same quantity first; at one frequency a leak is a gain, but into what rests.
+    """Channel and source, of the same quantity first; what moves alike at one frequency leaks as a gain would.
 
     On a shaker all of one quantity read one motion or one force, and a leak from each other is a gain, too.
     """
@@ -310,7 +310,8 @@ def _pairs(at: Surroundings) -> list[str]:
         (to, source)
         for to in at.channels
         for source in at.channels
-        if source != to and (to.endswith("_root") or not at.has_one_frequency)
+        if source != to
+        if to.endswith("_root") or not at.has_one_frequency or (source.endswith("_root") and to in at.unlike_base)
         if not (is_shaker and _are_alike(to, source))
     ]
     pairs.sort(key=lambda pair: not _are_alike(*pair))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
+from recorded_oscillators import RATE_HZ, run_of
 
 from sloshlab.diagnosis import surroundings
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
@@ -89,6 +91,31 @@ class Spectra:
 
     spectra: np.ndarray
     frequencies_hz: np.ndarray
+
+
+@pytest.mark.parametrize(
+    ("loud", "is_unlike"),
+    [
+        pytest.param((0.0, 0.0), False, id="one frequency"),
+        pytest.param((0.6, -0.6), True, id="two, at one the other way"),
+        pytest.param((0.1, -0.1), False, id="two, little at one"),
+    ],
+)
+def test_a_channel_is_unlike_the_base_where_no_complex_number_turns_one_into_the_other(
+    loud: tuple[float, float], is_unlike: bool
+) -> None:
+    """Of (1, l) and (2, 2 m) at two frequencies one number explains (1 + lm)²/((1 + l²)(1 + m²)): 0.22, 0.96."""
+    time = np.arange(1000) / RATE_HZ
+    base, other = (np.sin(2 * np.pi * 5 * time), np.sin(2 * np.pi * 11 * time))
+    turned, other_turned = (-np.cos(2 * np.pi * 5 * time), -np.cos(2 * np.pi * 11 * time))
+    signals = {
+        "acceleration_root": base + loud[0] * other,
+        "acceleration_tip": 2 * turned + 2 * loud[1] * other_turned,
+    }
+    run = run_of("run", signals, {}, 0, experiment="other")
+    found = surroundings._unlike_base([[cast(Any, SimpleNamespace(run=run))]])
+    assert ("acceleration_tip" in found) == is_unlike
+    assert "acceleration_root" not in found
 
 
 def test_modes_are_sought_at_the_highest_peaks_of_all_channels_together() -> None:

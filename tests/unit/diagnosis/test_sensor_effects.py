@@ -162,6 +162,17 @@ def test_a_leak_from_what_moves_alike_is_a_gain_and_is_not_sought(model: RigMode
     )
 
 
+def test_at_one_frequency_the_base_leaks_only_into_what_it_does_not_move_alike(model: RigModel) -> None:
+    """A tank at its resonance moves at one frequency, the base that drives it need not."""
+    channels = {"acceleration_tip": 9.0, "displacement_tank": 1e-3, "acceleration_root": 2.0}
+    at = replace(surroundings(model), channels=channels, has_one_frequency=True)
+    leaks = effect("sensor.cross_talk")
+    into_the_base = {"acceleration_root<acceleration_tip", "acceleration_root<displacement_tank"}
+    assert set(leaks.places(at)) == into_the_base
+    unlike = replace(at, unlike_base=frozenset({"acceleration_tip"}))
+    assert set(leaks.places(unlike)) == into_the_base | {"acceleration_tip<acceleration_root"}
+
+
 def test_a_leak_of_the_base_shows_in_the_readings_of_the_tip(model: RigModel) -> None:
     candidate = Candidate(effect("sensor.cross_talk"), surroundings(model), f"{CHANNEL}<acceleration_root")
     [run] = model.runs
