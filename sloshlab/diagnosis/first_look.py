@@ -40,7 +40,7 @@ class FirstLook:
         self._weights = softness * robust_weights(softness * residual, 10.0)
         self._weighted, self._left = jacobian.weighted(self._weights), self._weights * residual
         self._can_move = np.flatnonzero(~problem.at_bounds(theta))
-        prior = np.where(np.arange(jacobian.n_columns) < problem.n_baseline, 1.0, 0.0)
+        prior = problem.prior
         movable = np.ix_(self._can_move, self._can_move)
         self._inverse = np.linalg.pinv((self._weighted.normal() + np.diag(prior))[movable])
         self._gradient = (self._weighted.transposed_times(self._left) + prior * theta)[self._can_move]

@@ -102,7 +102,7 @@ class _Descent:
     ) -> None:
         self.problem, self.theta, self.residual = problem, theta, residual
         n = theta.size
-        self.prior = np.where(np.arange(n) < problem.n_baseline, 1.0, 0.0)
+        self.prior = problem.prior
         self.jacobian, self.hessian = known or BlockJacobian(n, ()), np.eye(n)
 
     def stage(self, share: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:

@@ -148,6 +148,11 @@ class FreeRunProblem:
         self.n_simulations = 0
 
     @property
+    def prior(self) -> FloatArray:
+        """Weights of the squares of scaled parameters: one where something is believed of them, else zero."""
+        return np.array([1.0] * self.n_baseline + [0.0] * (len(self.names) - self.n_baseline))
+
+    @property
     def moves(self) -> NDArray[np.bool_]:
         """Which of the baseline's parameters change the motion, not only what a channel reads."""
         return np.array([not parameter.is_reading for parameter in self._baseline])

@@ -76,10 +76,12 @@ def _unlike_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:
     """
     products: dict[str, list[FloatArray]] = {}
     for run in (observed[0].run for observed in fitting if not observed[0].run.is_free):
-        if _BASE not in run.recording:
+        if _BASE not in run.recording or not np.isfinite(run.recording[_BASE].values).any():
             continue
         base = _analytic(run.recording[_BASE].values)
         for name in channels(run.recording):
+            if not np.isfinite(run.recording[name].values).any():
+                continue
             own = _analytic(run.recording[name].values)
             part = np.array([np.vdot(base, own), np.vdot(base, base), np.vdot(own, own)])
             products.setdefault(name, []).append(part)

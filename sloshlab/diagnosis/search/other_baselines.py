@@ -45,7 +45,7 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
     fits = Fits(found.model, found.fitting, found.held_out, told, found.case.names_by_test())
     plain = fits.problem(candidates)
     draws = norm.ppf(qmc.Halton(len(plain.names), seed=0).random(_N_DRAWN))
-    at_best, is_baseline = plain.theta_of(best.fit.values), np.arange(len(plain.names)) < plain.n_baseline
+    at_best, is_baseline = plain.theta_of(best.fit.values), plain.prior > 0
     at_best_softly = soft_cost(plain, best.fit, STAGES[-3])
     ends = [best.fit]
     for i, draw in enumerate(np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)):

@@ -47,8 +47,7 @@ def scatter_of_runs(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJac
     residual = problem.residual(theta)
     weights = robust_weights(residual)
     weighted, pull = jacobian.weighted(weights), weights * residual
-    prior = np.diag((np.arange(theta.size) < problem.n_baseline).astype(np.float64))
-    covariance = np.linalg.pinv(weighted.normal() + prior)
+    covariance = np.linalg.pinv(weighted.normal() + np.diag(problem.prior))
     error = np.zeros(theta.size)
     for n in _PARTS_OF_A_RUN:
         gradients = _gradients_of_parts(weighted, pull, _parts(problem, n))

@@ -27,7 +27,7 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
     or it is what runs and parts of runs disagree by, whichever is more.
     What is not known of the baseline counts once, as its standard error or as how far fits about other baselines
     end elsewhere, whichever is more. Where gains or masses scale the number, it is known no better than those: a
-    cubic spring by the gain of a force and three times by that of a displacement.
+    cubic spring by the gain of a force and three times by that of a displacement, a leak by those of two sensors.
     """
     estimate = best.fit.values[f"{candidate.key}.{parameter}"]
     width = _half_width(best, candidate, parameter)

@@ -26,6 +26,10 @@ class Linear:
     soft: float = 1.0
     n_baseline: int = 2
 
+    @property
+    def prior(self) -> np.ndarray:
+        return np.array([1.0] * self.n_baseline + [0.0] * (self.fixed.size - self.n_baseline))
+
     def softness(self, share: float) -> np.ndarray:
         return np.full(N, self.soft)
 
@@ -111,11 +115,12 @@ def test_a_channel_is_unlike_the_base_where_no_complex_number_turns_one_into_the
     signals = {
         "acceleration_root": base + loud[0] * other,
         "acceleration_tip": 2 * turned + 2 * loud[1] * other_turned,
+        "acceleration_beam_1": np.full(time.size, np.nan),  # a sensor that did not work
     }
     run = run_of("run", signals, {}, 0, experiment="other")
     found = surroundings._unlike_base([[cast(Any, SimpleNamespace(run=run))]])
     assert ("acceleration_tip" in found) == is_unlike
-    assert "acceleration_root" not in found
+    assert not found & {"acceleration_root", "acceleration_beam_1"}
 
 
 def test_modes_are_sought_at_the_highest_peaks_of_all_channels_together() -> None:
