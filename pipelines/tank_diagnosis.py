@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 import xarray as xr
-from scipy.signal import decimate
+from scipy.signal import butter, sosfiltfilt
 
 from pipelines.diagnose import diagnose_case
 from pipelines.outputs import write_dataset
@@ -26,8 +27,14 @@ from sloshlab.recording import read_recording, write_recording
 
 _FROZEN: Final = 'tank_model = "frozen"'
 _VISCOUS: Final = 'tank_model = "viscous"\nparameters = {{ damping_kg_per_s = {:g} }}'
-_MAPS: Final = 'tank_model = "viscous"\nparameters = {{ maps = "{}", metric = "map" }}'
+_MAPS: Final = 'tank_model = "viscous"\nparameters = {{ maps = "{}", metric = "map", effective_mass = {} }}'
 _MAPS_FILE: Final = "maps.nc"
+_OF_SWEEPS: Final = "shaker/rig_fill_0.50.toml"
+_ORDER: Final = 8
+_MIRRORED: Final = 20
+"""Samples of the lower rate; further a filter does not reach."""
+_SHARE_OF_BAND: Final = 0.8
+"""Of what a lower rate leaves, to which recordings are filtered; there and back a filter halves at its corner."""
 _THREE_MODES: Final = (
     "frequencies_hz = [10.87, 78.31, 226.5]",
     "damping_ratios = [0.0032, 0.0090, 0.0176]",
@@ -54,6 +61,14 @@ class TankCase:
         What is known to be missing.
     every : int
         Of how many samples one is kept, after a low-pass filter without delay.
+    below_hz : float
+        To which recordings are filtered; liquids answer at twice and three times the frequency, too.
+    within_s : tuple of float
+        The part of recordings that is taken: of a sweep the frequencies at which something happens.
+    maps_from : tuple of str
+        Patterns of the sweeps that gave the maps of the liquid, where `twin` names maps.
+    work_known_below_g : float
+        Work per cycle at higher levels is left out of the maps.
     """
 
     name: str
@@ -62,7 +77,14 @@ class TankCase:
     twin: str
     left_out: str
     every: int
+    below_hz: float = np.inf
+    within_s: tuple[float, float] = (0.0, np.inf)
+    maps_from: tuple[str, ...] = ()
+    work_known_below_g: float = np.inf
 
+
+_STRONG_SWEEPS: Final = tuple(f"shaker/fill_0.50_sweep_{level}g*.nc" for level in ("3.00", "4.00", "5.00", "6.00"))
+_ALL_SWEEPS: Final = ("shaker/fill_0.50_sweep_1.50g.nc", "shaker/fill_0.50_sweep_2.00g.nc", *_STRONG_SWEEPS)
 
 CASES: Final = (
     TankCase(
@@ -76,10 +98,23 @@ CASES: Final = (
     TankCase(
         "shaker_maps",
         "shaker/rig_fill_0.50.toml",
-        tuple(f"shaker/fill_0.50_sweep_{level}g*.nc" for level in ("1.50", "2.00", "3.00")),
-        _MAPS.format(_MAPS_FILE),
+        _STRONG_SWEEPS,
+        _MAPS.format(_MAPS_FILE, "false"),
         "effective mass",
-        8,
+        12,
+        below_hz=16.0,
+        within_s=(80.0, 180.0),
+        maps_from=_STRONG_SWEEPS,
+    ),
+    TankCase(
+        "starts_maps",
+        "transients/rig_fill_0.50.toml",
+        ("transients/fill_0.50_sudden_start_1[01].?hz_[234].??g_*.nc",),
+        _MAPS.format(_MAPS_FILE, "true"),
+        "break-up after some cycles",
+        12,
+        below_hz=16.0,
+        maps_from=_ALL_SWEEPS,
     ),
     TankCase(
         "starts_viscous",
@@ -90,12 +125,16 @@ CASES: Final = (
         12,
     ),
     TankCase(
-        "high_g_viscous",
-        "transients/rig_fill_0.50.toml",
-        ("transients/fill_0.50_sudden_start_1[23].?hz_*.nc",),
-        _VISCOUS.format(4.0),
-        "dissipation at high accelerations, break-up after some cycles",
+        "high_g_maps",
+        "shaker/rig_fill_0.50.toml",
+        _STRONG_SWEEPS,
+        _MAPS.format(_MAPS_FILE, "true"),
+        "dissipation that grows no more at high accelerations",
         12,
+        below_hz=16.0,
+        within_s=(100.0, 145.0),
+        maps_from=_ALL_SWEEPS,
+        work_known_below_g=3.2,
     ),
     TankCase(
         "beam_frozen",
@@ -149,25 +188,51 @@ def make_case(recordings: Path, case: TankCase, folder: Path) -> None:
         (complete / "rig.toml").write_text(rig)
         if _MAPS_FILE in case.twin:
             settings = ShakerSettings.checked(p=6, m=24, boundaries="measured", allow_incomplete=False)
-            write_dataset(analyse_shaker(chosen, [recordings / case.rig], settings).maps, complete / _MAPS_FILE)
+            sweeps = [file for pattern in case.maps_from for file in sorted(recordings.glob(pattern))]
+            maps = analyse_shaker(sweeps, [recordings / _OF_SWEEPS], settings).maps
+            is_known = maps["u_bar"] * maps["omega_bar"] ** 2 < case.work_known_below_g
+            write_dataset(maps.assign(w_bar=maps["w_bar"].where(is_known)), complete / _MAPS_FILE)
         (complete / "recordings").mkdir()
         for file in chosen:
-            write_recording(at_lower_rate(read_recording(file), case.every), complete / "recordings" / file.name)
+            part = part_of(read_recording(file), *case.within_s)
+            write_recording(at_lower_rate(part, case.every, case.below_hz), complete / "recordings" / file.name)
 
 
-def at_lower_rate(recording: xr.Dataset, every: int) -> xr.Dataset:
-    """A recording of one sample in `every`, low-pass filtered before to the band that is left, without delay."""
+def part_of(recording: xr.Dataset, from_s: float, to_s: float) -> xr.Dataset:
+    """A recording between two times after its beginning; its times begin with zero again."""
+    chosen = (recording["time"].values >= from_s) & (recording["time"].values < to_s)
+    part = recording.isel(time=np.flatnonzero(chosen))
+    return part.assign_coords(time=recording["time"].values[: part.sizes["time"]])
+
+
+def at_lower_rate(recording: xr.Dataset, every: int, below_hz: float = np.inf) -> xr.Dataset:
+    """A recording of one sample in `every`, low-pass filtered before without delay.
+
+    At both ends the filter sees the recording mirrored: a release begins with its largest displacement, and a jump
+    from nothing to that would ring in the samples about it.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+    every : int
+    below_hz : float
+        Where the filter has fallen to a half, if that is lower than 0.8 of the band that is left.
+    """
+    rate = float(recording.attrs["sampling_rate_hz"])
+    low_pass = butter(_ORDER, min(below_hz, _SHARE_OF_BAND * 0.5 * rate / every), fs=rate, output="sos")
     kept: dict[str, xr.DataArray] = {}
     for name, variable in recording.data_vars.items():
         if variable.dims != ("time",):
             kept[str(name)] = variable
         elif variable.dtype.kind == "f":
-            values = decimate(variable.values.astype(float), every, ftype="fir", zero_phase=True)
-            kept[str(name)] = variable[::every].copy(data=values)
+            n_mirrored = min(_MIRRORED * every, variable.size - 1)
+            values = sosfiltfilt(low_pass, variable.values.astype(float), padtype="even", padlen=n_mirrored)
+            kept[str(name)] = variable[::every].copy(data=values[::every])
+            if "noise_std" in variable.attrs:
+                kept[str(name)].attrs["noise_std"] = float(variable.attrs["noise_std"]) / np.sqrt(every)
         else:
             kept[str(name)] = variable[::every]
-    rate = float(recording.attrs["sampling_rate_hz"]) / every
-    return xr.Dataset(kept, attrs={**recording.attrs, "sampling_rate_hz": rate})
+    return xr.Dataset(kept, attrs={**recording.attrs, "sampling_rate_hz": rate / every})
 
 
 if __name__ == "__main__":

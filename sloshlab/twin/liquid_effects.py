@@ -8,6 +8,16 @@ from __future__ import annotations
 from math import pi, sqrt
 
 from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.twin.break_up import (
+    AVERAGING,
+    NEVER_G,
+    at_rest,
+    level_g,
+    rate_of_break_up,
+    share_broken_up,
+    share_by_saturation,
+)
+from sloshlab.twin.break_up import PARAMETERS as BREAK_UP_PARAMETERS
 from sloshlab.twin.law import ACCELERATION, DISPLACEMENT, TIME, VELOCITY, law
 from sloshlab.twin.terms import ForceKind, Parameter, register
 
@@ -15,7 +25,10 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 # mypy: disable-error-code="no-untyped-def"
 
 _G = GRAVITY_M_PER_S2
-_NEVER = 1e6
+
+
+_BREAK_UP = 6
+"""Where the numbers of `break_up` begin among those of the damper."""
 
 
 @law
@@ -23,20 +36,16 @@ def _liquid_damping(motion, parameters, memory, rates):
     """−s [c · saturation + (m_l/π) ω W̄(â)] v; s builds up while the liquid is thrown about."""
     omega = sqrt(memory[1] / memory[0]) if memory[0] > 0 else 1.0
     omega = min(max(omega, 1.0), 1e4)
-    rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / parameters[9]
-    rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / parameters[9]
-    size = sqrt(2.0 * max(memory[1], 0.0)) / _G
-    violent = 1.0 / (1.0 + (parameters[8] / max(size, 1e-3 * parameters[8])) ** parameters[11])
-    calming = parameters[10] if parameters[10] > 0.0 else parameters[5]
-    rates[2] = violent * (1.0 - memory[2]) / parameters[5] - (1.0 - violent) * memory[2] / calming
-    built = memory[2] if parameters[5] > 1e-3 else 1.0
-    damping = parameters[0]
-    if size > parameters[4]:
-        damping *= (parameters[4] / size) ** 2
+    averaging = parameters[_BREAK_UP + AVERAGING]
+    rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / averaging
+    rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / averaging
+    size = level_g(memory[1])
+    rates[2] = rate_of_break_up(parameters, _BREAK_UP, size, memory[2])
+    damping = parameters[0] * share_by_saturation(parameters, _BREAK_UP, size)
     if size > parameters[2]:
-        over = (size - parameters[2]) / (parameters[7] * parameters[2])
+        over = (size - parameters[2]) / (parameters[4] * parameters[2])
         damping += parameters[1] / pi * omega * parameters[3] * 2.0 * over / (1.0 + over * over)
-    return -built * damping * motion[VELOCITY]
+    return -share_broken_up(parameters, _BREAK_UP, memory[2]) * damping * motion[VELOCITY]
 
 
 LIQUID_DAMPING = register(
@@ -46,22 +55,17 @@ LIQUID_DAMPING = register(
         (
             Parameter("damping_n_s_per_m", "N s m-1", 0.0, 1e4, 0.0),
             Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
-            Parameter("threshold_g", "1", 1e-3, 1e6, _NEVER),
+            Parameter("threshold_g", "1", 1e-3, 1e6, NEVER_G),
             Parameter("peak_w_bar", "1", 0.0, 100.0, 0.0),
-            Parameter("saturation_g", "1", 1e-3, 1e6, _NEVER),
-            Parameter("time_constant_s", "s", 1e-4, 100.0, 1e-3),
-            Parameter("start_frequency_hz", "Hz", 1e-3, 1e4, 10.0),
             Parameter("rise", "1", 1e-3, 1e3, 1.0),
-            Parameter("agitated_g", "1", 1e-3, 1e6, 1.0),
-            Parameter("averaging_s", "s", 1e-3, 100.0, 0.2),
-            Parameter("calming_s", "s", 0.0, 1e9, 0.0),
-            Parameter("sharpness", "1", 1.0, 100.0, 30.0),
+            Parameter("start_frequency_hz", "Hz", 1e-3, 1e4, 10.0),
+            *BREAK_UP_PARAMETERS,
         ),
         _liquid_damping,
         memory=lambda values, table: (
             1e-6,
             1e-6 * (2 * pi * values["start_frequency_hz"]) ** 2,
-            0.0 if values["time_constant_s"] > 1e-3 else 1.0,
+            at_rest(values["break_up_s"]),
         ),
         uses_acceleration=True,
         equation="−s [c (a_s/â)² beyond a_s + (m_l/π) Ω W̄_peak 2b/(1 + b²)] v, b = (â/a_t − 1)/rise beyond a_t, "

@@ -6,7 +6,7 @@ The structure of a twin always carries the frozen liquid. A liquid that is froze
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import pi, sqrt
+from math import log2, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,15 @@ from numba import njit
 
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError
+from sloshlab.twin.break_up import (
+    AVERAGING,
+    at_rest,
+    level_g,
+    rate_of_break_up,
+    share_broken_up,
+    share_by_saturation,
+)
+from sloshlab.twin.break_up import PARAMETERS as BREAK_UP_PARAMETERS
 from sloshlab.twin.law import ACCELERATION, DISPLACEMENT, VELOCITY, law
 from sloshlab.twin.map_region import outside_remarks
 from sloshlab.twin.terms import ForceKind, Parameter, register
@@ -23,6 +32,7 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 
 FloatArray = npt.NDArray[np.float64]
 _G = GRAVITY_M_PER_S2
+_MOST_OCTAVES, _MOST_DOUBLINGS = 2.0, 3.0
 _RADIUS, _STIFFNESS, _DAMPING, _HARDENING, _FROZEN, _LIQUID, _HEIGHT, _IN_FLIGHT = range(8)
 
 
@@ -148,35 +158,50 @@ def _track(motion, parameters, memory, rates):
     return omega, sqrt(motion[VELOCITY] ** 2 + (motion[ACCELERATION] / omega) ** 2) / omega
 
 
-@law
-def _viscous_map(motion, parameters, memory, rates):
-    """−c(ω̄, ū) v with c from (E.4)."""
-    omega, amplitude = _track(motion, parameters, memory, rates)
-    w_bar = _map_value(parameters, 4, omega / sqrt(_G / parameters[1]), amplitude / parameters[1])
-    return -parameters[0] / pi * omega * w_bar * motion[VELOCITY]
-
-
-@law
-def _effective_mass_map(motion, parameters, memory, rates):
-    """−β(ω̄, ū) m_l a."""
-    omega, amplitude = _track(motion, parameters, memory, rates)
-    beta = _map_value(parameters, 4, omega / sqrt(_G / parameters[1]), amplitude / parameters[1])
-    return -parameters[0] * beta * motion[ACCELERATION]
-
-
-def _tracked_at_start(values: Mapping[str, float], table: FloatArray) -> tuple[float, float]:
-    """Mean squares of a motion of h/10: a release begins with v = 0, which is no infinite frequency."""
-    omega = 2 * pi * values["start_frequency_hz"]
-    velocity = 0.1 * values["height_m"] * omega / sqrt(2.0)
-    return velocity**2, (omega * velocity) ** 2
-
-
 _OF_MAPS = (
     Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
     Parameter("height_m", "m", 1e-6, 100.0),
     Parameter("time_constant_s", "s", 1e-4, 100.0, 0.2),
     Parameter("start_frequency_hz", "Hz", 1e-3, 1e4, 10.0),
+    *BREAK_UP_PARAMETERS,
 )
+_BREAK_UP, _TABLE = 4, len(_OF_MAPS)
+"""Where the numbers of `break_up` and the table begin."""
+
+
+@njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def _share_of_map(motion, parameters, memory, rates):
+    """What acts of a map, which is that of liquid long thrown about at levels below saturation."""
+    rates[2] = (motion[ACCELERATION] ** 2 - memory[2]) / parameters[_BREAK_UP + AVERAGING]
+    level = level_g(memory[2])
+    rates[3] = rate_of_break_up(parameters, _BREAK_UP, level, memory[3])
+    return share_broken_up(parameters, _BREAK_UP, memory[3]) * share_by_saturation(parameters, _BREAK_UP, level)
+
+
+@law
+def _viscous_map(motion, parameters, memory, rates):
+    """−s c(ω̄, ū) v with c from (E.4)."""
+    omega, amplitude = _track(motion, parameters, memory, rates)
+    w_bar = _map_value(parameters, _TABLE, omega / sqrt(_G / parameters[1]), amplitude / parameters[1])
+    share = _share_of_map(motion, parameters, memory, rates)
+    return -share * parameters[0] / pi * omega * w_bar * motion[VELOCITY]
+
+
+@law
+def _effective_mass_map(motion, parameters, memory, rates):
+    """−s β(ω̄, ū) m_l a."""
+    omega, amplitude = _track(motion, parameters, memory, rates)
+    beta = _map_value(parameters, _TABLE, omega / sqrt(_G / parameters[1]), amplitude / parameters[1])
+    share = _share_of_map(motion, parameters, memory, rates)
+    return -share * parameters[0] * beta * motion[ACCELERATION]
+
+
+def _tracked_at_start(values: Mapping[str, float], table: FloatArray) -> tuple[float, float, float, float]:
+    """Mean squares of a motion of h/10: a release begins with v = 0, which is no infinite frequency."""
+    omega = 2 * pi * values["start_frequency_hz"]
+    velocity = 0.1 * values["height_m"] * omega / sqrt(2.0)
+    return velocity**2, (omega * velocity) ** 2, 0.0, at_rest(values["break_up_s"])
+
 
 VISCOUS_MAP = register(
     ForceKind(
@@ -187,7 +212,7 @@ VISCOUS_MAP = register(
         memory=_tracked_at_start,
         uses_acceleration=True,
         remarks=outside_remarks,
-        equation="−c(ω̄, ū) v, c = (m_l/π) √(g/h) ω̄ W̄(ω̄, ū) (E.4)",
+        equation="−s c(ω̄, ū) v, c = (m_l/π) √(g/h) ω̄ W̄(ω̄, ū) (E.4); s = 1 unless it saturates or breaks up late",
     )
 )
 EFFECTIVE_MASS_MAP = register(
@@ -199,7 +224,7 @@ EFFECTIVE_MASS_MAP = register(
         memory=_tracked_at_start,
         uses_acceleration=True,
         remarks=outside_remarks,
-        equation="−β(ω̄, ū) m_l a",
+        equation="−s β(ω̄, ū) m_l a; s = 1 unless it saturates or breaks up late",
     )
 )
 EFFECTIVE_MASS = register(
@@ -236,6 +261,44 @@ FADING_MASS = register(
         memory=lambda values, table: (0.0,),
         uses_acceleration=True,
         equation="−β m_l a / (1 + (â/a_f)²): the share of the liquid that does not follow falls with the motion",
+    )
+)
+
+
+@law
+def _varying_mass(motion, parameters, memory, rates):
+    """−β(f, â) m_l a, f and â from the running mean squares of v and a."""
+    rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / parameters[9]
+    rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / parameters[9]
+    frequency = sqrt(memory[1] / memory[0]) / (2.0 * pi) if memory[0] > 0 else parameters[1]
+    octaves = min(max(log2(max(frequency, 1e-6) / parameters[1]), -_MOST_OCTAVES), _MOST_OCTAVES)
+    doublings = min(max(log2(max(level_g(memory[1]), 1e-6) / parameters[2]), -_MOST_DOUBLINGS), _MOST_DOUBLINGS)
+    beta = parameters[3] + (parameters[4] + parameters[5] * octaves) * octaves
+    beta += (parameters[6] + parameters[7] * doublings + parameters[8] * octaves) * doublings
+    return -parameters[0] * max(beta, -0.99) * motion[ACCELERATION]
+
+
+VARYING_MASS = register(
+    ForceKind(
+        "varying_mass",
+        ("tank",),
+        (
+            Parameter("liquid_mass_kg", "kg", 1e-9, 1e6),
+            Parameter("frequency_hz", "Hz", 1e-3, 1e4),
+            Parameter("level_g", "1", 1e-6, 1e6),
+            Parameter("beta", "1", -0.99, 10.0),
+            Parameter("beta_per_octave", "1", -10.0, 10.0, 0.0),
+            Parameter("beta_per_octave_squared", "1", -10.0, 10.0, 0.0),
+            Parameter("beta_per_doubling", "1", -10.0, 10.0, 0.0),
+            Parameter("beta_per_doubling_squared", "1", -10.0, 10.0, 0.0),
+            Parameter("beta_per_octave_and_doubling", "1", -10.0, 10.0, 0.0),
+            Parameter("averaging_s", "s", 1e-3, 100.0, 0.2),
+        ),
+        _varying_mass,
+        memory=lambda values, table: (1e-6, 1e-6 * (2 * pi * values["frequency_hz"]) ** 2),
+        uses_acceleration=True,
+        equation="−β(f, â) m_l a, β = β₀ + b₁ x + b₂ x² + b₃ y + b₄ y² + b₅ x y, x = log₂(f/f₀) within ±2, "
+        "y = log₂(â/a₀) within ±3",
     )
 )
 

@@ -12,7 +12,7 @@ from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, forc
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.liquid_effects import AIR_CUSHION, FARADAY_WAVE, LATERAL_MODE, LIQUID_DAMPING, LIQUID_LOSS
 from sloshlab.twin.structure_forces import COULOMB_FRICTION, MASS_ERROR, QUADRATIC_DRAG, VISCOUS_DAMPING
-from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS
+from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS, VARYING_MASS
 from sloshlab.twin.terms import Term
 
 _CONTACT_HZ: Final = 50.0
@@ -109,6 +109,42 @@ FADING = force_effect(
     variant_of="effective_mass",
 )
 
+_VARIES: Final = (
+    "per_octave",
+    "per_octave_squared",
+    "per_doubling",
+    "per_doubling_squared",
+    "per_octave_and_doubling",
+)
+
+
+def _sweeps(at: Surroundings) -> bool:
+    """Whether a shaker moves the tank at several frequencies, at each of which it has the mass of its own."""
+    return at.twin.structure is None and not at.has_one_frequency
+
+
+VARYING = force_effect(
+    VARYING_MASS,
+    "tank",
+    lambda at: [
+        {"beta": sign * 0.1, **{f"beta_{name}": slope * 0.1 for name in _VARIES}}
+        for sign in (1, -1)
+        for slope in (1, -1)
+    ],
+    fixed=lambda at: {
+        "liquid_mass_kg": at.rig.liquid_mass_kg,
+        "frequency_hz": at.frequency_hz,
+        "level_g": 0.5 * _largest_g(at),
+        "averaging_s": 2 / at.frequency_hz,
+    },
+    fitted=("beta", *(f"beta_{name}" for name in _VARIES)),
+    needs=_sweeps,
+    separated_by="runs with frozen and moving liquid, at several amplitudes",
+    spoken_for_by=("does no work", "odd in displacement"),
+    includes=("mass_error",),
+    variant_of="effective_mass",
+)
+
 
 def _damping(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     del channel
@@ -147,18 +183,22 @@ SLOSHING = register(
 )
 
 
-def _changed_damping(change: Callable[[Term, Numbers, Surroundings], Term]) -> Callable[..., Extension]:
-    """What it makes of the dampers of the liquid that are there."""
+_DAMPERS: Final = ("viscous_damping", "liquid_damping", "viscous_map")
+_OF_MOVING_LIQUID: Final = (*_DAMPERS, "effective_mass_map")
+"""Forces of the baseline that stand for moving liquid: liquid that has not broken up yet has none of them."""
+
+
+def _changed_liquid(
+    change: Callable[[Term, Numbers, Surroundings], Term], kinds: tuple[str, ...]
+) -> Callable[..., Extension]:
+    """What it makes of the forces of the liquid that are there."""
 
     def extension(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         del channel
 
         def liquid(terms: tuple[Term, ...]) -> tuple[Term, ...]:
             return tuple(
-                change(_as_liquid_damping(term, at), numbers, at)
-                if term.name in ("viscous_damping", "liquid_damping")
-                else term
-                for term in terms
+                change(_as_liquid_damping(term, at), numbers, at) if term.name in kinds else term for term in terms
             )
 
         return Extension(liquid=liquid)
@@ -167,7 +207,7 @@ def _changed_damping(change: Callable[[Term, Numbers, Surroundings], Term]) -> C
 
 
 def _as_liquid_damping(term: Term, at: Surroundings) -> Term:
-    if term.name == "liquid_damping":
+    if term.name != "viscous_damping":
         return term
     return LIQUID_DAMPING(
         damping_n_s_per_m=max(term.values["damping_n_s_per_m"], 0.0),
@@ -177,7 +217,7 @@ def _as_liquid_damping(term: Term, at: Surroundings) -> Term:
 
 
 def _damps(at: Surroundings) -> bool:
-    return any(term.place == "tank" and term.name == "viscous_damping" for term in at.twin.terms)
+    return any(term.place == "tank" and term.name in _DAMPERS for term in at.twin.terms)
 
 
 _NEVER_CALM_S: Final = 1e9
@@ -185,11 +225,11 @@ DELAY = register(
     Effect(
         "breakup_delay",
         "tank",
-        "the damping of the liquid times s, ṡ = p (1 − s)/τ, p = rⁿ/(1 + rⁿ), r = â/a_agitated; s stays",
+        "the forces of moving liquid times s, ṡ = p (1 − s)/τ, p = rⁿ/(1 + rⁿ), r = â/a_agitated; s stays",
         (
             EffectParameter("time_constant_s", 2e-3, 20.0),
             EffectParameter("agitated_g", 0.02, 20.0),
-            EffectParameter("averaging_s", 0.01, 5.0),
+            EffectParameter("averaging_s", 0.01, 5.0, may_rest=True),  # a start that goes on does not tell it
             EffectParameter("sharpness", 2.0, 50.0, may_rest=True),
         ),
         lambda at: [
@@ -202,7 +242,14 @@ DELAY = register(
             for n in (1.0, 5.0)
             for share in (0.1, 0.4)
         ],
-        _changed_damping(lambda term, numbers, at: term.changed(**numbers, calming_s=_NEVER_CALM_S)),
+        _changed_liquid(
+            lambda term, numbers, at: term.changed(
+                break_up_s=numbers["time_constant_s"],
+                **{name: value for name, value in numbers.items() if name != "time_constant_s"},
+                calming_s=_NEVER_CALM_S,
+            ),
+            _OF_MOVING_LIQUID,
+        ),
         ("high_g_saturation",),
         "a sudden start at constant amplitude",
         _damps,
@@ -223,10 +270,11 @@ SATURATION = register(
             {"threshold_g": share * _largest_g(at), "averaging_s": 2 / at.frequency_hz}
             for share in (0.3, 0.5, 0.7)
         ],
-        _changed_damping(
+        _changed_liquid(
             lambda term, numbers, at: term.changed(
                 saturation_g=numbers["threshold_g"], averaging_s=numbers["averaging_s"]
-            )
+            ),
+            _DAMPERS,
         ),
         ("breakup_delay", "liquid_sloshing"),
         _LEVELS,

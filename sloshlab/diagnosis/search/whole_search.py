@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final, cast
 
 from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, candidates
+from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings, largest_strength
 from sloshlab.diagnosis.free_run_fit import fitted_baseline
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, huber_cost
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_cost
 from sloshlab.diagnosis.noise_floor import weighted_observations
 from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
@@ -78,7 +79,7 @@ def findings_of(
         best = cheapest(found)
         is_complete = best is not None and fits.is_complete(best)
     if not is_complete:
-        found += _second_effects(fits, found, retuned, pool)
+        found += _second_effects(fits, found, retuned, surroundings, pool)
     found += refinement.polished(retuned_fit, found, pool)
     retuned = refinement.retuned_from(found, retuned)
     any_force = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
@@ -102,7 +103,11 @@ def findings_of(
 
 
 def _second_effects(
-    fits: Fits, known: Sequence[Explanation], retuned: Explanation, pool: Sequence[Candidate]
+    fits: Fits,
+    known: Sequence[Explanation],
+    retuned: Explanation,
+    at: Surroundings,
+    pool: Sequence[Candidate],
 ) -> list[Explanation]:
     """Pairs of the best first effect and another, and what is left of the best pair without either.
 
@@ -119,6 +124,7 @@ def _second_effects(
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
     more = OneMoreEffect(fits)
+    pool = [*pool, *_possible_beside(best, at, pool)]
     pairs = more.fitted(best.fit, fits.jacobian(best.fit), pool, "fitting a second effect")
     alone = []
     pair = cheapest(pairs)
@@ -136,3 +142,13 @@ def _second_effects(
         if second is not None:
             pairs += more.fitted(second.fit, fits.jacobian(second.fit), pool, "exchanging the first effect")
     return [*pairs, *alone]
+
+
+def _possible_beside(best: Explanation, at: Surroundings, pool: Sequence[Candidate]) -> list[Candidate]:
+    """Effects that act on forces which only the best effect has brought, such as on the damping of a liquid."""
+    forces = extension_of(best.fit.candidates, best.fit.values).terms
+    if not forces:
+        return []
+    known = {one.key for one in pool}
+    beside = candidates(replace(at, twin=replace(at.twin, terms=(*at.twin.terms, *forces))))
+    return [one for one in beside if one.key not in known]

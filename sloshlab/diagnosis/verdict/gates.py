@@ -218,10 +218,13 @@ def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scal
 def _may_be_nothing(found: Findings, named: Explanation) -> bool:
     """Whether one effect is not told from nothing, and removes little enough for that to be so.
 
-    Where masses and gains trade against an effect its interval may hold zero although no baseline describes the
-    recordings without it; what removes more than what is clear is there.
+    Where masses and gains trade against an effect, or its own numbers against each other, its interval may hold
+    zero although no baseline describes the recordings without it; what removes more than what is clear, or half of
+    what is left without it, is there.
     """
-    if len(named.keys) > 1 or largest_strength(found.retuned.by_run, named.by_run) >= _CLEAR:
+    if len(named.keys) > 1 or _explains_half(found, named):
+        return False
+    if largest_strength(found.retuned.by_run, named.by_run) >= _CLEAR:
         return False
     return not is_told_from_nothing(named, named.fit.candidates[0])
 

@@ -102,19 +102,22 @@ def test_where_one_of_two_may_be_nothing_all_pairs_are_given_up(
 
 
 @pytest.mark.parametrize(
-    ("spread", "squares", "kind"),
+    ("spread", "squares", "rms", "kind"),
     [
-        pytest.param(1.0, 9.9, "unknown", id="it may be nothing"),
-        pytest.param(1.0, 10.1, "named", id="it removes what is clear"),
-        pytest.param(0.1, 9.9, "named", id="it has a size"),
+        pytest.param(1.0, 9.9, 1.0, "unknown", id="it may be nothing"),
+        pytest.param(1.0, 10.1, 1.0, "named", id="it removes what is clear"),
+        pytest.param(1.0, 9.9, 1.41, "unknown", id="it removes less than half"),
+        pytest.param(1.0, 9.9, 1.42, "named", id="it removes half of all"),
+        pytest.param(0.1, 9.9, 1.0, "named", id="it has a size"),
     ],
 )
 def test_one_effect_that_may_be_nothing_is_named_only_where_it_removes_what_is_clear(
-    monkeypatch: pytest.MonkeyPatch, spread: float, squares: float, kind: str
+    monkeypatch: pytest.MonkeyPatch, spread: float, squares: float, rms: float, kind: str
 ) -> None:
-    """√(10 − 1) is three noise floors."""
+    """√(10 − 1) is three noise floors, and an error of √2 has twice the mean square of one of 1."""
     drawn(monkeypatch, {FRICTION_NUMBER: spread})
-    _, verdict = answered(findings(left(500.0, 500.0, squares=squares), [left(0.0, 0.0, FRICTION)]))
+    retuned = left(500.0, 500.0, squares=squares, rms=rms)
+    _, verdict = answered(findings(retuned, [left(0.0, 0.0, FRICTION, rms=1.0)]))
     assert verdict.kind == kind
 
 

@@ -118,6 +118,26 @@ def level_g(m: Motion, averaging_s: float = 0.2, start: float = 1e-6 * OMEGA**2)
     return np.sqrt(2 * square) / G
 
 
+VARYING = {
+    "beta": 0.3,
+    "beta_per_octave": -0.4,
+    "beta_per_octave_squared": 0.8,
+    "beta_per_doubling": 0.25,
+    "beta_per_doubling_squared": 0.1,
+    "beta_per_octave_and_doubling": -0.5,
+}
+
+
+def varying_mass(m: Motion) -> np.ndarray:
+    """β of the frequency in octaves and the level in doublings; what `recorded_oscillators.surroundings` says."""
+    hz, level_at_zero, averaging = OMEGA / (2 * np.pi), 0.5 * START_M * OMEGA**2 / G, 4 * np.pi / OMEGA
+    v2, a2 = along(m, lambda y, x, v, a: (np.array([v**2, a**2]) - y) / averaging, (1e-6, 1e-6 * OMEGA**2))
+    x = np.clip(np.log2(np.sqrt(a2 / v2) / (2 * np.pi) / hz), -2, 2)
+    y = np.clip(np.log2(np.sqrt(2 * a2) / G / level_at_zero), -3, 3)
+    beta = 0.3 - 0.4 * x + 0.8 * x**2 + 0.25 * y + 0.1 * y**2 - 0.5 * x * y
+    return -beta * LIQUID_KG * m["a"]
+
+
 MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
     "structure.viscous_damping": ({"damping_n_s_per_m": 1.3}, lambda m: -1.3 * m["v"]),
     "structure.coulomb_friction": ({"force_n": 0.4}, lambda m: -0.4 * np.sign(m["v"])),
@@ -158,6 +178,7 @@ MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
         {"beta": 0.3, "fade_g": 2.5, "averaging_s": 0.2},
         lambda m: -0.3 * LIQUID_KG * m["a"] / (1 + (level_g(m, start=0.0) / 2.5) ** 2),
     ),
+    "tank.varying_mass": (VARYING, varying_mass),
     "tank.liquid_loss": ({"rate_kg_per_s": 0.01}, lambda m: 0.01 * m["t"] * m["a"]),
     "tank.lateral_mode": (
         {"frequency_hz": 4.5, "mass_kg": 0.03, "damping_ratio": 0.05},
@@ -337,7 +358,7 @@ def test_a_liquid_may_calm_down_as_fast_as_it_breaks_up(frozen: RigModel) -> Non
     """A time of calming of its own, or that of the break-up where none is stated."""
     for stated, acting in ((0.0, 0.4), (0.1, 0.1)):
         term = LIQUID_DAMPING(
-            damping_n_s_per_m=TANK_DAMPING, liquid_mass_kg=LIQUID_KG, time_constant_s=0.4, agitated_g=2.0,
+            damping_n_s_per_m=TANK_DAMPING, liquid_mass_kg=LIQUID_KG, break_up_s=0.4, agitated_g=2.0,
             averaging_s=0.12, calming_s=stated, sharpness=4.0,
         )  # fmt: skip
         m = moved_by(frozen, Extension(terms=(term,), key=tuple(term.values.items())))

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from recorded_oscillators import decays, effect, rig, surroundings
 
+from sloshlab.diagnosis.candidate import Candidate, candidates
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
+from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search import whole_search
 from sloshlab.diagnosis.search.fits import Fits
 
 
 def explanation(cost: float, *keys: str, left: float = 2.0, in_a_channel: float = 1.0) -> Any:
     by_run = {("run", "channel"): in_a_channel}
-    return SimpleNamespace(fit=SimpleNamespace(cost=cost, keys=keys), keys=keys, held_out_rms=left, by_run=by_run)
+    fit = SimpleNamespace(cost=cost, keys=keys, candidates=(), values={})
+    return SimpleNamespace(fit=fit, keys=keys, held_out_rms=left, by_run=by_run)
 
 
 class Tried:
@@ -57,7 +62,9 @@ def sought(
     monkeypatch.setattr(
         whole_search, "Refinement", lambda fits: SimpleNamespace(take_away=lambda pairs: [SECOND] if pairs else [])
     )
-    return tried, whole_search._second_effects(fits, [BEST], retuned, [])  # type: ignore[arg-type]
+    return tried, whole_search._second_effects(  # type: ignore[arg-type]
+        fits, [BEST], retuned, cast(Any, None), []
+    )
 
 
 def test_where_the_best_pair_leaves_too_much_its_first_effect_is_exchanged(
@@ -140,3 +147,24 @@ def test_pairs_are_not_tried_where_no_effect_removes_anything_to_speak_of(
     )
     assert bool(sought(monkeypatch, pair, retuned=retuned)[0].beside) == is_tried
     assert sought(monkeypatch, pair, retuned=retuned, shares_little=False)[0].beside
+
+
+@pytest.mark.parametrize(
+    ("key", "beside"),
+    [
+        ("tank.liquid_sloshing", {"tank.breakup_delay", "tank.high_g_saturation"}),
+        ("tank.quadratic_drag", set()),
+        ("tank.effective_mass", set()),
+    ],
+)
+def test_what_acts_on_the_damping_of_liquid_is_possible_beside_what_brings_it(
+    tmp_path: Path, key: str, beside: set[str]
+) -> None:
+    """Frozen liquid damps nothing that could come late."""
+    model = RigModel(rig(tmp_path), tmp_path, decays((0.02,), 1.0))
+    at = surroundings(model)
+    pool = candidates(at)
+    assert "tank.breakup_delay" not in {one.key for one in pool}
+    first = Candidate(effect(key), at)
+    best = Explanation(FreeRunFit((first,), first.starts()[0], 0.0, 0.0), 0.0, 1.0)
+    assert {one.key for one in whole_search._possible_beside(best, at, pool)} == beside

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipelines.tank_diagnosis import CASES, TankCase, at_lower_rate, make_case
+from pipelines.tank_diagnosis import CASES, TankCase, at_lower_rate, make_case, part_of
 from sloshlab.errors import InputError
 from sloshlab.recording import read_recording
 
@@ -41,6 +41,35 @@ def test_a_lower_rate_keeps_what_is_slow_where_it_is_and_nothing_that_is_fast() 
     assert np.allclose(np.diff(lower.time), 1 / 32.0)
     assert lower.quality.dtype == np.uint8
     assert np.abs(lower.force.values - slow[::16])[16:-16].max() < 0.01
+
+
+def recorded(values: np.ndarray, rate_hz: float) -> xr.Dataset:
+    variable = xr.Variable("time", values, {"noise_std": 0.4})
+    return xr.Dataset(
+        {"force": variable}, {"time": np.arange(values.size) / rate_hz}, {"sampling_rate_hz": rate_hz}
+    )
+
+
+def test_a_release_keeps_its_first_displacement() -> None:
+    """cos 2π 9 t begins with its largest value; a filter that sees nothing before it halves that."""
+    slow = np.cos(2 * np.pi * 9.0 * np.arange(4096) / 1024.0)
+    lower = at_lower_rate(recorded(slow, 1024.0), 16)
+    assert np.abs(lower.force.values - slow[::16])[:8].max() < 0.01
+
+
+def test_a_lower_rate_keeps_the_noise_per_band_and_nothing_above_what_is_asked() -> None:
+    noise = 0.4 * np.random.default_rng(2).standard_normal(2**17)
+    lower = at_lower_rate(recorded(noise, 512.0), 4, below_hz=16.0)
+    frequency = np.fft.rfftfreq(lower.force.size, 1 / 128.0)
+    power = np.abs(np.fft.rfft(lower.force.values)) ** 2 / lower.force.size
+    assert power[frequency < 12.0].mean() == pytest.approx(lower.force.attrs["noise_std"] ** 2, rel=0.05)
+    assert power[frequency > 22.0].mean() < 1e-3 * power[frequency < 12.0].mean()
+
+
+def test_a_part_of_a_recording_begins_with_zero() -> None:
+    part = part_of(recorded(np.arange(100.0), 10.0), 2.0, 5.0)
+    assert part.force.values.tolist() == list(np.arange(20.0, 50.0))
+    assert part.time.values[[0, -1]].tolist() == [0.0, 2.9]
 
 
 def test_recordings_that_are_not_there_are_said(tmp_path: Path) -> None:
