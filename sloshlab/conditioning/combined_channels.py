@@ -105,7 +105,31 @@ def total_force(recording: xr.Dataset, names: Sequence[str] | None = None) -> xr
     return _combined(recording, chosen, signs, "force_total", "force")
 
 
-def mean_acceleration(recording: xr.Dataset, names: Sequence[str] | None = None) -> xr.DataArray:
+def weights_by_noise(recording: xr.Dataset, names: Sequence[str]) -> list[float]:
+    """Weights of channels of one motion, inverse to the variance of their noise; equal unless all state it.
+
+    The mean with these weights has the least noise, not the least error of calibration.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Its channels may have the attribute `noise_std`.
+    names : sequence of str
+
+    Returns
+    -------
+    list of float
+        With sum 1.
+    """
+    stated = [float(recording[name].attrs.get("noise_std", 0.0)) for name in names]
+    known = all(np.isfinite(std) and std > 0 for std in stated)
+    inverse = [(min(stated) / std) ** 2 if known else 1.0 for std in stated]
+    return [one / sum(inverse) for one in inverse]
+
+
+def mean_acceleration(
+    recording: xr.Dataset, names: Sequence[str] | None = None, weights: Sequence[float] | None = None
+) -> xr.DataArray:
     """Acceleration ü of the tank: the mean of its accelerometers.
 
     Parameters
@@ -114,6 +138,8 @@ def mean_acceleration(recording: xr.Dataset, names: Sequence[str] | None = None)
         A recording in SI units.
     names : sequence of str, optional
         Accelerations to average; by default `acceleration_channels`.
+    weights : sequence of float, optional
+        One per name, with sum 1; equal by default.
 
     Returns
     -------
@@ -128,7 +154,8 @@ def mean_acceleration(recording: xr.Dataset, names: Sequence[str] | None = None)
     """
     chosen = acceleration_channels(recording) if names is None else list(names)
     _require_quantity(recording, chosen, "acceleration")
-    return _combined(recording, chosen, [1.0 / len(chosen)] * len(chosen), "acceleration_mean", "acceleration")
+    factors = [1.0 / len(chosen)] * len(chosen) if weights is None else list(weights)
+    return _combined(recording, chosen, factors, "acceleration_mean", "acceleration")
 
 
 def _require_quantity(recording: xr.Dataset, names: Sequence[str], quantity: str) -> None:

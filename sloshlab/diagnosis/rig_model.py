@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from sloshlab.conditioning.combined_channels import weights_by_noise
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.candidate import BLOCKS
 from sloshlab.diagnosis.case import CaseRun
@@ -237,8 +238,11 @@ class RigModel:
     ) -> Simulation:
         drive = self._drive(run, tuple(undone))
         twin = self._varied(run, values, extension, fluctuation=values.get(_FLUCTUATION + run.name, 1.0))
-        gains = [values.get(f"gain of {name}", 1.0) for name in self._trusted(run, undone)]
-        excitation = drive.excitation.scaled(1.0 / float(np.mean(gains))) if gains else drive.excitation
+        trusted = self._trusted(run, undone)
+        gains = [values.get(f"gain of {name}", 1.0) for name in trusted]
+        excitation = drive.excitation
+        if gains:
+            excitation = excitation.scaled(1.0 / float(np.dot(weights_by_noise(run.recording, trusted), gains)))
         rate = drive.excitation.sampling_rate_hz
         start = values.get(f"{RELEASE}{run.name}", drive.initial_displacement_m)
         per_period = _STEPS_PER_PERIOD_OF_A_RELEASE if run.is_free else STEPS_PER_PERIOD
@@ -294,7 +298,7 @@ class RigModel:
             if key in self._drives:
                 return self._drives[key]
         driving = self._drives[(run.name,)].channels if undone else ()
-        drive = drive_of(corrected(run, undone, driving), self.twin)
+        drive = drive_of(corrected(run, undone, driving), self.twin, by_noise=True)
         drive = replace(drive, excitation=remembered(drive.excitation))
         with self._lock:
             if len(self._drives) > 20 * max(1, len(self.runs)):

@@ -21,6 +21,7 @@ from sloshlab.conditioning.combined_channels import (
     force_channels,
     mean_acceleration,
     total_force,
+    weights_by_noise,
 )
 from sloshlab.conditioning.gaps import runs
 from sloshlab.conditioning.integration import integrated
@@ -68,7 +69,7 @@ class Drive:
     flags: tuple[str, ...]
 
 
-def drive_of(recording: xr.Dataset, twin: Twin, *, block: Block = "all") -> Drive:
+def drive_of(recording: xr.Dataset, twin: Twin, *, block: Block = "all", by_noise: bool = False) -> Drive:
     """Drive of a twin, or of one block alone on its measured input.
 
     Parameters
@@ -80,6 +81,9 @@ def drive_of(recording: xr.Dataset, twin: Twin, *, block: Block = "all") -> Driv
     block : {'all', 'tank', 'structure'}
         The closed loop; the tank on the measured motion of the tank; the structure on the measured force of the
         liquid, Δf = (M_dry + m_l) ü − F_ext.
+    by_noise : bool
+        Whether the tank's accelerometers that drive together count by their noise (`weights_by_noise`), for those
+        who find their gains themselves; alike by default, which halves errors of gains.
 
     Raises
     ------
@@ -98,14 +102,16 @@ def drive_of(recording: xr.Dataset, twin: Twin, *, block: Block = "all") -> Driv
     if twin.structure is None and block == "structure":
         raise InputError("block structure", got="a rig without [structure]", allowed="all or tank")
     if twin.structure is None or block == "tank":
-        return _driven_tank(recording, twin.tank_alone())
+        return _driven_tank(recording, twin.tank_alone(), by_noise=by_noise)
     return _driven_structure(recording, twin.structure_alone() if block == "structure" else twin, block)
 
 
-def _driven_tank(recording: xr.Dataset, twin: Twin) -> Drive:
+def _driven_tank(recording: xr.Dataset, twin: Twin, *, by_noise: bool) -> Drive:
     names = acceleration_channels(recording)
     rate = run_attributes(recording).sampling_rate_hz
-    acceleration, n_driven, flags = _usable(recording, names, mean_acceleration(recording, names).values)
+    weights = weights_by_noise(recording, names) if by_noise else None
+    mean = mean_acceleration(recording, names, weights).values
+    acceleration, n_driven, flags = _usable(recording, names, mean)
     if not _is_free(recording):
         acceleration -= acceleration.mean()
     motion = _integrated_twice(acceleration, rate)

@@ -7,6 +7,7 @@ from sloshlab.conditioning.combined_channels import (
     force_channels,
     mean_acceleration,
     total_force,
+    weights_by_noise,
 )
 from sloshlab.errors import AnalysisError
 
@@ -36,6 +37,21 @@ def test_cells_add_up_and_roof_accelerometers_average():
     assert run["force_cell_1"].values.tolist() == [1, 2, 3]
     assert run["force_cell_1"].attrs == {"quantity": "force"}
     assert np.array_equal(force["time"], run["time"])
+
+
+def test_weights_by_noise_give_the_mean_the_least_variance():
+    """1/σ²: a sensor of twice the noise counts a quarter of the other one."""
+    run = recording(acceleration_roof_1=[1.0, 2.0, 5.0], acceleration_roof_2=[6.0, 7.0, 0.0])
+    run["acceleration_roof_1"].attrs["noise_std"], run["acceleration_roof_2"].attrs["noise_std"] = 0.2, 0.1
+    names = ["acceleration_roof_1", "acceleration_roof_2"]
+    assert weights_by_noise(run, names) == pytest.approx([0.2, 0.8])
+    weighted = mean_acceleration(run, names, weights_by_noise(run, names))
+    assert weighted.values == pytest.approx([5.0, 6.0, 1.0])
+    for unknown in (0.0, np.nan, np.inf):
+        run["acceleration_roof_2"].attrs["noise_std"] = unknown
+        assert weights_by_noise(run, names) == [0.5, 0.5]
+    del run["acceleration_roof_1"].attrs["noise_std"]
+    assert weights_by_noise(run, ["acceleration_roof_1"]) == [1.0]
 
 
 def test_single_channels_are_copied_not_shared():

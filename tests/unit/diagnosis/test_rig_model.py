@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -144,19 +145,22 @@ SENSORS = {"acceleration_roof_1": 1.01, "acceleration_roof_2": 0.98, "accelerati
 """Gains of the sensors of a shaker."""
 
 
-def shaken(folder: Path) -> RigModel:
-    """A tank that is moved by 20 sin ωt; its sensors have gains, and no noise."""
+def shaken(folder: Path, noise: Mapping[str, float]) -> RigModel:
+    """A tank that is moved by 20 sin ωt; its sensors have gains and noise."""
     (folder / "shaker.toml").write_text(BEAM.partition("[structure]")[0] + '[twin]\ntank_model = "frozen"\n')
     moved = 20.0 * np.sin(2 * np.pi * 10.0 * np.arange(1000) / 250.0)
     channels = {name: gain * moved for name, gain in SENSORS.items()}
-    run = run_of("shaken", channels, {}, 1, experiment="shaker_sweep", acceleration_g=2.0)
+    run = run_of("shaken", channels, noise, 1, experiment="shaker_sweep", acceleration_g=2.0)
     return RigModel(Rig.from_toml(folder / "shaker.toml"), folder, [run])
 
 
 @pytest.mark.parametrize("faulty", ["", "acceleration_roof_1", "acceleration_control"])
-def test_gains_of_the_sensors_that_drive_say_how_far_the_tank_moved(tmp_path: Path, faulty: str) -> None:
+@pytest.mark.parametrize("noise", [{}, {"acceleration_roof_1": 1.5e-3, "acceleration_roof_2": 5e-4}])
+def test_gains_of_the_sensors_that_drive_say_how_far_the_tank_moved(
+    tmp_path: Path, faulty: str, noise: dict[str, float]
+) -> None:
     """With all of them, and where one has a fault of its own and the others drive: what is read is what was."""
-    model = shaken(tmp_path)
+    model = shaken(tmp_path, noise)
     [run] = model.runs
     values = {f"gain of {name}": gain for name, gain in SENSORS.items()}
     fault = SensorFault(faulty, lambda read, *_: 3.0 * read, None, ("sensor.tripled", faulty))
@@ -168,6 +172,15 @@ def test_gains_of_the_sensors_that_drive_say_how_far_the_tank_moved(tmp_path: Pa
     assert not any(one.is_reading for one in model.parameters if one.name in values and one.name in driving(model))
 
 
+def test_sensors_drive_by_their_noise(tmp_path: Path) -> None:
+    """A loud one beside a quiet one adds a hundredth of its noise, where the mean of both has half of it."""
+    model = shaken(tmp_path, {"acceleration_roof_1": 1.0, "acceleration_roof_2": 0.1})
+    [run] = model.runs
+    read = model.simulate(run, {f"gain of {name}": gain for name, gain in SENSORS.items()}, NOTHING)
+    true = SENSORS["acceleration_control"] * 20.0 * np.sin(2 * np.pi * 10.0 * np.arange(1000) / 250.0)
+    assert np.std((read["acceleration_control"] - true)[100:-100]) == pytest.approx(0.1, rel=0.1)
+
+
 def driving(model: RigModel) -> list[str]:
     return [f"gain of {name}" for name in model.driving(model.runs[0])]
 
@@ -176,5 +189,5 @@ def driving(model: RigModel) -> list[str]:
 def test_forces_that_average_over_a_cycle_have_steps_enough_at_low_rates(
     tmp_path: Path, rate_hz: float, n: int
 ) -> None:
-    model = shaken(tmp_path)
+    model = shaken(tmp_path, {})
     assert rig_model.steps_per_sample(model.twin, rate_hz) == n
