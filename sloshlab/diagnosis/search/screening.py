@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.first_look import FirstLook
-from sloshlab.diagnosis.force_starts import ForceStarts
+from sloshlab.diagnosis.force_starts import ForceStart, ForceStarts
 from sloshlab.diagnosis.free_run_fit import Start, nearest
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, extension_of
 from sloshlab.diagnosis.rig_model import RigModel
@@ -42,6 +42,37 @@ class _Look:
 
 
 @dataclass(frozen=True, eq=False)
+class _Promised:
+    """What first looks and the missing force say of a candidate.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    gains : ndarray, shape (n_looks,)
+        Decreases of the cost that first looks promise.
+    looks : list of _Look
+        Its starts, the most promising one first.
+    by_force : ForceStart or None
+        Its numbers with which its own force is most like the missing one, where that is known.
+    """
+
+    candidate: Candidate
+    gains: FloatArray
+    looks: list[_Look]
+    by_force: ForceStart | None
+
+    @property
+    def share_left(self) -> float:
+        """Of the missing force that its own leaves; one where that is not known."""
+        return self.by_force.share_left if self.by_force else 1.0
+
+    @property
+    def is_like_the_force(self) -> bool:
+        """Whether it is to be fitted whatever first looks promise."""
+        return self.share_left < _ALIKE
+
+
+@dataclass(frozen=True, eq=False)
 class Promise:
     """What is known of a candidate before it is fitted.
 
@@ -62,7 +93,7 @@ class Promise:
 
     @property
     def is_like_the_force(self) -> bool:
-        """Whether it is to be fitted whatever first looks promise."""
+        """Whether it is fitted to the end whatever others gain."""
         return self.share_left < _ALIKE
 
 
@@ -97,7 +128,7 @@ class Screening:
             for share in dict.fromkeys((shares[min(1, len(shares) - 1)], shares[-1]))
         ]
         missed_hz = most_missed_hz(problem.runs, residual, ACROSS_A_BAND)
-        promised = []
+        promised: list[_Promised] = []
         for i, candidate in enumerate(pool):
             self.fits.told(f"{what}: first look", i, len(pool))
             if candidate.key in [one.key for one in base.candidates]:
@@ -120,17 +151,24 @@ class Screening:
                 self.fits.failed[candidate.key] = "does not run from any start"
                 continue
             looks.sort(key=lambda one: -float(one.gains.max()))
-            like = by_force.numbers if by_force else None
-            if is_near:
-                sets = [*([like] if like else []), *(look.resized for look in looks)]
-                starts = [Start({**base.values, **one}, is_near=True) for one in sets[:_MOST_STARTS]]
-            else:
-                starts = self._from_afar(base, extended, looks, like, shares[0])
-                if by_force and by_force.share_left < _ALIKE:
-                    starts.append(Start({**base.values, **by_force.numbers}, is_near=True))
             gains_of = np.max([look.gains for look in looks], axis=0)
-            promised.append(Promise(candidate, starts, gains_of, by_force.share_left if by_force else 1.0))
-        return self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
+            promised.append(_Promised(candidate, gains_of, looks, by_force))
+        return [
+            Promise(one.candidate, self._starts(base, one, shares[0], is_near=is_near), one.gains, one.share_left)
+            for one in self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
+        ]
+
+    def _starts(self, base: FreeRunFit, one: _Promised, share: float, *, is_near: bool) -> list[Start]:
+        """Where a candidate is fitted from."""
+        like = one.by_force.numbers if one.by_force else None
+        if is_near:
+            sets = [*([like] if like else []), *(look.resized for look in one.looks)]
+            return [Start({**base.values, **numbers}, is_near=True) for numbers in sets[:_MOST_STARTS]]
+        extended = self.fits.problem((*base.candidates, one.candidate))
+        starts = self._from_afar(base, extended, one.looks, like, share)
+        if like and one.is_like_the_force:
+            starts.append(Start({**base.values, **like}, is_near=True))
+        return starts
 
     def _from_afar(
         self,
@@ -159,7 +197,7 @@ class Screening:
             self.fits.model, self.fits.fitting, base.values, extension_of(base.candidates, base.values)
         )
 
-    def _best(self, promised: Sequence[Promise], most: int) -> list[Promise]:
+    def _best(self, promised: Sequence[_Promised], most: int) -> list[_Promised]:
         """The candidates that promise most, in a soft look or in a hard one, or by their force."""
         if not promised:
             return []

@@ -16,11 +16,11 @@ from sloshlab.diagnosis import effects, free_run_problem
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.free_run_fit import fitted
+from sloshlab.diagnosis.free_run_fit import Start, fitted
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import fits, redrawn, refinement
+from sloshlab.diagnosis.search import fits, redrawn, refinement, screening
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import InPlace
 from sloshlab.diagnosis.search.refinement import Refinement
@@ -311,7 +311,17 @@ def test_numbers_at_their_bounds_are_eased_to_what_is_believed(case: Decays) -> 
     assert not case.fits.is_strained(FreeRunFit((), case.believed, 0.0, 0.0))
 
 
-def test_screening_keeps_what_explains_and_begins_it_near(case: Decays) -> None:
+def test_screening_keeps_what_explains_and_begins_it_near(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Places to begin from afar are sought for those alone that are fitted: each costs simulations."""
+    sought: list[str] = []
+
+    def from_afar(self: Screening, base: object, problem: FreeRunProblem, *others: Any) -> list[Start]:
+        sought.append(problem.candidates[-1].key)
+        return plain(self, base, problem, *others)  # type: ignore[arg-type]
+
+    plain = Screening._from_afar
+    monkeypatch.setattr(Screening, "_from_afar", from_afar)
+    monkeypatch.setattr(screening, "_MOST_FITTED", 3)
     problem = case.fits.problem()
     theta = problem.theta_of(case.baseline.values)
     jacobian = problem.jacobian(theta, problem.residual(theta), range(theta.size))
@@ -320,6 +330,8 @@ def test_screening_keeps_what_explains_and_begins_it_near(case: Decays) -> None:
     )
     keys = [one.candidate.key for one in promises]
     assert COULOMB in keys
+    assert sought == keys
+    assert len(keys) < len(case.pool)
     for one in promises:
         assert any(start.is_near for start in one.starts)
         assert (one.gains > 0).any()
