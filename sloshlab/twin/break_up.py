@@ -53,7 +53,12 @@ def share_broken_up(parameters, at, broken_up):
 
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
 def rate_of_break_up(parameters, at, level, broken_up):
-    """ṡ = p (1 − s)/τ − (1 − p) s/τ_calm, p = rⁿ/(1 + rⁿ), r = â/a_agitated; τ_calm = τ where none is stated."""
+    """ṡ = p (1 − s)/τ − (1 − p) s/τ_calm, p = rⁿ/(1 + rⁿ), r = â/a_agitated; τ_calm = τ where none is stated.
+
+    Zero where liquid is broken up at once: no step of a simulation has to follow a millisecond.
+    """
+    if parameters[at + _BREAK_UP] <= _AT_ONCE_S:
+        return 0.0
     agitated, time_constant = parameters[at + _AGITATED], parameters[at + _BREAK_UP]
     violent = 1.0 / (1.0 + (agitated / max(level, 1e-3 * agitated)) ** parameters[at + _SHARPNESS])
     calming = parameters[at + _CALMING] if parameters[at + _CALMING] > 0.0 else time_constant

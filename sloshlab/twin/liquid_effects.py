@@ -25,8 +25,6 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 # mypy: disable-error-code="no-untyped-def"
 
 _G = GRAVITY_M_PER_S2
-
-
 _BREAK_UP = 6
 """Where the numbers of `break_up` begin among those of the damper."""
 

@@ -83,7 +83,7 @@ def drive_of(recording: xr.Dataset, twin: Twin, *, block: Block = "all", by_nois
         liquid, Δf = (M_dry + m_l) ü − F_ext.
     by_noise : bool
         Whether the tank's accelerometers that drive together count by their noise (`weights_by_noise`), for those
-        who find their gains themselves; alike by default, which halves errors of gains.
+        who find their gains themselves; alike by default, which makes errors of gains least.
 
     Raises
     ------

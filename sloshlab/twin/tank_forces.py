@@ -243,8 +243,9 @@ EFFECTIVE_MASS = register(
 def _fading_mass(motion, parameters, memory, rates):
     """−β m_l a / (1 + (â/a_f)²), â from the running mean square of a."""
     rates[0] = (motion[ACCELERATION] ** 2 - memory[0]) / parameters[3]
-    size = sqrt(2.0 * max(memory[0], 0.0)) / _G
-    return -parameters[0] * parameters[1] * motion[ACCELERATION] / (1.0 + (size / parameters[2]) ** 2)
+    return (
+        -parameters[0] * parameters[1] * motion[ACCELERATION] / (1.0 + (level_g(memory[0]) / parameters[2]) ** 2)
+    )
 
 
 FADING_MASS = register(

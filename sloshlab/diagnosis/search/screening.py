@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -42,8 +42,8 @@ class _Look:
 
 
 @dataclass(frozen=True, eq=False)
-class _Promised:
-    """What first looks and the missing force say of a candidate.
+class Promise:
+    """What is known of a candidate before it is fitted.
 
     Attributes
     ----------
@@ -54,12 +54,15 @@ class _Promised:
         Its starts, the most promising one first.
     by_force : ForceStart or None
         Its numbers with which its own force is most like the missing one, where that is known.
+    starts : list of Start
+        Where it is fitted from; none of a candidate that is not chosen.
     """
 
     candidate: Candidate
     gains: FloatArray
     looks: list[_Look]
     by_force: ForceStart | None
+    starts: list[Start] = field(default_factory=list)
 
     @property
     def share_left(self) -> float:
@@ -68,32 +71,7 @@ class _Promised:
 
     @property
     def is_like_the_force(self) -> bool:
-        """Whether it is to be fitted whatever first looks promise."""
-        return self.share_left < _ALIKE
-
-
-@dataclass(frozen=True, eq=False)
-class Promise:
-    """What is known of a candidate before it is fitted.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    starts : list of Start
-    gains : ndarray, shape (n_looks,)
-        Decreases of the cost that first looks promise.
-    share_left : float
-        Of the missing force that its own leaves; one where that is not known.
-    """
-
-    candidate: Candidate
-    starts: list[Start]
-    gains: FloatArray
-    share_left: float
-
-    @property
-    def is_like_the_force(self) -> bool:
-        """Whether it is fitted to the end whatever others gain."""
+        """Whether it is to be fitted to the end whatever first looks promise and others gain."""
         return self.share_left < _ALIKE
 
 
@@ -128,7 +106,7 @@ class Screening:
             for share in dict.fromkeys((shares[min(1, len(shares) - 1)], shares[-1]))
         ]
         missed_hz = most_missed_hz(problem.runs, residual, ACROSS_A_BAND)
-        promised: list[_Promised] = []
+        promised: list[Promise] = []
         for i, candidate in enumerate(pool):
             self.fits.told(f"{what}: first look", i, len(pool))
             if candidate.key in [one.key for one in base.candidates]:
@@ -152,13 +130,13 @@ class Screening:
                 continue
             looks.sort(key=lambda one: -float(one.gains.max()))
             gains_of = np.max([look.gains for look in looks], axis=0)
-            promised.append(_Promised(candidate, gains_of, looks, by_force))
+            promised.append(Promise(candidate, gains_of, looks, by_force))
         return [
-            Promise(one.candidate, self._starts(base, one, shares[0], is_near=is_near), one.gains, one.share_left)
+            replace(one, starts=self._starts(base, one, shares[0], is_near=is_near))
             for one in self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
         ]
 
-    def _starts(self, base: FreeRunFit, one: _Promised, share: float, *, is_near: bool) -> list[Start]:
+    def _starts(self, base: FreeRunFit, one: Promise, share: float, *, is_near: bool) -> list[Start]:
         """Where a candidate is fitted from."""
         like = one.by_force.numbers if one.by_force else None
         if is_near:
@@ -197,7 +175,7 @@ class Screening:
             self.fits.model, self.fits.fitting, base.values, extension_of(base.candidates, base.values)
         )
 
-    def _best(self, promised: Sequence[_Promised], most: int) -> list[_Promised]:
+    def _best(self, promised: Sequence[Promise], most: int) -> list[Promise]:
         """The candidates that promise most, in a soft look or in a hard one, or by their force."""
         if not promised:
             return []

@@ -16,6 +16,7 @@ from sloshlab.rig import Structure as RigStructure
 from sloshlab.twin import preparation
 from sloshlab.twin.excitation import Excitation, free, harmonic, harmonic_force, recorded, stepped_sine
 from sloshlab.twin.law import VELOCITY, law
+from sloshlab.twin.liquid_effects import LIQUID_DAMPING
 from sloshlab.twin.rig_beam import base_participation_kg, beam_of_rig, scale_remarks, shapes_at
 from sloshlab.twin.sensors import Sensor
 from sloshlab.twin.status import Status
@@ -225,6 +226,17 @@ def test_the_forces_of_a_map_come_late_where_liquid_breaks_up_late_and_fall_wher
         # the running mean of 10 ms lets p swing about a half within the cycle
         assert np.abs(share - (1 - np.exp(-time[large] / 1.0)))[time[large] > 0.3].max() < 0.05
         assert np.abs(saturated[large] / plain[large] - 0.25)[time[large] > 3.5].max() < 0.03
+
+
+@pytest.mark.parametrize("rate_hz", [40.0, 64.0, 2000.0])
+def test_liquid_that_breaks_up_at_once_has_nothing_to_follow(rate_hz: float) -> None:
+    """At a low rate a state with a time constant of a millisecond would leave all bounds."""
+    known = {"liquid_mass_kg": 0.12, "start_frequency_hz": 10.0}
+    maps = (kind(**known, height_m=0.03, table=w_bar_map(1.2)) for kind in (VISCOUS_MAP, EFFECTIVE_MASS_MAP))
+    for term in (*maps, LIQUID_DAMPING(**known, damping_n_s_per_m=2.0)):
+        result = Twin(None, (term,)).simulate(harmonic(0.003, 10.0, 20.0, rate_hz))
+        np.testing.assert_array_equal(result.memory[:, -1], 1.0)
+        assert np.isfinite(result.memory).all()
 
 
 def test_a_constant_map_of_effective_mass_shifts_the_frequency() -> None:
