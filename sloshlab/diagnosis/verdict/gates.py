@@ -86,8 +86,8 @@ def verdict_of(found: Findings) -> Verdict:
     probabilities = _probabilities(found, scale)
     described = _in_need_of_all(found, scale)
     is_more = any(shows_more(one, found.retuned, scale) for one in described)
-    is_guess = not found.has_repeats and found.retuned.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
-    if not (is_more or is_guess or leaves_more(found, found.retuned)):
+    is_complete = not (leaves_more(found, found.retuned) or _leaves_much(found, found.retuned))
+    if is_complete and not is_more:
         certain = _certain(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
     named, is_answer = _shortest_that_holds(found, scale, described, ceiling)
@@ -95,7 +95,7 @@ def verdict_of(found: Findings) -> Verdict:
     if named is None or not is_answer:
         certain = _certain(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, unknown_statement(found, named), "", certain)
-    if not shows_more(at_its_best(found, named), found.retuned, scale):
+    if is_complete and not shows_more(at_its_best(found, named), found.retuned, scale):
         certain = _certain(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
     alternatives = alternatives_of(found, named, scale)
@@ -125,6 +125,11 @@ def leaves_more(found: Findings, one: Explanation) -> bool:
         return True
     is_told = not np.isnan(_in_common_where_judged(found, one))
     return found.has_repeats and not is_told and one.rms_without_bursts > LARGEST_REMAINDER
+
+
+def _leaves_much(found: Findings, one: Explanation) -> bool:
+    """Whether an explanation leaves more than may be called complete where no repeats tell the noise."""
+    return not found.has_repeats and one.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
 
 
 def _in_common_where_judged(found: Findings, one: Explanation) -> float:
@@ -176,6 +181,7 @@ def _holds(
         found.split.has_held_out
         and scale.held_out_gain(found.retuned, named) >= LEAST_GAIN
         and not leaves_more(found, named)
+        and not (_leaves_much(found, named) and not shows_more(at_its_best(found, named), found.retuned, scale))
         and not _may_be_nothing(found, named)
         and not _is_bettered(found, named, described, ceiling, scale)
     )

@@ -290,6 +290,37 @@ def test_what_leaves_more_than_repeats_differ_by_is_unknown(repeats: bool, rms: 
     assert nothing.kind == ("unknown" if more else "nothing_missing")
 
 
+@pytest.mark.parametrize(
+    ("in_common", "left_in_common", "kind"),
+    [
+        pytest.param(0.49, 0.0, "nothing_missing", id="neither shared nor large"),
+        pytest.param(0.51, 0.0, "named", id="takes away what repeats share"),
+        pytest.param(0.9, 0.51, "unknown", id="leaves what repeats share"),
+    ],
+)
+def test_what_repeats_share_is_something_however_small(in_common: float, left_in_common: float, kind: str) -> None:
+    """A gain beyond chance without a size worth a word."""
+    baseline = left(500.0, 500.0, squares=1.4, repeating={("run_2", TIP): in_common})
+    friction = left(0.0, 0.0, FRICTION, squares=1.0, repeating={("run_2", TIP): left_in_common})
+    assert judged(baseline, [friction], repeats=True).kind == kind
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "squares", "kind"),
+    [
+        pytest.param(1.9, 1.6, 1.0, "nothing_missing", id="little left, little removed"),
+        pytest.param(2.1, 1.9, 1.0, "named", id="made complete"),
+        pytest.param(2.3, 2.1, 1.0, "unknown", id="much left, little removed"),
+        pytest.param(2.3, 2.1, 4.0, "named", id="much left, much removed"),
+    ],
+)
+def test_without_repeats_a_small_name_must_make_it_complete(
+    before: float, after: float, squares: float, kind: str
+) -> None:
+    baseline = left(500.0, 500.0, squares=1.4 * squares, rms=before)
+    assert judged(baseline, [left(0.0, 0.0, FRICTION, squares=1.0, rms=after)]).kind == kind
+
+
 @pytest.mark.parametrize(("rms", "kind"), [(1.9, "nothing_missing"), (2.1, "unknown")])
 def test_without_repeats_twice_the_noise_is_not_nothing_and_a_name_may_leave_it(rms: float, kind: str) -> None:
     assert judged(left(0.0, 0.0, rms=rms), [left(0.0, 0.0, FRICTION)]).kind == kind
