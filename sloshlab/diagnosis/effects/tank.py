@@ -103,6 +103,7 @@ FADING = force_effect(
     fitted=("beta", "fade_g", "averaging_s"),
     bounds={"averaging_s": (0.05, 5.0)},
     may_rest=("averaging_s",),
+    look_alikes=("cubic_stiffness", "hysteresis", "clearance"),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
     spoken_for_by=("does no work", "odd in displacement"),
     includes=("mass_error",),

@@ -14,10 +14,10 @@ from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.first_look import FirstLook
 from sloshlab.diagnosis.force_starts import ForceStart, ForceStarts
 from sloshlab.diagnosis.free_run_fit import Start, nearest
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, extension_of
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search.fits import Fits
-from sloshlab.diagnosis.search.start_numbers import resized, with_smaller_ones
+from sloshlab.diagnosis.search.start_numbers import of_growing_sizes, resized, with_smaller_ones
 from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, most_missed_hz
 
 FloatArray = NDArray[np.float64]
@@ -54,6 +54,9 @@ class Promise:
         Its starts, the most promising one first.
     by_force : ForceStart or None
         Its numbers with which its own force is most like the missing one, where that is known.
+    much_larger : dict or None
+        Its number with which it is nearer to the recordings beside what is believed than the fit beside which it
+        is looked at, though no step from a small number leads there.
     starts : list of Start
         Where it is fitted from; none of a candidate that is not chosen.
     """
@@ -62,6 +65,7 @@ class Promise:
     gains: FloatArray
     looks: list[_Look]
     by_force: ForceStart | None
+    much_larger: dict[str, float] | None = None
     starts: list[Start] = field(default_factory=list)
 
     @property
@@ -130,11 +134,24 @@ class Screening:
                 continue
             looks.sort(key=lambda one: -float(one.gains.max()))
             gains_of = np.max([look.gains for look in looks], axis=0)
-            promised.append(Promise(candidate, gains_of, looks, by_force))
+            much_larger = None if is_near or base.candidates else self._much_larger(candidate, residual, shares[0])
+            promised.append(Promise(candidate, gains_of, looks, by_force, much_larger))
         return [
             replace(one, starts=self._starts(base, one, shares[0], is_near=is_near))
             for one in self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
         ]
+
+    def _much_larger(self, candidate: Candidate, residual: FloatArray, share: float) -> dict[str, float] | None:
+        """A size at which an effect beside what is believed leaves less than a fit without it."""
+        sizes = of_growing_sizes(candidate)
+        if not sizes:
+            return None
+        problem, believed = self.fits.problem((candidate,)), self.fits.model.believed
+        softness = problem.softness(share)
+        left = problem.residuals([problem.theta_of({**believed, **one}) for one in sizes])
+        costs = [huber_cost(softness * one) if np.isfinite(one).all() else np.inf for one in left]
+        nearest_one = int(np.argmin(costs))
+        return sizes[nearest_one] if costs[nearest_one] < huber_cost(softness * residual) else None
 
     def _starts(self, base: FreeRunFit, one: Promise, share: float, *, is_near: bool) -> list[Start]:
         """Where a candidate is fitted from."""
@@ -143,25 +160,20 @@ class Screening:
             sets = [*([like] if like else []), *(look.resized for look in one.looks)]
             return [Start({**base.values, **numbers}, is_near=True) for numbers in sets[:_MOST_STARTS]]
         extended = self.fits.problem((*base.candidates, one.candidate))
-        starts = self._from_afar(base, extended, one.looks, like, share)
+        starts = self._from_afar(base, extended, one, share)
         if like and one.is_like_the_force:
             starts.append(Start({**base.values, **like}, is_near=True))
         return starts
 
-    def _from_afar(
-        self,
-        base: FreeRunFit,
-        problem: FreeRunProblem,
-        looks: Sequence[_Look],
-        like_the_force: dict[str, float] | None,
-        share: float,
-    ) -> list[Start]:
+    def _from_afar(self, base: FreeRunFit, problem: FreeRunProblem, one: Promise, share: float) -> list[Start]:
         """A start with the baseline as believed and one with its numbers in a fit, each the nearest of several."""
+        looks, like_the_force = one.looks, one.by_force.numbers if one.by_force else None
         believed = base.values if base.candidates else self.fits.model.believed
-        far = [{**believed, **look.start} for look in looks[:_MOST_STARTS]]
+        larger = [one.much_larger] if one.much_larger else []
+        far = [{**believed, **numbers} for numbers in (*larger, *(look.start for look in looks[:_MOST_STARTS]))]
         places = [base.values, *([self.fits.eased(base)] if self.fits.is_strained(base) else [])]
         sets = [looks[0].resized, *([like_the_force] if like_the_force else [])]
-        close = [{**place, **one} for place in places for one in sets]
+        close = [{**place, **numbers} for place in places for numbers in sets]
         return [
             Start(nearest(problem, far, share), is_near=bool(base.candidates)),
             Start(nearest(problem, close, share), is_near=True),
@@ -185,7 +197,8 @@ class Screening:
         for rank, one in enumerate(sorted(promised, key=lambda one: -float(np.max(one.gains / top)))):
             is_little = one.gains.max() < _LEAST_PREDICTED
             is_little = is_little or float(np.max(one.gains / top)) < _LEAST_SHARE_OF_PROMISE
-            if (is_little or rank >= most) and not (one in by_force and one.is_like_the_force):
+            is_kept = one.much_larger is not None or (one in by_force and one.is_like_the_force)
+            if (is_little or rank >= most) and not is_kept:
                 self.fits.screened[one.candidate.key] = float(one.gains.max())
             else:
                 chosen.append(one)

@@ -11,6 +11,9 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.units import named_and_units
 
 _SIZES: Final = (0.03, 0.1, 0.3, 1.0, 3.0)
+_DOES_NO_WORK: Final = "does no work"
+_GROWING: Final = tuple(1.5**i for i in range(1, 12))
+"""What moves a resonance by more than its width is missed by every step from a small start."""
 
 
 def as_its_special_case(wider: Candidate, special: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
@@ -42,6 +45,13 @@ def as_its_general_form(special: Candidate, general: Candidate, fit: FreeRunFit)
 def of_many_sizes(candidate: Candidate) -> list[dict[str, float]]:
     """Starts of an effect, each at several sizes."""
     return [candidate.sized(start, factor) for start in candidate.starts() for factor in _SIZES]
+
+
+def of_growing_sizes(candidate: Candidate) -> list[dict[str, float]]:
+    """Starts of an effect of one number that does no work, up to a hundred times as large; none of others."""
+    if len(candidate.effect.parameters) > 1 or _DOES_NO_WORK not in candidate.effect.spoken_for_by:
+        return []
+    return [candidate.sized(start, factor) for start in candidate.starts() for factor in _GROWING]
 
 
 def with_smaller_ones(candidate: Candidate) -> list[dict[str, float]]:

@@ -99,6 +99,13 @@ def test_look_alikes_know_each_other_and_what_separates_them(one: str, other: st
         assert all(effect.separated_by for effect in named(name))
 
 
+def test_what_moves_a_frequency_with_the_level_is_tried_in_place_of_what_does_so_too() -> None:
+    """A mass that fades in violent motion detunes a beam as a spring of third order does."""
+    [fading] = named("fading_mass")
+    assert {"cubic_stiffness", "hysteresis", "clearance"} <= set(fading.look_alikes)
+    assert not set(named("effective_mass")[0].look_alikes) & {"cubic_stiffness", "hysteresis", "clearance"}
+
+
 def test_whatever_has_a_look_alike_says_what_separates_it_and_names_known_ones() -> None:
     names = {one.name for one in known_effects()}
     for one in known_effects():
