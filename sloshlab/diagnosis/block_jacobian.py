@@ -67,6 +67,25 @@ class BlockJacobian:
         )
         return BlockJacobian(self.n_columns + more.n_columns, blocks)
 
+    def part(self, chosen: Sequence[int], columns: Sequence[int]) -> BlockJacobian:
+        """Some blocks, one after another, and some columns alone.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Blocks in their order.
+        columns : sequence of int
+            In the order that they have then; all that the blocks see must be among them.
+        """
+        place = {column: i for i, column in enumerate(columns)}
+        blocks, first = [], 0
+        for one in (self.blocks[i] for i in chosen):
+            size = one.values.shape[0]
+            own = np.array([place[column] for column in one.columns.tolist()], np.intp)
+            blocks.append(_Block(slice(first, first + size), own, one.values.copy()))
+            first += size
+        return BlockJacobian(len(columns), tuple(blocks))
+
     def weighted(self, weights: FloatArray) -> BlockJacobian:
         """Every row times its weight."""
         return BlockJacobian(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -261,6 +261,26 @@ def begun(
         problem, best.fit.values, n_iterations=n_iterations, shares=(second,), known=best.jacobian, is_last=False
     )
     return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second))
+
+
+def on_more_runs(
+    begun_fit: BegunFit, problem: FreeRunProblem, others: Mapping[str, float], near: BlockJacobian
+) -> BegunFit:
+    """A fit that was begun on some of the runs, to be finished on all of them.
+
+    Parameters
+    ----------
+    begun_fit : BegunFit
+    problem : FreeRunProblem
+        Of all runs.
+    others : mapping
+        What belongs to the runs that were left out.
+    near : BlockJacobian
+        Of all runs, without the last candidate.
+    """
+    values = {**others, **begun_fit.fit.values}
+    known = _extended(problem, values, near) or BlockJacobian(len(problem.names), ())
+    return BegunFit(problem, replace(begun_fit.fit, values=values), known, begun_fit.cost)
 
 
 def nearest(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], share: float) -> Mapping[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -70,6 +71,38 @@ class Fits:
         self.failed: dict[str, str] = {}
         self.screened: dict[str, float] = {}
 
+    @cached_property
+    def of_one_repeat(self) -> Fits:
+        """The same with the first fitted run of every test alone; itself where no test has two of them.
+
+        Repeats have the same drive: to look at seventy candidates, and to begin fits from afar, one is enough.
+        """
+        test_of = {name: i for i, test in enumerate(self.tests) for name in test}
+        first: dict[object, list[Observation]] = {}
+        for run in self.fitting:
+            name = run[0].run.name
+            first.setdefault(test_of.get(name, name), run)
+        if len(first) == len(self.fitting):
+            return self
+        fewer = Fits(self.model, list(first.values()), self.held_out, self.told, self.tests)
+        fewer.failed, fewer.screened = self.failed, self.screened
+        return fewer
+
+    @property
+    def n_coefficients(self) -> int:
+        """Of the fitted runs."""
+        return sum(one.spectra.size for run in self.fitting for one in run)
+
+    def part_of(self, jacobian: BlockJacobian, fit: FreeRunFit, whole: Fits) -> BlockJacobian:
+        """Of a Jacobian of more fitted runs, at a fit to them, what concerns those that are fitted here."""
+        if whole is self:
+            return jacobian
+        names, all_names = self.problem_of(fit).names, whole.problem_of(fit).names
+        present = {run[0].run.name for run in self.fitting}
+        of_runs = [one.run.name for run in whole.fitting for one in run]
+        chosen = [i for i, name in enumerate(of_runs) if name in present]
+        return jacobian.part(chosen, [all_names.index(name) for name in names])
+
     def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
         """The fitted runs with some effects."""
         return FreeRunProblem(self.model, self.fitting, candidates)
@@ -119,7 +152,7 @@ class Fits:
             return {}
         start = problem.values(problem.theta_of(fit.values))
         best, _ = fitted(problem, start, n_iterations=3)
-        usual = fit.misfit / max(sum(one.spectra.size for each in self.fitting for one in each), 1)
+        usual = fit.misfit / max(self.n_coefficients, 1)
         n = max(sum(one.spectra.size for one in run), 1)
         releases = [name for name in problem.names if name == f"{RELEASE}{run[0].run.name}"]
         if not releases or best.trouble or best.misfit / n < _WORSE_THAN_OTHERS * usual:

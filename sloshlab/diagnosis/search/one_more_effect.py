@@ -8,7 +8,15 @@ from typing import Final
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import STAGES, begun, finished, scanned, soft_cost, stages_for
+from sloshlab.diagnosis.free_run_fit import (
+    STAGES,
+    begun,
+    finished,
+    on_more_runs,
+    scanned,
+    soft_cost,
+    stages_for,
+)
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.search.fits import Fits
 from sloshlab.diagnosis.search.in_place import InPlace
@@ -29,21 +37,26 @@ class OneMoreEffect:
     """
 
     def __init__(self, fits: Fits) -> None:
-        self.fits = fits
-        self.screening, self.in_place = Screening(fits), InPlace(fits)
+        self.fits, self.few = fits, fits.of_one_repeat
+        self.screening, self.in_place = Screening(self.few), InPlace(fits)
 
     def fitted(
         self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
-        """Fit each of some candidates beside what is in `base` already; the promising ones to the end."""
+        """Fit each of some candidates beside what is in `base` already; the promising ones to the end.
+
+        They are looked at and begun on one repeat of every test, and finished on all.
+        """
         shares = stages_for(self.fits.problem_of(base), base)
         is_near = shares != STAGES and not self.fits.is_strained(base)
-        promising = self.screening.chosen(base, jacobian, pool, what, shares, is_near=is_near)
+        near = self.few.part_of(jacobian, base, self.fits)
+        more = self.fits.n_coefficients / self.few.n_coefficients
+        promising = self.screening.chosen(base, near, pool, what, shares, is_near=is_near, more=more)
         begun_fits = []
         for i, promise in enumerate(promising):
             candidate = promise.candidate
             self.fits.told(f"{what}: {candidate.key}", i, 2 * len(promising))
-            one = begun(self.fits.problem((*base.candidates, candidate)), promise.starts, shares, near=jacobian)
+            one = begun(self.few.problem((*base.candidates, candidate)), promise.starts, shares, near=near)
             if one.fit.trouble:
                 self.fits.failed[candidate.key] = one.fit.trouble
             else:
@@ -51,14 +64,17 @@ class OneMoreEffect:
         kept = []
         lowest = min((one.cost for one, _ in begun_fits), default=0.0)
         most_alike = min(promising, key=lambda one: one.share_left, default=None)
-        at_base = soft_cost(self.fits.problem_of(base), base, shares[min(1, len(shares) - 1)])
+        at_base = soft_cost(self.few.problem_of(base), base, shares[min(1, len(shares) - 1)])
         for i, (one, promise) in enumerate(sorted(begun_fits, key=lambda each: each[0].cost)):
             candidate = promise.candidate
             is_out = i >= _ALWAYS_FINISHED and at_base - one.cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest)
             if is_out and not (promise is most_alike and promise.is_like_the_force):
-                self.fits.screened[candidate.key] = max(at_base - one.cost, 0.0)
+                self.fits.screened[candidate.key] = max(more * (at_base - one.cost), 0.0)
                 continue
             self.fits.told(f"{what}: {candidate.key}, to the end", len(promising) + i, 2 * len(promising))
+            if self.few is not self.fits:
+                whole = self.fits.problem((*base.candidates, candidate))
+                one = on_more_runs(one, whole, base.values, jacobian)
             done = finished(one, shares)
             if i < _MOST_SCANNED and shares == STAGES and not one.problem.is_down_to_noise(done):
                 number = f"{candidate.key}.{candidate.effect.parameters[0].name}"

@@ -99,8 +99,12 @@ class Screening:
         shares: Sequence[float],
         *,
         is_near: bool,
+        more: float = 1.0,
     ) -> list[Promise]:
-        """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from."""
+        """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from.
+
+        What is promised counts so many times as there are `more` coefficients to be fitted than are looked at.
+        """
         problem = self.fits.problem(base.candidates)
         theta = problem.theta_of(base.values)
         residual = problem.residual(theta)
@@ -126,7 +130,9 @@ class Screening:
                     gains = [look.gain(moved - residual) for look in looks_at]
                     looks.append(
                         _Look(
-                            np.array([gain for gain, _ in gains]), start, resized(candidate, start, max(gains)[1])
+                            more * np.array([gain for gain, _ in gains]),
+                            start,
+                            resized(candidate, start, max(gains)[1]),
                         )
                     )
             if not looks:

@@ -35,6 +35,23 @@ def test_products_are_those_of_the_dense_matrix() -> None:
     np.testing.assert_allclose(jacobian.normal(), matrix.T @ matrix, rtol=1e-13, atol=1e-15)
 
 
+def test_a_part_has_some_blocks_and_the_columns_in_the_order_asked_for() -> None:
+    """Blocks 0 and 2 see columns 0, 1 and 2; the last one is left out."""
+    matrix = dense()
+    found = in_blocks(matrix).part((0, 2), (2, 0, 1))
+    rows = [*range(4), *range(7, 12)]
+    np.testing.assert_array_equal(as_dense(found), matrix[rows][:, [2, 0, 1]])
+    along = np.random.default_rng(3).normal(size=len(rows))
+    np.testing.assert_allclose(found.transposed_times(along), matrix[rows][:, [2, 0, 1]].T @ along, rtol=1e-13)
+
+
+def test_a_part_is_changed_alone() -> None:
+    matrix = dense()
+    whole = in_blocks(matrix)
+    whole.part((0,), (0, 2)).correct(np.ones(2), np.full(4, 9.0))
+    np.testing.assert_array_equal(as_dense(whole), matrix)
+
+
 def test_weights_go_to_rows_and_leave_the_matrix_as_it_was() -> None:
     matrix = dense()
     jacobian, weights = in_blocks(matrix), np.random.default_rng(2).uniform(0.1, 3.0, sum(SIZES))

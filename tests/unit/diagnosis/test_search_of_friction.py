@@ -16,13 +16,14 @@ from sloshlab.diagnosis import effects, free_run_problem
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.free_run_fit import Start, fitted
+from sloshlab.diagnosis.free_run_fit import Start, begun, finished, fitted, on_more_runs
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search import fits, redrawn, refinement, screening
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import InPlace
+from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
 from sloshlab.diagnosis.search.refinement import Refinement
 from sloshlab.diagnosis.search.screening import Screening
 from sloshlab.diagnosis.split import Split
@@ -335,3 +336,60 @@ def test_screening_keeps_what_explains_and_begins_it_near(case: Decays, monkeypa
     for one in promises:
         assert any(start.is_near for start in one.starts)
         assert (one.gains > 0).any()
+
+
+class Repeated(Decays):
+    """Two repeats of one test and one of another are fitted."""
+
+    def __init__(self, folder: Path) -> None:
+        runs = decays((0.014, 0.014, 0.006, 0.01), duration_s=2.0, friction_n=(UP_N, DOWN_N))
+        self.model = RigModel(rig(folder), folder, runs)
+        observed = [observations(run, self.model.compared(run)) for run in runs]
+        tests = [["decay_0", "decay_1"], ["decay_2"], ["decay_3"]]
+        self.fits = Fits(self.model, observed[:3], observed[3:], lambda what, done, of: None, tests)
+        self.believed = self.model.believed
+        self.pool = {COULOMB: Candidate(effect(COULOMB), surroundings(self.model))}
+        self.baseline = fitted(self.fits.problem(), self.believed, n_iterations=4)[0]
+
+
+@pytest.fixture(scope="module")
+def repeated(tmp_path_factory: pytest.TempPathFactory) -> Repeated:
+    return Repeated(tmp_path_factory.mktemp("repeated"))
+
+
+def test_one_repeat_of_every_test_is_looked_at(case: Decays, repeated: Repeated) -> None:
+    few = repeated.fits.of_one_repeat
+    assert [run[0].run.name for run in few.fitting] == ["decay_0", "decay_2"]
+    assert few is repeated.fits.of_one_repeat
+    assert few.of_one_repeat is few
+    assert few.failed is repeated.fits.failed
+    assert few.screened is repeated.fits.screened
+    assert case.fits.of_one_repeat is case.fits
+    assert repeated.fits.n_coefficients > 1.4 * few.n_coefficients
+
+
+def test_the_part_of_a_jacobian_is_that_of_fewer_runs(repeated: Repeated) -> None:
+    few, fit = repeated.fits.of_one_repeat, repeated.baseline
+    part = few.part_of(repeated.fits.jacobian(fit), fit, repeated.fits)
+    expected = few.jacobian(fit)
+    assert part.n_columns == expected.n_columns == len(few.problem().names) < len(repeated.fits.problem().names)
+    for unit in np.eye(part.n_columns):
+        np.testing.assert_allclose(part.times(unit), expected.times(unit), rtol=1e-9, atol=1e-9)
+
+
+def test_what_is_begun_on_some_runs_is_finished_on_all(repeated: Repeated) -> None:
+    few, fits, base = repeated.fits.of_one_repeat, repeated.fits, repeated.baseline
+    candidate = repeated.pool[COULOMB]
+    jacobian = fits.jacobian(base)
+    start = Start({**base.values, **candidate.starts()[0]}, is_near=True)
+    one = begun(few.problem((candidate,)), [start], near=few.part_of(jacobian, base, fits))
+    whole = on_more_runs(one, fits.problem((candidate,)), base.values, jacobian)
+    assert whole.fit.values["release of decay_1"] == base.values["release of decay_1"]
+    assert whole.fit.values[COULOMB_N] == one.fit.values[COULOMB_N]
+    assert whole.jacobian.n_columns == len(fits.problem((candidate,)).names)
+    done = finished(whole)
+    assert done.values[COULOMB_N] == pytest.approx(0.5 * (UP_N + DOWN_N), rel=0.15)
+    assert done.cost < base.cost
+    [found, *_] = OneMoreEffect(fits).fitted(base, jacobian, [candidate], "")
+    assert found.fit.cost == pytest.approx(done.cost, rel=0.02)
+    assert set(found.fit.names) == {*fits.problem().names, COULOMB_N}
