@@ -33,9 +33,11 @@ from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
-STEPS_PER_PERIOD: Final = 12.0
-_STEPS_PER_PERIOD_OF_A_RELEASE: Final = 24.0
-"""Of the highest mode, which a release excites most; within longer steps friction may stop a place twice."""
+STEPS_PER_PERIOD: Final = 8.0
+_STEPS_PER_PERIOD_OF_A_RELEASE: Final = 12.0
+"""Of the highest mode, which a release excites most; its own motion is followed exactly (`for_steps_of`)."""
+_FINER_FOR_EVENTS: Final = 2.0
+"""Within longer steps friction may stop a place twice, and a contact open and close."""
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _LEAST_STEPS_PER_S: Final = 500.0
 """Of a tank that follows its measured motion: forces that average over a cycle need some tens of steps in it."""
@@ -246,10 +248,12 @@ class RigModel:
         rate = drive.excitation.sampling_rate_hz
         start = values.get(f"{RELEASE}{run.name}", drive.initial_displacement_m)
         per_period = _STEPS_PER_PERIOD_OF_A_RELEASE if run.is_free else STEPS_PER_PERIOD
-        simulation = twin.simulate(
-            excitation, initial_displacement_m=start, n_substeps=steps_per_sample(twin, rate, per_period)
-        )
-        return simulation.require_done()
+        if any(term.kind.dry_friction or term.kind.events for term in twin.terms):
+            per_period *= _FINER_FOR_EVENTS
+        n_substeps = steps_per_sample(twin, rate, per_period)
+        if twin.structure is not None:
+            twin = replace(twin, structure=twin.structure.for_steps_of(1.0 / (rate * n_substeps)))
+        return twin.simulate(excitation, initial_displacement_m=start, n_substeps=n_substeps).require_done()
 
     def _trusted(self, run: CaseRun, undone: Sequence[SensorFault] = ()) -> list[str]:
         """Channels whose mean moves the tank, and which are compared, too: their gains say how far it moved."""

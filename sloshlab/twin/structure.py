@@ -6,8 +6,9 @@ and on the one-degree-of-freedom rig it is added to the moving mass. Forces of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, sqrt
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,9 @@ from sloshlab.rig import Rig
 from sloshlab.twin.rig_beam import base_participation_kg
 
 FloatArray = npt.NDArray[np.float64]
+_LONGEST_STEP: Final = 1.5
+"""Times the angular frequency of a mode; fewer than four steps per period do not follow it at all."""
+_N_NEWTON: Final = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,34 @@ class Structure:
         if self.rocked is None:
             return shape
         return shape @ self.rocked.of_clamped + np.outer(np.asarray(x_m), self.rocked.rotation_rad_per_m)
+
+    def for_steps_of(self, step_s: float) -> Structure:
+        """The structure that classical Runge–Kutta moves in such steps as this one moves by itself.
+
+        A step of order 4 multiplies a mode of eigenvalue λ by R(λh), the first five terms of exp(λh): it lags and
+        decays by little, which adds up over a decay. Stiffness and damping of each mode are such that R is exp(λh)
+        of the mode that is meant (prewarping, as in the design of digital filters). Modes that do not oscillate,
+        or of which a period has fewer than four steps, stay as they are.
+
+        Parameters
+        ----------
+        step_s : float
+        """
+        decay = 0.5 * self.dampings_kg_per_s / self.masses_kg
+        squared = self.stiffnesses_n_per_m / self.masses_kg - decay**2
+        oscillates = (squared > 0.0) & (squared + decay**2 < (_LONGEST_STEP / step_s) ** 2)
+        meant = (-decay + 1j * np.sqrt(np.where(oscillates, squared, 0.0))) * step_s
+        z = meant.copy()
+        for _ in range(_N_NEWTON):
+            slope = 1 + z * (1 + z / 2 * (1 + z / 3))
+            z = z - (slope + z**4 / 24 - np.exp(meant)) / slope
+        stiffness = self.masses_kg * np.abs(z / step_s) ** 2
+        damping = -2.0 * self.masses_kg * z.real / step_s
+        return replace(
+            self,
+            stiffnesses_n_per_m=np.where(oscillates, stiffness, self.stiffnesses_n_per_m),
+            dampings_kg_per_s=np.where(oscillates, damping, self.dampings_kg_per_s),
+        )
 
     def static_deflection(self, deflection_m: float) -> FloatArray:
         """Modal coordinates under a static force at the tank that deflects it by `deflection_m`."""
