@@ -16,6 +16,7 @@ from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
 
 _MOST_ANEW: Final = 3
+_MOST_RIVALS: Final = 5
 _LEAST_SHARE_OF_GAIN: Final = 0.5
 """Of that of the best, by which an effect is worth another beginning."""
 _MOST_THROWS, _MOST_IN_VAIN, _N_PLACES = 16, 4, 48
@@ -52,28 +53,47 @@ class Refinement:
         known : sequence of Explanation
             With one effect each.
         """
-        by_key: dict[str, Explanation] = {}
-        for one in sorted(known, key=lambda one: one.fit.cost):
-            by_key.setdefault(one.keys[-1], one)
         found: list[Explanation] = []
         lowest = min((one.fit.cost for one in known), default=base.cost)
-        for key, one in list(by_key.items())[:_MOST_ANEW]:
+        for one in _best_by_effect(known)[:_MOST_ANEW]:
             gain = base.cost - one.fit.cost
             if gain < max(LEAST_TO_BUILD_ON, _LEAST_SHARE_OF_GAIN * (base.cost - lowest)):
                 break
-            problem = self.fits.problem_of(one.fit)
-            if problem.is_down_to_noise(one.fit):
+            if self.fits.problem_of(one.fit).is_down_to_noise(one.fit):
                 break
-            self.fits.told(f"fitting {key} from what is believed", len(found), _MOST_ANEW)
-            effect = {
-                name: value for name, value in one.fit.values.items() if name not in self.fits.model.believed
-            }
-            sizes = [one.fit.candidates[-1].sized(effect, factor) for factor in _OTHER_SIZES]
-            starts = [{**self.fits.model.believed, **numbers} for numbers in sizes]
-            fit, _ = fitted(problem, nearest(problem, starts, STAGES[0]))
-            if not fit.trouble and fit.cost < one.fit.cost:
-                found.append(self.fits.judged(fit))
+            self.fits.told(f"fitting {one.keys[-1]} from what is believed", len(found), _MOST_ANEW)
+            found += self._from_believed(one)
         return found
+
+    def unstrained(self, known: Sequence[Explanation]) -> list[Explanation]:
+        """The best effect and its rivals from what is believed, where it has the baseline at the end of its range.
+
+        The retuned baseline that it was fitted from took as much of it as is allowed. All may describe the
+        recordings nearly alike from there, though not from where the baseline is more likely.
+
+        Parameters
+        ----------
+        known : sequence of Explanation
+            With one effect each.
+        """
+        rivals = _best_by_effect(known)
+        rivals = [one for one in rivals if one.fit.cost - rivals[0].fit.cost < LEAST_TO_BUILD_ON][:_MOST_RIVALS]
+        if len(rivals) < 2 or not self.fits.is_strained(rivals[0].fit):
+            return []
+        found: list[Explanation] = []
+        for i, one in enumerate(rivals):
+            self.fits.told(f"fitting {one.keys[-1]} from what is believed", i, len(rivals))
+            found += self._from_believed(one)
+        return found
+
+    def _from_believed(self, one: Explanation) -> list[Explanation]:
+        """An effect fitted with the baseline as believed, from some sizes; none where that is no better."""
+        effect = {name: value for name, value in one.fit.values.items() if name not in self.fits.model.believed}
+        sizes = [one.fit.candidates[-1].sized(effect, factor) for factor in _OTHER_SIZES]
+        starts = [{**self.fits.model.believed, **numbers} for numbers in sizes]
+        problem = self.fits.problem_of(one.fit)
+        fit, _ = fitted(problem, nearest(problem, starts, STAGES[0]))
+        return [self.fits.judged(fit)] if not fit.trouble and fit.cost < one.fit.cost else []
 
     def climbed(self, known: Sequence[Explanation]) -> list[Explanation]:
         """The best effect of several numbers from the nearest of many places about it, time and again.
@@ -165,6 +185,14 @@ class Refinement:
             if not fit.trouble and fit.cost < best.fit.cost:
                 best = self.fits.judged(fit)
         return best
+
+
+def _best_by_effect(known: Sequence[Explanation]) -> list[Explanation]:
+    """The best fit of each effect, the best effect first."""
+    by_key: dict[str, Explanation] = {}
+    for one in sorted(known, key=lambda one: one.fit.cost):
+        by_key.setdefault(one.keys[-1], one)
+    return list(by_key.values())
 
 
 def _places_about(fit: FreeRunFit, names: Sequence[str], turn: int) -> list[dict[str, float]]:

@@ -73,7 +73,9 @@ def findings_of(
         found += InPlace(fits).specialised(best, found, pool)
         best = cheapest(found)
         is_complete = best is not None and fits.is_complete(best)
-    if not is_complete:
+    if is_complete:
+        found += refinement.unstrained(found)
+    else:
         found += refinement.anew(retuned_fit, found)
         found += refinement.climbed(found)
         best = cheapest(found)

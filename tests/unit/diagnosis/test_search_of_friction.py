@@ -194,6 +194,25 @@ def test_an_effect_is_fitted_again_from_what_is_believed(
     assert start[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N])
 
 
+def test_rivals_beside_a_strained_baseline_are_fitted_from_what_is_believed(
+    case: Decays, coulomb: Explanation
+) -> None:
+    """The best one and what is nearly as good, not what is far behind."""
+    best = strained(case, coulomb)
+    other = case.fit(STRIBECK)
+    near, far = (replace(other, fit=replace(other.fit, cost=best.fit.cost + more)) for more in (23.0, 25.0))
+    found = Refinement(case.fits).unstrained([near, best])
+    assert {one.keys for one in found} <= {(COULOMB,), (STRIBECK,)}
+    assert found[0].keys == (COULOMB,)
+    assert found[0].fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
+    assert not case.fits.is_strained(found[0].fit)
+    assert Refinement(case.fits).unstrained([far, best]) == []
+    relaxed = replace(coulomb, fit=replace(coulomb.fit, cost=best.fit.cost))
+    assert not case.fits.is_strained(relaxed.fit)
+    assert Refinement(case.fits).unstrained([near, relaxed]) == []
+    assert Refinement(case.fits).unstrained([]) == []
+
+
 def test_what_gains_nothing_is_not_fitted_again(case: Decays, coulomb: Explanation) -> None:
     no_gain = replace(coulomb, fit=replace(coulomb.fit, cost=case.baseline.cost - 10.0))
     assert Refinement(case.fits).anew(case.baseline, [no_gain]) == []
