@@ -294,10 +294,21 @@ def nearest(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], shar
     """
     if len(starts) == 1:
         return starts[0]
+    return starts[int(np.argmin(costs_at(problem, starts, share)))]
+
+
+def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], share: float) -> list[float]:
+    """Costs before anything is fitted, channels known only to a share of their RMS; infinite of what does not run.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    starts : sequence of mappings
+    share : float
+    """
     softness = problem.softness(share)
     left = problem.residuals([problem.theta_of(start) for start in starts])
-    costs = [huber_cost(softness * one) if np.isfinite(one).all() else np.inf for one in left]
-    return starts[int(np.argmin(costs))]
+    return [huber_cost(softness * one) if np.isfinite(one).all() else np.inf for one in left]
 
 
 def finished(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
@@ -19,6 +19,7 @@ from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.free_run_fit import fitted
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.observations import (
+    FOR_NOTHING,
     Observation,
     noise_of_sensor,
     observations,
@@ -31,6 +32,11 @@ from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
 _N_NOISY: Final = 4
+_N_BLOCKS: Final = 9
+_MOSTLY: Final = 1.0
+"""Mean square by the noise of drives over that by the sensor's own, from which it is most of what is there."""
+_REACH: Final = 0.05
+"""Of a frequency: twice what is believed to be normal of a mode, as an effect may move it, too."""
 _MOST_OF_STATED: Final = 2.0
 """Of a sensor's noise: drives of repeats that differ by more were not the same."""
 _SECONDS_OF_A_SPECTRUM: Final = 4.0
@@ -54,7 +60,10 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     fit, _ = fitted(
         FreeRunProblem(model, [_loosened(plain[run.name]) for run in case.runs]), model.believed, n_iterations=5
     )
-    plain = _with_noise_of_drives(case, model, plain, fit)
+    raw = {name: _raw_residual(model, observed, fit) for name, observed in plain.items()}
+    sensors = {name: _with_simulated(observed, raw[name]) for name, observed in plain.items()}
+    noise = _noise_of_drives(case, model, sensors, fit)
+    plain = {name: [_louder(one, noise) for one in observed] for name, observed in sensors.items()}
     weighted = dict(plain)
     repeated: list[Observation] = []
     alone: list[CaseRun] = []
@@ -63,26 +72,30 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
             alone += test
             continue
         group = [plain[run.name] for run in test]
-        raw = [_raw_residual(model, observed, fit) for observed in group]
-        for run, observed in zip(test, with_scatter(group, raw), strict=True):
+        for run, observed in zip(test, with_scatter(group, [raw[run.name] for run in test]), strict=True):
             weighted[run.name] = observed
             repeated += observed
     for run in alone:
         weighted[run.name] = with_typical_scatter(plain[run.name], repeated)
-    return {name: within_band(observed) for name, observed in weighted.items()}
+    return {
+        name: within_band(
+            [_quieted(one, of_sensor, noise) for one, of_sensor in zip(observed, sensors[name], strict=True)]
+        )
+        for name, observed in weighted.items()
+    }
 
 
-def _with_noise_of_drives(
+def _noise_of_drives(
     case: Case, model: DiagnosedModel, plain: dict[str, list[Observation]], fit: FreeRunFit
-) -> dict[str, list[Observation]]:
-    """Observations with what the noise of driving accelerometers makes of the simulation added to their variance.
+) -> dict[tuple[str, str], FloatArray]:
+    """Mean square that the noise of driving accelerometers adds to each coefficient, per run and channel.
 
     At a resonance it is narrow: two repeats alone tell its size to a factor of two or three. It is measured by
     simulations whose drive has as much noise once more, of the colour that repeats tell (`_colour`). Of several
     that drive together each may have to do so alone, beside an effect on the others, and the noisiest counts.
     """
     if not isinstance(model, RigModel) or case.rig is None:
-        return plain
+        return {}
     found: dict[tuple[str, str], FloatArray] = {}
     colours = {name: _colour(case, name) for run in case.runs for name in model.driving(run) if not run.is_free}
     for run in case.runs:
@@ -93,11 +106,23 @@ def _with_noise_of_drives(
             recording = run.recording.drop_vars([name for name in driving if name != kept])
             kept_alone, colour = replace(run, recording=recording), colours[kept]
             for place, noise in _noise_through(case, kept_alone, kept, colour, plain, fit).items():
-                found[place] = np.maximum(found.get(place, 0.0), noise)
-    return {
-        name: [replace(one, variance=one.variance + found.get((name, one.channel), 0.0)) for one in observed]
-        for name, observed in plain.items()
-    }
+                found[place] = np.maximum(found.get(place, 0.0), _near_by(noise))
+    return found
+
+
+def _louder(one: Observation, noise: Mapping[tuple[str, str], FloatArray]) -> Observation:
+    """An observation of a sensor with the noise of drives in its variance."""
+    return replace(one, variance=one.variance + noise.get((one.run.name, one.channel), 0.0))
+
+
+def _quieted(one: Observation, of_sensor: Observation, noise: Mapping[tuple[str, str], FloatArray]) -> Observation:
+    """An observation that counts for nothing where there is nothing but the noise of drives.
+
+    There a simulation shows noise that the recording has not, and is nearer to it the less of a resonance it has:
+    it would be fitted with more damping, less participation, and a frequency beyond the bands that are compared.
+    """
+    is_noise = noise.get((one.run.name, one.channel), 0.0) > _MOSTLY * of_sensor.variance
+    return replace(one, variance=np.where(is_noise & ~one.informative, FOR_NOTHING, 1.0) * one.variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,12 +199,25 @@ def _noise_through(
             for one in plain[run.name]:
                 if one.channel in loud and one.channel != driving:
                     square = (one.of(loud[one.channel]) - one.of(quiet[one.channel])) ** 2
-                    own = uniform_filter(square, (3, 9), mode="nearest") / _N_NOISY
-                    found[run.name, one.channel] = found.get((run.name, one.channel), 0.0) + own
+                    found[run.name, one.channel] = found.get((run.name, one.channel), 0.0) + square / _N_NOISY
     for one in plain[run.name]:
         if one.channel not in run.recording.data_vars:
             found[run.name, one.channel] = np.full(one.spectra.shape, std**2)
     return found
+
+
+def _near_by(square: FloatArray) -> FloatArray:
+    """Mean squares over some blocks, the largest of all bands in which a resonance may lie that is in one.
+
+    What noise makes of a resonance is steady and as narrow as that is; where it is, only a fit will tell, and a
+    band that is thought to be quiet must not draw it, nor a noisy one.
+    """
+    steady = uniform_filter(square, (_N_BLOCKS, 1), mode="nearest")
+    bands = np.arange(square.shape[1])
+    reach = np.ceil(_REACH * (bands + 0.5)).astype(int)
+    return np.stack(
+        [steady[:, max(k - n, 0) : k + n + 1].max(axis=1) for k, n in zip(bands, reach, strict=True)], 1
+    )
 
 
 def _readings(case: Case, run: CaseRun, fit: FreeRunFit) -> dict[str, FloatArray]:
@@ -192,6 +230,13 @@ def _loosened(observed: Sequence[Observation]) -> list[Observation]:
     return [
         replace(one, variance=one.variance + (0.05**2) * float(np.mean(one.spectra**2)))
         for one in within_band(observed)
+    ]
+
+
+def _with_simulated(observed: Sequence[Observation], raw: Mapping[str, FloatArray]) -> list[Observation]:
+    """Observations with what is simulated of them, where it is."""
+    return [
+        replace(one, simulated=one.spectra - raw[one.channel]) if one.channel in raw else one for one in observed
     ]
 
 

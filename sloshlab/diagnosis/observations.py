@@ -22,7 +22,7 @@ ZERO_IS_KNOWN: Final = "zero_is_known"
 """Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
 _SLOWEST_INTEGRATED_HZ: Final = 5 * DRIFT_CORNER_HZ
-_FOR_NOTHING: Final = 100.0
+FOR_NOTHING: Final = 100.0
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
 _LEAST_SHARE: Final = 1e-4
 """No channel is believed to better than this share of its RMS per coefficient; quantisation and rounding."""
@@ -48,6 +48,8 @@ class Observation:
         Bands of the transform, if not all of them are kept.
     is_rough : bool
         Whether some of the channel need not be described, though repeats may share it.
+    simulated : ndarray of shape of `spectra`, or None
+        Of the same, as a first fit of the baseline simulates it, where that is known.
     """
 
     run: CaseRun
@@ -58,6 +60,7 @@ class Observation:
     variance: FloatArray
     n_transformed: int = 0
     is_rough: bool = False
+    simulated: FloatArray | None = None
 
     @property
     def n_bands(self) -> int:
@@ -77,8 +80,12 @@ class Observation:
 
     @property
     def informative(self) -> NDArray[np.bool_]:
-        """Coefficients in whose neighbourhood the recording stands out of what does not repeat."""
-        power = uniform_filter(self.spectra**2, (3, 3), mode="nearest")
+        """Coefficients in whose neighbourhood the recording or its simulation stands out of what does not repeat.
+
+        A simulation that is driven by a faulty sensor moves where nothing is recorded.
+        """
+        shown = [one for one in (self.spectra, self.simulated) if one is not None]
+        power = np.max([uniform_filter(one**2, (3, 3), mode="nearest") for one in shown], axis=0)
         return np.asarray(power > _INFORMATIVE * self.variance)
 
     def of(self, values: FloatArray) -> FloatArray:
@@ -122,7 +129,7 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
         variance = np.full(spectra.shape, max(_stated(variable), _white_level(spectra), least, 1e-300))
         if variable.attrs["quantity"] in ("displacement", "velocity") and _is_integrated(run, driving):
             slow = band_frequencies_hz(n_bands, rate) < _SLOWEST_INTEGRATED_HZ
-            variance[:, slow] += _FOR_NOTHING * (spectra[:, slow] ** 2).mean()
+            variance[:, slow] += FOR_NOTHING * (spectra[:, slow] ** 2).mean()
         is_rough = float(variable.attrs.get("known_to", 0.0)) > 0.0
         found.append(Observation(run, name, keeps_mean, known, spectra, variance, is_rough=is_rough))
     return found
@@ -178,6 +185,7 @@ def within_band(observed: Sequence[Observation]) -> list[Observation]:
             one,
             spectra=np.ascontiguousarray(one.spectra[:, :n_kept]),
             variance=np.ascontiguousarray(one.variance[:, :n_kept]),
+            simulated=None if one.simulated is None else np.ascontiguousarray(one.simulated[:, :n_kept]),
             n_transformed=n_bands,
         )
         for one in observed

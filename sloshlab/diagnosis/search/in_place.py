@@ -10,7 +10,7 @@ import numpy as np
 
 from sloshlab.diagnosis.candidate import Candidate, Surroundings
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest, soft_cost
+from sloshlab.diagnosis.free_run_fit import STAGES, costs_at, fitted, nearest, soft_cost
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.start_numbers import as_its_general_form, as_its_special_case, of_many_sizes
@@ -51,11 +51,9 @@ class InPlace:
                 continue
             self.fits.told(f"{what}: {candidate.key} in place of {special.effect.name}", 0, 1)
             problem = self.fits.problem((*base.candidates, candidate))
-            softness = problem.softness(_SOFT)
             sizes = of_many_sizes(candidate)
             starts = [{**at, **one} for at in (best.fit.values, self.fits.eased(base)) for one in sizes]
-            left = problem.residuals([problem.theta_of(start) for start in starts])
-            costs = [huber_cost(softness * one) for one in left]
+            costs = costs_at(problem, starts, _SOFT)
             name = f"{candidate.effect.block}.{candidate.effect.name}"
             if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
                 nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
@@ -173,8 +171,8 @@ class InPlace:
             if is_done or candidate.key in known:
                 continue
             starts = [{**best.fit.values, **one} for one in as_its_special_case(candidate, special, best.fit)]
-            costs = [huber_cost(problem.residual(problem.theta_of(start))) for start in starts]
-            fit, _ = fitted(problem, starts[int(np.argmin(costs))], n_iterations=6, shares=STAGES[-2:])
+            start = nearest(problem, starts, STAGES[-1])
+            fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-2:])
             if not fit.trouble:
                 found.append(self.fits.judged(fit))
         return found

@@ -13,7 +13,7 @@ from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.first_look import FirstLook
 from sloshlab.diagnosis.force_starts import ForceStart, ForceStarts
-from sloshlab.diagnosis.free_run_fit import Start, nearest
+from sloshlab.diagnosis.free_run_fit import Start, costs_at, nearest
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search.fits import Fits
@@ -153,11 +153,9 @@ class Screening:
         if not sizes:
             return None
         problem, believed = self.fits.problem((candidate,)), self.fits.model.believed
-        softness = problem.softness(share)
-        left = problem.residuals([problem.theta_of({**believed, **one}) for one in sizes])
-        costs = [huber_cost(softness * one) if np.isfinite(one).all() else np.inf for one in left]
-        nearest_one = int(np.argmin(costs))
-        return sizes[nearest_one] if costs[nearest_one] < huber_cost(softness * residual) else None
+        costs = costs_at(problem, [{**believed, **one} for one in sizes], share)
+        least = int(np.argmin(costs))
+        return sizes[least] if costs[least] < huber_cost(problem.softness(share) * residual) else None
 
     def _starts(self, base: FreeRunFit, one: Promise, share: float, *, is_near: bool) -> list[Start]:
         """Where a candidate is fitted from."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,17 @@ from scipy.signal import lfilter, welch
 
 from sloshlab.diagnosis.case import Case, CaseRun
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
-from sloshlab.diagnosis.noise_floor import _WHITE, _Colour, _colour, _noise_through, weighted_observations
-from sloshlab.diagnosis.observations import noise_of_sensor, observations
+from sloshlab.diagnosis.noise_floor import (
+    _WHITE,
+    _Colour,
+    _colour,
+    _louder,
+    _near_by,
+    _noise_through,
+    _quieted,
+    weighted_observations,
+)
+from sloshlab.diagnosis.observations import Observation, noise_of_sensor, observations
 from sloshlab.diagnosis.rig_model import RigModel
 
 NOISE_M_PER_S2 = 0.1
@@ -123,3 +133,59 @@ def test_the_noise_of_a_sensor_is_what_is_stated_or_what_its_high_bands_show() -
     assert noise_of_sensor(run, "acceleration_root") == pytest.approx(NOISE_M_PER_S2, rel=0.05)
     del run.recording["acceleration_root"].attrs["noise_std"]
     assert noise_of_sensor(run, "acceleration_root") == pytest.approx(NOISE_M_PER_S2, rel=0.15)
+
+
+def test_what_a_drive_moves_counts_where_nothing_is_recorded(tmp_path: Path) -> None:
+    """A hum on the accelerometer of the base alone: the simulated mass hums, the recorded one rests."""
+    hum_hz, runs = 20.0, []
+    for repeat in range(2):
+        run = quiet_run(8.0, seed=repeat, noise=1e-3)
+        root = run.recording["acceleration_root"]
+        hum = 2.0 * np.sin(2 * np.pi * hum_hz * np.arange(root.size) / RATE_HZ + repeat)
+        recording = run.recording.assign(acceleration_root=root.copy(data=root.values + hum))
+        runs.append(CaseRun(f"run {repeat}", recording.assign_attrs(repeat=repeat), run.attributes))
+    case = case_of(tmp_path, *runs)
+    found = weighted_observations(case, RigModel(case.rig, tmp_path, case.runs))  # type: ignore[arg-type]
+    for [one] in found.values():
+        hums = np.abs(one.frequencies_hz - hum_hz) < 1.0
+        assert one.informative[2:-2, hums].all()
+        assert one.simulated is not None
+        # well above its resonance a mass on a spring moves by 1/(r² − 1) of its base, and a first fit lessens it
+        passed = 1 / ((2 * np.pi * hum_hz / OMEGA) ** 2 - 1)
+        of_base = one.of(hum)
+        power = (one.simulated[3:-3, hums] ** 2).sum() / (of_base[3:-3, hums] ** 2).sum()
+        assert np.sqrt(power) == pytest.approx(passed, rel=0.3)
+
+
+def test_noise_of_a_resonance_may_lie_where_the_resonance_may() -> None:
+    """One narrow line: as large in all bands within five per cent, at least in the next ones, over some blocks."""
+    square = np.zeros((40, 100))
+    square[:, 5], square[:, 60] = 1.0, 2.0
+    found = _near_by(square)
+    expected = np.zeros(100)
+    # band k is at k + 1/2 and looks 0.05 (k + 1/2) bands to both sides, rounded up: 57 and 64 look at 60
+    expected[4:7], expected[57:65] = 1.0, 2.0
+    np.testing.assert_allclose(found, np.tile(expected, (40, 1)))
+    burst = np.zeros((40, 100))
+    burst[20, 30] = 9.0
+    assert _near_by(burst)[:, 30].tolist() == [0.0] * 16 + [1.0] * 9 + [0.0] * 15
+
+
+def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
+    run = quiet_run(8.0)
+    [rests] = observations(run, ["acceleration_tip"])
+    sensor, place = rests.variance, ("quiet", "acceleration_tip")
+
+    def counts_for_less(one: Observation, share: float) -> bool:
+        noise = {place: share * sensor}
+        louder = _louder(one, noise)
+        np.testing.assert_allclose(louder.variance, (1 + share) * sensor)
+        [factor] = np.unique((_quieted(louder, one, noise).variance / louder.variance).round(6))
+        assert factor in (1.0, 100.0)
+        return bool(factor > 1.0)
+
+    assert counts_for_less(rests, 3.0)
+    assert not counts_for_less(rests, 0.5)
+    assert not counts_for_less(replace(rests, spectra=rests.spectra + 10 * np.sqrt(sensor)), 3.0)
+    assert not counts_for_less(replace(rests, simulated=np.full(sensor.shape, 10 * np.sqrt(sensor.max()))), 3.0)
+    np.testing.assert_array_equal(_quieted(rests, rests, {}).variance, sensor)
