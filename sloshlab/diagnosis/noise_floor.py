@@ -23,6 +23,7 @@ from sloshlab.diagnosis.observations import (
     Observation,
     noise_of_sensor,
     observations,
+    slow_displacements,
     with_scatter,
     with_typical_scatter,
     within_band,
@@ -35,6 +36,8 @@ _N_NOISY: Final = 4
 _N_BLOCKS: Final = 9
 _MOSTLY: Final = 1.0
 """Mean square by the noise of drives over that by the sensor's own, from which it is most of what is there."""
+_SLOWLY: Final = 3.0
+"""Standard deviations by noise to which a displacement is known that drift removal has gone over."""
 _REACH: Final = 0.05
 """Of a frequency: twice what is believed to be normal of a mode, as an effect may move it, too."""
 _MOST_OF_STATED: Final = 2.0
@@ -61,9 +64,17 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
         FreeRunProblem(model, [_loosened(plain[run.name]) for run in case.runs]), model.believed, n_iterations=5
     )
     raw = {name: _raw_residual(model, observed, fit) for name, observed in plain.items()}
+    if isinstance(model, RigModel):
+        plain = {
+            run.name: observations(run, model.compared(run), model.driving(run), knows_noise_of_drive=True)
+            for run in case.runs
+        }
     sensors = {name: _with_simulated(observed, raw[name]) for name, observed in plain.items()}
     noise = _noise_of_drives(case, model, sensors, fit)
-    plain = {name: [_louder(one, noise) for one in observed] for name, observed in sensors.items()}
+    plain = {
+        name: [_louder(one, noise, model.driving(one.run)) for one in observed]
+        for name, observed in sensors.items()
+    }
     weighted = dict(plain)
     repeated: list[Observation] = []
     alone: list[CaseRun] = []
@@ -110,9 +121,14 @@ def _noise_of_drives(
     return found
 
 
-def _louder(one: Observation, noise: Mapping[tuple[str, str], FloatArray]) -> Observation:
-    """An observation of a sensor with the noise of drives in its variance."""
-    return replace(one, variance=one.variance + noise.get((one.run.name, one.channel), 0.0))
+def _louder(one: Observation, noise: Mapping[tuple[str, str], FloatArray], driving: Sequence[str]) -> Observation:
+    """An observation of a sensor with the noise of drives in its variance.
+
+    Slow displacements of a base are lost with the drift that integration removes; what is left of them besides its
+    noise is known to a few times that only.
+    """
+    variance = one.variance + noise.get((one.run.name, one.channel), 0.0)
+    return replace(one, variance=np.where(slow_displacements(one, driving), _SLOWLY**2, 1.0) * variance)
 
 
 def _quieted(one: Observation, of_sensor: Observation, noise: Mapping[tuple[str, str], FloatArray]) -> Observation:

@@ -22,6 +22,8 @@ ZERO_IS_KNOWN: Final = "zero_is_known"
 """Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
 _SLOWEST_INTEGRATED_HZ: Final = 5 * DRIFT_CORNER_HZ
+_SETTLES_S: Final = 1.0 / DRIFT_CORNER_HZ
+"""What a filter that removes drift makes of beginnings and ends."""
 FOR_NOTHING: Final = 100.0
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
 _LEAST_SHARE: Final = 1e-4
@@ -97,7 +99,9 @@ class Observation:
         return np.asarray((self.spectra - self.of(values)) / np.sqrt(self.variance))
 
 
-def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()) -> list[Observation]:
+def observations(
+    run: CaseRun, names: Sequence[str], driving: Sequence[str] = (), *, knows_noise_of_drive: bool = False
+) -> list[Observation]:
     """Channels of a run, weighted by the noise of their sensors alone.
 
     Parameters
@@ -106,15 +110,17 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
     names : sequence of str
     driving : sequence of str
         Channels that drive the simulation.
+    knows_noise_of_drive : bool
+        Whether what its noise makes of slow displacements is added elsewhere.
 
     Notes
     -----
     The noise of a sensor is `noise_std`, and in squares beside it what no model need describe (`known_to`), where
     the recording states them, or what the quietest of bands near the end of its spectrum shows; never less than
     10⁻⁴ of the channel. Where accelerometers drive the simulation, slow displacements and velocities are lost with
-    the drift that integration removes, and count for nothing.
+    the drift that integration removes, and count for nothing; where the noise of what drives is known, near
+    beginnings and ends only.
     """
-    rate = run.attributes.sampling_rate_hz
     n_bands = _n_bands(run)
     found = []
     for name in names:
@@ -127,12 +133,30 @@ def observations(run: CaseRun, names: Sequence[str], driving: Sequence[str] = ()
         spectra = _spectra(values, known, keeps_mean, n_bands, run)
         least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
         variance = np.full(spectra.shape, max(_stated(variable), _white_level(spectra), least, 1e-300))
-        if variable.attrs["quantity"] in ("displacement", "velocity") and _is_integrated(run, driving):
-            slow = band_frequencies_hz(n_bands, rate) < _SLOWEST_INTEGRATED_HZ
-            variance[:, slow] += FOR_NOTHING * (spectra[:, slow] ** 2).mean()
         is_rough = float(variable.attrs.get("known_to", 0.0)) > 0.0
-        found.append(Observation(run, name, keeps_mean, known, spectra, variance, is_rough=is_rough))
+        one = Observation(run, name, keeps_mean, known, spectra, variance, is_rough=is_rough)
+        lost = slow_displacements(one, driving)
+        if lost.any():
+            times = one.times_s
+            at_ends = (times - times[0] < _SETTLES_S) | (times[-1] - times < _SETTLES_S)
+            everywhere = FOR_NOTHING * (spectra[lost] ** 2).mean()
+            variance[lost & (at_ends[:, None] | (not knows_noise_of_drive))] += everywhere
+        found.append(one)
     return found
+
+
+def slow_displacements(one: Observation, driving: Sequence[str]) -> NDArray[np.bool_]:
+    """Coefficients of displacements and velocities that integration of an accelerometer hardly tells.
+
+    Parameters
+    ----------
+    one : Observation
+    driving : sequence of str
+        Channels that drive the simulation.
+    """
+    quantity = one.run.recording[one.channel].attrs["quantity"]
+    is_lost = quantity in ("displacement", "velocity") and _is_integrated(one.run, driving)
+    return np.broadcast_to((one.frequencies_hz < _SLOWEST_INTEGRATED_HZ) & is_lost, one.spectra.shape)
 
 
 def noise_of_sensor(run: CaseRun, name: str) -> float:

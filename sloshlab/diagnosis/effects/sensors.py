@@ -200,7 +200,7 @@ def _drifted(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
         del others, recorded
         time = np.arange(values.size) / rate
-        return np.asarray(values + numbers["rate"] * (time - time.mean()))
+        return np.asarray(values + numbers["rate"] * time)
 
     return reading
 

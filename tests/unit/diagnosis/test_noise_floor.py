@@ -178,7 +178,7 @@ def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
 
     def counts_for_less(one: Observation, share: float) -> bool:
         noise = {place: share * sensor}
-        louder = _louder(one, noise)
+        louder = _louder(one, noise, ())
         np.testing.assert_allclose(louder.variance, (1 + share) * sensor)
         [factor] = np.unique((_quieted(louder, one, noise).variance / louder.variance).round(6))
         assert factor in (1.0, 100.0)
@@ -189,3 +189,24 @@ def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
     assert not counts_for_less(replace(rests, spectra=rests.spectra + 10 * np.sqrt(sensor)), 3.0)
     assert not counts_for_less(replace(rests, simulated=np.full(sensor.shape, 10 * np.sqrt(sensor.max()))), 3.0)
     np.testing.assert_array_equal(_quieted(rests, rests, {}).variance, sensor)
+
+
+def test_slow_displacements_are_known_to_a_few_times_the_noise_of_the_base(tmp_path: Path) -> None:
+    """Near the ends, where the filter that removes drift settles, and where that is not known: not at all."""
+    still = np.zeros(round(20.0 * RATE_HZ))
+    channels = {"displacement_tank": still + 1e-3, "acceleration_root": still}
+    run = run_of("quiet", channels, {"acceleration_root": 0.1, "displacement_tank": 1e-5}, 1, experiment="other")
+    driving = ("acceleration_root",)
+    [one] = observations(run, ["displacement_tank"], driving, knows_noise_of_drive=True)
+    [unknown] = observations(run, ["displacement_tank"], driving)
+    slow, middle = one.frequencies_hz < 2.5, (one.times_s > 2.5) & (one.times_s < 17.0)
+    sensor = one.variance[-1, -1]
+    assert (one.variance[np.ix_(middle, slow)] == sensor).all()
+    assert (one.variance[np.ix_(~middle, slow)] > 1e3 * sensor).sum() >= 2 * 4 * slow.sum()
+    assert (unknown.variance[:, slow] > 1e3 * sensor).all()
+    assert (unknown.variance[:, ~slow] == sensor).all()
+    noise = {("quiet", "displacement_tank"): np.full(one.spectra.shape, 7.0 * sensor)}
+    louder = _louder(one, noise, driving).variance
+    np.testing.assert_allclose(louder[np.ix_(middle, slow)], 9 * 8.0 * sensor)
+    np.testing.assert_allclose(louder[:, ~slow], 8.0 * sensor)
+    np.testing.assert_allclose(_louder(one, noise, ()).variance[np.ix_(middle, slow)], 8.0 * sensor)
