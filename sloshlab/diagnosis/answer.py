@@ -8,12 +8,13 @@ from typing import Final
 
 import numpy as np
 
+from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem, huber_cost
 from sloshlab.diagnosis.search import redrawn
 from sloshlab.diagnosis.search.fits import Told
 from sloshlab.diagnosis.verdict import Verdict, verdict_of
-from sloshlab.diagnosis.verdict.comparison import LEAST_MORE, Scale
+from sloshlab.diagnosis.verdict.comparison import LEAST_MORE, Scale, at_its_best, has_gained, is_there
 from sloshlab.diagnosis.verdict.interval import is_told_from_nothing
 
 _MOST_ROUNDS: Final = 5
@@ -57,7 +58,8 @@ def _as_large_as_nothing(found: Findings, pair: Explanation) -> list[str]:
     """Which of two effects have no size: by their intervals, or as nothing changes where it is taken to be zero.
 
     An effect on one of several sensors that drive together leaves the drive to the others, and may gain by that
-    whatever its size is.
+    whatever its size is. Where numbers trade against each other or against the baseline, an interval may hold zero
+    although nothing describes the recordings without the effect; what is clear beside the other one is there.
     """
     problem, scale = FreeRunProblem(found.model, found.fitting, pair.fit.candidates), Scale.of(found)
     nothing = []
@@ -65,9 +67,16 @@ def _as_large_as_nothing(found: Findings, pair: Explanation) -> list[str]:
         without = {**pair.fit.values, **{f"{one.key}.{name}": 0.0 for name in one.sizes}}
         residual = problem.residual(problem.theta_of(without))
         lost = (huber_cost(residual) - pair.fit.misfit) / scale.fitting if np.isfinite(residual).all() else np.inf
-        if lost < LEAST_MORE or not is_told_from_nothing(pair, one):
+        if lost < LEAST_MORE or not (is_told_from_nothing(pair, one) or _is_clear(found, pair, one, scale)):
             nothing.append(one.key)
     return nothing
+
+
+def _is_clear(found: Findings, pair: Explanation, effect: Candidate, scale: Scale) -> bool:
+    """Whether one of two effects removes what is clear, or half, of what the other one leaves, fitted alone."""
+    rest = {key for key in pair.keys if key != effect.key}
+    alone = [at_its_best(found, one) for one in found.explanations if set(one.keys) == rest]
+    return bool(alone) and all(has_gained(pair, one, scale) and is_there(one, pair) for one in alone)
 
 
 def _without(found: Findings, pair: Explanation, nothing: Sequence[str]) -> Findings:

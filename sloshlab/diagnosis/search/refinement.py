@@ -26,6 +26,8 @@ _OF_A_NUMBER: Final = (0.4, 0.15)
 """Standard deviations of the logarithm of a number over places about one, in turns."""
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)
 """Of what was found: beside a baseline that hides a part of an effect the rest of it is left."""
+_OTHER_FREQUENCIES: Final = tuple(np.geomspace(0.7, 1.4, 6))
+"""Over that of a mode: its valley is narrow, and what is left at first does not tell the way there."""
 
 
 class Refinement:
@@ -90,10 +92,15 @@ class Refinement:
         """An effect fitted with the baseline as believed, from some sizes; none where that is no better."""
         effect = {name: value for name, value in one.fit.values.items() if name not in self.fits.model.believed}
         sizes = [one.fit.candidates[-1].sized(effect, factor) for factor in _OTHER_SIZES]
-        starts = [{**self.fits.model.believed, **numbers} for numbers in sizes]
+        places = [[{**self.fits.model.believed, **numbers} for numbers in sizes]]
+        frequency = f"{one.keys[-1]}.frequency_hz"
+        if frequency in effect:
+            moved = [x * effect[frequency] for x in _OTHER_FREQUENCIES]
+            places += [[{**size, frequency: other_hz} for size in places[0]] for other_hz in moved]
         problem = self.fits.problem_of(one.fit)
-        fit, _ = fitted(problem, nearest(problem, starts, STAGES[0]))
-        return [self.fits.judged(fit)] if not fit.trouble and fit.cost < one.fit.cost else []
+        fits = [fitted(problem, nearest(problem, starts, STAGES[0]))[0] for starts in places]
+        best = min(fits, key=lambda fit: fit.cost)
+        return [self.fits.judged(best)] if not best.trouble and best.cost < one.fit.cost else []
 
     def climbed(self, known: Sequence[Explanation]) -> list[Explanation]:
         """The best effect of several numbers from the nearest of many places about it, time and again.

@@ -20,6 +20,8 @@ LEAST_STRENGTH: Final = 0.7
 
 Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
 """
+_CLEAR: Final = 3.0
+"""Noise floors that an effect removes, from which it is there whatever its size is told from."""
 _ON_FITTED_RUNS: Final = 2.0
 """The same on runs that were fitted, over that on others: what suits them may be theirs alone."""
 
@@ -86,6 +88,16 @@ def shows_more(more: Explanation, less: Explanation, scale: Scale) -> bool:
         largest_strength(less.by_run, judged) >= LEAST_STRENGTH
         or largest_strength(less.by_run, fitted) >= _ON_FITTED_RUNS * LEAST_STRENGTH
     )
+
+
+def explains_half(less: Explanation, more: Explanation) -> bool:
+    """Whether an explanation leaves less than half of the held-out mean square that another does."""
+    return more.held_out_rms**2 < 0.5 * less.held_out_rms**2
+
+
+def is_there(less: Explanation, more: Explanation) -> bool:
+    """Whether what an explanation adds is there whatever its numbers are told from: clear, or half of all."""
+    return explains_half(less, more) or largest_strength(less.by_run, more.by_run) >= _CLEAR
 
 
 def at_its_best(found: Findings, one: Explanation) -> Explanation:

@@ -8,13 +8,15 @@ from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings, largest_strength
+from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
 from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equals_of, includes
 from sloshlab.diagnosis.verdict.comparison import (
     Scale,
     at_its_best,
+    explains_half,
     has_gained,
     is_clearly_better,
+    is_there,
     shows_more,
 )
 from sloshlab.diagnosis.verdict.interval import is_told_from_nothing
@@ -35,8 +37,6 @@ _LITTLE_IN_COMMON: Final = 0.25
 _MOST_IN_COMMON: Final = 0.5
 _MOST_IN_A_CHANNEL: Final = 1.5
 """Mean squares, in noise floors, of what repeats of a test have in common of what is left."""
-_CLEAR: Final = 3.0
-"""Noise floors that an effect removes, from which it is there whatever its size is told from."""
 _NUMBERS_OF_THE_UNKNOWN: Final = 3
 """What it would have if it had a name."""
 
@@ -165,7 +165,7 @@ def _shortest_that_holds(
         wider = _best_of(found, scale, 2)
         if (
             wider is not None
-            and _explains_half(found, wider)
+            and explains_half(found.retuned, wider)
             and shows_more(wider, at_its_best(found, named), scale)
             and _holds(found, scale, wider, described, ceiling)
         ):
@@ -196,13 +196,8 @@ def _shortest_sufficient(found: Findings, scale: Scale, adequate_rms: float) -> 
     if single is None or pair is None:
         return single
     adds = pair.held_out_rms <= adequate_rms < single.held_out_rms and has_gained(pair, single, scale)
-    adds = adds and _explains_half(found, pair)
+    adds = adds and explains_half(found.retuned, pair)
     return pair if adds or is_clearly_better(pair, single, scale) else single
-
-
-def _explains_half(found: Findings, one: Explanation) -> bool:
-    """Whether an explanation leaves less than half of the mean square that the retuned baseline does."""
-    return one.held_out_rms**2 < 0.5 * found.retuned.held_out_rms**2
 
 
 def _best_of(found: Findings, scale: Scale, n: int) -> Explanation | None:
@@ -228,9 +223,7 @@ def _may_be_nothing(found: Findings, named: Explanation) -> bool:
     zero although no baseline describes the recordings without it; what removes more than what is clear, or half of
     what is left without it, is there.
     """
-    if len(named.keys) > 1 or _explains_half(found, named):
-        return False
-    if largest_strength(found.retuned.by_run, named.by_run) >= _CLEAR:
+    if len(named.keys) > 1 or is_there(found.retuned, named):
         return False
     return not is_told_from_nothing(named, named.fit.candidates[0])
 

@@ -102,6 +102,28 @@ def test_where_one_of_two_may_be_nothing_all_pairs_are_given_up(
 
 
 @pytest.mark.parametrize(
+    ("squares", "rms", "beside", "is_named"),
+    [
+        pytest.param(9.9, 1.0, FRICTION, False, id="it may be nothing"),
+        pytest.param(10.1, 1.0, FRICTION, True, id="it removes what is clear"),
+        pytest.param(9.9, 1.41, FRICTION, False, id="it removes less than half"),
+        pytest.param(9.9, 1.42, FRICTION, True, id="it removes half of all"),
+        pytest.param(10.1, 1.42, STRIBECK, False, id="nobody knows what it removes"),
+    ],
+)
+def test_one_of_two_that_may_be_nothing_stands_where_it_removes_what_is_clear(
+    monkeypatch: pytest.MonkeyPatch, squares: float, rms: float, beside: Mapping[str, float], is_named: bool
+) -> None:
+    """As for one effect, √(10 − 1) is three noise floors; held against the other effect fitted alone."""
+    drawn(monkeypatch, {DRAG_NUMBER: 0.5})
+    pair = replace(PAIR, held_out_rms=1.0)
+    retuned = left(500.0, 500.0, squares=20.0, rms=5.0)
+    found, _ = answered(findings(retuned, [pair, left(200.0, 200.0, beside, squares=squares, rms=rms)]))
+    assert any(one.keys == PAIR.keys for one in found.explanations) is is_named
+    assert bool(found.failed) is not is_named
+
+
+@pytest.mark.parametrize(
     ("spread", "squares", "rms", "kind"),
     [
         pytest.param(1.0, 9.9, 1.0, "unknown", id="it may be nothing"),

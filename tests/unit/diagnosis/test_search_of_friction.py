@@ -41,6 +41,7 @@ COULOMB, ASYMMETRIC, STRIBECK, CUBIC, CONSTANT = (
     )
 )
 COULOMB_N = f"{COULOMB}.force_n"
+MODE = "structure.missing_mode"
 
 
 class Decays:
@@ -192,6 +193,27 @@ def test_an_effect_is_fitted_again_from_what_is_believed(
     [start] = begun
     assert {name: value for name, value in start.items() if name in case.believed} == case.believed
     assert start[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N])
+
+
+def test_a_mode_is_fitted_again_from_other_frequencies(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each with the nearest of its sizes, beside what is believed; the best of all fits is kept."""
+    mode = Candidate(effect(MODE), case.pool[COULOMB].surroundings)
+    numbers = {f"{MODE}.frequency_hz": 10.0, f"{MODE}.damping_ratio": 0.02, f"{MODE}.participation": 0.03}
+    fit = FreeRunFit((mode,), {**case.baseline.values, **numbers}, case.baseline.cost - 100.0, 0.0)
+    begun: list[Mapping[str, float]] = []
+
+    def watched(problem: FreeRunProblem, start: Mapping[str, float]) -> Any:
+        begun.append(start)
+        cost = fit.cost - 50.0 + abs(start[f"{MODE}.frequency_hz"] - 12.0)
+        return replace(fit, values=dict(start), cost=cost), None
+
+    monkeypatch.setattr(refinement, "fitted", watched)
+    [found] = Refinement(case.fits).anew(case.baseline, [Explanation(fit, 0.0, 1.0)])
+    frequencies_hz = [start[f"{MODE}.frequency_hz"] for start in begun]
+    np.testing.assert_allclose(frequencies_hz, [10.0, 7.0, 8.041, 9.237, 10.61, 12.188, 14.0], rtol=1e-3)
+    assert all(start[name] == value for start in begun for name, value in case.believed.items())
+    assert {start[f"{MODE}.participation"] for start in begun} <= {0.03, 0.06, 0.12}
+    assert found.fit.values[f"{MODE}.frequency_hz"] == pytest.approx(12.188, rel=1e-3)
 
 
 def test_rivals_beside_a_strained_baseline_are_fitted_from_what_is_believed(
