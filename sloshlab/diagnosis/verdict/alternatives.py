@@ -13,6 +13,11 @@ from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gai
 
 LEAST_SEPARATION: Final = 6.0
 """Log-likelihood ratio, on all runs, by which an explanation must beat another to be the only one."""
+_WITHIN_SCATTER: Final = 0.5 * LEAST_STRENGTH
+"""Noise floors: what leaves no more than this in any channel of any run is as good, however sure that is.
+
+Channels share the noise of what drives them, so that log-likelihoods of all together are surer than they may be.
+"""
 _LEAST_SHARE: Final = 0.5
 """Of the gain of the best that an alternative must have."""
 _LITTLE: Final = 0.05
@@ -45,6 +50,7 @@ def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Ex
             continue
         is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
         is_alike = is_alike or (_differs(one, best) and not _shows_less(one, best, scale))
+        is_alike = is_alike or (len(one.keys) == len(best.keys) and _is_within_scatter(one, best))
         is_kin = _is_case_of(one, best) or _is_case_of(best, one)
         is_less = is_kin and is_clearly_better(best, one, scale)
         if is_alike or (not is_less and _is_alike_at_one_frequency(found, one, best)):
@@ -54,9 +60,13 @@ def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Ex
 
 
 def _shows_less(general: Explanation, special: Explanation, scale: Scale) -> bool:
-    """Whether a general form with numbers of its own is worse than its special case, by half of what is clear."""
-    is_worse = has_gained(special, general, scale)
-    return is_worse and largest_strength(general.by_run, special.by_run) >= 0.5 * LEAST_STRENGTH
+    """Whether a general form with numbers of its own is worse than its special case by more than scatter."""
+    return has_gained(special, general, scale) and not _is_within_scatter(general, special)
+
+
+def _is_within_scatter(one: Explanation, best: Explanation) -> bool:
+    """Whether an explanation leaves hardly more than another in every channel of every run."""
+    return largest_strength(one.by_run, best.by_run) < _WITHIN_SCATTER
 
 
 def _is_alike_at_one_frequency(found: Findings, one: Explanation, best: Explanation) -> bool:
