@@ -14,9 +14,10 @@ from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gai
 LEAST_SEPARATION: Final = 6.0
 """Log-likelihood ratio, on all runs, by which an explanation must beat another to be the only one."""
 _WITHIN_SCATTER: Final = 0.5 * LEAST_STRENGTH
-"""Noise floors: what leaves no more than this in any channel of any run is as good, however sure that is.
+"""Noise floors that hardly show in any channel of any run.
 
-Channels share the noise of what drives them, so that log-likelihoods of all together are surer than they may be.
+Channels share the noise of what drives them, so that log-likelihoods of all together are surer than they may be:
+what leaves no more than this beyond the best is as good then.
 """
 _LEAST_SHARE: Final = 0.5
 """Of the gain of the best that an alternative must have."""
@@ -40,6 +41,7 @@ def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Ex
     missing shows something that they cannot. Nor are general forms that are: other numbers make them so.
     """
     alike = [best]
+    shares_noise = bool(found.surroundings.driving)
     seen = {best.named_in_blocks}
     for one in sorted(found.explanations, key=lambda one: -scale.evidence(one)):
         if len(one.keys) > len(best.keys) or one.named_in_blocks in seen or not np.isfinite(one.held_out):
@@ -50,7 +52,8 @@ def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Ex
             continue
         is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
         is_alike = is_alike or (_differs(one, best) and not _shows_less(one, best, scale))
-        is_alike = is_alike or (len(one.keys) == len(best.keys) and _is_within_scatter(one, best))
+        has_as_many = len(one.keys) == len(best.keys)
+        is_alike = is_alike or (shares_noise and has_as_many and _is_within_scatter(one, best))
         is_kin = _is_case_of(one, best) or _is_case_of(best, one)
         is_less = is_kin and is_clearly_better(best, one, scale)
         if is_alike or (not is_less and _is_alike_at_one_frequency(found, one, best)):
