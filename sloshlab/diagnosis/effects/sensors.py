@@ -103,15 +103,29 @@ GAIN = _sensor_effect(
 )
 
 
-def _shifted(sign: float) -> Callable[[Numbers], Reading]:
-    def of(numbers: Numbers) -> Reading:
-        def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-            del others, recorded
-            return _later(values, sign * numbers["delay_s"] * rate)
+_RINGING_SAMPLES: Final = 4
+"""What is made of a jump by filters and interpolation between samples."""
 
-        return reading
 
-    return of
+def _delayed(numbers: Numbers) -> Reading:
+    def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
+        """What happened before the recording, or after it, is not known: a held tank that is released jumps."""
+        del others
+        samples = numbers["delay_s"] * rate
+        moved, place = _later(values, samples), np.arange(values.size)
+        unknown = abs(samples) + _RINGING_SAMPLES * min(abs(samples), 1.0)
+        outside = np.clip(unknown - (place if samples > 0 else place[::-1]), 0.0, 1.0)
+        return np.asarray(np.where(np.isfinite(recorded), moved + outside * (recorded - moved), moved))
+
+    return reading
+
+
+def _earlier(numbers: Numbers) -> Reading:
+    def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
+        del others, recorded
+        return _later(values, -numbers["delay_s"] * rate)
+
+    return reading
 
 
 def _later(values: FloatArray, samples: float) -> FloatArray:
@@ -132,8 +146,8 @@ DELAY = _sensor_effect(
     "y(t) → y(t − τ)",
     (EffectParameter("delay_s", -0.05, 0.05),),
     lambda at: [{"delay_s": sign * 0.02 / at.frequency_hz} for sign in (1, -1)],
-    _shifted(1.0),
-    _shifted(-1.0),
+    _delayed,
+    _earlier,
     look_alikes=("viscous_damping", "sensor_high_pass"),
     spoken_for_by=("one channel alone", "follows its rate"),
     places=_channels_and_devices,

@@ -145,7 +145,7 @@ class InPlace:
         if best is None:
             return []
         last = best.fit.candidates[-1]
-        specials = [one for one in kept if one is best or _is_special_case(one.fit.candidates[-1], last)]
+        specials = [one for one in kept if one is best or is_special_case(one.fit.candidates[-1], last)]
         found = []
         for special in {one.keys[-1]: one for one in sorted(specials, key=lambda one: -one.fit.cost)}.values():
             known = {one.keys[-1] for one in kept if one in specials or one.fit.cost < special.fit.cost + _AS_GOOD}
@@ -163,7 +163,7 @@ class InPlace:
         special, is_done = best.fit.candidates[-1], self.fits.problem_of(best.fit).is_down_to_noise(best.fit)
         found = []
         for candidate in pool:
-            if not _is_special_case(special, candidate):
+            if not is_special_case(special, candidate):
                 continue
             self.fits.told(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
             problem = self.fits.problem((*base.candidates, candidate))
@@ -206,7 +206,7 @@ class InPlace:
         for general in wider.fit.candidates:
             others = [one for one in wider.fit.candidates if one is not general]
             for special in pool:
-                if not _is_special_case(special, general):
+                if not is_special_case(special, general):
                     continue
                 self.fits.told(f"polishing {special.key} in place of {general.effect.name}", 0, 1)
                 problem = self.fits.problem((*others, special))
@@ -225,7 +225,8 @@ def _always(limits: Limits) -> Callable[[Surroundings], Limits]:
     return lambda surroundings: limits
 
 
-def _is_special_case(special: Candidate, general: Candidate) -> bool:
+def is_special_case(special: Candidate, general: Candidate) -> bool:
+    """Whether an effect is another one with fewer numbers, in the same block."""
     return general.effect.block == special.effect.block and special.effect.known_as in general.effect.includes
 
 

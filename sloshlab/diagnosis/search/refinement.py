@@ -26,6 +26,8 @@ _OF_A_NUMBER: Final = (0.4, 0.15)
 """Standard deviations of the logarithm of a number over places about one, in turns."""
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)
 """Of what was found: beside a baseline that hides a part of an effect the rest of it is left."""
+_SIZES_BESIDE_FRICTION: Final = (0.5, 0.75, 1.5, 2.0, 3.0)
+"""Over that which was found: every fit beside dry friction ends in the side valley in which it begins."""
 _OTHER_FREQUENCIES: Final = tuple(np.geomspace(0.7, 1.4, 6))
 """Over that of a mode: its valley is narrow, and what is left at first does not tell the way there."""
 
@@ -65,6 +67,37 @@ class Refinement:
                 break
             self.fits.told(f"fitting {one.keys[-1]} from what is believed", len(found), _MOST_ANEW)
             found += self._from_believed(one)
+        return found
+
+    def from_other_sizes(self, base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
+        """The best effects of one number, fitted again from other sizes where the baseline has dry friction.
+
+        An effect of more numbers leaves a side valley more easily, and would be named in the place of a simple one
+        that stays in it. Nothing is done where the best effect has one number and leaves nothing.
+
+        Parameters
+        ----------
+        base : FreeRunFit
+            The retuned baseline.
+        known : sequence of Explanation
+            With one effect each.
+        """
+        ranked = _best_by_effect(known)
+        if not ranked or not any(term.kind.dry_friction for term in self.fits.model.twin.terms):
+            return []
+        if _is_simple(ranked[0]) and self.fits.is_complete(ranked[0]):
+            return []
+        least = max(LEAST_TO_BUILD_ON, _LEAST_SHARE_OF_GAIN * (base.cost - ranked[0].fit.cost))
+        simple = [one for one in ranked if _is_simple(one) and base.cost - one.fit.cost > least][:_MOST_ANEW]
+        found: list[Explanation] = []
+        for i, one in enumerate(simple):
+            self.fits.told(f"fitting {one.keys[-1]} from other sizes", i, len(simple))
+            problem, candidate = self.fits.problem_of(one.fit), one.fit.candidates[-1]
+            effect = {name: value for name, value in one.fit.values.items() if name not in base.values}
+            places = [{**base.values, **candidate.sized(effect, factor)} for factor in _SIZES_BESIDE_FRICTION]
+            best = min((fitted(problem, place)[0] for place in places), key=lambda fit: fit.cost)
+            if not best.trouble and best.cost < one.fit.cost:
+                found.append(self.fits.judged(best))
         return found
 
     def unstrained(self, known: Sequence[Explanation]) -> list[Explanation]:
@@ -192,6 +225,11 @@ class Refinement:
             if not fit.trouble and fit.cost < best.fit.cost:
                 best = self.fits.judged(fit)
         return best
+
+
+def _is_simple(one: Explanation) -> bool:
+    """Whether its effect has one number."""
+    return len(one.fit.candidates[-1].effect.parameters) == 1
 
 
 def _best_by_effect(known: Sequence[Explanation]) -> list[Explanation]:

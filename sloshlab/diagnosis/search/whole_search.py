@@ -18,7 +18,7 @@ from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search.any_force import ceilings
 from sloshlab.diagnosis.search.fits import Fits, Told, cheapest
-from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
+from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace, is_special_case
 from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
 from sloshlab.diagnosis.search.refinement import Refinement
 from sloshlab.diagnosis.split import split
@@ -31,6 +31,8 @@ _NOTHING_TO_SPEAK_OF: Final = 0.5
 """Noise floors that single effects remove at most where pairs are not tried: below what a verdict speaks of."""
 _SHARE_LEFT_BY_A_PAIR: Final = 0.8
 """Of what its first effect leaves; a second one that gains less does not tell that the first one is wrong."""
+_SHARE_OF_A_SPECIAL_CASE: Final = 0.5
+"""Of what the general form gains; what gains less has little of it."""
 
 
 def findings_of(
@@ -68,6 +70,9 @@ def findings_of(
     pool = candidates(surroundings)
     found = OneMoreEffect(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
     refinement, best = Refinement(fits), cheapest(found)
+    if not fits.is_complete(retuned):
+        found += refinement.from_other_sizes(retuned_fit, found)
+        best = cheapest(found)
     is_complete = fits.is_complete(best or retuned)
     if not is_complete and best is not None:
         found += InPlace(fits).specialised(best, found, pool)
@@ -114,8 +119,8 @@ def _second_effects(
     """Pairs of the best first effect and another, and what is left of the best pair without either.
 
     None where no effect removes anything to speak of and repeats have next to nothing in common: what other runs
-    leave is noise then. Where the best pair leaves too much, others are tried beside its second effect: the first
-    was the best alone.
+    leave is noise then. Where pairs leave too much, others are tried beside the special case of the best effect,
+    whose other numbers stood for a second one, and beside the second of the best pair: the first was best alone.
     """
     best = cheapest(known)
     if best is None or retuned.fit.cost - best.fit.cost < LEAST_TO_BUILD_ON:
@@ -130,6 +135,10 @@ def _second_effects(
     pairs = more.fitted(best.fit, fits.jacobian(best.fit), pool, "fitting a second effect")
     alone = []
     pair = cheapest(pairs)
+    special = _special_case_of(best, known, retuned)
+    if special is not None and (pair is None or not fits.is_complete(pair)):
+        pairs += more.fitted(special.fit, fits.jacobian(special.fit), pool, "fitting one beside a special case")
+        pair = cheapest(pairs)
     if pair is not None and best.fit.cost - pair.fit.cost > LEAST_TO_BUILD_ON:
         alone += more.in_place.one_for_all(pair.fit, retuned.fit, pool)
     alone += Refinement(fits).take_away([one for one in pairs if one.keys[:-1] == best.keys])
@@ -144,6 +153,14 @@ def _second_effects(
         if second is not None:
             pairs += more.fitted(second.fit, fits.jacobian(second.fit), pool, "exchanging the first effect")
     return [*pairs, *alone]
+
+
+def _special_case_of(best: Explanation, known: Sequence[Explanation], retuned: Explanation) -> Explanation | None:
+    """The best explanation by a special case of an effect that gains a good share of what that does."""
+    least = _SHARE_OF_A_SPECIAL_CASE * (retuned.fit.cost - best.fit.cost)
+    general = best.fit.candidates[-1]
+    specials = [one for one in known if is_special_case(one.fit.candidates[-1], general)]
+    return cheapest([one for one in specials if retuned.fit.cost - one.fit.cost > least])
 
 
 def _possible_beside(best: Explanation, at: Surroundings, pool: Sequence[Candidate]) -> list[Candidate]:

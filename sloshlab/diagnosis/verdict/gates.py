@@ -211,7 +211,7 @@ def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scal
     """A special case of effects in their place, unless the general form is better by a size worth speaking of."""
     for special in sorted(alike, key=lambda one: -scale.evidence(one)):
         is_special = special.n_numbers < best.n_numbers and includes(best, special)
-        if is_special and not is_clearly_better(best, special, scale):
+        if is_special and not (is_clearly_better(best, special, scale) or shows_more(best, special, scale)):
             return special
     return best
 

@@ -216,6 +216,53 @@ def test_a_mode_is_fitted_again_from_other_frequencies(case: Decays, monkeypatch
     assert found.fit.values[f"{MODE}.frequency_hz"] == pytest.approx(12.188, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("is_dry", "is_complete", "also_general", "is_tried"),
+    [
+        pytest.param(True, False, False, True, id="something is left"),
+        pytest.param(True, True, True, True, id="an effect of more numbers is best"),
+        pytest.param(True, True, False, False, id="nothing is left"),
+        pytest.param(False, False, False, False, id="no dry friction"),
+    ],
+)
+def test_beside_dry_friction_simple_effects_are_fitted_from_other_sizes(
+    case: Decays,
+    coulomb: Explanation,
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    is_dry: bool,
+    is_complete: bool,
+    also_general: bool,
+    is_tried: bool,
+) -> None:
+    """Each side valley keeps what begins in it; here the one about twice the size is the deepest."""
+    size, cost = coulomb.fit.values[COULOMB_N], coulomb.fit.cost
+    begun: list[Mapping[str, float]] = []
+
+    def stays(problem: FreeRunProblem, start: Mapping[str, float]) -> Any:
+        begun.append(start)
+        left = cost - 50.0 + 10.0 * abs(start[COULOMB_N] / size - 2.0)
+        return replace(coulomb.fit, values=dict(start), cost=left), None
+
+    monkeypatch.setattr(refinement, "fitted", stays)
+    monkeypatch.setattr(Fits, "is_complete", lambda self, one: is_complete)
+    terms = (SimpleNamespace(kind=SimpleNamespace(dry_friction=is_dry)),)
+    monkeypatch.setattr(case.fits.model, "twin", SimpleNamespace(terms=terms))
+    monkeypatch.setattr(case.fits, "judged", lambda fit: Explanation(fit, 0.0, 1.0))
+    known = [coulomb]
+    if also_general:
+        general = Candidate(effect(STRIBECK), case.pool[COULOMB].surroundings)
+        known.append(replace(coulomb, fit=replace(coulomb.fit, candidates=(general,), cost=cost - 10.0)))
+    found = Refinement(case.fits).from_other_sizes(case.baseline, known)
+    if not is_tried:
+        assert (found, begun) == ([], [])
+        return
+    np.testing.assert_allclose([start[COULOMB_N] / size for start in begun], [0.5, 0.75, 1.5, 2.0, 3.0])
+    assert all(start[name] == value for start in begun for name, value in case.baseline.values.items())
+    [best] = found
+    assert best.fit.values[COULOMB_N] == pytest.approx(2.0 * size)
+
+
 def test_rivals_beside_a_strained_baseline_are_fitted_from_what_is_believed(
     case: Decays, coulomb: Explanation
 ) -> None:

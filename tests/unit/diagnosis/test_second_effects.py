@@ -18,9 +18,14 @@ from sloshlab.diagnosis.search import whole_search
 from sloshlab.diagnosis.search.fits import Fits
 
 
-def explanation(cost: float, *keys: str, left: float = 2.0, in_a_channel: float = 1.0) -> Any:
+def explanation(
+    cost: float, *keys: str, left: float = 2.0, in_a_channel: float = 1.0, includes: tuple[str, ...] = ()
+) -> Any:
     by_run = {("run", "channel"): in_a_channel}
-    fit = SimpleNamespace(cost=cost, keys=keys, candidates=(), values={})
+    acts = tuple(
+        SimpleNamespace(effect=SimpleNamespace(block="structure", known_as=key, includes=includes)) for key in keys
+    )
+    fit = SimpleNamespace(cost=cost, keys=keys, candidates=acts, values={})
     return SimpleNamespace(fit=fit, keys=keys, held_out_rms=left, by_run=by_run)
 
 
@@ -41,7 +46,8 @@ class Tried:
 
 
 RETUNED = explanation(5000.0, in_a_channel=9.0)
-BEST, SECOND = explanation(3000.0, "stiffness_change"), explanation(4500.0, "hum")
+BEST = explanation(3000.0, "stiffness_change", includes=("mass_error",))
+SECOND = explanation(4500.0, "hum")
 
 
 def sought(
@@ -51,19 +57,23 @@ def sought(
     is_noise: bool = False,
     retuned: Any = RETUNED,
     shares_little: bool = True,
+    known: tuple[Any, ...] = (),
+    is_complete: bool = False,
 ) -> tuple[Tried, list[Any]]:
     tried = Tried({BEST.keys: [pair], SECOND.keys: [explanation(1000.0, "hum", "missing_mode", left=0.9)]})
     fits = SimpleNamespace(
+        is_complete=lambda one: is_complete,
         problem_of=lambda fit: SimpleNamespace(is_down_to_noise=lambda fit: is_noise),
         jacobian=lambda fit: None,
         shares_little=lambda one: shares_little,
     )
     monkeypatch.setattr(whole_search, "OneMoreEffect", lambda fits: tried)
+    monkeypatch.setattr(whole_search, "_possible_beside", lambda best, at, pool: [])
     monkeypatch.setattr(
         whole_search, "Refinement", lambda fits: SimpleNamespace(take_away=lambda pairs: [SECOND] if pairs else [])
     )
     return tried, whole_search._second_effects(  # type: ignore[arg-type]
-        fits, [BEST], retuned, cast(Any, None), []
+        fits, [*known, BEST], retuned, cast(Any, None), []
     )
 
 
@@ -73,6 +83,24 @@ def test_where_the_best_pair_leaves_too_much_its_first_effect_is_exchanged(
     tried, found = sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum"))
     assert tried.beside == [("stiffness_change",), ("hum",)]
     assert [one.keys for one in found] == [("stiffness_change", "hum"), ("hum", "missing_mode"), ("hum",)]
+
+
+@pytest.mark.parametrize(
+    ("special", "is_complete", "is_tried"),
+    [
+        pytest.param(explanation(3990.0, "mass_error"), False, True, id="a special case with half the gain"),
+        pytest.param(explanation(4010.0, "mass_error"), False, False, id="with less"),
+        pytest.param(explanation(3990.0, "constant_force"), False, False, id="another effect"),
+        pytest.param(explanation(3990.0, "mass_error"), True, False, id="the pair leaves nothing"),
+    ],
+)
+def test_a_second_effect_is_sought_beside_the_special_case_of_the_first(
+    monkeypatch: pytest.MonkeyPatch, special: Any, is_complete: bool, is_tried: bool
+) -> None:
+    """Other numbers of the general form may have stood for the second effect."""
+    pair = explanation(2990.0, "stiffness_change", "hum")
+    tried, _ = sought(monkeypatch, pair, known=(special,), is_complete=is_complete)
+    assert tried.beside == [("stiffness_change",), *([special.keys] if is_tried else [])]
 
 
 def test_a_pair_that_leaves_little_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:

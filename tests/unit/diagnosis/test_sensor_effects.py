@@ -55,6 +55,27 @@ def test_a_delayed_channel_shows_what_was_there_earlier(model: RigModel, delay_s
     np.testing.assert_allclose(one.undone(expected, RATE, {}, SIGNAL)[200:-200], SIGNAL[200:-200], atol=6e-3)
 
 
+@pytest.mark.parametrize(
+    ("delay_samples", "known"),
+    [(3.0, slice(7, None)), (-3.0, slice(None, -7)), (0.25, slice(2, None)), (0.0, slice(None))],
+)
+def test_what_was_before_a_delayed_channel_is_not_known(
+    model: RigModel, delay_samples: float, known: slice
+) -> None:
+    """A held tank reads nothing before it is released, and filters make of the jump what they will."""
+    one = fault(model, "sensor_delay", {"delay_s": delay_samples / RATE})
+    recorded = SIGNAL + 100.0
+    reading = read(one, SIGNAL, recorded)
+    is_known = np.zeros(SIGNAL.size, bool)
+    is_known[known] = True
+    expected = AMPLITUDE * np.cos(OMEGA * (T - delay_samples / RATE) + PHASE)
+    np.testing.assert_allclose(reading[is_known], expected[is_known], atol=0.02 * AMPLITUDE)
+    if abs(delay_samples) >= 1.0:
+        np.testing.assert_allclose(reading[~is_known], recorded[~is_known])
+    lost = np.full(SIGNAL.size, np.nan)
+    assert np.isfinite(read(one, SIGNAL, lost)).all()
+
+
 def test_a_discharging_sensor_leads_and_loses_low_frequencies(model: RigModel) -> None:
     """jωτ/(1 + jωτ) after the charge of the first sample has leaked away."""
     tau = 0.03

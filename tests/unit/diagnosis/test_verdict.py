@@ -108,6 +108,12 @@ def test_friction_of_one_number_is_named_before_friction_of_three(better: float)
         pytest.param(left(20.0, 20.0, FRICTION, squares=1.50), "stribeck_friction", id="by 0.7 noise floors"),
         pytest.param(left(20.0, 20.0, FRICTION, squares=1.48), "coulomb_friction", id="by less"),
         pytest.param(left(20.0, 11.0, FRICTION, squares=1.50), "coulomb_friction", id="not on held-out runs"),
+        pytest.param(
+            left(20.0, 20.0, FRICTION, squares=1.0, in_fitted_run=2.98), "stribeck_friction", id="in a fitted run"
+        ),
+        pytest.param(
+            left(20.0, 20.0, FRICTION, squares=1.0, in_fitted_run=2.94), "coulomb_friction", id="by less there"
+        ),
     ],
 )
 def test_friction_of_three_numbers_is_named_where_it_is_better_by_more(friction: Explanation, named: str) -> None:
