@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -58,11 +58,7 @@ class Refinement:
             With one effect each.
         """
         found: list[Explanation] = []
-        lowest = min((one.fit.cost for one in known), default=base.cost)
-        for one in _best_by_effect(known)[:_MOST_ANEW]:
-            gain = base.cost - one.fit.cost
-            if gain < max(LEAST_TO_BUILD_ON, _LEAST_SHARE_OF_GAIN * (base.cost - lowest)):
-                break
+        for one in _with_good_gains(base, known)[:_MOST_ANEW]:
             if self.fits.problem_of(one.fit).is_down_to_noise(one.fit):
                 break
             self.fits.told(f"fitting {one.keys[-1]} from what is believed", len(found), _MOST_ANEW)
@@ -82,22 +78,17 @@ class Refinement:
         known : sequence of Explanation
             With one effect each.
         """
-        ranked = _best_by_effect(known)
-        if not ranked or not any(term.kind.dry_friction for term in self.fits.model.twin.terms):
+        worth = _with_good_gains(base, known)
+        if not worth or not any(term.kind.dry_friction for term in self.fits.model.twin.terms):
             return []
-        if _is_simple(ranked[0]) and self.fits.is_complete(ranked[0]):
+        if _is_simple(worth[0]) and self.fits.is_complete(worth[0]):
             return []
-        least = max(LEAST_TO_BUILD_ON, _LEAST_SHARE_OF_GAIN * (base.cost - ranked[0].fit.cost))
-        simple = [one for one in ranked if _is_simple(one) and base.cost - one.fit.cost > least][:_MOST_ANEW]
+        simple = [one for one in worth if _is_simple(one)][:_MOST_ANEW]
         found: list[Explanation] = []
         for i, one in enumerate(simple):
             self.fits.told(f"fitting {one.keys[-1]} from other sizes", i, len(simple))
-            problem, candidate = self.fits.problem_of(one.fit), one.fit.candidates[-1]
-            effect = {name: value for name, value in one.fit.values.items() if name not in base.values}
-            places = [{**base.values, **candidate.sized(effect, factor)} for factor in _SIZES_BESIDE_FRICTION]
-            best = min((fitted(problem, place)[0] for place in places), key=lambda fit: fit.cost)
-            if not best.trouble and best.cost < one.fit.cost:
-                found.append(self.fits.judged(best))
+            sizes = self._sized(one, _SIZES_BESIDE_FRICTION)
+            found += self._better_from(one, [{**base.values, **numbers} for numbers in sizes])
         return found
 
     def unstrained(self, known: Sequence[Explanation]) -> list[Explanation]:
@@ -123,16 +114,24 @@ class Refinement:
 
     def _from_believed(self, one: Explanation) -> list[Explanation]:
         """An effect fitted with the baseline as believed, from some sizes; none where that is no better."""
-        effect = {name: value for name, value in one.fit.values.items() if name not in self.fits.model.believed}
-        sizes = [one.fit.candidates[-1].sized(effect, factor) for factor in _OTHER_SIZES]
+        sizes = self._sized(one, _OTHER_SIZES)
         places = [[{**self.fits.model.believed, **numbers} for numbers in sizes]]
         frequency = f"{one.keys[-1]}.frequency_hz"
-        if frequency in effect:
-            moved = [x * effect[frequency] for x in _OTHER_FREQUENCIES]
+        if frequency in one.fit.values:
+            moved = [x * one.fit.values[frequency] for x in _OTHER_FREQUENCIES]
             places += [[{**size, frequency: other_hz} for size in places[0]] for other_hz in moved]
         problem = self.fits.problem_of(one.fit)
-        fits = [fitted(problem, nearest(problem, starts, STAGES[0]))[0] for starts in places]
-        best = min(fits, key=lambda fit: fit.cost)
+        return self._better_from(one, [nearest(problem, starts, STAGES[0]) for starts in places])
+
+    def _sized(self, one: Explanation, factors: Sequence[float]) -> list[dict[str, float]]:
+        """The numbers of its effect, without those of the baseline, larger by factors."""
+        effect = {name: value for name, value in one.fit.values.items() if name not in self.fits.model.believed}
+        return [one.fit.candidates[-1].sized(effect, factor) for factor in factors]
+
+    def _better_from(self, one: Explanation, places: Sequence[Mapping[str, float]]) -> list[Explanation]:
+        """The best of fits of the same effects from several places; none where that is no better."""
+        problem = self.fits.problem_of(one.fit)
+        best = min((fitted(problem, place)[0] for place in places), key=lambda fit: fit.cost)
         return [self.fits.judged(best)] if not best.trouble and best.cost < one.fit.cost else []
 
     def climbed(self, known: Sequence[Explanation]) -> list[Explanation]:
@@ -225,6 +224,14 @@ class Refinement:
             if not fit.trouble and fit.cost < best.fit.cost:
                 best = self.fits.judged(fit)
         return best
+
+
+def _with_good_gains(base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
+    """The best fit of each effect that gains a good share of what the best effect does, the best first."""
+    ranked = _best_by_effect(known)
+    lowest = min((one.fit.cost for one in ranked), default=base.cost)
+    least = max(LEAST_TO_BUILD_ON, _LEAST_SHARE_OF_GAIN * (base.cost - lowest))
+    return [one for one in ranked if base.cost - one.fit.cost >= least]
 
 
 def _is_simple(one: Explanation) -> bool:
