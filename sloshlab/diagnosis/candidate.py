@@ -155,6 +155,12 @@ def _its_own_limits(surroundings: Surroundings) -> Mapping[str, tuple[float, flo
     return {}
 
 
+def _at_its_starts(surroundings: Surroundings) -> Sequence[Numbers]:
+    """Is looked at where it starts alone."""
+    del surroundings
+    return []
+
+
 def nowhere(size: float) -> Sequence[Mapping[str, tuple[float, float]]]:
     """Is worth no look where it differs from its special case."""
     del size
@@ -194,6 +200,9 @@ class Effect:
         Name of the effect of which this is another form; answers have that name.
     size : tuple of str
         Numbers that grow with it and without which it is nothing; if none, the first and all of its unit.
+    sought_at : callable
+        (surroundings) → more sets of numbers, held against the missing force along the measured motion: many, for
+        an effect that other numbers make another one in jumps.
     """
 
     name: str
@@ -212,6 +221,7 @@ class Effect:
     differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = nowhere
     variant_of: str = ""
     size: tuple[str, ...] = ()
+    sought_at: Callable[[Surroundings], Iterable[Numbers]] = _at_its_starts
 
     @property
     def known_as(self) -> str:
@@ -242,9 +252,21 @@ class Candidate:
 
     def starts(self) -> list[dict[str, float]]:
         """Sets of numbers to start from, named as in a fit."""
+        return self._named(self.effect.starts)
+
+    def sought_at(self) -> list[dict[str, float]]:
+        """More sets of numbers, named as in a fit, to hold against the missing force."""
+        return self._named(self.effect.sought_at)
+
+    @property
+    def comes_in_jumps(self) -> bool:
+        """Whether small changes of its numbers make it another one, so that it is sought at many places."""
+        return self.effect.sought_at is not _at_its_starts
+
+    def _named(self, sets: Callable[[Surroundings], Iterable[Numbers]]) -> list[dict[str, float]]:
         return [
             {f"{self.key}.{name}": value for name, value in numbers.items()}
-            for numbers in self.effect.starts(replace(self.surroundings, channel=self.channel))
+            for numbers in sets(replace(self.surroundings, channel=self.channel))
         ]
 
     @property

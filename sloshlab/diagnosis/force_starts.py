@@ -35,6 +35,11 @@ _FEWEST_NUMBERS: Final = 2
 _MOST_TRIED: Final = 2
 _N_EVALUATIONS: Final = 15, 40
 """Per number: of every start that is tried, and then of the best."""
+_MOST_SOUGHT: Final = 6
+_PROMISING: Final = 0.9
+"""Of the missing force, that the best of many places may leave before they are descended from."""
+_FAR, _CLOSE = 0.7, 0.15
+"""First steps of a descent, of the logarithm of a number: where a force comes in jumps its valleys are narrow."""
 _FOLLOWED: Final = {STRUCTURE: [0, 1], EITHER: [0, 1], TANK: [2, 1]}
 """Motions of a place whose multiples the baseline follows; with all three any force of a free motion is one."""
 _N_PROBED: Final = 400
@@ -129,10 +134,13 @@ class ForceStart:
         Named as in a fit.
     share_left : float
         Of the mean square of the missing force, beyond what the baseline can follow.
+    others : tuple of dict
+        Numbers at which other descents ended, of what is sought at many places.
     """
 
     numbers: dict[str, float]
     share_left: float
+    others: tuple[dict[str, float], ...] = ()
 
 
 class ForceStarts:
@@ -194,11 +202,20 @@ class ForceStarts:
         share, numbers = min(
             (_descended(left, start, first) for _, start in begun[:_MOST_TRIED]), key=lambda one: one[0]
         )
+        others: list[tuple[float, FloatArray]] = []
+        if sought := [np.array([one[name] for name in names]) for one in candidate.sought_at()]:
+            grown = np.array([parameter.name in candidate.sizes for parameter in parameters])
+            others = _sought(force, sought, place, grown, first)
+            share, numbers = min((share, numbers), *others, key=lambda one: one[0])
         if share < 1.0 - _LEAST_EXPLAINED:
-            share, numbers = _descended(left, numbers, then)
+            share, numbers = _descended(left, numbers, then, _CLOSE if sought else _FAR)
         if not share < 1.0 - _LEAST_EXPLAINED:
             return None
-        return ForceStart(dict(zip(names, np.clip(numbers, *bounds.T).tolist(), strict=True)), share)
+        best, *more = (
+            dict(zip(names, np.clip(one, *bounds.T).tolist(), strict=True))
+            for one in (numbers, *(one for _, one in others))
+        )
+        return ForceStart(best, share, tuple(more))
 
     def _at(self, block: str) -> _Place | None:
         if block not in self._places:
@@ -260,8 +277,34 @@ def _sized(
     return place.share_left(found), start
 
 
+def _sought(
+    force: Callable[[FloatArray], FloatArray | None],
+    places: Sequence[FloatArray],
+    at: _Place,
+    grown: NDArray[np.bool_],
+    n_evaluations: int,
+) -> list[tuple[float, FloatArray]]:
+    """Shares left and numbers from the best of many places, at the size that suits the missing force best.
+
+    The force grows in proportion to the numbers that are `grown`. What leaves nearly all at each place is not it.
+    """
+
+    def sized(numbers: FloatArray) -> tuple[float, FloatArray]:
+        found = force(numbers)
+        size = 0.0 if found is None else float(found @ found)
+        if found is None or size == 0.0:
+            return np.inf, numbers
+        factor = max(float(found @ at.force_n) / size, _LEAST_FACTOR)
+        return at.share_left(found * factor), np.where(grown, numbers * factor, numbers)
+
+    best = sorted((sized(numbers) for numbers in places), key=lambda one: one[0])
+    tried = [numbers for share, numbers in best[:_MOST_SOUGHT] if share < _PROMISING]
+    reached = [_descended(lambda numbers: sized(numbers)[0], one, n_evaluations, _CLOSE) for one in tried]
+    return [sized(numbers) for _, numbers in reached] or best[:1]
+
+
 def _descended(
-    left: Callable[[FloatArray], float], start: FloatArray, n_evaluations: int
+    left: Callable[[FloatArray], float], start: FloatArray, n_evaluations: int, step: float = _FAR
 ) -> tuple[float, FloatArray]:
     """Simplex (Nelder and Mead 1965, doi:10.1093/comjnl/7.4.308) in logarithms of numbers of one sign each."""
     scale = np.where(start == 0, 1.0, start)
@@ -274,7 +317,7 @@ def _descended(
         return value if np.isfinite(value) else 1e12
 
     n = start.size
-    simplex = np.vstack([np.zeros(n), np.diag(np.full(n, 0.7))])
+    simplex = np.vstack([np.zeros(n), np.diag(np.full(n, step))])
     options = {"maxfev": n_evaluations, "initial_simplex": simplex, "xatol": 1e-2, "fatol": 1e-4}
     found = minimize(cost, np.zeros(n), method="Nelder-Mead", options=options)
     return float(found.fun), numbers(found.x)

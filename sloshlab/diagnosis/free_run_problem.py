@@ -235,13 +235,13 @@ class FreeRunProblem:
             places.append(moved)
 
         def derivative(place: FloatArray, column: int) -> FloatArray:
-            difference = (self._residual_moved(place, column, at) - at) / (place[column] - theta[column])
+            difference = (self.residual_moved(place, column, at) - at) / (place[column] - theta[column])
             return difference if np.isfinite(difference).all() else np.zeros(at.size)
 
         found = list((map if N_THREADS == 1 else _POOL.map)(derivative, places, columns))
         return BlockJacobian.of_columns(found, [one.spectra.size for run in self.runs for one in run])
 
-    def _residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
+    def residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
         """Residuals after one parameter was moved; unchanged in other runs and channels where it has its own."""
         owner, seen_by = run_of(self.names[column], self.model), self._seen_by[column]
         if not owner and not seen_by:

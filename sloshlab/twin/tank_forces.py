@@ -33,7 +33,7 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 FloatArray = npt.NDArray[np.float64]
 _G = GRAVITY_M_PER_S2
 _MOST_OCTAVES, _MOST_DOUBLINGS = 2.0, 3.0
-_RADIUS, _STIFFNESS, _DAMPING, _HARDENING, _FROZEN, _LIQUID, _HEIGHT, _IN_FLIGHT = range(8)
+_RADIUS, _STIFFNESS, _DAMPING, _HARDENING, _FROZEN, _LIQUID, _HEIGHT, _IN_FLIGHT, _PULLS = range(9)
 
 
 @law
@@ -56,6 +56,8 @@ def _bouncing_ball(motion, parameters, memory, rates):
                 1.0 + parameters[_HARDENING] * overlap * overlap / (radius - abs(overlap))
             )
             contact = stiffness * overlap + parameters[_DAMPING] * closing
+            if (contact > 0.0) == (side == 0):
+                contact *= parameters[_PULLS]
     rates[0], rates[1] = memory[1], -_G - contact / mass
     return contact + mass * _G
 
@@ -115,6 +117,8 @@ BOUNCING_BALL = register(
             Parameter("height_m", "m", 1e-6, 100.0),
             # share of the damping that acts in flight too: 0 while in contact only, 1 as (2.3) is printed
             Parameter("damping_in_flight", "1", 0.0, 1.0, 0.0),
+            # share of what damping pulls back before contact is lost: 1 as printed, 0 of a liquid, which pushes
+            Parameter("contact_pulls", "1", 0.0, 1.0, 1.0),
         ),
         _bouncing_ball,
         events=_bouncing_ball_events,

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from math import pi
 from typing import Final
 
+import numpy as np
+from scipy.stats import qmc
+
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
 from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, force_effect, rocks
@@ -16,6 +19,11 @@ from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS
 from sloshlab.twin.terms import Term
 
 _CONTACT_HZ: Final = 50.0
+_LEAST_FLIGHT, _LARGEST_FLIGHT = np.log((0.25, 20.0, 0.05)), np.log((1.3, 200.0, 0.9))
+_PLACES_OF_A_FLIGHT: Final = np.exp(
+    qmc.scale(qmc.Halton(3, scramble=False).random(301)[1:], _LEAST_FLIGHT, _LARGEST_FLIGHT)
+)
+"""Share of the room, frequency [Hz] and damping ratio of a contact: 2 % of the gap make another later bounce."""
 _LEVELS = "decays or sweeps at accelerations below and above the threshold"
 
 
@@ -285,6 +293,19 @@ SATURATION = register(
 )
 
 
+def _flying(
+    at: Surroundings, room: float, contact_hz: float, damping_ratio: float, share: float = 0.05
+) -> dict[str, float]:
+    """A share of the liquid that flies through so much of the room above it."""
+    rate, mass_kg = 2 * pi * contact_hz, share * at.rig.liquid_mass_kg
+    return {
+        "gap_m": room * (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
+        "stiffness_n_per_m": mass_kg * rate**2,
+        "damping_kg_per_s": 2 * damping_ratio * mass_kg * rate,
+        "share": share,
+    }
+
+
 def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     del channel
     height = at.rig.tank.height_m
@@ -297,6 +318,7 @@ def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         beta=1.0 - numbers["share"],
         liquid_mass_kg=at.rig.liquid_mass_kg,
         height_m=height,
+        contact_pulls=0.0,
     )
     return Extension(terms=(ball,))
 
@@ -313,20 +335,14 @@ IMPACT = register(
             EffectParameter("share", 0.002, 1.0, may_rest=True),
         ),
         lambda at: [
-            {
-                "gap_m": room * (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
-                "stiffness_n_per_m": share * at.rig.liquid_mass_kg * (2 * pi * _CONTACT_HZ) ** 2,
-                "damping_kg_per_s": 0.6 * share * at.rig.liquid_mass_kg * 2 * pi * _CONTACT_HZ,
-                "share": share,
-            }
-            for share in (1.0, 0.2, 0.05)
-            for room in (1.0, 0.6)
+            _flying(at, room, _CONTACT_HZ, 0.3, share) for share in (1.0, 0.2, 0.05) for room in (1.0, 0.6)
         ],
         _impact,
         ("liquid_sloshing", "clearance"),
         "accelerations below and above 1 g, forces sampled fast",
         spoken_for_by=("takes energy", "impulsive", "onset", "memory"),
         size=("stiffness_n_per_m", "damping_kg_per_s", "share"),
+        sought_at=lambda at: [_flying(at, *place) for place in _PLACES_OF_A_FLIGHT],
     )
 )
 LATERAL = force_effect(

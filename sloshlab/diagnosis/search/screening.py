@@ -28,6 +28,7 @@ _MOST_BESIDE: Final = 6
 _MOST_STARTS: Final = 2
 _LEAST_SHARE_OF_PROMISE: Final = 0.02
 _MOST_BY_FORCE: Final = 2
+_SIZES_IN_JUMPS: Final = (1.0, 0.75, 1.25, 1.5, 2.0)
 _ALIKE: Final = 0.85
 """Share of the missing force that an effect's own may leave, to be like it."""
 
@@ -159,24 +160,32 @@ class Screening:
 
     def _starts(self, base: FreeRunFit, one: Promise, share: float, *, is_near: bool) -> list[Start]:
         """Where a candidate is fitted from."""
-        like = one.by_force.numbers if one.by_force else None
+        extended = self.fits.problem((*base.candidates, one.candidate))
+        like = self._at_its_size(base, extended, one)
         if is_near:
             sets = [*([like] if like else []), *(look.resized for look in one.looks)]
             return [Start({**base.values, **numbers}, is_near=True) for numbers in sets[:_MOST_STARTS]]
-        extended = self.fits.problem((*base.candidates, one.candidate))
         starts = self._from_afar(base, extended, one, share)
         if like and one.is_like_the_force:
             starts.append(Start({**base.values, **like}, is_near=True))
         return starts
 
+    def _at_its_size(self, base: FreeRunFit, problem: FreeRunProblem, one: Promise) -> dict[str, float]:
+        """Numbers with which a candidate's force is like the missing one, at the best size beside a fit."""
+        sets = _like_the_force(one)
+        if len(sets) < 2:
+            return sets[0] if sets else {}
+        costs = costs_at(problem, [{**base.values, **numbers} for numbers in sets], 0.0)
+        return sets[int(np.argmin(costs))]
+
     def _from_afar(self, base: FreeRunFit, problem: FreeRunProblem, one: Promise, share: float) -> list[Start]:
         """A start with the baseline as believed and one with its numbers in a fit, each the nearest of several."""
-        looks, like_the_force = one.looks, one.by_force.numbers if one.by_force else None
+        looks = one.looks
         believed = base.values if base.candidates else self.fits.model.believed
         larger = [one.much_larger] if one.much_larger else []
         far = [{**believed, **numbers} for numbers in (*larger, *(look.start for look in looks[:_MOST_STARTS]))]
         places = [base.values, *([self.fits.eased(base)] if self.fits.is_strained(base) else [])]
-        sets = [looks[0].resized, *([like_the_force] if like_the_force else [])]
+        sets = [looks[0].resized, *_like_the_force(one)]
         close = [{**place, **numbers} for place in places for numbers in sets]
         return [
             Start(nearest(problem, far, share), is_near=bool(base.candidates)),
@@ -207,3 +216,17 @@ class Screening:
             else:
                 chosen.append(one)
         return chosen
+
+
+def _like_the_force(one: Promise) -> list[dict[str, float]]:
+    """Numbers with which a candidate's force is like the missing one; none where they are not known.
+
+    What comes in jumps is tried wherever it was like it, and at other sizes, too: the baseline beside which it was
+    sought hides some of it, and from one place no way leads to another.
+    """
+    if one.by_force is None:
+        return []
+    if not one.candidate.comes_in_jumps:
+        return [one.by_force.numbers]
+    places = (one.by_force.numbers, *one.by_force.others)
+    return [one.candidate.sized(numbers, size) for numbers in places for size in _SIZES_IN_JUMPS]

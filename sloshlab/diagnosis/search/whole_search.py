@@ -86,7 +86,8 @@ def findings_of(
         best = cheapest(found)
         is_complete = best is not None and fits.is_complete(best)
     if not is_complete:
-        found += _second_effects(fits, found, retuned, surroundings, pool)
+        pairs = _second_effects(fits, found, retuned, surroundings, pool)
+        found += [*pairs, *refinement.climbed([one for one in pairs if len(one.keys) > 1])]
     found += refinement.polished(retuned_fit, found, pool)
     retuned = refinement.retuned_from(found, retuned)
     any_force = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)

@@ -16,7 +16,8 @@ from sloshlab.diagnosis import effects, free_run_problem
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.free_run_fit import Start, begun, finished, fitted, on_more_runs
+from sloshlab.diagnosis.force_starts import ForceStart
+from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, finished, fitted, on_more_runs
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
@@ -309,6 +310,57 @@ def test_an_effect_of_several_numbers_climbs_along_a_ridge(case: Decays, monkeyp
     assert second == {name: pytest.approx(2 * value - off[name]) for name, value in first.items()}
 
 
+def test_a_climb_goes_on_from_other_releases(
+    case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each run's own release is the best of its run alone, where no throw of the effect's numbers leads on."""
+    wide = case.fit(ASYMMETRIC)
+    releases = [name for name in wide.fit.values if name.startswith("release")]
+    assert len(releases) == 2
+    off = {**wide.fit.values, **{name: 1.03 * wide.fit.values[name] for name in releases}}
+    problem = case.fits.problem_of(wide.fit)
+    at_off = huber_cost(problem.residual(problem.theta_of(off)))
+
+    def stays(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
+        cost = huber_cost(problem.residual(problem.theta_of(start)))
+        return FreeRunFit(problem.candidates, dict(start), cost, cost), None
+
+    monkeypatch.setattr(refinement, "fitted", stays)
+    monkeypatch.setattr(refinement, "nearest", lambda problem, starts, share: off)
+    start = replace(wide, fit=replace(wide.fit, values=off, cost=at_off))
+    [found] = Refinement(case.fits).climbed([start])
+    assert found.fit.cost < 0.5 * at_off
+    for name in releases:
+        assert found.fit.values[name] == pytest.approx(wide.fit.values[name], rel=0.004)
+    assert Refinement(case.fits).climbed([found]) == []
+
+
+def test_of_two_effects_the_one_in_jumps_is_thrown(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [f"{ASYMMETRIC}.force_{side}_n" for side in ("up", "down")]
+    pair = case.fit(COULOMB, ASYMMETRIC, n_iterations=1)
+    pair = replace(pair, fit=replace(pair.fit, values={**pair.fit.values, **dict.fromkeys(names, 0.1)}))
+    assert Refinement(case.fits).climbed([pair]) == []
+    sudden = replace(case.pool[ASYMMETRIC].effect, sought_at=lambda at: [{}])
+    candidates = (pair.fit.candidates[0], replace(pair.fit.candidates[1], effect=sudden))
+    assert [one.comes_in_jumps for one in candidates] == [False, True]
+    thrown: list[dict[str, float]] = []
+
+    def looked_at(problem: FreeRunProblem, starts: Any, share: float) -> Any:
+        thrown.extend(starts)
+        return starts[0]
+
+    def in_vain(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
+        return FreeRunFit(problem.candidates, dict(start), np.inf, np.inf), None
+
+    monkeypatch.setattr(refinement, "fitted", in_vain)
+    monkeypatch.setattr(refinement, "nearest", looked_at)
+    known = replace(pair, fit=replace(pair.fit, candidates=candidates))
+    assert Refinement(case.fits).climbed([known]) == []
+    assert len(thrown) == 4 * 48
+    changed = {name for one in thrown for name, value in one.items() if value != pair.fit.values[name]}
+    assert changed == set(names)
+
+
 def test_an_effect_of_one_number_does_not_climb(case: Decays, coulomb: Explanation) -> None:
     assert Refinement(case.fits).climbed([coulomb]) == []
 
@@ -481,3 +533,26 @@ def test_what_is_begun_on_some_runs_is_finished_on_all(repeated: Repeated) -> No
     [found, *_] = OneMoreEffect(fits).fitted(base, jacobian, [candidate], "")
     assert found.fit.cost == pytest.approx(done.cost, rel=0.02)
     assert set(found.fit.names) == {*fits.problem().names, COULOMB_N}
+
+
+def test_what_comes_in_jumps_is_begun_at_the_best_of_places_and_sizes(
+    case: Decays, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its force was like the missing one at two places, both too small; what is smooth starts at the first."""
+    near, far = (
+        {f"{ASYMMETRIC}.force_up_n": up, f"{ASYMMETRIC}.force_down_n": 0.5 * DOWN_N} for up in (0.15, 0.02)
+    )
+    smooth = case.pool[ASYMMETRIC]
+    sudden = replace(smooth, effect=replace(smooth.effect, sought_at=lambda at: [{}]))
+    places = SimpleNamespace(of=lambda candidate: ForceStart(far, 0.1, (near,)))
+    monkeypatch.setattr(Screening, "_force_starts", lambda self, base: places)
+    base = replace(case.baseline, values={**case.baseline.values, **case.believed})
+    jacobian = case.fits.jacobian(base)
+
+    def begun_from(candidate: Candidate) -> list[dict[str, float]]:
+        [promise] = Screening(case.fits).chosen(base, jacobian, [candidate], "", STAGES[-2:], is_near=True)
+        return [{name: start.values[name] for name in near} for start in promise.starts]
+
+    assert begun_from(smooth)[0] == far
+    twice = {name: pytest.approx(2.0 * value) for name, value in near.items()}
+    assert begun_from(sudden)[0] == twice

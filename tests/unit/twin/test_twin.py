@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import AnalysisError, InputError, RigError
 from sloshlab.modal.cantilever import cantilever_modes
 from sloshlab.rig import Rig
@@ -169,6 +170,38 @@ def test_a_copy_in_another_process_would_be_the_same_twin() -> None:
     run = free(0.2, 2000.0)
     runs = [one.simulate(run, initial_displacement_m=-0.06).displacement_m.tobytes() for one in (twin, copied)]
     assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize("pulls", [0.0, 1.0])
+def test_a_ball_bounces_as_its_contact_pulls_or_does_not(pulls: float) -> None:
+    """Restitution of a spring and damper, the force cut off where it would pull or not.
+
+    exp(−(β/ω)(π − atan(2βω/(ω² − β²)))) and exp(−πβ/ω) with β = c/2m, ω² = k/m − β²
+    (Schwager and Pöschel 2007, doi:10.1007/s10035-007-0065-z), from the times of flight in a tank that was jerked.
+    """
+    mass, contact_rad_per_s, ratio = 0.1, 2 * np.pi * 300.0, 0.3
+    beta, omega = ratio * contact_rad_per_s, contact_rad_per_s * np.sqrt(1 - ratio**2)
+    ball = BOUNCING_BALL(
+        radius_m=0.01, stiffness_n_per_m=mass * contact_rad_per_s**2, damping_kg_per_s=2 * mass * beta,
+        hardening_per_m=0.0, beta=0.0, liquid_mass_kg=mass, height_m=2.0, contact_pulls=pulls,
+    )  # fmt: skip
+    rate_hz, jerk_s = 20_000.0, 0.02
+    time = np.arange(round(2.0 * rate_hz)) / rate_hz
+    moving, phase = time < jerk_s, np.pi * np.minimum(time, jerk_s) / jerk_s
+    x = 0.05 * (phase - 0.5 * np.sin(2 * phase)) / np.pi
+    v = np.where(moving, 0.05 * (1 - np.cos(2 * phase)) / jerk_s, 0.0)
+    a = np.where(moving, 0.1 * np.pi * np.sin(2 * phase) / jerk_s**2, 0.0)
+    alone = sdof().with_term(ball).tank_alone()
+    run = alone.simulate(recorded(rate_hz, displacement=x, velocity=v, acceleration=a)).require_done()
+    contact = run.forces_n[:, 0] - mass * GRAVITY_M_PER_S2
+    assert pulls == (contact[time > jerk_s].max() > 1.0)
+    touches = np.abs(contact) > 1e-2
+    begins, ends = (np.flatnonzero(np.diff(touches.astype(int)) == sign) for sign in (1, -1))
+    flights = [(b - e) / rate_hz for e, b in zip(ends, begins[begins > ends[0]], strict=False)]
+    closed = np.exp(-np.pi * beta / omega)
+    if not pulls:
+        closed = np.exp(-beta / omega * (np.pi - np.arctan2(2 * beta * omega, omega**2 - beta**2)))
+    assert flights[1] / flights[0] == pytest.approx(closed, rel=0.01)
 
 
 def test_a_tank_alone_on_its_motion_repeats_the_closed_loop() -> None:
