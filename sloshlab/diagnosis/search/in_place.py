@@ -37,9 +37,14 @@ class InPlace:
         self.fits = fits
 
     def look_alikes(
-        self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
+        self,
+        base: FreeRunFit,
+        kept: Sequence[Explanation],
+        pool: Sequence[Candidate],
+        what: str,
+        most: int = _MOST_LOOK_ALIKES,
     ) -> list[Explanation]:
-        """Effects that the same recordings may show as the best one, in its place."""
+        """Effects that the same recordings may show as the best one, in its place, `most` of them fitted."""
         best = cheapest(kept)
         if best is None or base.candidates or base.cost - best.fit.cost < LEAST_TO_BUILD_ON:
             return []
@@ -58,7 +63,7 @@ class InPlace:
             if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
                 nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
         found = []
-        for _, problem, start in sorted(nearest_of.values(), key=lambda one: one[0])[:_MOST_LOOK_ALIKES]:
+        for _, problem, start in sorted(nearest_of.values(), key=lambda one: one[0])[:most]:
             fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
             if not fit.trouble:
                 found.append(self.fits.judged(fit))

@@ -31,6 +31,8 @@ _NOTHING_TO_SPEAK_OF: Final = 0.5
 """Noise floors that single effects remove at most where pairs are not tried: below what a verdict speaks of."""
 _SHARE_LEFT_BY_A_PAIR: Final = 0.8
 """Of what its first effect leaves; a second one that gains less does not tell that the first one is wrong."""
+_LOOK_ALIKES_BESIDE_FRICTION: Final = 6
+"""Fitted where the best effect has left its side valley: what is nearest at first may be in that of another."""
 _SHARE_OF_A_SPECIAL_CASE: Final = 0.5
 """Of what the general form gains; what gains less has little of it."""
 
@@ -71,7 +73,7 @@ def findings_of(
     found = OneMoreEffect(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
     refinement, best = Refinement(fits), cheapest(found)
     if not fits.is_complete(retuned):
-        found += refinement.from_other_sizes(retuned_fit, found)
+        found += _beside_friction(fits, retuned_fit, found, pool)
         best = cheapest(found)
     is_complete = fits.is_complete(best or retuned)
     if not is_complete and best is not None:
@@ -108,6 +110,21 @@ def findings_of(
         fits.failed,
         fits.screened,
     )
+
+
+def _beside_friction(
+    fits: Fits, retuned: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
+) -> list[Explanation]:
+    """Effects of one number from other sizes, and what looks like them from where the best is one of these.
+
+    Look-alikes that were fitted before may be in the side valley that it has left.
+    """
+    found = Refinement(fits).from_other_sizes(retuned, known)
+    best = cheapest([*known, *found])
+    if best not in found:
+        return found
+    alike = InPlace(fits).look_alikes(retuned, [best], pool, "fitting one effect", _LOOK_ALIKES_BESIDE_FRICTION)
+    return [*found, *alike]
 
 
 def _second_effects(

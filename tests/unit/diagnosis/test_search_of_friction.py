@@ -21,7 +21,7 @@ from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, finished, fitt
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import fits, redrawn, refinement, screening
+from sloshlab.diagnosis.search import fits, redrawn, refinement, screening, whole_search
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import InPlace
 from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
@@ -556,3 +556,25 @@ def test_what_comes_in_jumps_is_begun_at_the_best_of_places_and_sizes(
     assert begun_from(smooth)[0] == far
     twice = {name: pytest.approx(2.0 * value) for name, value in near.items()}
     assert begun_from(sudden)[0] == twice
+
+
+@pytest.mark.parametrize("other_size_gains", [0.0, 100.0])
+def test_look_alikes_are_fitted_from_a_better_size(
+    case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch, other_size_gains: float
+) -> None:
+    """Where the best effect has left its side valley, what looks like it may still be in there; six of them."""
+    other = replace(coulomb, fit=replace(coulomb.fit, cost=coulomb.fit.cost - other_size_gains + 1.0))
+    alike, asked = case.fit(STRIBECK, n_iterations=1), []
+
+    def look_alikes(self: InPlace, base: FreeRunFit, kept: Any, pool: Any, what: str, most: int) -> Any:
+        asked.append((base, kept, most))
+        return [alike]
+
+    monkeypatch.setattr(Refinement, "from_other_sizes", lambda self, base, known: [other])
+    monkeypatch.setattr(InPlace, "look_alikes", look_alikes)
+    found = whole_search._beside_friction(case.fits, case.baseline, [coulomb], list(case.pool.values()))
+    if other_size_gains:
+        assert found == [other, alike]
+        assert asked == [(case.baseline, [other], 6)]
+    else:
+        assert (found, asked) == ([other], [])
