@@ -9,7 +9,13 @@ import numpy as np
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation, Findings, largest_strength
-from sloshlab.diagnosis.verdict.comparison import LEAST_STRENGTH, Scale, has_gained, is_clearly_better
+from sloshlab.diagnosis.verdict.comparison import (
+    LEAST_STRENGTH,
+    Scale,
+    has_gained,
+    has_surely_gained,
+    is_clearly_better,
+)
 
 LEAST_SEPARATION: Final = 6.0
 """Log-likelihood ratio, on all runs, by which an explanation must beat another to be the only one."""
@@ -53,7 +59,8 @@ def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Ex
         is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
         is_alike = is_alike or (_differs(one, best) and not _shows_less(one, best, scale))
         has_as_many = len(one.keys) == len(best.keys)
-        is_alike = is_alike or (shares_noise and has_as_many and _is_within_scatter(one, best))
+        is_little = _is_within_scatter(one, best) and not has_surely_gained(best, one, scale)
+        is_alike = is_alike or (shares_noise and has_as_many and is_little)
         is_kin = _is_case_of(one, best) or _is_case_of(best, one)
         is_less = is_kin and is_clearly_better(best, one, scale)
         if is_alike or (not is_less and _is_alike_at_one_frequency(found, one, best)):

@@ -20,6 +20,7 @@ LEAST_STRENGTH: Final = 0.7
 
 Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
 """
+_SURELY: Final = 2.0
 _CLEAR: Final = 3.0
 """Noise floors that an effect removes, from which it is there whatever its size is told from."""
 _ON_FITTED_RUNS: Final = 2.0
@@ -71,6 +72,12 @@ class Scale:
 def has_gained(more: Explanation, less: Explanation, scale: Scale) -> bool:
     """Whether an explanation gains more than chance gives over another, on fitted and on held-out runs."""
     return scale.held_out_gain(less, more) > LEAST_MORE and scale.fit_gain(less, more) > LEAST_MORE
+
+
+def has_surely_gained(more: Explanation, less: Explanation, scale: Scale) -> bool:
+    """Whether the gain is twice what is beyond chance even if all channels had one noise, as on a driven rig."""
+    alike = _SURELY * max(len({channel for _, channel in more.by_run}), 1)
+    return has_gained(more, less, replace(scale, fitting=alike * scale.fitting, held_out=alike * scale.held_out))
 
 
 def is_clearly_better(more: Explanation, less: Explanation, scale: Scale) -> bool:

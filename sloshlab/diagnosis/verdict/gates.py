@@ -15,6 +15,7 @@ from sloshlab.diagnosis.verdict.comparison import (
     at_its_best,
     explains_half,
     has_gained,
+    has_surely_gained,
     is_clearly_better,
     is_there,
     shows_more,
@@ -211,7 +212,9 @@ def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scal
     """A special case of effects in their place, unless the general form is better by a size worth speaking of."""
     for special in sorted(alike, key=lambda one: -scale.evidence(one)):
         is_special = special.n_numbers < best.n_numbers and includes(best, special)
-        if is_special and not (is_clearly_better(best, special, scale) or shows_more(best, special, scale)):
+        if is_special and not any(
+            is_more(best, special, scale) for is_more in (is_clearly_better, shows_more, has_surely_gained)
+        ):
             return special
     return best
 

@@ -60,8 +60,22 @@ def test_what_leaves_no_more_than_scatter_is_as_good(
     squares: float, numbers: dict[str, float], at: Surroundings, kind: str
 ) -> None:
     """√(1.1225 − 1) is half of what is worth a word; channels that share a noise are surer than they may be."""
-    other = left(90.0, 90.0, numbers, squares=squares)
+    other = left(20.0, 20.0, numbers, squares=squares)
     assert judged(BASELINE, [left(0.0, 0.0, FRICTION), other], at=at).kind == kind
+
+
+@pytest.mark.parametrize(
+    ("behind", "kind"), [(23.9, "indistinguishable"), (24.1, "named")], ids=["may be one noise", "is more"]
+)
+def test_what_is_worse_in_one_noise_of_all_channels_is_not(behind: float, kind: str) -> None:
+    """Twice what chance gives, on both kinds of runs, were all channels one."""
+    other = left(behind, behind, DRAG, squares=1.1)
+    assert judged(BASELINE, [left(0.0, 0.0, FRICTION), other], at=DRIVEN).kind == kind
+    best, twice = (
+        replace(one, by_run={**one.by_run, ("run_1", "another"): 1.0})
+        for one in (left(0.0, 0.0, FRICTION), left(2 * behind, 2 * behind, DRAG, squares=1.1))
+    )
+    assert judged(BASELINE, [best, twice], at=DRIVEN).kind == kind
 
 
 def test_one_effect_within_scatter_of_two_is_no_alternative() -> None:

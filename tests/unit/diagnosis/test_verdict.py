@@ -103,6 +103,8 @@ def test_friction_of_one_number_is_named_before_friction_of_three(better: float)
         pytest.param(left(20.0, 20.0, FRICTION, squares=1.50), "stribeck_friction", id="by 0.7 noise floors"),
         pytest.param(left(20.0, 20.0, FRICTION, squares=1.48), "coulomb_friction", id="by less"),
         pytest.param(left(20.0, 11.0, FRICTION, squares=1.50), "coulomb_friction", id="not on held-out runs"),
+        pytest.param(left(24.1, 24.1, FRICTION, squares=1.01), "stribeck_friction", id="surely"),
+        pytest.param(left(99.0, 23.9, FRICTION, squares=1.01), "coulomb_friction", id="surely where fitted"),
         pytest.param(
             left(20.0, 20.0, FRICTION, squares=1.0, in_fitted_run=2.98), "stribeck_friction", id="in a fitted run"
         ),
@@ -112,7 +114,7 @@ def test_friction_of_one_number_is_named_before_friction_of_three(better: float)
     ],
 )
 def test_friction_of_three_numbers_is_named_where_it_is_better_by_more(friction: Explanation, named: str) -> None:
-    """By chance on both kinds of runs and by what is worth a word; else the special case is enough."""
+    """By more than chance on both kinds of runs and by what is worth a word, or surely; else the special case."""
     verdict = judged(BASELINE, [friction, left(0.0, 0.0, STRIBECK)])
     assert (verdict.kind, names(verdict)) == ("named", [(named,)])
 
