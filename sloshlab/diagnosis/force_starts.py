@@ -36,8 +36,9 @@ _MOST_TRIED: Final = 2
 _N_EVALUATIONS: Final = 15, 40
 """Per number: of every start that is tried, and then of the best."""
 _MOST_SOUGHT: Final = 6
+_FIRST_SOUGHT: Final = 100
 _PROMISING: Final = 0.9
-"""Of the missing force, that the best of many places may leave before they are descended from."""
+"""Of the missing force, that the best of the first places may leave if the others are to be looked at."""
 _FAR, _CLOSE = 0.7, 0.15
 """First steps of a descent, of the logarithm of a number: where a force comes in jumps its valleys are narrow."""
 _FOLLOWED: Final = {STRUCTURE: [0, 1], EITHER: [0, 1], TANK: [2, 1]}
@@ -206,7 +207,7 @@ class ForceStarts:
         if sought := [np.array([one[name] for name in names]) for one in candidate.sought_at()]:
             grown = np.array([parameter.name in candidate.sizes for parameter in parameters])
             others = _sought(force, sought, place, grown, first)
-            share, numbers = min((share, numbers), *others, key=lambda one: one[0])
+            share, numbers = min([(share, numbers), *others], key=lambda one: one[0])
         if share < 1.0 - _LEAST_EXPLAINED:
             share, numbers = _descended(left, numbers, then, _CLOSE if sought else _FAR)
         if not share < 1.0 - _LEAST_EXPLAINED:
@@ -286,7 +287,8 @@ def _sought(
 ) -> list[tuple[float, FloatArray]]:
     """Shares left and numbers from the best of many places, at the size that suits the missing force best.
 
-    The force grows in proportion to the numbers that are `grown`. What leaves nearly all at each place is not it.
+    The force grows in proportion to the numbers that are `grown`. What leaves nearly all at each of the first
+    places is not it; none are returned then.
     """
 
     def sized(numbers: FloatArray) -> tuple[float, FloatArray]:
@@ -297,10 +299,14 @@ def _sought(
         factor = max(float(found @ at.force_n) / size, _LEAST_FACTOR)
         return at.share_left(found * factor), np.where(grown, numbers * factor, numbers)
 
-    best = sorted((sized(numbers) for numbers in places), key=lambda one: one[0])
-    tried = [numbers for share, numbers in best[:_MOST_SOUGHT] if share < _PROMISING]
+    begun = [sized(numbers) for numbers in places[:_FIRST_SOUGHT]]
+    if min(share for share, _ in begun) > _PROMISING:
+        return []
+    begun += [sized(numbers) for numbers in places[_FIRST_SOUGHT:]]
+    best = sorted(begun, key=lambda one: one[0])
+    tried = [numbers for _, numbers in best[:_MOST_SOUGHT]]
     reached = [_descended(lambda numbers: sized(numbers)[0], one, n_evaluations, _CLOSE) for one in tried]
-    return [sized(numbers) for _, numbers in reached] or best[:1]
+    return [sized(numbers) for _, numbers in reached]
 
 
 def _descended(
