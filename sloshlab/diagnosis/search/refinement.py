@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, huber_cost
-from sloshlab.diagnosis.rig_model import RELEASE
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
 
@@ -21,38 +18,13 @@ _MOST_ANEW: Final = 3
 _MOST_RIVALS: Final = 5
 _LEAST_SHARE_OF_GAIN: Final = 0.5
 """Of that of the best, by which an effect is worth another beginning."""
-_N_PLACES: Final = 48
-_LEAST_SHARE: Final = 0.01
-"""Of the cost: a throw that gains less is in vain, as crumbs lead nowhere."""
 
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)
 """Of what was found: beside a baseline that hides a part of an effect the rest of it is left."""
 _SIZES_BESIDE_FRICTION: Final = (0.5, 0.75, 1.5, 2.0, 3.0)
 """Over that which was found: every fit beside dry friction ends in the side valley in which it begins."""
-_RELEASES: Final = tuple(np.linspace(0.94, 1.06, 41))
 _OTHER_FREQUENCIES: Final = tuple(np.geomspace(0.7, 1.4, 6))
 """Over that of a mode: its valley is narrow, and what is left at first does not tell the way there."""
-
-
-@dataclass(frozen=True)
-class _Throws:
-    """How far and how often numbers are thrown.
-
-    Attributes
-    ----------
-    most, most_in_vain : int
-    spreads : tuple of float
-        Standard deviations of the logarithm of a number over places about one, in turns.
-    """
-
-    most: int
-    most_in_vain: int
-    spreads: tuple[float, ...]
-
-
-_ALONG_RIDGES: Final = _Throws(16, 4, (0.4, 0.15))
-_IN_JUMPS: Final = _Throws(32, 8, (0.1, 0.03))
-_IN_JUMPS_BESIDE_ANOTHER: Final = _Throws(16, 4, (0.1, 0.03))
 
 
 class Refinement:
@@ -157,68 +129,6 @@ class Refinement:
         best = min((fitted(problem, place)[0] for place in places), key=lambda fit: fit.cost)
         return [self.fits.judged(best)] if not best.trouble and best.cost < one.fit.cost else []
 
-    def climbed(self, known: Sequence[Explanation]) -> list[Explanation]:
-        """The best effect of several numbers from the nearest of many places about it, time and again.
-
-        Of two effects that which comes in jumps; it stays beside the other one.
-
-        Contacts and friction make ridges along which steps are short: a throw goes further, and what has led to a
-        better place is done once more from there (Hooke and Jeeves 1961, doi:10.1145/321062.321069).
-
-        Parameters
-        ----------
-        known : sequence of Explanation
-        """
-        best = cheapest(known)
-        thrown = _thrown(best) if best is not None else None
-        if best is None or thrown is None:
-            return []
-        throws = _ALONG_RIDGES
-        if thrown.comes_in_jumps:
-            throws = _IN_JUMPS if len(best.keys) == 1 else _IN_JUMPS_BESIDE_ANOTHER
-        names = [f"{thrown.key}.{one.name}" for one in thrown.effect.parameters]
-        problem, fit, n_in_vain = self.fits.problem_of(best.fit), best.fit, 0
-        further: dict[str, float] | None = None
-        is_released_anew = False
-        for i in range(throws.most):
-            if n_in_vain >= throws.most_in_vain:
-                break
-            self.fits.told(f"fitting {thrown.key} from places about it", i, throws.most)
-            start = further or nearest(problem, _places_about(fit, names, i, throws.spreads), STAGES[2])
-            other, _ = fitted(problem, start, n_iterations=6, shares=STAGES[1:])
-            if other.trouble or other.cost >= fit.cost:
-                n_in_vain += further is None
-                further = None
-                if is_released_anew or (other := self._released_anew(fit)).cost >= (1.0 - _LEAST_SHARE) * fit.cost:
-                    is_released_anew = True
-                    continue
-            is_released_anew = False
-            n_in_vain = 0 if fit.cost - other.cost > _LEAST_SHARE * fit.cost else n_in_vain + 1
-            further = {name: value + (value - fit.values[name]) for name, value in other.values.items()}
-            fit = other
-        return [self.fits.judged(fit)] if fit is not best.fit else []
-
-    def _released_anew(self, fit: FreeRunFit) -> FreeRunFit:
-        """The fit from other releases of its runs, each the best for its run alone; itself where none is better.
-
-        Contacts and friction change what follows a release in jumps, of every run by itself.
-        """
-        problem, values = self.fits.problem_of(fit), dict(fit.values)
-        theta = problem.theta_of(fit.values)
-        residual = problem.residual(theta)
-        for column, name in enumerate(problem.names):
-            if not name.startswith(RELEASE):
-                continue
-            least = huber_cost(residual)
-            for factor in _RELEASES:
-                moved = problem.theta_of({**fit.values, name: factor * fit.values[name]})
-                cost = huber_cost(problem.residual_moved(moved, column, residual))
-                if cost < least:
-                    least, values[name] = cost, factor * fit.values[name]
-        if values == fit.values:
-            return fit
-        return fitted(problem, values, shares=STAGES[-2:])[0]
-
     def polished(
         self, base: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
     ) -> list[Explanation]:
@@ -288,14 +198,6 @@ def _with_good_gains(base: FreeRunFit, known: Sequence[Explanation]) -> list[Exp
     return [one for one in ranked if base.cost - one.fit.cost >= least]
 
 
-def _thrown(best: Explanation) -> Candidate | None:
-    """The effect whose numbers are thrown: one of several numbers alone, of two the one that comes in jumps."""
-    if len(best.keys) > 1:
-        return next((one for one in best.fit.candidates if one.comes_in_jumps), None)
-    last = best.fit.candidates[-1]
-    return last if len(last.effect.parameters) > 1 else None
-
-
 def _is_simple(one: Explanation) -> bool:
     """Whether its effect has one number."""
     return len(one.fit.candidates[-1].effect.parameters) == 1
@@ -307,15 +209,3 @@ def _best_by_effect(known: Sequence[Explanation]) -> list[Explanation]:
     for one in sorted(known, key=lambda one: one.fit.cost):
         by_key.setdefault(one.keys[-1], one)
     return list(by_key.values())
-
-
-def _places_about(
-    fit: FreeRunFit, names: Sequence[str], turn: int, spreads: Sequence[float]
-) -> list[dict[str, float]]:
-    """Values of a fit, some numbers larger or smaller by factors drawn evenly; others at every turn."""
-    spread = spreads[turn % len(spreads)]
-    thrown = np.exp(spread * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PLACES)))
-    return [
-        {**fit.values, **{name: fit.values[name] * float(factor) for name, factor in zip(names, row, strict=True)}}
-        for row in thrown
-    ]

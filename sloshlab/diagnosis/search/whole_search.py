@@ -17,6 +17,7 @@ from sloshlab.diagnosis.noise_floor import weighted_observations
 from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search.any_force import ceilings
+from sloshlab.diagnosis.search.climbing import climbed
 from sloshlab.diagnosis.search.fits import Fits, Told, cheapest
 from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace, is_special_case
 from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
@@ -84,12 +85,12 @@ def findings_of(
         found += refinement.unstrained(found)
     else:
         found += refinement.anew(retuned_fit, found)
-        found += refinement.climbed(found)
+        found += climbed(fits, found)
         best = cheapest(found)
         is_complete = best is not None and fits.is_complete(best)
     if not is_complete:
         pairs = _second_effects(fits, found, retuned, surroundings, pool)
-        found += [*pairs, *refinement.climbed([one for one in pairs if len(one.keys) > 1])]
+        found += [*pairs, *climbed(fits, [one for one in pairs if len(one.keys) > 1])]
     found += refinement.polished(retuned_fit, found, pool)
     retuned = refinement.retuned_from(found, retuned)
     any_force = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)

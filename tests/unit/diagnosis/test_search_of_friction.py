@@ -21,7 +21,7 @@ from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, finished, fitt
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import fits, redrawn, refinement, screening, whole_search
+from sloshlab.diagnosis.search import climbing, fits, redrawn, refinement, screening, whole_search
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import InPlace
 from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
@@ -302,9 +302,9 @@ def test_an_effect_of_several_numbers_climbs_along_a_ridge(case: Decays, monkeyp
     off = {**wide.fit.values, **{name: 0.3 * wide.fit.values[name] for name in names}}
     problem = case.fits.problem_of(wide.fit)
     at_off = huber_cost(problem.residual(problem.theta_of(off)))
-    monkeypatch.setattr(refinement, "fitted", stays)
+    monkeypatch.setattr(climbing, "fitted", stays)
     start = replace(wide, fit=replace(wide.fit, values=off, cost=at_off))
-    [found] = Refinement(case.fits).climbed([start])
+    [found] = climbing.climbed(case.fits, [start])
     assert found.fit.cost < 0.5 * at_off
     first, second = begun[:2]
     assert second == {name: pytest.approx(2 * value - off[name]) for name, value in first.items()}
@@ -325,21 +325,21 @@ def test_a_climb_goes_on_from_other_releases(
         cost = huber_cost(problem.residual(problem.theta_of(start)))
         return FreeRunFit(problem.candidates, dict(start), cost, cost), None
 
-    monkeypatch.setattr(refinement, "fitted", stays)
-    monkeypatch.setattr(refinement, "nearest", lambda problem, starts, share: off)
+    monkeypatch.setattr(climbing, "fitted", stays)
+    monkeypatch.setattr(climbing, "nearest", lambda problem, starts, share: off)
     start = replace(wide, fit=replace(wide.fit, values=off, cost=at_off))
-    [found] = Refinement(case.fits).climbed([start])
+    [found] = climbing.climbed(case.fits, [start])
     assert found.fit.cost < 0.5 * at_off
     for name in releases:
         assert found.fit.values[name] == pytest.approx(wide.fit.values[name], rel=0.004)
-    assert Refinement(case.fits).climbed([found]) == []
+    assert climbing.climbed(case.fits, [found]) == []
 
 
 def test_of_two_effects_the_one_in_jumps_is_thrown(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
     names = [f"{ASYMMETRIC}.force_{side}_n" for side in ("up", "down")]
     pair = case.fit(COULOMB, ASYMMETRIC, n_iterations=1)
     pair = replace(pair, fit=replace(pair.fit, values={**pair.fit.values, **dict.fromkeys(names, 0.1)}))
-    assert Refinement(case.fits).climbed([pair]) == []
+    assert climbing.climbed(case.fits, [pair]) == []
     sudden = replace(case.pool[ASYMMETRIC].effect, sought_at=lambda at: [{}])
     candidates = (pair.fit.candidates[0], replace(pair.fit.candidates[1], effect=sudden))
     assert [one.comes_in_jumps for one in candidates] == [False, True]
@@ -352,17 +352,17 @@ def test_of_two_effects_the_one_in_jumps_is_thrown(case: Decays, monkeypatch: py
     def in_vain(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
         return FreeRunFit(problem.candidates, dict(start), np.inf, np.inf), None
 
-    monkeypatch.setattr(refinement, "fitted", in_vain)
-    monkeypatch.setattr(refinement, "nearest", looked_at)
+    monkeypatch.setattr(climbing, "fitted", in_vain)
+    monkeypatch.setattr(climbing, "nearest", looked_at)
     known = replace(pair, fit=replace(pair.fit, candidates=candidates))
-    assert Refinement(case.fits).climbed([known]) == []
+    assert climbing.climbed(case.fits, [known]) == []
     assert len(thrown) == 4 * 48
     changed = {name for one in thrown for name, value in one.items() if value != pair.fit.values[name]}
     assert changed == set(names)
 
 
 def test_an_effect_of_one_number_does_not_climb(case: Decays, coulomb: Explanation) -> None:
-    assert Refinement(case.fits).climbed([coulomb]) == []
+    assert climbing.climbed(case.fits, [coulomb]) == []
 
 
 def findings(case: Decays, *explanations: Explanation) -> Findings:
