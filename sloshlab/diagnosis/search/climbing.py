@@ -131,8 +131,8 @@ def _places_about(
     """Values of a fit, some numbers larger or smaller by factors drawn evenly; others at every turn."""
     names = [f"{thrown.key}.{one.name}" for one in thrown.effect.parameters]
     spread = spreads[turn % len(spreads)]
-    thrown = np.exp(spread * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PLACES)))
+    factors = np.exp(spread * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PLACES)))
     return [
         {**fit.values, **{name: fit.values[name] * float(factor) for name, factor in zip(names, row, strict=True)}}
-        for row in thrown
+        for row in factors
     ]
