@@ -93,6 +93,11 @@ class _Place:
         left = self.force_n - force
         return float(left @ left) / max(float(self.force_n @ self.force_n), 1e-300)
 
+    def factor(self, force: FloatArray) -> float:
+        """By which a force is most like the missing one; zero of none."""
+        size = float(force @ force)
+        return max(float(force @ self.force_n) / size, _LEAST_FACTOR) if size else 0.0
+
     def _beyond(self, force: FloatArray) -> FloatArray:
         return np.asarray(force - self.followed @ (self.followed.T @ force))
 
@@ -266,15 +271,14 @@ def _sized(
     The size is in the number, if there is one, with which the force grows in proportion.
     """
     found = force(start)
-    size = 0.0 if found is None else float(found @ found)
-    if found is None or size == 0.0:
+    factor = 0.0 if found is None else place.factor(found)
+    if found is None or factor == 0.0:
         return np.inf, start
-    factor = float(found @ place.force_n) / size
+    size = float(found @ found)
     for k in range(start.size):
         doubled = force(_with(start, k, 2.0 * start[k]))
         if doubled is not None and float(((doubled - 2.0 * found) ** 2).sum()) < _IN_PROPORTION**2 * size:
-            sized = _with(start, k, start[k] * max(factor, _LEAST_FACTOR))
-            return place.share_left(found * max(factor, _LEAST_FACTOR)), sized
+            return place.share_left(found * factor), _with(start, k, start[k] * factor)
     return place.share_left(found), start
 
 
@@ -293,10 +297,9 @@ def _sought(
 
     def sized(numbers: FloatArray) -> tuple[float, FloatArray]:
         found = force(numbers)
-        size = 0.0 if found is None else float(found @ found)
-        if found is None or size == 0.0:
+        factor = 0.0 if found is None else at.factor(found)
+        if found is None or factor == 0.0:
             return np.inf, numbers
-        factor = max(float(found @ at.force_n) / size, _LEAST_FACTOR)
         return at.share_left(found * factor), np.where(grown, numbers * factor, numbers)
 
     begun = [sized(numbers) for numbers in places[:_FIRST_SOUGHT]]

@@ -18,7 +18,6 @@ _MOST_ANEW: Final = 3
 _MOST_RIVALS: Final = 5
 _LEAST_SHARE_OF_GAIN: Final = 0.5
 """Of that of the best, by which an effect is worth another beginning."""
-
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)
 """Of what was found: beside a baseline that hides a part of an effect the rest of it is left."""
 _SIZES_BESIDE_FRICTION: Final = (0.5, 0.75, 1.5, 2.0, 3.0)

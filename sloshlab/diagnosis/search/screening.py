@@ -29,6 +29,7 @@ _MOST_STARTS: Final = 2
 _LEAST_SHARE_OF_PROMISE: Final = 0.02
 _MOST_BY_FORCE: Final = 2
 _SIZES_IN_JUMPS: Final = (1.0, 0.75, 1.25, 1.5, 2.0)
+"""Over those with which the force of what comes in jumps is like the missing one."""
 _ALIKE: Final = 0.85
 """Share of the missing force that an effect's own may leave, to be like it."""
 

@@ -21,6 +21,7 @@ LEAST_STRENGTH: Final = 0.7
 Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
 """
 _SURELY: Final = 2.0
+"""Times what is beyond chance, for each channel, from which a gain counts however small it is beside the noise."""
 _CLEAR: Final = 3.0
 """Noise floors that an effect removes, from which it is there whatever its size is told from."""
 _ON_FITTED_RUNS: Final = 2.0
