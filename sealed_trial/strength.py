@@ -36,7 +36,7 @@ SHAPE_TOLERANCE: Final = 0.02
 _STEP = 0.2
 _THINNED = 3
 _LEAST_DAMPING, _MOST_DAMPING = 0.05, 7.0
-_STAYS_LINEAR, _STAYS_LINEAR_IN_FREQUENCY = 0.2, 0.004
+_STAYS_LINEAR, _STAYS_LINEAR_IN_FREQUENCY = 0.2, 0.001
 _RELINEARISED_AT_ONCE, _SCANNED = 3, 13
 _MOST_BASELINES: Final = {"sdof": 7, "beam": 5, "shaker": 4}
 """Of an effect; a beam's are costly."""
@@ -93,7 +93,7 @@ class NoiseFloor:
         self._laboratory, self._sensors = laboratory, sensors
         self.floor = {name: self._floor_of(name, plain) for name in plain[0]}
         self._baselines = [self._linearised(laboratory, plain)]
-        self._frequencies: list[tuple[HiddenRig, FloatArray]] = []
+        self._frequencies: dict[str, list[tuple[float, FloatArray]]] = {}
 
     def start_anew(self) -> None:
         """Forget where baselines were linearised again, for another effect."""
@@ -109,9 +109,9 @@ class NoiseFloor:
         return float(np.sqrt((np.mean(scatter) if scatter else 0.0) + self._sensors[name].noise ** 2))
 
     def _stacked(self, runs: Sequence[Signals]) -> FloatArray:
-        return np.concatenate(
-            [run[name][::_THINNED] / floor for name, floor in self.floor.items() for run in runs]
-        )
+        """All channels over their floors, thinned, without the instant of a release: one sample shows nothing."""
+        every = slice(_THINNED, None, _THINNED)
+        return np.concatenate([run[name][every] / floor for name, floor in self.floor.items() for run in runs])
 
     def _linearised(self, laboratory: Laboratory, signals: Sequence[Signals]) -> _Baseline:
         directions = (*self._of_rig(laboratory, signals), *self._of_readings(laboratory, signals))
@@ -182,7 +182,7 @@ class NoiseFloor:
 
     def _relinearised(self, target: FloatArray, best: _Retuned, damping_is_known: bool) -> _Retuned:
         """Less remains about a baseline with a frequency like that of the changed signals, and about its like."""
-        following = self._nearest_frequency(target)
+        following = self._nearest_frequencies(target)
         for _ in range(_RELINEARISED_AT_ONCE):
             rig = following or best.rig
             if len(self._baselines) == _MOST_BASELINES[rig.kind] or (best.is_near and following is None):
@@ -195,20 +195,29 @@ class NoiseFloor:
             best, following = min(best, retuned, key=lambda one: one.strength), None
         return best
 
-    def _nearest_frequency(self, target: FloatArray) -> HiddenRig | None:
-        """The rig with the possible frequency of its first mode whose signals are nearest, where it has modes.
+    def _nearest_frequencies(self, target: FloatArray) -> HiddenRig | None:
+        """The rig with the possible frequency of every mode whose signals are nearest, where it has modes.
 
-        From elsewhere no step finds a phase that is off by more than a radian.
+        From elsewhere no step finds a phase that is off by more than a radian. One mode after the other: what a
+        linear rig shows is the sum of its modes.
         """
         rig = self._laboratory.rig
         if rig.kind == "shaker":
             return None
-        if not self._frequencies:
-            for change in np.linspace(*_about_belief(FREQUENCY_TOLERANCE, rig.factor("frequency_1")), _SCANNED):
-                other = replace(self._laboratory, rig=rig.with_factor("frequency_1", 1 + change))
-                self._frequencies.append((other.rig, self._stacked(other.signals(relative_tolerance=QUICK))))
-        nearest = min(self._frequencies, key=lambda known: float(np.sum((target - known[1]) ** 2)))[0]
-        return None if any(baseline.rig is nearest for baseline in self._baselines) else nearest
+        for name in (one for one in rig.tunable if one.startswith("frequency")):
+            if name not in self._frequencies:
+                self._frequencies[name] = self._scanned(name)
+            change, _ = min(self._frequencies[name], key=lambda known: float(np.sum((target - known[1]) ** 2)))
+            rig = rig.with_factor(name, 1 + change)
+        return None if any(baseline.rig.factors == rig.factors for baseline in self._baselines) else rig
+
+    def _scanned(self, name: str) -> list[tuple[float, FloatArray]]:
+        """Possible changes of a factor of the rig, and the signals with each."""
+        rig, found = self._laboratory.rig, []
+        for change in np.linspace(*_about_belief(FREQUENCY_TOLERANCE, rig.factor(name)), _SCANNED):
+            other = replace(self._laboratory, rig=rig.with_factor(name, 1 + change))
+            found.append((float(change), self._stacked(other.signals(relative_tolerance=QUICK))))
+        return found
 
     def _retuned(self, baseline: _Baseline, target: FloatArray, damping_is_known: bool) -> _Retuned:
         difference = target - baseline.reference

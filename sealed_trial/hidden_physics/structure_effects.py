@@ -190,10 +190,8 @@ STRUCTURE_EFFECTS: Final = (
     HiddenEffect("hysteresis", "structure", hysteresis, _CARRIED, needs_levels=True),
     HiddenEffect("cubic_stiffness", "structure", cubic, _CARRIED, needs_levels=True),
     HiddenEffect("quadratic_stiffness", "structure", quadratic, _CARRIED, needs_levels=True),
-    HiddenEffect("stiffness_change", "structure", stiffness, ("sdof",), needs_frequencies=True),
     HiddenEffect("clearance", "structure", clearance, _CARRIED, needs_levels=True),
     HiddenEffect("missing_mode", "structure", missing_mode, _CARRIED, needs_levels=True),
-    HiddenEffect("mass_error", "structure", mass, ("sdof",), needs_frequencies=True),
     HiddenEffect("constant_force", "structure", constant, _CARRIED),
     HiddenEffect("base_rocking", "excitation", rocking, ("beam",)),
 )

@@ -92,6 +92,13 @@ def integrate(y, n_samples, step, relative, conditions, system, seen_all, events
     seen, out, shifted = np.empty(at.N_OUTPUTS + 4), np.empty(at.N_CONDITIONS), np.empty(y.size)
     n_events, t, h = 0, 0.0, 0.2 * step
     evaluate(t, y, slopes[0], seen, conditions, system)
+    for _ in range(at.N_CONDITIONS):  # what is let go outside a margin has left it at once
+        margins(y, seen, conditions, n, p, out)
+        which = _first_left(out)
+        if which < 0:
+            break
+        switch(which, y, seen, conditions, n, p)
+        evaluate(t, y, slopes[0], seen, conditions, system)
     _note(seen_all[0], seen, slopes[0], n)
     for sample in range(1, n_samples):
         end = sample * step

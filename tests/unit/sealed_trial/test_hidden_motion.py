@@ -42,6 +42,13 @@ def test_dry_friction_turns_every_half_period_and_sticks_where_it_can_hold() -> 
     np.testing.assert_allclose(abs(run.seen[-1, at.O_DISPLACEMENT]), abs(rest), atol=1e-9)
 
 
+@pytest.mark.parametrize(("friction_n", "acceleration"), [(4.0, -158.0), (310.0, -5.0), (330.0, 0.0)])
+def test_what_is_let_go_slides_at_once_unless_friction_holds_it(friction_n: float, acceleration: float) -> None:
+    """−(k x₀ − F)/m from the first sample on, k x₀ = 320 N."""
+    _, run = released(oscillator(FRICTION_UP=friction_n, FRICTION_DOWN=friction_n), 0.1, 0.02)
+    assert run.seen[0, at.O_ACCELERATION] == pytest.approx(acceleration, abs=1e-9)
+
+
 def test_friction_that_differs_up_and_down_equals_even_friction_and_a_constant_force() -> None:
     _, uneven = released(oscillator(FRICTION_UP=3.0, FRICTION_DOWN=1.0), 0.03, 2.0)
     _, even = released(oscillator(FRICTION_UP=2.0, FRICTION_DOWN=2.0, CONSTANT=-1.0), 0.03, 2.0)

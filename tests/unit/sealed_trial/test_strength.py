@@ -130,3 +130,35 @@ def test_a_mass_on_a_beam_that_retuning_hides_does_not_show() -> None:
 
     assert strength(0.008) < 0.5
     assert strength(0.08) > 3.0
+
+
+@pytest.mark.parametrize("plan_name", ["sdof_decays", "sdof_base", "sdof_mixed", "sdof_one_frequency"])
+def test_a_mass_on_one_mode_is_a_softer_spring_and_less_damping(plan_name: str) -> None:
+    """(m + δm)(z̈ + ẅ) + c(1 + δ) ż + k(1 + δ) z = 0 divided by 1 + δ: no recording tells mass and spring apart."""
+    laboratory = laboratory_of(plan_name)
+    system = laboratory.rig.system()
+    mass, stiffness = (float(matrix[0, 0]) for matrix in (system.mass, system.stiffness))
+    damped = replace(laboratory, rig=laboratory.rig.with_factor("damping_1", 1.05))
+    both = Change({}, {at.STRUCTURE_MASS: 0.05 * mass, at.STIFFNESS_CHANGE: 0.05 * stiffness})
+    for plain, changed in zip(laboratory.signals(), damped.signals([both]), strict=True):
+        for name, values in plain.items():
+            assert changed[name] == pytest.approx(values, abs=1e-9 * (1.0 + np.abs(values).max()))
+
+
+def test_a_base_that_rocks_within_the_tolerances_of_all_modes_does_not_show() -> None:
+    """It softens every mode, ten times this size by half of what frequencies may be off by, twenty times by more."""
+    laboratory = laboratory_of("beam_decays")
+    laboratory = replace(laboratory, plan=_first_run(laboratory.plan))
+    stiffness = float(laboratory.rig.system().stiffness[0, 0])
+    assert laboratory.rig.beam is not None
+    compliance = 0.004 / (stiffness * laboratory.rig.beam.length_m**2)
+    floor, _ = floor_of(laboratory)
+
+    def strength(size: float) -> float:
+        floor.start_anew()
+        rocks = Change({}, compliance_rad_per_n_m=size * compliance)
+        return floor.strength(laboratory.signals([rocks], relative_tolerance=QUICK), damping_is_known=False)
+
+    assert strength(0.5) < 1.0
+    assert strength(10.0) < 1.0
+    assert strength(20.0) > 3.0
