@@ -28,6 +28,8 @@ _MOST_PAIRS: Final = 20
 _SPLINE_DEGREE: Final = 5
 _LARGEST_LEAK: Final = 0.1
 """Of a channel's reading; what adds more is no leak but another connection or gain."""
+_LARGEST_LEAK_OF_ITS_KIND: Final = 0.2
+"""The same for what another channel of the same quantity adds: both have the same cables and amplifiers."""
 
 
 def _channels_and_devices(at: Surroundings) -> list[str]:
@@ -367,8 +369,9 @@ def _leaks(at: Surroundings) -> list[Numbers]:
 def _largest_leaks(at: Surroundings) -> Mapping[str, tuple[float, float]]:
     to, _, source = at.channel.partition("<")
     most = _LARGEST_LEAK * _all_of_it(at)
-    if to.endswith("_root") and to.partition("_")[0] == source.partition("_")[0]:
-        most = max(most, _LARGEST_LEAK)  # a base that rests reads nothing else
+    if to.partition("_")[0] == source.partition("_")[0]:
+        is_base = to.endswith("_root")  # one that rests reads nothing else
+        most = max(most, _LARGEST_LEAK) if is_base else _LARGEST_LEAK_OF_ITS_KIND * _all_of_it(at)
     return {"ratio": (-most, most)}
 
 

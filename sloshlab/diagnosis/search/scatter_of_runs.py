@@ -39,7 +39,7 @@ def scatter_of_runs(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJac
     -----
     C (Σ gᵢ gᵢᵀ) C n/(n − 1) with the gradients gᵢ of the n parts about their mean and C the covariance of the fit
     (Liang and Zeger 1986, doi:10.1093/biomet/73.1.13), times the quantile of Student's t over that of the normal
-    distribution at as many runs.
+    distribution at as many quarters of runs.
     """
     if len(problem.runs) < 2:
         return {}
@@ -54,7 +54,8 @@ def scatter_of_runs(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJac
         about_mean = gradients - gradients.mean(axis=0)
         square = about_mean.T @ about_mean * len(gradients) / (len(gradients) - 1)
         error = np.maximum(error, np.sqrt(np.maximum(np.diag(covariance @ square @ covariance), 0.0)))
-    few = float(t.ppf(_QUANTILE, len(problem.runs) - 1) / norm.ppf(_QUANTILE))
+    n_parts = max(_PARTS_OF_A_RUN) * len(problem.runs)
+    few = float(t.ppf(_QUANTILE, n_parts - 1) / norm.ppf(_QUANTILE))
     return {
         name: few * float(error[i] * problem.scales[i])
         for i, name in enumerate(problem.names)

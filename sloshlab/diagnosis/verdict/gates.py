@@ -237,10 +237,11 @@ def _is_bettered(
     """Whether another description shows more, unless repeats have too little in common of what is left to them.
 
     What they do not have in common is what one run happened to have, such as a liquid that damps more for a while.
+    What leaves no more than the noise floor does is adequate however little a freer description leaves.
     """
     if _in_common_where_judged(found, named) < _LITTLE_IN_COMMON:
         return False
-    if named.held_out_rms > ADEQUATE * ceiling.held_out_rms:
+    if named.held_out_rms > ADEQUATE * max(ceiling.held_out_rms, 1.0):
         return True
     return any(shows_more(one, at_its_best(found, named), scale) for one in others)
 

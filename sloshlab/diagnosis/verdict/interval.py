@@ -11,8 +11,8 @@ from sloshlab.diagnosis.explanation import Explanation
 
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
-_ERRORS_OVER_STANDARD_ERRORS: Final = 2.0
-"""On cases whose truth was known."""
+_ERRORS_OVER_STANDARD_ERRORS: Final = 1.25
+"""On cases whose truth was known, root of the mean square, where nothing but noise counts."""
 _CALIBRATION: Final = 0.01
 _LENGTHS: Final = {"_n_per_m3": 3, "_n_per_m2": 2, "_n_s2_per_m2": 2, "_n_per_m": 1, "_n_s_per_m": 1}
 """Power of a length, or of one per time, by which a force of the unit is divided: its gain counts as often."""
@@ -64,8 +64,8 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
     is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s") and not is_between
     power = next((power for ending, power in _LENGTHS.items() if parameter.endswith(ending)), int(is_between))
     of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(best.fit.values[name])
-    elsewhere = max(best.spread.get(name, 0.0), of_belief)
-    return _NORMAL_90 * float(np.linalg.norm([scatter, of_gain, elsewhere]))
+    elsewhere = max(best.spread.get(name, 0.0), of_belief, of_gain)
+    return _NORMAL_90 * float(np.hypot(scatter, elsewhere))
 
 
 def _named(candidate: Candidate, parameter: str) -> EffectParameter:

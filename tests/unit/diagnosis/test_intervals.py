@@ -33,9 +33,9 @@ def interval_of(values: Mapping[str, float], rms: float = NOISE) -> dict[str, fl
 def test_intervals_are_as_wide_as_errors_were_and_wider_where_the_fit_leaves_more(
     rms: float, widened: float
 ) -> None:
-    """Two standard errors, twice that at two noise floors, at 90 %, beside one per cent of the size."""
+    """1.25 standard errors, twice that at two noise floors, at 90 %, beside one per cent of the size."""
     force = interval_of(FRICTION, rms)
-    width = np.hypot(2.0 * 0.01 * widened, 0.0037) * norm.ppf(0.95)
+    width = np.hypot(0.0125 * widened, 0.0037) * norm.ppf(0.95)
     assert (force["estimate"], force["level"]) == (0.37, 0.9)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
     assert 0.37 - force["low"] == pytest.approx(width, rel=1e-4)
@@ -45,13 +45,13 @@ def test_an_interval_is_as_wide_as_fits_about_other_baselines_end_elsewhere() ->
     spread = replace(left(0.0, 0.0, FRICTION), spread={"structure.coulomb_friction.force_n": 0.04})
     facts = verdict_facts(findings(BASELINE, [spread]), judged(BASELINE, [spread]))
     [force] = [one["parameters"]["force_n"] for one in facts["effects"]]
-    width = np.linalg.norm([0.02, 0.0037, 0.04]) * norm.ppf(0.95)
+    width = np.hypot(0.0125, 0.04) * norm.ppf(0.95)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
 
 
-@pytest.mark.parametrize(("disagree", "counts"), [(0.05, 0.05), (0.01, 0.02)])
+@pytest.mark.parametrize(("disagree", "counts"), [(0.05, 0.05), (0.01, 0.0125)])
 def test_an_interval_is_as_wide_as_runs_disagree(disagree: float, counts: float) -> None:
-    """Instead of twice the standard error that noise alone would give, where it is more."""
+    """Instead of what noise alone would give, where it is more."""
     scatter = replace(left(0.0, 0.0, FRICTION), scatter={"structure.coulomb_friction.force_n": disagree})
     facts = verdict_facts(findings(BASELINE, [scatter]), judged(BASELINE, [scatter]))
     [force] = [one["parameters"]["force_n"] for one in facts["effects"]]
@@ -76,12 +76,13 @@ def test_standard_errors_by_noise_and_by_what_is_believed_are_told_apart(n: floa
 
 @pytest.mark.parametrize(("elsewhere", "of_belief"), [(0.003, 0.01), (0.04, 0.04)])
 def test_what_is_not_known_of_the_baseline_counts_once(elsewhere: float, of_belief: float) -> None:
+    """As fits end elsewhere, as a belief is sure, or as a gain of one per cent does (0.0037)."""
     one = replace(
         left(0.0, 0.0, FRICTION), fit=beside_a_gain(4.0), spread={"structure.coulomb_friction.force_n": elsewhere}
     )
     facts = verdict_facts(findings(BASELINE, [one]), judged(BASELINE, [one]))
     [force] = [part["parameters"]["force_n"] for part in facts["effects"]]
-    width = np.linalg.norm([2 * 0.005, 0.0037, of_belief]) * norm.ppf(0.95)
+    width = np.hypot(1.25 * 0.005, of_belief) * norm.ppf(0.95)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
 
 
@@ -89,16 +90,16 @@ def test_what_is_not_known_of_the_baseline_counts_once(elsewhere: float, of_beli
     "number", ["sensor.mains_hum_60.acceleration_tip.amplitude", "structure.coulomb_friction.force_n"]
 )
 def test_a_size_is_known_no_better_than_gains_and_masses(number: str) -> None:
-    """One per cent of 4 m/s², or of 4 N, beside two standard errors."""
+    """One per cent of 4 m/s², or of 4 N, beside what noise does."""
     size = interval_of({number: 4.0})
-    width = norm.ppf(0.95) * np.hypot(0.02, 0.04)
+    width = norm.ppf(0.95) * np.hypot(0.0125, 0.04)
     assert size["high"] - 4.0 == pytest.approx(width, rel=1e-4)
     assert 4.0 - size["low"] == pytest.approx(width, rel=1e-4)
 
 
 def test_a_loss_per_second_is_a_size() -> None:
     loss = interval_of({"tank.liquid_loss.rate_kg_per_s": 0.5})
-    assert loss["high"] - 0.5 == pytest.approx(norm.ppf(0.95) * np.hypot(0.02, 0.005), rel=1e-4)
+    assert loss["high"] - 0.5 == pytest.approx(norm.ppf(0.95) * np.hypot(0.0125, 0.005), rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -113,16 +114,16 @@ def test_a_loss_per_second_is_a_size() -> None:
 )
 def test_the_gain_of_a_displacement_counts_with_its_power(number: str, gains: float) -> None:
     size = interval_of({number: 4.0})
-    assert size["high"] - 4.0 == pytest.approx(norm.ppf(0.95) * np.hypot(0.02, 0.04 * gains), rel=1e-4)
+    assert size["high"] - 4.0 == pytest.approx(norm.ppf(0.95) * np.hypot(0.0125, 0.04 * gains), rel=1e-4)
 
 
 def test_a_leak_has_the_gains_of_two_sensors_in_it_and_a_gain_has_none() -> None:
     leak = interval_of({"sensor.cross_talk.acceleration_tip<acceleration_root.ratio": 1.0})
-    assert leak["high"] - 1.0 == pytest.approx(norm.ppf(0.95) * np.hypot(0.02, 0.01 * np.sqrt(2)), rel=1e-4)
+    assert leak["high"] - 1.0 == pytest.approx(norm.ppf(0.95) * np.hypot(0.0125, 0.01 * np.sqrt(2)), rel=1e-4)
     gain = interval_of({"sensor.sensor_gain.acceleration_tip.ratio": 4.0})
-    assert gain["high"] - 4.0 == pytest.approx(norm.ppf(0.95) * 0.02, rel=1e-4)
+    assert gain["high"] - 4.0 == pytest.approx(norm.ppf(0.95) * 0.0125, rel=1e-4)
 
 
 def test_a_time_does_not_depend_on_gains() -> None:
     leak = interval_of({"sensor.sensor_high_pass.acceleration_tip.time_constant_s": 4.0})
-    assert leak["high"] - 4.0 == pytest.approx(0.02 * norm.ppf(0.95), rel=1e-4)
+    assert leak["high"] - 4.0 == pytest.approx(0.0125 * norm.ppf(0.95), rel=1e-4)

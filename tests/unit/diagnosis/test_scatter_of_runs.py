@@ -36,11 +36,12 @@ def scatter_of(offsets: np.ndarray, n_runs: int) -> float:
 
 
 def few(n_runs: int) -> float:
-    return float(t.ppf(0.95, n_runs - 1) / norm.ppf(0.95))
+    """For the number of quarters, by which the larger of two errors is told."""
+    return float(t.ppf(0.95, 4 * n_runs - 1) / norm.ppf(0.95))
 
 
 def test_runs_that_differ_as_a_whole_tell_the_error_of_their_mean() -> None:
-    """The standard error of a mean of five, larger for there are five only."""
+    """The standard error of a mean of five, a little larger for there are twenty quarters only."""
     of_runs = np.array([0.3, -0.2, 0.1, 0.6, -0.4])
     expected = few(5) * SCALE * of_runs.std(ddof=1) / np.sqrt(5)
     assert scatter_of(np.repeat(of_runs, 4), 5) == pytest.approx(expected, rel=1e-9)

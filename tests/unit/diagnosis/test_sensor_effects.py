@@ -194,6 +194,25 @@ def test_at_one_frequency_the_base_leaks_only_into_what_it_does_not_move_alike(m
     assert set(leaks.places(unlike)) == into_the_base | {"acceleration_tip<acceleration_root"}
 
 
+@pytest.mark.parametrize(
+    ("place", "most"),
+    [
+        ("acceleration_tip<acceleration_root", 0.2 * 9.0 / 2.0),
+        ("acceleration_root<acceleration_tip", 0.1),
+        ("acceleration_tip<displacement_tank", 0.1 * 9.0 / 1e-3),
+        ("acceleration_root<displacement_tank", 0.1 * 2.0 / 1e-3),
+    ],
+)
+def test_a_leak_adds_a_tenth_of_a_reading_and_a_fifth_from_a_channel_of_its_kind(
+    model: RigModel, place: str, most: float
+) -> None:
+    """Of what the base itself reads a tenth, or of what leaks into it where it rests."""
+    channels = {"acceleration_tip": 9.0, "displacement_tank": 1e-3, "acceleration_root": 2.0}
+    leak = Candidate(effect("sensor.cross_talk"), replace(surroundings(model), channels=channels), place)
+    [ratio] = leak.effect.parameters
+    assert leak.bounds(ratio) == (pytest.approx(-most), pytest.approx(most))
+
+
 def test_a_leak_of_the_base_shows_in_the_readings_of_the_tip(model: RigModel) -> None:
     candidate = Candidate(effect("sensor.cross_talk"), surroundings(model), f"{CHANNEL}<acceleration_root")
     [run] = model.runs

@@ -147,6 +147,17 @@ def test_a_nameless_description_that_is_clearly_better_leaves_the_name_unknown(
 
 
 @pytest.mark.parametrize(
+    ("left_by_force", "left_by_name", "kind"), [(0.8, 1.14, "named"), (0.8, 1.16, "unknown"), (1.1, 1.25, "named")]
+)
+def test_what_leaves_no_more_than_the_noise_floor_is_adequate(
+    left_by_force: float, left_by_name: float, kind: str
+) -> None:
+    """However little a freer description leaves, and beside one that leaves more."""
+    force = left(0.0, 0.0, squares=1.0, rms=left_by_force, surface="structure")
+    assert judged(BASELINE, [left(5.0, 5.0, FRICTION, rms=left_by_name)], [force]).kind == kind
+
+
+@pytest.mark.parametrize(
     ("repeats", "rms", "more"),
     [
         pytest.param(True, 1.26, True, id="more than repeats differ by"),

@@ -146,7 +146,7 @@ def test_a_mass_on_one_mode_is_a_softer_spring_and_less_damping(plan_name: str) 
 
 
 def test_a_base_that_rocks_within_the_tolerances_of_all_modes_does_not_show() -> None:
-    """It softens every mode, ten times this size by half of what frequencies may be off by, twenty times by more."""
+    """It softens every mode, ten times this by less than frequencies may be off by, twenty times by more."""
     laboratory = laboratory_of("beam_decays")
     laboratory = replace(laboratory, plan=_first_run(laboratory.plan))
     stiffness = float(laboratory.rig.system().stiffness[0, 0])
