@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest
+from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest, soft_cost
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.search.fits import Fits, cheapest
@@ -19,6 +19,8 @@ from sloshlab.diagnosis.search.fits import Fits, cheapest
 _N_PLACES: Final = 48
 _LEAST_SHARE: Final = 0.01
 """Of the cost: a throw that gains less is in vain, as crumbs lead nowhere."""
+_FAR_BEHIND: Final = 1.1
+"""Cost, channels known to a share of their RMS only, over that of the best fit."""
 _RELEASES: Final = tuple(np.linspace(0.94, 1.06, 41))
 """Over that of a run, each tried for the run by itself."""
 
@@ -72,7 +74,10 @@ def climbed(fits: Fits, known: Sequence[Explanation]) -> list[Explanation]:
             break
         fits.told(f"fitting {thrown.key} from places about it", i, throws.most)
         start = further or nearest(problem, _places_about(fit, thrown, i, throws.spreads), STAGES[2])
-        other, _ = fitted(problem, start, n_iterations=6, shares=STAGES[1:])
+        if thrown.comes_in_jumps:
+            other, _ = fitted(problem, start, n_iterations=6, shares=STAGES[1:])
+        else:
+            other = _from_throw(problem, start, fit)
         if not _is_better(other, fit):
             n_in_vain += further is None
             further = None
@@ -95,6 +100,15 @@ def _thrown(best: Explanation) -> Candidate | None:
         return next((one for one in best.fit.candidates if one.comes_in_jumps), None)
     last = best.fit.candidates[-1]
     return last if len(last.effect.parameters) > 1 else None
+
+
+def _from_throw(problem: FreeRunProblem, start: Mapping[str, float], best: FreeRunFit) -> FreeRunFit:
+    """A fit along a ridge, given up half way where it is far behind the best one there."""
+    share = STAGES[2]
+    first, jacobian = fitted(problem, start, n_iterations=6, shares=(STAGES[1], share), is_last=False)
+    if first.trouble or soft_cost(problem, first, share) > _FAR_BEHIND * soft_cost(problem, best, share):
+        return replace(first, trouble=first.trouble or "is far behind")
+    return fitted(problem, first.values, n_iterations=6, shares=STAGES[3:], known=jacobian)[0]
 
 
 def _is_better(other: FreeRunFit, fit: FreeRunFit) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest
+from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, fitted, nearest
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
@@ -24,6 +24,8 @@ _SIZES_BESIDE_FRICTION: Final = (0.5, 0.75, 1.5, 2.0, 3.0)
 """Over that which was found: every fit beside dry friction ends in the side valley in which it begins."""
 _OTHER_FREQUENCIES: Final = tuple(np.geomspace(0.7, 1.4, 6))
 """Over that of a mode: its valley is narrow, and what is left at first does not tell the way there."""
+_MOST_PROMISING: Final = 2
+"""Of these, that are fitted to the end."""
 
 
 class Refinement:
@@ -115,7 +117,15 @@ class Refinement:
             moved = [x * one.fit.values[frequency] for x in _OTHER_FREQUENCIES]
             places += [[{**size, frequency: other_hz} for size in places[0]] for other_hz in moved]
         problem = self.fits.problem_of(one.fit)
-        return self._better_from(one, [nearest(problem, starts, STAGES[0]) for starts in places])
+        own, *others = (nearest(problem, starts, STAGES[0]) for starts in places)
+        return self._better_from(one, [own, *self._promising(one, others)])
+
+    def _promising(self, one: Explanation, starts: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
+        """Where the best of several beginnings are after two stages on one repeat of every test."""
+        problem = self.fits.of_one_repeat.problem_of(one.fit)
+        fits = [(begun(problem, [Start(start)]), start) for start in starts]
+        runs = sorted((each for each in fits if not each[0].fit.trouble), key=lambda each: each[0].cost)
+        return [{**start, **first.fit.values} for first, start in runs[:_MOST_PROMISING]]
 
     def _sized(self, one: Explanation, factors: Sequence[float]) -> list[dict[str, float]]:
         """The numbers of its effect, without those of the baseline, larger by factors."""

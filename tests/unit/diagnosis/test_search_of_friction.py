@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -197,24 +197,35 @@ def test_an_effect_is_fitted_again_from_what_is_believed(
 
 
 def test_a_mode_is_fitted_again_from_other_frequencies(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each with the nearest of its sizes, beside what is believed; the best of all fits is kept."""
+    """With the nearest of its sizes, beside what is believed; its own and the two best beginnings to the end."""
     mode = Candidate(effect(MODE), case.pool[COULOMB].surroundings)
-    numbers = {f"{MODE}.frequency_hz": 10.0, f"{MODE}.damping_ratio": 0.02, f"{MODE}.participation": 0.03}
+    frequency = f"{MODE}.frequency_hz"
+    numbers = {frequency: 10.0, f"{MODE}.damping_ratio": 0.02, f"{MODE}.participation": 0.03}
     fit = FreeRunFit((mode,), {**case.baseline.values, **numbers}, case.baseline.cost - 100.0, 0.0)
-    begun: list[Mapping[str, float]] = []
+    first: list[Mapping[str, float]] = []
+    last: list[Mapping[str, float]] = []
+
+    def beginning(problem: FreeRunProblem, starts: Sequence[Start]) -> Any:
+        [start] = starts
+        first.append(start.values)
+        moved = {**start.values, frequency: 1.01 * start.values[frequency]}
+        trouble = "does not run" if start.values[frequency] == pytest.approx(12.188, rel=1e-3) else ""
+        begun_fit = replace(fit, values=moved, trouble=trouble)
+        return SimpleNamespace(fit=begun_fit, cost=abs(start.values[frequency] - 12.0))
 
     def watched(problem: FreeRunProblem, start: Mapping[str, float]) -> Any:
-        begun.append(start)
-        cost = fit.cost - 50.0 + abs(start[f"{MODE}.frequency_hz"] - 12.0)
-        return replace(fit, values=dict(start), cost=cost), None
+        last.append(start)
+        return replace(fit, values=dict(start), cost=fit.cost - 50.0 + abs(start[frequency] - 12.0)), None
 
+    monkeypatch.setattr(refinement, "begun", beginning)
     monkeypatch.setattr(refinement, "fitted", watched)
     [found] = Refinement(case.fits).anew(case.baseline, [Explanation(fit, 0.0, 1.0)])
-    frequencies_hz = [start[f"{MODE}.frequency_hz"] for start in begun]
-    np.testing.assert_allclose(frequencies_hz, [10.0, 7.0, 8.041, 9.237, 10.61, 12.188, 14.0], rtol=1e-3)
-    assert all(start[name] == value for start in begun for name, value in case.believed.items())
-    assert {start[f"{MODE}.participation"] for start in begun} <= {0.03, 0.06, 0.12}
-    assert found.fit.values[f"{MODE}.frequency_hz"] == pytest.approx(12.188, rel=1e-3)
+    begun_hz, ended_hz = ([start[frequency] for start in starts] for starts in (first, last))
+    np.testing.assert_allclose(begun_hz, [7.0, 8.041, 9.237, 10.61, 12.188, 14.0], rtol=1e-3)
+    np.testing.assert_allclose(ended_hz, [10.0, 1.01 * 10.61, 1.01 * 14.0], rtol=1e-3)
+    assert all(start[name] == value for start in (*first, *last) for name, value in case.believed.items())
+    assert {start[f"{MODE}.participation"] for start in first} <= {0.03, 0.06, 0.12}
+    assert found.fit.values[frequency] == pytest.approx(1.01 * 10.61, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -293,7 +304,8 @@ def test_an_effect_of_several_numbers_climbs_along_a_ridge(case: Decays, monkeyp
     begun: list[dict[str, float]] = []
 
     def stays(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
-        begun.append(dict(start))
+        if more["shares"][-1] == STAGES[-1]:
+            begun.append(dict(start))
         cost = huber_cost(problem.residual(problem.theta_of(start)))
         return FreeRunFit(problem.candidates, dict(start), cost, cost), None
 
@@ -308,6 +320,27 @@ def test_an_effect_of_several_numbers_climbs_along_a_ridge(case: Decays, monkeyp
     assert found.fit.cost < 0.5 * at_off
     first, second = begun[:2]
     assert second == {name: pytest.approx(2 * value - off[name]) for name, value in first.items()}
+
+
+def test_a_throw_far_behind_is_given_up_half_way(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the cost of the half, and neither where it is near nor for an effect in jumps."""
+    wide = case.fit(ASYMMETRIC)
+    stages: list[float] = []
+
+    def watched(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
+        stages.extend(more["shares"])
+        return fitted(problem, start, **more)
+
+    problem = case.fits.problem_of(wide.fit)
+    monkeypatch.setattr(climbing, "fitted", watched)
+    near = climbing._from_throw(problem, wide.fit.values, wide.fit)
+    assert not near.trouble
+    assert near.cost == pytest.approx(wide.fit.cost, rel=0.01)
+    assert tuple(stages) == STAGES[1:]
+    stages.clear()
+    monkeypatch.setattr(climbing, "soft_cost", lambda problem, fit, share: 1.0 if fit is wide.fit else 1.11)
+    assert climbing._from_throw(problem, wide.fit.values, wide.fit).trouble
+    assert tuple(stages) == STAGES[1:3]
 
 
 def test_a_climb_goes_on_from_other_releases(
