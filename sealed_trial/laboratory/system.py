@@ -115,13 +115,10 @@ def initial_state(system: System, deflection_m: float) -> FloatArray:
     return state
 
 
-def initial_conditions(system: System, deflection_m: float) -> npt.NDArray[np.int64]:
-    """Contact conditions that belong to `initial_state`."""
-    p = system.parameters
+def initial_conditions(system: System) -> npt.NDArray[np.int64]:
+    """Contact conditions of a rig at rest; what a release leaves at once the integration finds."""
     conditions = np.zeros(at.N_CONDITIONS, dtype=np.int64)
-    if p[at.CLEARANCE_STIFFNESS] and abs(deflection_m) > p[at.CLEARANCE_GAP]:
-        conditions[at.D_CLEARANCE] = 1 if deflection_m > 0 else -1
-    if p[at.LOOSE_MASS]:
+    if system.parameters[at.LOOSE_MASS]:
         conditions[at.D_LOOSE] = -1
     return conditions
 
@@ -148,7 +145,7 @@ def simulate(
         n_samples,
         1.0 / sampling_rate_hz,
         system.arrays(motion),
-        initial_conditions(system, deflection_m),
+        initial_conditions(system),
         relative_tolerance=relative_tolerance,
     )
     return SimulatedRun(seen, events, final)

@@ -31,7 +31,7 @@ from sloshlab.diagnosis.verdict.wording import (
 LEAST_GAIN: Final = 12.0
 """Held-out log-likelihood ratio from which something is missing."""
 ADEQUATE: Final = 1.15
-"""Held-out error over that of the best correction up to which an explanation is adequate."""
+"""Held-out error over that of the best correction, or over the noise floor, up to which one is adequate."""
 _LARGEST_WITHOUT_REPEATS: Final = 2.0
 """What a baseline may leave and be called complete where only what is said of sensors tells the noise."""
 _LITTLE_IN_COMMON: Final = 0.25
@@ -237,7 +237,7 @@ def _is_bettered(
     """Whether another description shows more, unless repeats have too little in common of what is left to them.
 
     What they do not have in common is what one run happened to have, such as a liquid that damps more for a while.
-    What leaves no more than the noise floor does is adequate however little a freer description leaves.
+    What leaves no more than `ADEQUATE` noise floors is adequate however little a freer description leaves.
     """
     if _in_common_where_judged(found, named) < _LITTLE_IN_COMMON:
         return False

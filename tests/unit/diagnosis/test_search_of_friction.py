@@ -10,6 +10,18 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from decays_under_friction import (
+    ASYMMETRIC,
+    CONSTANT,
+    COULOMB,
+    COULOMB_N,
+    CUBIC,
+    DOWN_N,
+    MODE,
+    STRIBECK,
+    UP_N,
+    Decays,
+)
 from recorded_oscillators import decays, effect, rig, surroundings
 
 from sloshlab.diagnosis import effects, free_run_problem
@@ -21,7 +33,7 @@ from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, finished, fitt
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import climbing, fits, redrawn, refinement, screening, whole_search
+from sloshlab.diagnosis.search import fits, redrawn, refinement, screening, whole_search
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import InPlace
 from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
@@ -30,39 +42,6 @@ from sloshlab.diagnosis.search.screening import Screening
 from sloshlab.diagnosis.split import Split
 
 assert effects.__all__
-UP_N, DOWN_N = 0.3, 0.1
-COULOMB, ASYMMETRIC, STRIBECK, CUBIC, CONSTANT = (
-    f"structure.{name}"
-    for name in (
-        "coulomb_friction",
-        "asymmetric_friction",
-        "stribeck_friction",
-        "cubic_stiffness",
-        "constant_force",
-    )
-)
-COULOMB_N = f"{COULOMB}.force_n"
-MODE = "structure.missing_mode"
-
-
-class Decays:
-    """Two fitted decays and one that chooses nothing."""
-
-    def __init__(self, folder: Path) -> None:
-        runs = decays((0.006, 0.014, 0.01), duration_s=3.0, friction_n=(UP_N, DOWN_N))
-        model = RigModel(rig(folder), folder, runs)
-        observed = [observations(run, model.compared(run)) for run in runs]
-        self.fits = Fits(model, observed[:2], observed[2:], lambda what, done, of: None)
-        self.believed = model.believed
-        at = surroundings(model)
-        self.pool = {key: Candidate(effect(key), at) for key in (COULOMB, ASYMMETRIC, STRIBECK, CUBIC, CONSTANT)}
-        self.baseline = fitted(self.fits.problem(), self.believed, n_iterations=6)[0]
-
-    def fit(self, *keys: str, n_iterations: int = 4, **numbers: float) -> Explanation:
-        candidates = [self.pool[key] for key in keys]
-        start = {**self.believed, **{name: value for one in candidates for name, value in one.starts()[0].items()}}
-        fit, _ = fitted(self.fits.problem(candidates), {**start, **numbers}, n_iterations=n_iterations)
-        return self.fits.judged(fit)
 
 
 @pytest.fixture(scope="module")
@@ -297,105 +276,6 @@ def test_rivals_beside_a_strained_baseline_are_fitted_from_what_is_believed(
 def test_what_gains_nothing_is_not_fitted_again(case: Decays, coulomb: Explanation) -> None:
     no_gain = replace(coulomb, fit=replace(coulomb.fit, cost=case.baseline.cost - 10.0))
     assert Refinement(case.fits).anew(case.baseline, [no_gain]) == []
-
-
-def test_an_effect_of_several_numbers_climbs_along_a_ridge(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A fit that stays where it begins: throws find a better place, and what has led there is done again."""
-    begun: list[dict[str, float]] = []
-
-    def stays(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
-        if more["shares"][-1] == STAGES[-1]:
-            begun.append(dict(start))
-        cost = huber_cost(problem.residual(problem.theta_of(start)))
-        return FreeRunFit(problem.candidates, dict(start), cost, cost), None
-
-    wide = case.fit(ASYMMETRIC)
-    names = [f"{ASYMMETRIC}.force_{side}_n" for side in ("up", "down")]
-    off = {**wide.fit.values, **{name: 0.3 * wide.fit.values[name] for name in names}}
-    problem = case.fits.problem_of(wide.fit)
-    at_off = huber_cost(problem.residual(problem.theta_of(off)))
-    monkeypatch.setattr(climbing, "fitted", stays)
-    start = replace(wide, fit=replace(wide.fit, values=off, cost=at_off))
-    [found] = climbing.climbed(case.fits, [start])
-    assert found.fit.cost < 0.5 * at_off
-    first, second = begun[:2]
-    assert second == {name: pytest.approx(2 * value - off[name]) for name, value in first.items()}
-
-
-def test_a_throw_far_behind_is_given_up_half_way(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the cost of the half, and neither where it is near nor for an effect in jumps."""
-    wide = case.fit(ASYMMETRIC)
-    stages: list[float] = []
-
-    def watched(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
-        stages.extend(more["shares"])
-        return fitted(problem, start, **more)
-
-    problem = case.fits.problem_of(wide.fit)
-    monkeypatch.setattr(climbing, "fitted", watched)
-    near = climbing._from_throw(problem, wide.fit.values, wide.fit)
-    assert not near.trouble
-    assert near.cost == pytest.approx(wide.fit.cost, rel=0.01)
-    assert tuple(stages) == STAGES[1:]
-    stages.clear()
-    monkeypatch.setattr(climbing, "soft_cost", lambda problem, fit, share: 1.0 if fit is wide.fit else 1.11)
-    assert climbing._from_throw(problem, wide.fit.values, wide.fit).trouble
-    assert tuple(stages) == STAGES[1:3]
-
-
-def test_a_climb_goes_on_from_other_releases(
-    case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each run's own release is the best of its run alone, where no throw of the effect's numbers leads on."""
-    wide = case.fit(ASYMMETRIC)
-    releases = [name for name in wide.fit.values if name.startswith("release")]
-    assert len(releases) == 2
-    off = {**wide.fit.values, **{name: 1.03 * wide.fit.values[name] for name in releases}}
-    problem = case.fits.problem_of(wide.fit)
-    at_off = huber_cost(problem.residual(problem.theta_of(off)))
-
-    def stays(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
-        cost = huber_cost(problem.residual(problem.theta_of(start)))
-        return FreeRunFit(problem.candidates, dict(start), cost, cost), None
-
-    monkeypatch.setattr(climbing, "fitted", stays)
-    monkeypatch.setattr(climbing, "nearest", lambda problem, starts, share: off)
-    start = replace(wide, fit=replace(wide.fit, values=off, cost=at_off))
-    [found] = climbing.climbed(case.fits, [start])
-    assert found.fit.cost < 0.5 * at_off
-    for name in releases:
-        assert found.fit.values[name] == pytest.approx(wide.fit.values[name], rel=0.004)
-    assert climbing.climbed(case.fits, [found]) == []
-
-
-def test_of_two_effects_the_one_in_jumps_is_thrown(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
-    names = [f"{ASYMMETRIC}.force_{side}_n" for side in ("up", "down")]
-    pair = case.fit(COULOMB, ASYMMETRIC, n_iterations=1)
-    pair = replace(pair, fit=replace(pair.fit, values={**pair.fit.values, **dict.fromkeys(names, 0.1)}))
-    assert climbing.climbed(case.fits, [pair]) == []
-    sudden = replace(case.pool[ASYMMETRIC].effect, sought_at=lambda at: [{}])
-    candidates = (pair.fit.candidates[0], replace(pair.fit.candidates[1], effect=sudden))
-    assert [one.comes_in_jumps for one in candidates] == [False, True]
-    thrown: list[dict[str, float]] = []
-
-    def looked_at(problem: FreeRunProblem, starts: Any, share: float) -> Any:
-        thrown.extend(starts)
-        return starts[0]
-
-    def in_vain(problem: FreeRunProblem, start: Mapping[str, float], **more: Any) -> Any:
-        return FreeRunFit(problem.candidates, dict(start), np.inf, np.inf), None
-
-    monkeypatch.setattr(climbing, "fitted", in_vain)
-    monkeypatch.setattr(climbing, "nearest", looked_at)
-    known = replace(pair, fit=replace(pair.fit, candidates=candidates))
-    assert climbing.climbed(case.fits, [known]) == []
-    assert len(thrown) == 4 * 48
-    changed = {name for one in thrown for name, value in one.items() if value != pair.fit.values[name]}
-    assert changed == set(names)
-
-
-def test_an_effect_of_one_number_does_not_climb(case: Decays, coulomb: Explanation) -> None:
-    assert climbing.climbed(case.fits, [coulomb]) == []
 
 
 def findings(case: Decays, *explanations: Explanation) -> Findings:
