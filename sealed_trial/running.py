@@ -29,6 +29,9 @@ from sloshlab.errors import InputError
 DIAGNOSES: Final = "diagnoses"
 OUTCOME: Final = "outcome.json"
 _LOOKED_THROUGH_BYTES: Final = 4096
+_MEMORY_EVERY_S: Final = 0.3
+_SESSION: Final = 3
+"""Field of `/proc/PID/stat` after the name of the process (proc(5))."""
 DIAGNOSE: Final = (sys.executable, "-m", "pipelines.command_line", "diagnose")
 
 
@@ -42,7 +45,7 @@ class Outcome:
         'done', 'crashed' or 'timed_out'.
     exit_code : int
     wall_s, processor_s, memory_mib : float
-        Of the process and its children.
+        Of the process and its children; what they share of their memory counts once.
     last_words : str
         End of its stderr.
     """
@@ -176,11 +179,11 @@ def _diagnosed(
 
 def _waited(pid: int, until: float, stopping: threading.Event) -> tuple[str, int, tuple[float, float]]:
     """Status, exit code, processor seconds and peak memory [MiB] of a child, killed when its time is over."""
-    status = "done"
+    status, largest_mib, looked_at = "done", 0.0, 0.0
     while True:
         found, wait_status, usage = os.wait4(pid, os.WNOHANG)
         if found:
-            spent = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+            spent = usage.ru_utime + usage.ru_stime, max(usage.ru_maxrss / 1024, largest_mib)
             if stopping.is_set():
                 raise KeyboardInterrupt
             return status, os.waitstatus_to_exitcode(wait_status), spent
@@ -188,4 +191,18 @@ def _waited(pid: int, until: float, stopping: threading.Event) -> tuple[str, int
             status = "timed_out"
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(pid, signal.SIGKILL)
+        if time.monotonic() - looked_at > _MEMORY_EVERY_S:
+            largest_mib, looked_at = max(largest_mib, _memory_mib(pid)), time.monotonic()
         time.sleep(0.05)
+
+
+def _memory_mib(session: int) -> float:
+    """Memory of all processes of a session, what they share counted once; zero where the system does not tell."""
+    total_kib = 0
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError, ValueError, IndexError):  # it has ended meanwhile, or is not ours
+            after_name = (process / "stat").read_text().rpartition(")")[2].split()
+            if int(after_name[_SESSION]) == session:
+                lines = (process / "smaps_rollup").read_text().splitlines()
+                total_kib += sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+    return total_kib / 1024

@@ -6,8 +6,9 @@ multiplied.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,12 +47,28 @@ class BlockJacobian:
         sizes : sequence of int
             Rows of each block.
         """
+        ends = np.cumsum([0, *sizes]).tolist()
+        rows = [slice(first, end) for first, end in pairwise(ends)]
+        return cls.of_blocks([dict(enumerate(column[one] for one in rows)) for column in columns], sizes)
+
+    @classmethod
+    def of_blocks(cls, columns: Sequence[Mapping[int, FloatArray]], sizes: Sequence[int]) -> BlockJacobian:
+        """From those parts of columns that may not be zero.
+
+        Parameters
+        ----------
+        columns : sequence of mapping
+            Of each the derivatives in some blocks by their number, shape (rows of the block,).
+        sizes : sequence of int
+            Rows of each block.
+        """
         blocks, first = [], 0
-        for size in sizes:
-            rows = slice(first, first + size)
-            seen = [i for i, column in enumerate(columns) if column[rows].any()]
-            values = np.column_stack([columns[i][rows] for i in seen]) if seen else np.zeros((size, 0))
-            blocks.append(_Block(rows, np.array(seen, np.intp), np.ascontiguousarray(values)))
+        for number, size in enumerate(sizes):
+            seen = [i for i, column in enumerate(columns) if number in column and column[number].any()]
+            values = np.empty((size, len(seen)))
+            for place, i in enumerate(seen):
+                values[:, place] = columns[i][number]
+            blocks.append(_Block(slice(first, first + size), np.array(seen, np.intp), values))
             first += size
         return cls(len(columns), tuple(blocks))
 
@@ -92,6 +109,23 @@ class BlockJacobian:
             self.n_columns,
             tuple(replace(one, values=one.values * weights[one.rows, None]) for one in self.blocks),
         )
+
+    def normal_equations(self, weights: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Jᵀ W² J and Jᵀ W² r, block by block, as a block fits where the whole does not: into the cache.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (n_rows,)
+            Diagonal of W.
+        residual : ndarray, shape (n_rows,)
+        """
+        normal, gradient = np.zeros((self.n_columns, self.n_columns)), np.zeros(self.n_columns)
+        for one in self.blocks:
+            own = weights[one.rows]
+            values = one.values * own[:, None]
+            normal[np.ix_(one.columns, one.columns)] += values.T @ values
+            gradient[one.columns] += values.T @ (own * residual[one.rows])
+        return normal, gradient
 
     def normal(self) -> FloatArray:
         """Jᵀ J, shape (n_columns, n_columns)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -27,11 +27,14 @@ class DiagnosedModel(Protocol):
         Those whose names end with ``release of RUN`` or ``in RUN`` belong to that run alone.
     blocks : tuple of str
         Of `sloshlab.diagnosis.candidate.BLOCKS`, those in which something may be missing.
+    may_be_copied : bool
+        Whether a copy of this process simulates the same; code of others may not bear to be copied as it runs.
     """
 
     runs: tuple[CaseRun, ...]
     parameters: tuple[BaselineParameter, ...]
     blocks: tuple[str, ...]
+    may_be_copied: bool
 
     @property
     def twin(self) -> Twin:
@@ -51,8 +54,10 @@ class DiagnosedModel(Protocol):
     def driving(self, run: CaseRun) -> tuple[str, ...]:
         """Channels that drive the simulation of a run."""
 
-    def simulate(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> dict[str, FloatArray]:
-        """What the compared channels of a run read; raises `AnalysisError` where it does not reach its end."""
+    def simulate(
+        self, run: CaseRun, values: Mapping[str, float], extension: Extension, only: Collection[str] = ()
+    ) -> dict[str, FloatArray]:
+        """What the compared channels of a run read, all or some; raises `AnalysisError` where it does not end."""
 
     def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
         """Displacement, velocity, acceleration of the place where effects act, shape (n, 3)."""

@@ -20,6 +20,8 @@ _LARGEST_DAMPING: Final = 1e8
 _LEAST_SHARE_OF_PROMISE: Final = 0.3
 _LAST_STAGE: Final = 0.03
 """Of the tolerance: small steps along a valley add up to more than the gates of a verdict."""
+_HOPELESS: Final = 0.1
+"""Of the decrease at which a stage ends: what promises less is not simulated."""
 _N_DRAWN: Final = 32
 _N_REFINED: Final = 2
 _LEFT_BEHIND: Final = 1.02
@@ -115,22 +117,26 @@ class _Descent:
                     self.theta, self.residual, range(self.theta.size), coarse=share > 0
                 )
                 is_fresh = True
-            gain, promised, damping = self._step(softness, damping)
-            is_done = gain < tolerance * (1.0 if share > 0 else _LAST_STAGE) and (iteration > 0 or gain <= 0)
+            least = tolerance * (1.0 if share > 0 else _LAST_STAGE)
+            gain, promised, damping = self._step(softness, damping, _HOPELESS * least)
+            is_done = gain < least and (iteration > 0 or gain <= 0)
             if is_done and (is_fresh or not needs_fresh):
                 break
             is_wanted = is_done or gain < _LEAST_SHARE_OF_PROMISE * promised
             is_fresh = is_fresh and gain <= 0
 
-    def _step(self, softness: FloatArray, damping: float) -> tuple[float, float, float]:
-        """One step; relative decrease of the cost, what the Jacobian promised, and the next damping."""
+    def _step(self, softness: FloatArray, damping: float, least: float) -> tuple[float, float, float]:
+        """One step; relative decrease of the cost, what the Jacobian promised, and the next damping.
+
+        None is made where so small a one that it could succeed promises less than the least decrease.
+        """
         theta, residual, prior = self.theta, self.residual, self.prior
         limit = _limit(softness * residual)
         weights = softness * robust_weights(softness * residual, limit)
-        weighted = self.jacobian.weighted(weights)
-        self.hessian = weighted.normal() + np.diag(prior)
+        normal, pull = self.jacobian.normal_equations(weights, residual)
+        self.hessian = normal + np.diag(prior)
         expected = self.problem.expected
-        gradient = weighted.transposed_times(weights * residual) + prior * (theta - expected)
+        gradient = pull + prior * (theta - expected)
 
         def cost(at: FloatArray, r: FloatArray) -> float:
             if not np.isfinite(r).all():
@@ -141,11 +147,13 @@ class _Descent:
         while damping < _LARGEST_DAMPING:
             lift = np.diag(damping * np.maximum(np.diag(self.hessian), 1e-12))
             tried = _step_within_bounds(self.problem, theta, self.hessian + lift, gradient)
+            step = tried - theta
+            promised = -float(2 * gradient @ step + step @ self.hessian @ step)
+            if not promised > least * before:
+                break
             new = self.problem.residual(tried)
             after = cost(tried, new)
             if after < before:
-                step = tried - theta
-                promised = -float(2 * gradient @ step + step @ self.hessian @ step)
                 self.jacobian.correct(step, new - residual)
                 self.theta, self.residual = tried, new
                 return (before - after) / before, promised / before, max(damping / 10, 1e-9)
@@ -386,10 +394,16 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
     return best
 
 
-def scanned(
-    problem: FreeRunProblem, fit: FreeRunFit, name: str, shares: Sequence[float] = STAGES, *, n_iterations: int = 5
+def from_another_size(
+    problem: FreeRunProblem,
+    fit: FreeRunFit,
+    name: str,
+    factor: float,
+    shares: Sequence[float] = STAGES,
+    *,
+    n_iterations: int = 5,
 ) -> FreeRunFit:
-    """The best of a fit and of fits from other sizes of one of its numbers, to leave a side valley.
+    """A fit from another size of one of its numbers, to leave a side valley.
 
     Parameters
     ----------
@@ -397,24 +411,27 @@ def scanned(
     fit : FreeRunFit
     name : str
         Of the number.
+    factor : float
+        Over its size.
     shares : sequence of float
         Stages; the first is left out.
     n_iterations : int
         At most, per stage.
+
+    Returns
+    -------
+    FreeRunFit
+        With its trouble where it was given up, as it was left behind or led back.
     """
-    best, share = fit, shares[1]
-    reached = soft_cost(problem, fit, share)
-    for factor in SCANNED:
-        start = {**fit.values, name: fit.values[name] * factor}
-        other, _ = fitted(problem, start, n_iterations=n_iterations, shares=(share,))
-        if other.trouble or soft_cost(problem, other, share) > _LEFT_BEHIND * reached:
-            continue
-        if abs(other.values[name] - fit.values[name]) < _CAME_BACK * abs(fit.values[name]):
-            continue
-        other, _ = fitted(problem, other.values, n_iterations=n_iterations, shares=shares[2:])
-        if not other.trouble and other.cost < best.cost:
-            best = other
-    return best
+    start, share = {**fit.values, name: fit.values[name] * factor}, shares[1]
+    other, _ = fitted(problem, start, n_iterations=n_iterations, shares=(share,))
+    if other.trouble:
+        return other
+    if soft_cost(problem, other, share) > _LEFT_BEHIND * soft_cost(problem, fit, share):
+        return replace(other, trouble="was left behind")
+    if abs(other.values[name] - fit.values[name]) < _CAME_BACK * abs(fit.values[name]):
+        return replace(other, trouble="came back")
+    return fitted(problem, other.values, n_iterations=n_iterations, shares=shares[2:])[0]
 
 
 def _step_within_bounds(

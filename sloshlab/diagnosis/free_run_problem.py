@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Final, TypeVar
 
 import numpy as np
@@ -16,6 +16,8 @@ from sloshlab.diagnosis.candidate import Candidate, channels_of
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.second_process import SecondProcess, second_process
+from sloshlab.diagnosis.side_by_side import N_AT_ONCE, works_alone
 from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
@@ -30,8 +32,7 @@ _FEWEST_IN_A_RUN: Final = 50
 _QUIETER: Final = 0.75
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel in which nothing more is to be found."""
-N_THREADS = 2
-_POOL: Final = ThreadPoolExecutor(N_THREADS)
+_POOL: Final = ThreadPoolExecutor(N_AT_ONCE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +146,8 @@ class FreeRunProblem:
             for one in self._baseline
         ] + [one.bounds(parameter) for one in self.candidates for parameter in one.effect.parameters]
         self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
+        ends = np.cumsum([0] + [one.spectra.size for run in self.runs for one in run])
+        self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
         self.n_simulations = 0
 
     @property
@@ -181,28 +184,31 @@ class FreeRunProblem:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
-        if N_THREADS == 1 or len(self.runs) == 1:
+        if works_alone() or len(self.runs) == 1:
             return self._of_runs_in_turn(theta)
-        values = self.values(theta)
-        return np.concatenate(list(_POOL.map(lambda run: self._of_run(run, values), self.runs)))
+        values, beside = self.values(theta), self._second_process()
+        return np.concatenate(list(_POOL.map(lambda run: self._of_runs([run], values, beside), self.runs)))
 
     def residuals(self, thetas: Sequence[FloatArray]) -> list[FloatArray]:
         """Residuals of several sets of parameters, of as many at a time as there are threads."""
-        if N_THREADS == 1 or len(thetas) == 1:
+        if works_alone() or len(thetas) == 1:
             return [self.residual(theta) for theta in thetas]
-        return list(_POOL.map(self._of_runs_in_turn, thetas))
+        beside = self._second_process()
+        return list(_POOL.map(lambda theta: self._of_runs_in_turn(theta, beside), thetas))
 
-    def _of_runs_in_turn(self, theta: FloatArray) -> FloatArray:
-        values = self.values(theta)
-        return np.concatenate([self._of_run(run, values) for run in self.runs])
+    def _second_process(self) -> SecondProcess | None:
+        return second_process(residuals_of_runs, self.model, self.runs, self.candidates)
 
-    def _of_run(self, run: Sequence[Observation], values: Mapping[str, float]) -> FloatArray:
-        self.n_simulations += 1
-        try:
-            readings = self.model.simulate(run[0].run, values, extension_of(self.candidates, values))
-        except SloshlabError:
-            return np.full(sum(observation.spectra.size for observation in run), np.inf)
-        return np.concatenate([observation.residual(readings[observation.channel]).ravel() for observation in run])
+    def _of_runs_in_turn(self, theta: FloatArray, beside: SecondProcess | None = None) -> FloatArray:
+        return self._of_runs(self.runs, self.values(theta), beside)
+
+    def _of_runs(
+        self, runs: Sequence[Sequence[Observation]], values: Mapping[str, float], beside: SecondProcess | None
+    ) -> FloatArray:
+        """Residuals of runs, by the second process where there is one and it has nothing else to do."""
+        self.n_simulations += len(runs)
+        found = None if beside is None else beside.done(runs, values, self.candidates)
+        return residuals_of_runs(self.model, runs, values, self.candidates) if found is None else found
 
     def softness(self, share: float) -> FloatArray:
         """Factors of the residuals as if all channels were known only to a share of their RMS."""
@@ -234,29 +240,70 @@ class FreeRunProblem:
             moved[column] += step if physical <= self.high[column] else -step
             places.append(moved)
 
-        def derivative(place: FloatArray, column: int) -> FloatArray:
-            difference = (self.residual_moved(place, column, at) - at) / (place[column] - theta[column])
-            return difference if np.isfinite(difference).all() else np.zeros(at.size)
+        beside = None if works_alone() else self._second_process()
 
-        found = list((map if N_THREADS == 1 else _POOL.map)(derivative, places, columns))
-        return BlockJacobian.of_columns(found, [one.spectra.size for run in self.runs for one in run])
+        def derivative(place: FloatArray, column: int) -> dict[int, FloatArray]:
+            found = self._moved(place, column, beside)
+            for block, moved in found.items():
+                moved -= at[self._rows[block]]
+                moved /= place[column] - theta[column]
+            return found if all(np.isfinite(moved).all() for moved in found.values()) else {}
+
+        found = list((map if works_alone() else _POOL.map)(derivative, places, columns))
+        return BlockJacobian.of_blocks(found, [one.spectra.size for run in self.runs for one in run])
 
     def residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
         """Residuals after one parameter was moved; unchanged in other runs and channels where it has its own."""
+        found = at.copy()
+        for block, moved in self._moved(theta, column, None).items():
+            found[self._rows[block]] = moved
+        return found
+
+    def _moved(self, theta: FloatArray, column: int, beside: SecondProcess | None) -> dict[int, FloatArray]:
+        """Residuals of the channels of runs which a parameter changes, by their number, after it was moved."""
         owner, seen_by = run_of(self.names[column], self.model), self._seen_by[column]
-        if not owner and not seen_by:
-            return self._of_runs_in_turn(theta)
-        moved, first, values = at.copy(), 0, self.values(theta)
+        runs: list[list[Observation]] = []
+        blocks: list[int] = []
+        n_before = 0
         for run in self.runs:
-            parts = [one for one in run if not seen_by or one.channel in seen_by]
-            chosen = parts if not owner or run[0].run.name == owner else []
-            found = self._of_run(chosen, values) if chosen else np.zeros(0)
-            for one in run:
-                if one in chosen:
-                    moved[first : first + one.spectra.size] = found[: one.spectra.size]
-                    found = found[one.spectra.size :]
-                first += one.spectra.size
-        return moved
+            if not owner or run[0].run.name == owner:
+                chosen = [i for i, one in enumerate(run) if not seen_by or one.channel in seen_by]
+                runs += [[run[i] for i in chosen]] if chosen else []
+                blocks += [n_before + i for i in chosen]
+            n_before += len(run)
+        if not runs:
+            return {}
+        moved = self._of_runs(runs, self.values(theta), None if seen_by else beside)
+        ends = np.cumsum([one.spectra.size for run in runs for one in run])
+        return dict(zip(blocks, np.split(moved, ends[:-1]), strict=True))
+
+
+def residuals_of_runs(
+    model: DiagnosedModel,
+    runs: Sequence[Sequence[Observation]],
+    values: Mapping[str, float],
+    candidates: Sequence[Candidate],
+) -> FloatArray:
+    """Weighted residuals of runs, one after another; infinite of a run whose simulation does not reach its end.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    runs : sequence of sequences of Observation
+    values : mapping
+        Of the baseline, and ``key.parameter`` of every candidate.
+    candidates : sequence of Candidate
+    """
+    found: list[FloatArray] = []
+    for run in runs:
+        try:
+            names = [one.channel for one in run]
+            readings = model.simulate(run[0].run, values, extension_of(candidates, values), names)
+        except SloshlabError:
+            found += [np.full(one.spectra.size, np.inf) for one in run]
+        else:
+            found += [one.residual(readings[one.channel]).ravel() for one in run]
+    return np.concatenate(found)
 
 
 def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str, ...]:
@@ -391,7 +438,8 @@ def robust_weights(residual: FloatArray, limit: float = ROBUST) -> FloatArray:
 def huber_cost(residual: FloatArray, limit: float = ROBUST) -> float:
     """Sum of squares, of which those beyond some standard deviations, four by default, grow only linearly."""
     size = np.abs(residual)
-    return float(np.where(size > limit, 2 * limit * size - limit**2, size**2).sum())
+    within = np.minimum(size, limit)
+    return float((within * (2 * size - within)).sum())
 
 
 def run_of(name: str, model: DiagnosedModel) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -96,7 +97,11 @@ class Observation:
 
     def residual(self, values: FloatArray) -> FloatArray:
         """Recorded minus simulated spectra in standard deviations, shape (n_blocks, n_bands)."""
-        return np.asarray((self.spectra - self.of(values)) / np.sqrt(self.variance))
+        return np.asarray((self.spectra - self.of(values)) / self._deviation)
+
+    @cached_property
+    def _deviation(self) -> FloatArray:
+        return np.asarray(np.sqrt(self.variance))
 
 
 def observations(

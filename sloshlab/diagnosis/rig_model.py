@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -96,7 +96,7 @@ class RigModel:
 
     def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun]) -> None:
         self.rig = rig
-        self.blocks = BLOCKS
+        self.blocks, self.may_be_copied = BLOCKS, True
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}
@@ -174,7 +174,9 @@ class RigModel:
         """Channels that drive the twin in a run."""
         return self._drive(run, ()).channels
 
-    def simulate(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> dict[str, FloatArray]:
+    def simulate(
+        self, run: CaseRun, values: Mapping[str, float], extension: Extension, only: Collection[str] = ()
+    ) -> dict[str, FloatArray]:
         """What the channels of a run read.
 
         Parameters
@@ -183,6 +185,8 @@ class RigModel:
         values : mapping
             Of `parameters`; absent ones are as believed.
         extension : Extension
+        only : collection of str
+            Channels that are asked for; all of them by default.
 
         Raises
         ------
@@ -193,6 +197,8 @@ class RigModel:
         rate = run.attributes.sampling_rate_hz
         others, readings = {**self._channels[run.name].driving, **truth.channels}, {}
         for name, true in truth.channels.items():
+            if only and name not in only:
+                continue
             reading = true * values.get(f"gain of {name}", 1.0) * _relative_share(name, truth.channels, values)
             if name in truth.modes:
                 reading = reading + truth.modes[name] @ [values.get(shape, 0.0) for shape in self._shapes[name]]

@@ -235,9 +235,10 @@ def _keep_inputs(
     excited: Excited, n_substeps: int, first: int, stop: int, external: FloatArray, base_motion: FloatArray
 ) -> None:
     if excited.table.size:
-        rows = 2 * n_substeps * np.arange(first, stop) - excited.first
-        base_motion[first:stop] = excited.table[rows, :3]
-        external[first:stop] = excited.table[rows, INPUTS.index("force")]
+        begin, per_row = 2 * n_substeps * first - excited.first, 2 * n_substeps
+        of_rows = excited.table[begin : begin + per_row * (stop - first) : per_row]
+        base_motion[first:stop] = of_rows[:, :3]
+        external[first:stop] = of_rows[:, INPUTS.index("force")]
 
 
 def _largest(s: Scratch, ready: Prepared) -> FloatArray:

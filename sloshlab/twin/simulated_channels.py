@@ -112,7 +112,12 @@ def true_channel(
         return simulation.base_motion[:, order] if has_structure else None
     if place.startswith("beam"):
         return _along_beam(simulation, along, order, rig)
-    return simulation.places[:, 1, order] if place.startswith(_TANK_PLACES) else None
+    return _of_tank(simulation, order) if place.startswith(_TANK_PLACES) else None
+
+
+def _of_tank(simulation: Simulation, order: int) -> FloatArray:
+    of_orders = (simulation.displacement_m, simulation.velocity_m_per_s, simulation.acceleration_m_per_s2)
+    return of_orders[order]
 
 
 def _force(simulation: Simulation, place: str, attributes: Mapping[str, Any], n_cells: int) -> FloatArray | None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cached_property
-from typing import Final
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property, partial
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -20,11 +20,14 @@ from sloshlab.diagnosis.free_run_problem import (
     mean_squares,
     mean_squares_of_runs,
     mean_squares_that_repeat,
+    residuals_of_runs,
     rms_without_bursts,
     run_of,
 )
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RELEASE
+from sloshlab.diagnosis.second_process import second_process
+from sloshlab.diagnosis.side_by_side import is_copy, side_by_side
 
 _WORSE_THAN_OTHERS: Final = 1.2
 _OTHER_RELEASES: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
@@ -35,6 +38,7 @@ _LITTLE_ALONE: Final = 1.5
 """Mean squares, in noise floors: what repeats of a test share, in all channels and in one; what one run leaves in
 most channels."""
 Told = Callable[[str, int, int], None]
+_Result = TypeVar("_Result")
 
 
 class Fits:
@@ -66,7 +70,8 @@ class Fits:
         told: Told,
         tests: Sequence[Sequence[str]] = (),
     ) -> None:
-        self.model, self.fitting, self.held_out, self.told = model, fitting, held_out, told
+        self.model, self.fitting, self.held_out = model, fitting, held_out
+        self.told: Told = lambda what, done, of: None if is_copy() else told(what, done, of)
         self.tests = tests
         self.failed: dict[str, str] = {}
         self.screened: dict[str, float] = {}
@@ -102,6 +107,37 @@ class Fits:
         of_runs = [one.run.name for run in whole.fitting for one in run]
         chosen = [i for i, name in enumerate(of_runs) if name in present]
         return jacobian.part(chosen, [all_names.index(name) for name in names])
+
+    def made_known(self, candidates: Sequence[Candidate]) -> None:
+        """Tell the second process of many effects at once; of each that it has not seen it would be made anew."""
+        second_process(residuals_of_runs, self.model, [*self.fitting, *self.held_out], candidates)
+
+    def side_by_side(
+        self, pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Candidate]
+    ) -> list[_Result]:
+        """Results of pieces of work that do not depend on each other, in two processes where that can be.
+
+        Parameters
+        ----------
+        pieces : sequence of callable
+        candidates : iterable of Candidate
+            Those that results may contain.
+        """
+        if not self.model.may_be_copied:
+            return [piece() for piece in pieces]
+        return side_by_side(pieces, candidates)
+
+    def all_fitted(
+        self, pieces: Sequence[Callable[[], FreeRunFit]], candidates: Iterable[Candidate]
+    ) -> list[Explanation]:
+        """Fits that do not depend on each other, each judged; without those that did not run."""
+
+        def judged(piece: Callable[[], FreeRunFit]) -> Explanation | None:
+            fit = piece()
+            return None if fit.trouble else self.judged(fit)
+
+        found = self.side_by_side([partial(judged, piece) for piece in pieces], candidates)
+        return [one for one in found if one is not None]
 
     def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
         """The fitted runs with some effects."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -19,9 +20,11 @@ LEAST_TO_BUILD_ON: Final = 24.0
 """Decrease of the cost by one effect, below which nobody looks for its look-alikes or a second one."""
 _AS_GOOD: Final = 2.0
 """Of the cost: a general form that is worse than its special case has ended in a side valley."""
-_SOFT: Final = 0.03
+_SOFT: Final = STAGES[-3]
 _MOST_LOOK_ALIKES: Final = 4
 _MOST_FOR_ALL: Final = 2
+_FAR_BEHIND: Final = 2.0
+"""Cost, channels known to a share of their RMS only, over that of what an effect is tried in place of."""
 Limits = Mapping[str, tuple[float, float]]
 
 
@@ -62,12 +65,9 @@ class InPlace:
             name = f"{candidate.effect.block}.{candidate.effect.name}"
             if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
                 nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
-        found = []
-        for _, problem, start in sorted(nearest_of.values(), key=lambda one: one[0])[:most]:
-            fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
-            if not fit.trouble:
-                found.append(self.fits.judged(fit))
-        return found
+        best_of = sorted(nearest_of.values(), key=lambda one: one[0])[:most]
+        pieces = [partial(_fitted_unless_behind, problem, start, after) for _, problem, start in best_of]
+        return self.fits.all_fitted(pieces, pool)
 
     def exchanged(
         self, pair: Explanation, base: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
@@ -86,9 +86,9 @@ class InPlace:
             Whose effects are not tried again.
         pool : sequence of Candidate
         """
-        most = soft_cost(self.fits.problem_of(base), base, _SOFT)
+        most, reached = (soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (base, pair.fit))
         tried = {frozenset(one.keys) for one in known}
-        found = []
+        nearest_ones: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
         for replaced in pair.fit.candidates:
             others = tuple(one for one in pair.fit.candidates if one is not replaced)
             near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
@@ -104,11 +104,9 @@ class InPlace:
                 cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
                 if cost < most:
                     near.append((cost, problem, start))
-            for _, problem, start in sorted(near, key=lambda one: one[0])[:_MOST_LOOK_ALIKES]:
-                fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
-                if not fit.trouble:
-                    found.append(self.fits.judged(fit))
-        return found
+            nearest_ones += sorted(near, key=lambda one: one[0])[:_MOST_LOOK_ALIKES]
+        pieces = [partial(_fitted_unless_behind, problem, start, reached) for _, problem, start in nearest_ones]
+        return self.fits.all_fitted(pieces, [*pair.fit.candidates, *pool])
 
     def one_for_all(self, wider: FreeRunFit, base: FreeRunFit, pool: Sequence[Candidate]) -> list[Explanation]:
         """One effect of several numbers in place of everything that a fit has beyond the baseline, from there.
@@ -124,7 +122,8 @@ class InPlace:
             Without; an effect must lie nearer to `wider` than this before it is fitted.
         pool : sequence of Candidate
         """
-        most = 0.5 * sum(soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (wider, base))
+        reached, before = (soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (wider, base))
+        most = 0.5 * (reached + before)
         near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
         chosen = [one for one in pool if len(one.effect.parameters) > 1 and one.effect.block != "sensor"]
         for i, candidate in enumerate(chosen):
@@ -135,12 +134,9 @@ class InPlace:
             cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
             if cost < most:
                 near.append((cost, problem, start))
-        found = []
-        for _, problem, start in sorted(near, key=lambda one: one[0])[:_MOST_FOR_ALL]:
-            fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
-            if not fit.trouble:
-                found.append(self.fits.judged(fit))
-        return found
+        best_of = sorted(near, key=lambda one: one[0])[:_MOST_FOR_ALL]
+        pieces = [partial(_fitted_unless_behind, problem, start, most) for _, problem, start in best_of]
+        return self.fits.all_fitted(pieces, pool)
 
     def generalised(
         self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
@@ -166,38 +162,34 @@ class InPlace:
         what: str,
     ) -> list[Explanation]:
         special, is_done = best.fit.candidates[-1], self.fits.problem_of(best.fit).is_down_to_noise(best.fit)
-        found = []
-        for candidate in pool:
+        pieces: list[Callable[[], FreeRunFit]] = []
+        for candidate in sorted(pool, key=lambda one: -len(one.effect.parameters)):  # what takes longest first
             if not is_special_case(special, candidate):
                 continue
             self.fits.told(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
             problem = self.fits.problem((*base.candidates, candidate))
-            found += self._differing(problem, candidate, special, best.fit)
+            pieces += self._differing(problem, candidate, special, best.fit)
             if is_done or candidate.key in known:
                 continue
             starts = [{**best.fit.values, **one} for one in as_its_special_case(candidate, special, best.fit)]
             start = nearest(problem, starts, STAGES[-1])
-            fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-2:])
-            if not fit.trouble:
-                found.append(self.fits.judged(fit))
-        return found
+            pieces.append(partial(_fitted_closely, problem, start))
+        return self.fits.all_fitted(pieces, [*base.candidates, *pool])
 
     def _differing(
         self, problem: FreeRunProblem, candidate: Candidate, special: Candidate, fit: FreeRunFit
-    ) -> list[Explanation]:
-        """A general effect where it clearly is not its special case."""
+    ) -> list[Callable[[], FreeRunFit]]:
+        """Fits of a general effect where it clearly is not its special case."""
         if len(special.effect.parameters) > 1:
             return []
         size = fit.values[f"{special.key}.{special.effect.parameters[0].name}"]
-        found = []
+        pieces: list[Callable[[], FreeRunFit]] = []
         for limits in candidate.effect.differs(size):
             bounded = replace(candidate, effect=replace(candidate.effect, limits=_always(limits)))
             start = {f"{candidate.key}.{name}": 0.5 * (low + high) for name, (low, high) in limits.items()}
             within = self.fits.problem((*problem.candidates[:-1], bounded))
-            one, _ = fitted(within, {**fit.values, **start}, n_iterations=4, shares=STAGES[-2:])
-            if not one.trouble:
-                found.append(self.fits.judged(replace(one, candidates=(*problem.candidates[:-1], candidate))))
-        return found
+            pieces.append(partial(_fitted_within, within, {**fit.values, **start}, problem.candidates))
+        return pieces
 
     def specialised(
         self, wider: Explanation, known: Sequence[Explanation], pool: Sequence[Candidate]
@@ -207,7 +199,7 @@ class InPlace:
         for one in known:
             keys = frozenset(one.keys)
             tried[keys] = min(one.fit.cost, tried.get(keys, np.inf))
-        found = []
+        pieces: list[Callable[[], FreeRunFit]] = []
         for general in wider.fit.candidates:
             others = [one for one in wider.fit.candidates if one is not general]
             for special in pool:
@@ -218,12 +210,29 @@ class InPlace:
                 sizes = as_its_general_form(special, general, wider.fit)
                 start = nearest(problem, [{**wider.fit.values, **one} for one in sizes], _SOFT)
                 at_start = huber_cost(problem.residual(problem.theta_of(start)))
-                if not at_start < tried.get(frozenset((special.key, *(one.key for one in others))), np.inf):
-                    continue
-                fit, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-2:])
-                if not fit.trouble:
-                    found.append(self.fits.judged(fit))
-        return found
+                if at_start < tried.get(frozenset((special.key, *(one.key for one in others))), np.inf):
+                    pieces.append(partial(_fitted_closely, problem, start))
+        return self.fits.all_fitted(pieces, [*wider.fit.candidates, *pool])
+
+
+def _fitted_closely(problem: FreeRunProblem, start: Mapping[str, float]) -> FreeRunFit:
+    """A fit from what is nearly it."""
+    return fitted(problem, start, n_iterations=6, shares=STAGES[-2:])[0]
+
+
+def _fitted_within(
+    problem: FreeRunProblem, start: Mapping[str, float], candidates: tuple[Candidate, ...]
+) -> FreeRunFit:
+    """A fit within bounds of its own, of effects that have others."""
+    return replace(fitted(problem, start, n_iterations=4, shares=STAGES[-2:])[0], candidates=candidates)
+
+
+def _fitted_unless_behind(problem: FreeRunProblem, start: Mapping[str, float], reached: float) -> FreeRunFit:
+    """A fit from nearby, left where it is after its first stage if its cost there is far beyond that reached."""
+    first, jacobian = fitted(problem, start, n_iterations=6, shares=(_SOFT,), is_last=False)
+    if first.trouble or soft_cost(problem, first, _SOFT) > _FAR_BEHIND * reached:
+        return first
+    return fitted(problem, first.values, n_iterations=6, shares=STAGES[-2:], known=jacobian)[0]
 
 
 def _always(limits: Limits) -> Callable[[Surroundings], Limits]:

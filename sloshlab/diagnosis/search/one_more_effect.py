@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_fit import (
+    SCANNED,
     STAGES,
+    BegunFit,
     begun,
     finished,
+    from_another_size,
     on_more_runs,
-    scanned,
     soft_cost,
     stages_for,
 )
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.search.fits import Fits
 from sloshlab.diagnosis.search.in_place import InPlace
-from sloshlab.diagnosis.search.screening import Screening
+from sloshlab.diagnosis.search.screening import Promise, Screening
 
 _MOST_SCANNED: Final = 1
 _ALWAYS_FINISHED: Final = 3
@@ -52,33 +55,60 @@ class OneMoreEffect:
         near = self.few.part_of(jacobian, base, self.fits)
         more = self.fits.n_coefficients / self.few.n_coefficients
         promising = self.screening.chosen(base, near, pool, what, shares, is_near=is_near, more=more)
+        everything = [*base.candidates, *pool]
+
+        def first_stages(i: int, promise: Promise) -> tuple[FreeRunFit, BlockJacobian, float]:
+            self.fits.told(f"{what}: {promise.candidate.key}", i, 2 * len(promising))
+            problem = self.few.problem((*base.candidates, promise.candidate))
+            one = begun(problem, promise.starts, shares, near=near)
+            is_of_use = self.few is self.fits
+            return one.fit, one.jacobian if is_of_use else BlockJacobian(len(problem.names), ()), one.cost
+
         begun_fits = []
-        for i, promise in enumerate(promising):
-            candidate = promise.candidate
-            self.fits.told(f"{what}: {candidate.key}", i, 2 * len(promising))
-            one = begun(self.few.problem((*base.candidates, candidate)), promise.starts, shares, near=near)
-            if one.fit.trouble:
-                self.fits.failed[candidate.key] = one.fit.trouble
+        pieces = [partial(first_stages, i, promise) for i, promise in enumerate(promising)]
+        reached = self.fits.side_by_side(pieces, everything)
+        for promise, (fit, known, cost) in zip(promising, reached, strict=True):
+            if fit.trouble:
+                self.fits.failed[promise.candidate.key] = fit.trouble
             else:
-                begun_fits.append((one, promise))
-        kept = []
+                begun_fits.append((BegunFit(self.few.problem(fit.candidates), fit, known, cost), promise))
         lowest = min((one.cost for one, _ in begun_fits), default=0.0)
         most_alike = min(promising, key=lambda one: one.share_left, default=None)
         at_base = soft_cost(self.few.problem_of(base), base, shares[min(1, len(shares) - 1)])
+        goes_on = []
         for i, (one, promise) in enumerate(sorted(begun_fits, key=lambda each: each[0].cost)):
-            candidate = promise.candidate
             is_out = i >= _ALWAYS_FINISHED and at_base - one.cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest)
             if is_out and not (promise is most_alike and promise.is_like_the_force):
-                self.fits.screened[candidate.key] = max(more * (at_base - one.cost), 0.0)
-                continue
-            self.fits.told(f"{what}: {candidate.key}, to the end", len(promising) + i, 2 * len(promising))
+                self.fits.screened[promise.candidate.key] = max(more * (at_base - one.cost), 0.0)
+            else:
+                goes_on.append(one)
+
+        def to_the_end(i: int, one: BegunFit) -> FreeRunFit:
+            told_of = f"{what}: {one.fit.candidates[-1].key}, to the end"
+            self.fits.told(told_of, len(promising) + i, 2 * len(promising))
             if self.few is not self.fits:
-                whole = self.fits.problem((*base.candidates, candidate))
-                one = on_more_runs(one, whole, base.values, jacobian)
-            done = finished(one, shares)
-            if i < _MOST_SCANNED and shares == STAGES and not one.problem.is_down_to_noise(done):
-                number = f"{candidate.key}.{candidate.effect.parameters[0].name}"
-                done = scanned(one.problem, done, number, shares)
-            kept.append(self.fits.judged(done))
+                one = on_more_runs(one, self.fits.problem(one.fit.candidates), base.values, jacobian)
+            return finished(one, shares)
+
+        pieces_left = [partial(to_the_end, i, one) for i, one in enumerate(goes_on)]
+        done = self.fits.side_by_side(pieces_left, everything)
+        if shares == STAGES:
+            done[:_MOST_SCANNED] = [self._scanned(fit, shares) for fit in done[:_MOST_SCANNED]]
+        self.fits.failed |= {fit.candidates[-1].key: fit.trouble for fit in done if fit.trouble}
+        kept = self.fits.all_fitted([partial(_itself, fit) for fit in done], everything)
         kept += self.in_place.look_alikes(base, kept, pool, what)
         return [*kept, *self.in_place.generalised(base, kept, pool, what)]
+
+    def _scanned(self, fit: FreeRunFit, shares: Sequence[float]) -> FreeRunFit:
+        """The best of a fit and of fits from other sizes of its effect, where anything is left to be found."""
+        problem, last = self.fits.problem_of(fit), fit.candidates[-1]
+        if problem.is_down_to_noise(fit):
+            return fit
+        name = f"{last.key}.{last.effect.parameters[0].name}"
+        pieces = [partial(from_another_size, problem, fit, name, factor, shares) for factor in SCANNED]
+        others = self.fits.side_by_side(pieces, fit.candidates)
+        return min([fit, *(one for one in others if not one.trouble)], key=lambda one: one.cost)
+
+
+def _itself(fit: FreeRunFit) -> FreeRunFit:
+    return fit

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm, qmc, t
 
 from sloshlab.diagnosis.explanation import Explanation, Findings
@@ -14,6 +16,7 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.search.fits import Fits, Told
 from sloshlab.diagnosis.search.scatter_of_runs import scatter_of_runs
 
+FloatArray = NDArray[np.float64]
 _N_DRAWN: Final = 6
 _MOST_TOLERANCES: Final = 1.25
 _OF_A_NUMBER: Final = 0.3
@@ -47,19 +50,21 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
     draws = norm.ppf(qmc.Halton(len(plain.names), seed=0).random(_N_DRAWN))
     at_best, is_baseline = plain.theta_of(best.fit.values), plain.prior > 0
     at_best_softly = soft_cost(plain, best.fit, STAGES[-3])
-    ends = [best.fit]
-    for i, draw in enumerate(np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)):
-        told("fitting about other baselines", i, _N_DRAWN)
+
+    def from_draw(i: int, draw: FloatArray) -> FreeRunFit:
+        fits.told("fitting about other baselines", i, _N_DRAWN)
         expected = plain.values(np.where(is_baseline, draw, 0.0))
         far = (i + 1) / _N_DRAWN
         start = np.where(is_baseline, at_best + far * draw, at_best * np.exp(far * _OF_A_NUMBER * draw))
         problem = FreeRunProblem(found.model, found.fitting, candidates, expected=expected)
         fit, jacobian = fitted(problem, plain.values(start), n_iterations=6, shares=STAGES[-3:-2], is_last=False)
         if fit.trouble or soft_cost(plain, fit, STAGES[-3]) > _LEFT_BEHIND * at_best_softly:
-            continue
-        fit, _ = fitted(problem, fit.values, n_iterations=6, shares=STAGES[-2:], known=jacobian)
-        if not fit.trouble:
-            ends.append(fit)
+            return replace(fit, trouble=fit.trouble or "has gone astray")
+        return fitted(problem, fit.values, n_iterations=6, shares=STAGES[-2:], known=jacobian)[0]
+
+    draws = np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)
+    reached = fits.side_by_side([partial(from_draw, i, draw) for i, draw in enumerate(draws)], candidates)
+    ends = [best.fit, *(fit for fit in reached if not fit.trouble)]
     lowest = min(ends, key=lambda one: one.misfit)
     better = best
     if lowest.misfit < best.fit.misfit - _CHANCE:

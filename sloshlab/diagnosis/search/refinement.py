@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import takewhile
 from typing import Final
 
 import numpy as np
@@ -10,7 +12,7 @@ import numpy as np
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, fitted, nearest
-from sloshlab.diagnosis.free_run_problem import FreeRunFit
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
 
@@ -53,13 +55,11 @@ class Refinement:
         known : sequence of Explanation
             With one effect each.
         """
-        found: list[Explanation] = []
-        for one in _with_good_gains(base, known)[:_MOST_ANEW]:
-            if self.fits.problem_of(one.fit).is_down_to_noise(one.fit):
-                break
-            self.fits.told(f"fitting {one.keys[-1]} from what is believed", len(found), _MOST_ANEW)
-            found += self._from_believed(one)
-        return found
+        chosen = takewhile(
+            lambda one: not self.fits.problem_of(one.fit).is_down_to_noise(one.fit),
+            _with_good_gains(base, known)[:_MOST_ANEW],
+        )
+        return self._each_from_believed(list(chosen))
 
     def from_other_sizes(self, base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
         """The best effects of one number, fitted again from other sizes where the baseline has dry friction.
@@ -102,11 +102,16 @@ class Refinement:
         rivals = [one for one in rivals if one.fit.cost - rivals[0].fit.cost < LEAST_TO_BUILD_ON][:_MOST_RIVALS]
         if len(rivals) < 2 or not self.fits.is_strained(rivals[0].fit):
             return []
-        found: list[Explanation] = []
-        for i, one in enumerate(rivals):
-            self.fits.told(f"fitting {one.keys[-1]} from what is believed", i, len(rivals))
-            found += self._from_believed(one)
-        return found
+        return self._each_from_believed(rivals)
+
+    def _each_from_believed(self, chosen: Sequence[Explanation]) -> list[Explanation]:
+        def piece(i: int, one: Explanation) -> list[Explanation]:
+            self.fits.told(f"fitting {one.keys[-1]} from what is believed", i, len(chosen))
+            return self._from_believed(one)
+
+        pieces = [partial(piece, i, one) for i, one in enumerate(chosen)]
+        found = self.fits.side_by_side(pieces, [of for one in chosen for of in one.fit.candidates])
+        return [better for of_one in found for better in of_one]
 
     def _from_believed(self, one: Explanation) -> list[Explanation]:
         """An effect fitted with the baseline as believed, from some sizes; none where that is no better."""
@@ -123,9 +128,18 @@ class Refinement:
     def _promising(self, one: Explanation, starts: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
         """Where the best of several beginnings are after two stages on one repeat of every test."""
         problem = self.fits.of_one_repeat.problem_of(one.fit)
-        fits = [(begun(problem, [Start(start)]), start) for start in starts]
-        runs = sorted((each for each in fits if not each[0].fit.trouble), key=lambda each: each[0].cost)
-        return [{**start, **first.fit.values} for first, start in runs[:_MOST_PROMISING]]
+
+        def beginning(start: Mapping[str, float]) -> tuple[FreeRunFit, float]:
+            first = begun(problem, [Start(start)])
+            return first.fit, first.cost
+
+        reached = self.fits.side_by_side([partial(beginning, start) for start in starts], one.fit.candidates)
+        fits = [
+            (cost, {**start, **fit.values})
+            for (fit, cost), start in zip(reached, starts, strict=True)
+            if not fit.trouble
+        ]
+        return [values for _, values in sorted(fits, key=lambda each: each[0])[:_MOST_PROMISING]]
 
     def _sized(self, one: Explanation, factors: Sequence[float]) -> list[dict[str, float]]:
         """The numbers of its effect, without those of the baseline, larger by factors."""
@@ -135,7 +149,8 @@ class Refinement:
     def _better_from(self, one: Explanation, places: Sequence[Mapping[str, float]]) -> list[Explanation]:
         """The best of fits of the same effects from several places; none where that is no better."""
         problem = self.fits.problem_of(one.fit)
-        best = min((fitted(problem, place)[0] for place in places), key=lambda fit: fit.cost)
+        pieces = [partial(_fitted_from, problem, place) for place in places]
+        best = min(self.fits.side_by_side(pieces, one.fit.candidates), key=lambda fit: fit.cost)
         return [self.fits.judged(best)] if not best.trouble and best.cost < one.fit.cost else []
 
     def polished(
@@ -175,14 +190,14 @@ class Refinement:
         pair = cheapest(pairs)
         if pair is None:
             return []
-        found = []
-        for i, candidate in enumerate(pair.fit.candidates):
-            self.fits.told(f"taking away one of two effects: {candidate.key} is left", i, len(pair.keys))
-            problem = self.fits.problem((candidate,))
-            fit, _ = fitted(problem, pair.fit.values, shares=STAGES[-2:])
-            if not fit.trouble:
-                found.append(self.fits.judged(fit))
-        return found
+        values = pair.fit.values
+
+        def left_alone(candidate: Candidate) -> FreeRunFit:
+            self.fits.told(f"taking away one of two effects: {candidate.key} is left", 0, 1)
+            return fitted(self.fits.problem((candidate,)), values, shares=STAGES[-2:])[0]
+
+        pieces = [partial(left_alone, one) for one in pair.fit.candidates]
+        return self.fits.all_fitted(pieces, pair.fit.candidates)
 
     def retuned_from(self, known: Sequence[Explanation], retuned: Explanation) -> Explanation:
         """The retuned baseline from where the best explanations have it: what an effect gains must be its own."""
@@ -197,6 +212,10 @@ class Refinement:
             if not fit.trouble and fit.cost < best.fit.cost:
                 best = self.fits.judged(fit)
         return best
+
+
+def _fitted_from(problem: FreeRunProblem, place: Mapping[str, float]) -> FreeRunFit:
+    return fitted(problem, place)[0]
 
 
 def _with_good_gains(base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -116,11 +117,9 @@ class Screening:
             for share in dict.fromkeys((shares[min(1, len(shares) - 1)], shares[-1]))
         ]
         missed_hz = most_missed_hz(problem.runs, residual, ACROSS_A_BAND)
-        promised: list[Promise] = []
-        for i, candidate in enumerate(pool):
+
+        def promise_of(i: int, candidate: Candidate) -> Promise | None:
             self.fits.told(f"{what}: first look", i, len(pool))
-            if candidate.key in [one.key for one in base.candidates]:
-                continue
             by_force = None if forces is None else forces.of(candidate)
             extended = self.fits.problem((*base.candidates, candidate))
             looks = []
@@ -138,12 +137,19 @@ class Screening:
                         )
                     )
             if not looks:
-                self.fits.failed[candidate.key] = "does not run from any start"
-                continue
+                return None
             looks.sort(key=lambda one: -float(one.gains.max()))
             gains_of = np.max([look.gains for look in looks], axis=0)
             much_larger = None if is_near or base.candidates else self._much_larger(candidate, residual, shares[0])
-            promised.append(Promise(candidate, gains_of, looks, by_force, much_larger))
+            return Promise(candidate, gains_of, looks, by_force, much_larger)
+
+        others = [one for one in pool if one.key not in {known.key for known in base.candidates}]
+        pieces = [partial(promise_of, i, candidate) for i, candidate in enumerate(others)]
+        promises = self.fits.side_by_side(pieces, pool)
+        for candidate, promise in zip(others, promises, strict=True):
+            if promise is None:
+                self.fits.failed[candidate.key] = "does not run from any start"
+        promised = [one for one in promises if one is not None]
         return [
             replace(one, starts=self._starts(base, one, shares[0], is_near=is_near))
             for one in self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)

@@ -71,6 +71,7 @@ def findings_of(
     retuned = fits.judged(retuned_fit)
     surroundings = surroundings_of(problem, retuned_fit, case.rig)
     pool = candidates(surroundings)
+    fits.made_known(pool)
     found = OneMoreEffect(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
     refinement, best = Refinement(fits), cheapest(found)
     if not fits.is_complete(retuned):
@@ -151,6 +152,7 @@ def _second_effects(
         return []
     more = OneMoreEffect(fits)
     pool = [*pool, *_possible_beside(best, at, pool)]
+    fits.made_known(pool)
     pairs = more.fitted(best.fit, fits.jacobian(best.fit), pool, "fitting a second effect")
     alone = []
     pair = cheapest(pairs)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -53,6 +53,7 @@ class UserTwinModel:
         self.name, self.described = name, twin
         self.runs: tuple[CaseRun, ...] = tuple(runs)
         self.blocks: tuple[str, ...] = ("structure", "sensor")
+        self.may_be_copied = False
         self._lock, self._one_at_a_time = threading.Lock(), threading.Lock()
         self._truths: OrderedDict[tuple[Any, ...], tuple[dict[str, FloatArray], FloatArray]] = OrderedDict()
         self._excitations: OrderedDict[str, Excitation] = OrderedDict()
@@ -97,8 +98,10 @@ class UserTwinModel:
         del run
         return tuple(self.described.driving)
 
-    def simulate(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> dict[str, FloatArray]:
-        """What the compared channels of a run read.
+    def simulate(
+        self, run: CaseRun, values: Mapping[str, float], extension: Extension, only: Collection[str] = ()
+    ) -> dict[str, FloatArray]:
+        """What the compared channels of a run read, all or some.
 
         Raises
         ------
@@ -109,6 +112,8 @@ class UserTwinModel:
         others = {**self._views[run.name].channels, **truth}
         rate, readings = run.attributes.sampling_rate_hz, {}
         for name, true in truth.items():
+            if only and name not in only:
+                continue
             reading = true * values.get(f"gain of {name}", 1.0)
             for fault in extension.faults:
                 if fault.channel == name:

@@ -35,6 +35,25 @@ def test_products_are_those_of_the_dense_matrix() -> None:
     np.testing.assert_allclose(jacobian.normal(), matrix.T @ matrix, rtol=1e-13, atol=1e-15)
 
 
+def test_normal_equations_are_those_of_weighted_rows() -> None:
+    matrix, generator = dense(), np.random.default_rng(2)
+    weights, residual = generator.uniform(0.1, 2.0, sum(SIZES)), generator.normal(size=sum(SIZES))
+    normal, pull = in_blocks(matrix).normal_equations(weights, residual)
+    of_rows = matrix * weights[:, None]
+    np.testing.assert_allclose(normal, of_rows.T @ of_rows, rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(pull, of_rows.T @ (weights * residual), rtol=1e-13, atol=1e-15)
+
+
+def test_columns_are_made_of_the_blocks_that_are_given() -> None:
+    """Blocks that are not given, and those that are zero, are not kept."""
+    first, last = np.array([1.0, 2.0, 3.0, 4.0]), np.array([5.0, 6.0, 7.0, 8.0, 9.0])
+    found = BlockJacobian.of_blocks([{0: first, 1: np.zeros(3)}, {2: last}, {}], SIZES)
+    expected = np.zeros((sum(SIZES), 3))
+    expected[:4, 0], expected[7:, 1] = first, last
+    np.testing.assert_array_equal(as_dense(found), expected)
+    assert [one.columns.tolist() for one in found.blocks] == [[0], [], [1]]
+
+
 def test_a_part_has_some_blocks_and_the_columns_in_the_order_asked_for() -> None:
     """Blocks 0 and 2 see columns 0, 1 and 2; the last one is left out."""
     matrix = dense()

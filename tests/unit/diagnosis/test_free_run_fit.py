@@ -327,3 +327,36 @@ def test_what_one_channel_or_run_alone_shows_is_as_if_all_were_simulated(tmp_pat
         np.testing.assert_array_equal(found, problem.residual(moved), err_msg=name)
         touched += int(0 < np.count_nonzero(found != at) < at.size)
     assert touched >= 5  # two gains, two releases and this one
+
+
+def test_only_channels_that_are_asked_for_are_made(tmp_path: Path) -> None:
+    runs = decays(duration_s=1.5)
+    model = RigModel(rig(tmp_path), tmp_path, runs)
+    every = model.simulate(runs[0], model.believed, Extension())
+    assert len(every) > 1
+    [(name, alone)] = model.simulate(runs[0], model.believed, Extension(), [TIP]).items()
+    assert name == TIP
+    np.testing.assert_array_equal(alone, every[TIP])
+
+
+def test_no_step_is_simulated_that_promises_next_to_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the optimum a fit makes one Jacobian and at most a step; refused ones were made ever smaller before."""
+    problem = problem_of(tmp_path, decays(duration_s=1.5), [], [FREQUENCY, LOSS])
+    best, _ = fitted(problem, problem.model.believed, tolerance=1e-9, n_iterations=30)
+    theta, n_made = problem.theta_of(best.values), 0
+
+    def counted(self: FreeRunProblem, at: np.ndarray) -> np.ndarray:
+        nonlocal n_made
+        n_made += 1
+        return self._of_runs_in_turn(at)
+
+    monkeypatch.setattr(FreeRunProblem, "residual", counted)
+    again, _ = fitted(problem, best.values, shares=STAGES[-1:])
+    assert n_made <= 3
+    np.testing.assert_allclose(problem.theta_of(again.values), theta, atol=1e-3)
+    n_made = 0
+    far, _ = fitted(problem, problem.values(theta + 2.0), shares=STAGES[-1:])
+    assert n_made > 3
+    np.testing.assert_allclose(problem.theta_of(far.values), theta, atol=1e-2)

@@ -24,16 +24,16 @@ from decays_under_friction import (
 )
 from recorded_oscillators import decays, effect, rig, surroundings
 
-from sloshlab.diagnosis import effects, free_run_problem
+from sloshlab.diagnosis import effects, side_by_side
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.force_starts import ForceStart
-from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, finished, fitted, on_more_runs
+from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, finished, fitted, on_more_runs, soft_cost
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import fits, redrawn, refinement, screening, whole_search
+from sloshlab.diagnosis.search import fits, in_place, redrawn, refinement, screening, whole_search
 from sloshlab.diagnosis.search.fits import Fits, cheapest
 from sloshlab.diagnosis.search.in_place import InPlace
 from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
@@ -108,6 +108,20 @@ def test_one_effect_takes_the_place_of_two(case: Decays, coulomb: Explanation) -
     assert best.fit.cost == pytest.approx(both.fit.cost, rel=0.02)
     up, down = (best.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
     assert up + down == pytest.approx(UP_N + DOWN_N, rel=0.05)
+
+
+@pytest.mark.parametrize(("reached", "is_left"), [(0.4, True), (0.6, False)])
+def test_a_look_alike_that_is_far_behind_is_not_fitted_to_the_end(
+    case: Decays, reached: float, is_left: bool
+) -> None:
+    """Twice what was reached is far behind; after the first stage, that is, and with its softness."""
+    problem = case.fits.problem([case.pool[CUBIC]])
+    start = {**case.believed, **case.pool[CUBIC].starts()[0]}
+    first, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:-2], is_last=False)
+    found = in_place._fitted_unless_behind(problem, start, reached * soft_cost(problem, first, STAGES[-3]))
+    whole, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
+    assert whole.cost < 0.999 * first.cost
+    assert found.cost == pytest.approx((first if is_left else whole).cost, rel=1e-4)
 
 
 def test_a_look_alike_takes_the_place_of_one_of_two_effects(case: Decays) -> None:
@@ -196,6 +210,7 @@ def test_a_mode_is_fitted_again_from_other_frequencies(case: Decays, monkeypatch
         last.append(start)
         return replace(fit, values=dict(start), cost=fit.cost - 50.0 + abs(start[frequency] - 12.0)), None
 
+    monkeypatch.setattr(side_by_side, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
     monkeypatch.setattr(refinement, "begun", beginning)
     monkeypatch.setattr(refinement, "fitted", watched)
     [found] = Refinement(case.fits).anew(case.baseline, [Explanation(fit, 0.0, 1.0)])
@@ -235,6 +250,7 @@ def test_beside_dry_friction_simple_effects_are_fitted_from_other_sizes(
         left = cost - 50.0 + 10.0 * abs(start[COULOMB_N] / size - 2.0)
         return replace(coulomb.fit, values=dict(start), cost=left), None
 
+    monkeypatch.setattr(side_by_side, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
     monkeypatch.setattr(refinement, "fitted", stays)
     monkeypatch.setattr(Fits, "is_complete", lambda self, one: is_complete)
     terms = (SimpleNamespace(kind=SimpleNamespace(dry_friction=is_dry)),)
@@ -320,7 +336,7 @@ def test_derivatives_and_places_are_the_same_on_one_core_and_on_two(
         return np.array(residuals), np.array([jacobian.times(unit) for unit in units])
 
     on_two = found()
-    monkeypatch.setattr(free_run_problem, "N_THREADS", 1)
+    monkeypatch.setattr(side_by_side, "N_AT_ONCE", 1)
     for one, other in zip(found(), on_two, strict=True):
         np.testing.assert_array_equal(one, other)
     for residual, place in zip(on_two[0], places, strict=True):

@@ -66,6 +66,7 @@ def sought(
         problem_of=lambda fit: SimpleNamespace(is_down_to_noise=lambda fit: is_noise),
         jacobian=lambda fit: None,
         shares_little=lambda one: shares_little,
+        made_known=lambda pool: None,
     )
     monkeypatch.setattr(whole_search, "OneMoreEffect", lambda fits: tried)
     monkeypatch.setattr(whole_search, "_possible_beside", lambda best, at, pool: [])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from pathlib import Path
 
 import pytest
 from hand_made_trials import KEY, stand_in, truth, written_trial
@@ -74,3 +76,24 @@ def test_a_key_in_reach_is_refused(tmp_path, monkeypatch, place: str) -> None:
     with pytest.raises(InputError, match="no key in reach"):
         require_no_key(trial, arguments, environment)
     assert made.hex() in line
+
+
+@pytest.mark.skipif(not Path("/proc/self/smaps_rollup").exists(), reason="the system does not tell")
+def test_memory_is_that_of_a_process_and_its_copy_with_what_they_share_once(tmp_path) -> None:
+    """100 MiB in both, 150 MiB more in the copy; Python itself takes less than 40."""
+    trial, script = tmp_path / "trial", tmp_path / "forks.py"
+    written_trial(trial, FOUR[:1], None)
+    script.write_text(
+        "import os, sys, time, pathlib\n"
+        "shared = bytearray(os.urandom(1)) * (100 * 2**20)\n"
+        "copy = os.fork()\n"
+        "if not copy:\n"
+        "    own = bytearray(os.urandom(1)) * (150 * 2**20)\n"
+        "    time.sleep(1.5)\n"
+        "    os._exit(0)\n"
+        "os.waitpid(copy, 0)\n"
+        "pathlib.Path(sys.argv[-1], 'verdict.json').write_text('{}')\n"
+    )
+    [outcome] = run_trial(trial, n_workers=1, time_limit_s=60.0, command=(sys.executable, str(script)))
+    assert outcome.status == "done"
+    assert 250.0 < outcome.memory_mib < 330.0

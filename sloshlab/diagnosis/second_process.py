@@ -1,0 +1,176 @@
+"""Simulations in a second process: two threads of one interpreter wait for each other half of the time.
+
+It is a copy of this one (fork), so that runs, effects and compiled laws need not be sent. It gives the same
+numbers, bit for bit, and is no more than a second pair of hands: where it cannot be had, or has ended, all is done
+here.
+"""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import signal
+import threading
+import warnings
+import weakref
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from mmap import mmap
+from multiprocessing.connection import Connection
+from typing import Final, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.side_by_side import CAN_FORK, works_alone
+
+FloatArray = NDArray[np.float64]
+Runs = Sequence[Sequence[Observation]]
+Values = Mapping[str, float]
+Work = Callable[[DiagnosedModel, Runs, Values, Sequence[Candidate]], FloatArray]
+"""Weighted residuals of runs, one after another."""
+_LEAST_COEFFICIENTS: Final = 20_000
+"""Of all runs; a copy and its messages take longer than what is less."""
+_SECONDS_TO_END: Final = 1.0
+_Thing = TypeVar("_Thing")
+
+
+class SecondProcess:
+    """A copy of this process that does one kind of work on one model.
+
+    Parameters
+    ----------
+    work : callable
+    model : DiagnosedModel
+    observed : sequence of Observation
+    candidates : sequence of Candidate
+        Those of which it can be asked.
+    """
+
+    def __init__(
+        self, work: Work, model: DiagnosedModel, observed: Iterable[Observation], candidates: Iterable[Candidate]
+    ) -> None:
+        self.observed, self.candidates = _Numbered(observed), _Numbered(candidates)
+        self.n_done = 0
+        self._is_busy = threading.Lock()
+        n = sum(one.spectra.size for one in self.observed.all)
+        self._shared: FloatArray = np.frombuffer(mmap(-1, 8 * max(1, n)), np.float64)
+        context = multiprocessing.get_context("fork")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(
+            target=_serve,
+            args=(self._connection, theirs, work, model, self.observed.all, self.candidates.all, self._shared),
+            daemon=True,
+        )
+        with warnings.catch_warnings():  # other threads wait for work meanwhile, and hold no lock
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._process.start()
+        theirs.close()
+
+    def done(self, runs: Runs, values: Values, candidates: Sequence[Candidate]) -> FloatArray | None:
+        """The work on some runs; None where it is busy, has failed or has ended."""
+        if not self._is_busy.acquire(blocking=False):
+            return None
+        try:
+            of_runs = [[self.observed.number_of(one) for one in run] for run in runs]
+            self._connection.send((of_runs, dict(values), [self.candidates.number_of(one) for one in candidates]))
+            n = self._connection.recv()
+            self.n_done += n is not None
+            return None if n is None else self._shared[:n].copy()
+        except (OSError, EOFError):
+            return None
+        finally:
+            self._is_busy.release()
+
+    def close(self) -> None:
+        """End it; nothing happens where it has ended."""
+        self._connection.close()
+        self._process.join(_SECONDS_TO_END)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+
+_PRESENT: Final[weakref.WeakKeyDictionary[DiagnosedModel, SecondProcess]] = weakref.WeakKeyDictionary()
+
+
+def second_process(
+    work: Work, model: DiagnosedModel, runs: Runs, candidates: Sequence[Candidate]
+) -> SecondProcess | None:
+    """That of a model, made anew where it has not seen a run or an effect; ended when the model is.
+
+    To be called while no other thread works on the model.
+
+    Parameters
+    ----------
+    work : callable
+    model : DiagnosedModel
+    runs : sequence of sequences of Observation
+    candidates : sequence of Candidate
+
+    Returns
+    -------
+    SecondProcess or None
+        None where it would be of no use or of no good: small problems, other systems, code that is not ours.
+    """
+    if works_alone() or not (CAN_FORK and model.may_be_copied):
+        return None
+    present = _PRESENT.get(model)
+    observed = [one for run in runs for one in run]
+    if present is None and sum(one.spectra.size for one in observed) < _LEAST_COEFFICIENTS:
+        return None
+    if present is not None:
+        unseen = [one for one in observed if one not in present.observed]
+        unknown = [one for one in candidates if one not in present.candidates]
+        if not unseen and not unknown:
+            return present
+        present.close()
+        observed, candidates = [*present.observed.all, *unseen], [*present.candidates.all, *unknown]
+    found = _PRESENT[model] = SecondProcess(work, model, observed, candidates)
+    weakref.finalize(model, found.close)
+    return found
+
+
+class _Numbered(Generic[_Thing]):
+    """Things in the order in which they were given, told apart by which they are, not by what they equal."""
+
+    def __init__(self, things: Iterable[_Thing]) -> None:
+        self.all = tuple(things)
+        self._numbers = {id(one): i for i, one in enumerate(self.all)}
+
+    def __contains__(self, one: _Thing) -> bool:
+        return id(one) in self._numbers
+
+    def number_of(self, one: _Thing) -> int:
+        return self._numbers[id(one)]
+
+
+def _serve(
+    of_the_first: Connection,
+    connection: Connection,
+    work: Work,
+    model: DiagnosedModel,
+    observed: Sequence[Observation],
+    candidates: Sequence[Candidate],
+    shared: FloatArray,
+) -> None:
+    """Work until the first process hangs up."""
+    of_the_first.close()  # or this copy of it would keep the line open
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process, which ends this one
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    gc.freeze()  # what was there already is not looked through, which would copy it
+    while True:
+        try:
+            of_runs, values, of_candidates = connection.recv()
+        except (OSError, EOFError):
+            return
+        try:
+            runs = [[observed[i] for i in run] for run in of_runs]
+            found = work(model, runs, values, [candidates[i] for i in of_candidates])
+            shared[: found.size] = found
+            n = found.size
+        except Exception:  # noqa: BLE001 - whatever it is, the first process meets it when it does the work itself
+            n = None
+        connection.send(n)
