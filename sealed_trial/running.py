@@ -30,6 +30,7 @@ DIAGNOSES: Final = "diagnoses"
 OUTCOME: Final = "outcome.json"
 _LOOKED_THROUGH_BYTES: Final = 4096
 _MEMORY_EVERY_S: Final = 0.3
+"""What the system keeps as the peak of a process, ru_maxrss, begins with that of the process which started it."""
 _SESSION: Final = 3
 """Field of `/proc/PID/stat` after the name of the process (proc(5))."""
 DIAGNOSE: Final = (sys.executable, "-m", "pipelines.command_line", "diagnose")
@@ -183,7 +184,7 @@ def _waited(pid: int, until: float, stopping: threading.Event) -> tuple[str, int
     while True:
         found, wait_status, usage = os.wait4(pid, os.WNOHANG)
         if found:
-            spent = usage.ru_utime + usage.ru_stime, max(usage.ru_maxrss / 1024, largest_mib)
+            spent = usage.ru_utime + usage.ru_stime, largest_mib or usage.ru_maxrss / 1024
             if stopping.is_set():
                 raise KeyboardInterrupt
             return status, os.waitstatus_to_exitcode(wait_status), spent
