@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate, channels_of
+from sloshlab.diagnosis.copied_process import N_AT_ONCE
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.second_process import SecondProcess, second_process
-from sloshlab.diagnosis.side_by_side import N_AT_ONCE, works_alone
+from sloshlab.diagnosis.side_by_side import works_alone
 from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]

@@ -41,7 +41,7 @@ _FINER_FOR_EVENTS: Final = 2.0
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _LEAST_STEPS_PER_S: Final = 500.0
 """Of a tank that follows its measured motion: forces that average over a cycle need some tens of steps in it."""
-_MOST_KEPT_BYTES: Final = 3e8
+_MOST_KEPT_BYTES: Final = 5e7
 RELEASE: Final = "release of "
 _FLUCTUATION: Final = "damping of the liquid in "
 _TOLERANCE_OF_FLUCTUATION: Final = 0.05

@@ -7,13 +7,10 @@ here.
 
 from __future__ import annotations
 
-import gc
-import multiprocessing
-import signal
 import threading
-import warnings
 import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from mmap import mmap
 from multiprocessing.connection import Connection
 from typing import Final, Generic, TypeVar
@@ -22,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.copied_process import CAN_FORK, copied, ended
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.side_by_side import CAN_FORK, works_alone
+from sloshlab.diagnosis.side_by_side import works_alone
 
 FloatArray = NDArray[np.float64]
 Runs = Sequence[Sequence[Observation]]
@@ -33,7 +31,6 @@ Work = Callable[[DiagnosedModel, Runs, Values, Sequence[Candidate]], FloatArray]
 """Weighted residuals of runs, one after another."""
 _LEAST_COEFFICIENTS: Final = 20_000
 """Of all runs; a copy and its messages take longer than what is less."""
-_SECONDS_TO_END: Final = 1.0
 _Thing = TypeVar("_Thing")
 
 
@@ -57,17 +54,9 @@ class SecondProcess:
         self._is_busy = threading.Lock()
         n = sum(one.spectra.size for one in self.observed.all)
         self._shared: FloatArray = np.frombuffer(mmap(-1, 8 * max(1, n)), np.float64)
-        context = multiprocessing.get_context("fork")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(
-            target=_serve,
-            args=(self._connection, theirs, work, model, self.observed.all, self.candidates.all, self._shared),
-            daemon=True,
+        self._process, self._line = copied(
+            _serve, work, model, self.observed.all, self.candidates.all, self._shared
         )
-        with warnings.catch_warnings():  # other threads wait for work meanwhile, and hold no lock
-            warnings.simplefilter("ignore", DeprecationWarning)
-            self._process.start()
-        theirs.close()
 
     def done(self, runs: Runs, values: Values, candidates: Sequence[Candidate]) -> FloatArray | None:
         """The work on some runs; None where it is busy, has failed or has ended."""
@@ -75,8 +64,8 @@ class SecondProcess:
             return None
         try:
             of_runs = [[self.observed.number_of(one) for one in run] for run in runs]
-            self._connection.send((of_runs, dict(values), [self.candidates.number_of(one) for one in candidates]))
-            n = self._connection.recv()
+            self._line.send((of_runs, dict(values), [self.candidates.number_of(one) for one in candidates]))
+            n = self._line.recv()
             self.n_done += n is not None
             return None if n is None else self._shared[:n].copy()
         except (OSError, EOFError):
@@ -86,11 +75,7 @@ class SecondProcess:
 
     def close(self) -> None:
         """End it; nothing happens where it has ended."""
-        self._connection.close()
-        self._process.join(_SECONDS_TO_END)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
+        ended(self._process, self._line)
 
 
 _PRESENT: Final[weakref.WeakKeyDictionary[DiagnosedModel, SecondProcess]] = weakref.WeakKeyDictionary()
@@ -148,8 +133,7 @@ class _Numbered(Generic[_Thing]):
 
 
 def _serve(
-    of_the_first: Connection,
-    connection: Connection,
+    line: Connection,
     work: Work,
     model: DiagnosedModel,
     observed: Sequence[Observation],
@@ -157,20 +141,13 @@ def _serve(
     shared: FloatArray,
 ) -> None:
     """Work until the first process hangs up."""
-    of_the_first.close()  # or this copy of it would keep the line open
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process, which ends this one
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    gc.freeze()  # what was there already is not looked through, which would copy it
-    while True:
-        try:
-            of_runs, values, of_candidates = connection.recv()
-        except (OSError, EOFError):
-            return
-        try:
-            runs = [[observed[i] for i in run] for run in of_runs]
-            found = work(model, runs, values, [candidates[i] for i in of_candidates])
-            shared[: found.size] = found
-            n = found.size
-        except Exception:  # noqa: BLE001 - whatever it is, the first process meets it when it does the work itself
-            n = None
-        connection.send(n)
+    with suppress(OSError, EOFError):
+        while True:
+            of_runs, values, of_candidates = line.recv()
+            n: int | None = None
+            with suppress(Exception):  # whatever it is, the first process meets it when it does the work itself
+                runs = [[observed[i] for i in run] for run in of_runs]
+                found = work(model, runs, values, [candidates[i] for i in of_candidates])
+                shared[: found.size] = found
+                n = found.size
+            line.send(n)

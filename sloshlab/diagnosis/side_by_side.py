@@ -1,4 +1,4 @@
-"""Independent work in two processes: this one, and a copy of it (fork) that takes every piece that is left.
+"""Independent work in two processes: this one, and a copy of it that takes every piece that is left.
 
 What comes of a piece is the same, bit for bit, whoever does it; pieces that the copy fails at are done here, where
 what is wrong with them shows.
@@ -6,43 +6,31 @@ what is wrong with them shows.
 
 from __future__ import annotations
 
-import gc
 import io
 import multiprocessing
 import pickle
-import signal
-import sys
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import Synchronized
-from typing import Final, TypeVar
+from typing import TypeVar
 
+from sloshlab.diagnosis import copied_process
 from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.copied_process import CAN_FORK, copied, ended, is_copy
 
 _Result = TypeVar("_Result")
-N_AT_ONCE = 2
-"""Threads or processes that work at once."""
-CAN_FORK: Final = sys.platform == "linux"
-"""Elsewhere there are no copies (Windows), or none that system libraries bear (macOS)."""
 
 
 class _Here:
     """This process."""
 
     has_company = False
-    is_copy = False
 
 
 def works_alone() -> bool:
     """Whether one thread does everything: on one core, or beside another process that has the other core."""
-    return N_AT_ONCE == 1 or _Here.has_company
-
-
-def is_copy() -> bool:
-    """Whether this process is the copy: nobody reads what it says."""
-    return _Here.is_copy
+    return copied_process.N_AT_ONCE == 1 or _Here.has_company or is_copy()
 
 
 def side_by_side(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Candidate]) -> list[_Result]:
@@ -60,24 +48,15 @@ def side_by_side(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[C
     if len(pieces) < 2 or not CAN_FORK or works_alone():
         return [piece() for piece in pieces]
     known = {id(one): one for one in candidates}
-    context = multiprocessing.get_context("fork")
-    ours, theirs = context.Pipe(duplex=False)
-    taken = context.Value("i", 0)
-    copy = context.Process(target=_as_copy, args=(ours, theirs, pieces, taken, known), daemon=True)
-    with warnings.catch_warnings():  # other threads wait for work meanwhile, and hold no lock
-        warnings.simplefilter("ignore", DeprecationWarning)
-        copy.start()
-    theirs.close()
+    taken = multiprocessing.get_context("fork").Value("i", 0)
+    copy, line = copied(_take_what_is_left, pieces, taken, known)
     try:
         with _in_company():
             results = {i: pieces[i]() for i in _numbers(taken, len(pieces))}
         with suppress(OSError, EOFError):  # it has ended before its time
-            results |= _Reader(io.BytesIO(ours.recv_bytes()), known).load()
-        copy.join()
+            results |= _Reader(io.BytesIO(line.recv_bytes()), known).load()
     finally:
-        ours.close()
-        copy.kill()
-        copy.join()
+        ended(copy, line)
     return [results[i] if i in results else piece() for i, piece in enumerate(pieces)]
 
 
@@ -101,28 +80,20 @@ def _numbers(taken: Synchronized[int], n: int) -> Iterator[int]:
         yield i
 
 
-def _as_copy(
-    of_the_first: Connection,
-    connection: Connection,
+def _take_what_is_left(
+    line: Connection,
     pieces: Sequence[Callable[[], object]],
     taken: Synchronized[int],
     known: Mapping[int, Candidate],
 ) -> None:
     """Take pieces until none is left, then hand over what came of them."""
-    of_the_first.close()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process, which ends this one
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    gc.freeze()  # what was there already is not looked through, which would copy it
-    _Here.has_company = _Here.is_copy = True
     results = {}
     for i in _numbers(taken, len(pieces)):
-        try:
+        with suppress(Exception):  # whatever it is, the first process meets it when it does the piece itself
             results[i] = pieces[i]()
-        except Exception:  # noqa: BLE001 - whatever it is, the first process meets it when it does the piece
-            continue
     written = io.BytesIO()
     _Writer(written, known).dump(results)
-    connection.send_bytes(written.getbuffer())
+    line.send_bytes(written.getbuffer())
 
 
 class _Writer(pickle.Pickler):
@@ -137,7 +108,7 @@ class _Writer(pickle.Pickler):
 
 
 class _Reader(pickle.Unpickler):
-    """Reads only what our own copy wrote to its end of a pipe."""
+    """Reads only what our own copy wrote to its end of a line."""
 
     def __init__(self, file: io.BytesIO, known: Mapping[int, Candidate]) -> None:
         super().__init__(file)

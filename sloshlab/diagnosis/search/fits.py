@@ -10,6 +10,7 @@ import numpy as np
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.copied_process import is_copy
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest
@@ -27,7 +28,7 @@ from sloshlab.diagnosis.free_run_problem import (
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.second_process import second_process
-from sloshlab.diagnosis.side_by_side import is_copy, side_by_side
+from sloshlab.diagnosis.side_by_side import side_by_side
 
 _WORSE_THAN_OTHERS: Final = 1.2
 _OTHER_RELEASES: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
@@ -138,6 +139,10 @@ class Fits:
 
         found = self.side_by_side([partial(judged, piece) for piece in pieces], candidates)
         return [one for one in found if one is not None]
+
+    def all_judged(self, fits: Sequence[FreeRunFit], candidates: Iterable[Candidate]) -> list[Explanation]:
+        """Fits, each judged; without those that did not run."""
+        return self.side_by_side([partial(self.judged, fit) for fit in fits if not fit.trouble], candidates)
 
     def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
         """The fitted runs with some effects."""

@@ -55,49 +55,83 @@ class OneMoreEffect:
         near = self.few.part_of(jacobian, base, self.fits)
         more = self.fits.n_coefficients / self.few.n_coefficients
         promising = self.screening.chosen(base, near, pool, what, shares, is_near=is_near, more=more)
-        everything = [*base.candidates, *pool]
+        begun_fits = self._begun(base, near, promising, what, shares)
+        going_on = self._worth_finishing(base, begun_fits, shares, more)
+        done = self._finished(base, jacobian, going_on, what, shares)
+        self.fits.failed |= {fit.candidates[-1].key: fit.trouble for fit in done if fit.trouble}
+        kept = self.fits.all_judged(done, [*base.candidates, *pool])
+        kept += self.in_place.look_alikes(base, kept, pool, what)
+        return [*kept, *self.in_place.generalised(base, kept, pool, what)]
 
-        def first_stages(i: int, promise: Promise) -> tuple[FreeRunFit, BlockJacobian, float]:
+    def _begun(
+        self,
+        base: FreeRunFit,
+        near: BlockJacobian,
+        promising: Sequence[Promise],
+        what: str,
+        shares: Sequence[float],
+    ) -> list[tuple[BegunFit, Promise]]:
+        """Candidates after their first stages; what did not run is remembered as failed."""
+
+        def first_stages(i: int, promise: Promise) -> tuple[FreeRunFit, float]:
             self.fits.told(f"{what}: {promise.candidate.key}", i, 2 * len(promising))
             problem = self.few.problem((*base.candidates, promise.candidate))
             one = begun(problem, promise.starts, shares, near=near)
-            is_of_use = self.few is self.fits
-            return one.fit, one.jacobian if is_of_use else BlockJacobian(len(problem.names), ()), one.cost
+            return one.fit, one.cost
 
-        begun_fits = []
         pieces = [partial(first_stages, i, promise) for i, promise in enumerate(promising)]
-        reached = self.fits.side_by_side(pieces, everything)
-        for promise, (fit, known, cost) in zip(promising, reached, strict=True):
+        candidates = [*base.candidates, *(one.candidate for one in promising)]
+        found = []
+        for promise, (fit, cost) in zip(promising, self.fits.side_by_side(pieces, candidates), strict=True):
             if fit.trouble:
                 self.fits.failed[promise.candidate.key] = fit.trouble
             else:
-                begun_fits.append((BegunFit(self.few.problem(fit.candidates), fit, known, cost), promise))
+                problem = self.few.problem(fit.candidates)
+                found.append((BegunFit(problem, fit, BlockJacobian(len(problem.names), ()), cost), promise))
+        return found
+
+    def _worth_finishing(
+        self,
+        base: FreeRunFit,
+        begun_fits: Sequence[tuple[BegunFit, Promise]],
+        shares: Sequence[float],
+        more: float,
+    ) -> list[BegunFit]:
+        """Those that gained most, the best first; the others are remembered with what they promised."""
         lowest = min((one.cost for one, _ in begun_fits), default=0.0)
-        most_alike = min(promising, key=lambda one: one.share_left, default=None)
+        most_alike = min((promise for _, promise in begun_fits), key=lambda one: one.share_left, default=None)
         at_base = soft_cost(self.few.problem_of(base), base, shares[min(1, len(shares) - 1)])
-        goes_on = []
+        found = []
         for i, (one, promise) in enumerate(sorted(begun_fits, key=lambda each: each[0].cost)):
             is_out = i >= _ALWAYS_FINISHED and at_base - one.cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest)
             if is_out and not (promise is most_alike and promise.is_like_the_force):
                 self.fits.screened[promise.candidate.key] = max(more * (at_base - one.cost), 0.0)
             else:
-                goes_on.append(one)
+                found.append(one)
+        return found
+
+    def _finished(
+        self,
+        base: FreeRunFit,
+        jacobian: BlockJacobian,
+        going_on: Sequence[BegunFit],
+        what: str,
+        shares: Sequence[float],
+    ) -> list[FreeRunFit]:
+        """Fits to the end on all runs; far from the recordings, of the best one from other sizes, too."""
 
         def to_the_end(i: int, one: BegunFit) -> FreeRunFit:
-            told_of = f"{what}: {one.fit.candidates[-1].key}, to the end"
-            self.fits.told(told_of, len(promising) + i, 2 * len(promising))
+            n = len(going_on)
+            self.fits.told(f"{what}: {one.fit.candidates[-1].key}, to the end", n + i, 2 * n)
             if self.few is not self.fits:
                 one = on_more_runs(one, self.fits.problem(one.fit.candidates), base.values, jacobian)
             return finished(one, shares)
 
-        pieces_left = [partial(to_the_end, i, one) for i, one in enumerate(goes_on)]
-        done = self.fits.side_by_side(pieces_left, everything)
+        pieces = [partial(to_the_end, i, one) for i, one in enumerate(going_on)]
+        done = self.fits.side_by_side(pieces, [of for one in going_on for of in one.fit.candidates])
         if shares == STAGES:
             done[:_MOST_SCANNED] = [self._scanned(fit, shares) for fit in done[:_MOST_SCANNED]]
-        self.fits.failed |= {fit.candidates[-1].key: fit.trouble for fit in done if fit.trouble}
-        kept = self.fits.all_fitted([partial(_itself, fit) for fit in done], everything)
-        kept += self.in_place.look_alikes(base, kept, pool, what)
-        return [*kept, *self.in_place.generalised(base, kept, pool, what)]
+        return done
 
     def _scanned(self, fit: FreeRunFit, shares: Sequence[float]) -> FreeRunFit:
         """The best of a fit and of fits from other sizes of its effect, where anything is left to be found."""
@@ -108,7 +142,3 @@ class OneMoreEffect:
         pieces = [partial(from_another_size, problem, fit, name, factor, shares) for factor in SCANNED]
         others = self.fits.side_by_side(pieces, fit.candidates)
         return min([fit, *(one for one in others if not one.trouble)], key=lambda one: one.cost)
-
-
-def _itself(fit: FreeRunFit) -> FreeRunFit:
-    return fit

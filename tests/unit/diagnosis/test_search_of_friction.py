@@ -24,7 +24,7 @@ from decays_under_friction import (
 )
 from recorded_oscillators import decays, effect, rig, surroundings
 
-from sloshlab.diagnosis import effects, side_by_side
+from sloshlab.diagnosis import copied_process, effects
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.explanation import Explanation, Findings
@@ -210,7 +210,7 @@ def test_a_mode_is_fitted_again_from_other_frequencies(case: Decays, monkeypatch
         last.append(start)
         return replace(fit, values=dict(start), cost=fit.cost - 50.0 + abs(start[frequency] - 12.0)), None
 
-    monkeypatch.setattr(side_by_side, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
+    monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
     monkeypatch.setattr(refinement, "begun", beginning)
     monkeypatch.setattr(refinement, "fitted", watched)
     [found] = Refinement(case.fits).anew(case.baseline, [Explanation(fit, 0.0, 1.0)])
@@ -250,7 +250,7 @@ def test_beside_dry_friction_simple_effects_are_fitted_from_other_sizes(
         left = cost - 50.0 + 10.0 * abs(start[COULOMB_N] / size - 2.0)
         return replace(coulomb.fit, values=dict(start), cost=left), None
 
-    monkeypatch.setattr(side_by_side, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
+    monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
     monkeypatch.setattr(refinement, "fitted", stays)
     monkeypatch.setattr(Fits, "is_complete", lambda self, one: is_complete)
     terms = (SimpleNamespace(kind=SimpleNamespace(dry_friction=is_dry)),)
@@ -336,7 +336,7 @@ def test_derivatives_and_places_are_the_same_on_one_core_and_on_two(
         return np.array(residuals), np.array([jacobian.times(unit) for unit in units])
 
     on_two = found()
-    monkeypatch.setattr(side_by_side, "N_AT_ONCE", 1)
+    monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)
     for one, other in zip(found(), on_two, strict=True):
         np.testing.assert_array_equal(one, other)
     for residual, place in zip(on_two[0], places, strict=True):

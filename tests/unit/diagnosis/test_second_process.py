@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from decays_under_friction import COULOMB, CUBIC, STRIBECK, Decays
 
+from sloshlab.diagnosis import copied_process
 from sloshlab.diagnosis import second_process as module
-from sloshlab.diagnosis import side_by_side
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem, residuals_of_runs
 from sloshlab.diagnosis.second_process import SecondProcess
 
-pytestmark = pytest.mark.skipif(not side_by_side.CAN_FORK, reason="no copies of a process here")
+pytestmark = pytest.mark.skipif(not copied_process.CAN_FORK, reason="no copies of a process here")
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_it_gives_the_same_numbers_bit_for_bit(case: Decays, monkeypatch: pytest
     jacobian = problem.jacobian(theta, residuals[0], range(theta.size))
     assert made(problem) is beside
     assert beside.n_done > 0
-    monkeypatch.setattr(side_by_side, "N_AT_ONCE", 1)
+    monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)
     for found, expected in zip(residuals, problem.residuals(places), strict=True):
         np.testing.assert_array_equal(found, expected)
     alone = problem.jacobian(theta, residuals[0], range(theta.size))
@@ -104,6 +104,6 @@ def test_there_is_none_for_code_of_others_for_little_work_or_on_one_core(
         changed.setattr(problem.model, "may_be_copied", False)
         assert process_of(problem) is None
     with monkeypatch.context() as changed:
-        changed.setattr(side_by_side, "N_AT_ONCE", 1)
+        changed.setattr(copied_process, "N_AT_ONCE", 1)
         assert process_of(problem) is None
     assert process_of(problem) is not None

@@ -11,13 +11,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from sloshlab.diagnosis import effects, side_by_side
+from sloshlab.diagnosis import copied_process, effects, side_by_side
 from sloshlab.diagnosis.candidate import Candidate, known_effects
-from sloshlab.diagnosis.side_by_side import is_copy
+from sloshlab.diagnosis.copied_process import is_copy
 
 assert effects.__all__
 CANDIDATES = [Candidate(one, cast(Any, None)) for one in known_effects()[:3]]
-pytestmark = pytest.mark.skipif(not side_by_side.CAN_FORK, reason="no copies of a process here")
+pytestmark = pytest.mark.skipif(not copied_process.CAN_FORK, reason="no copies of a process here")
 
 
 def slow_square(i: int) -> tuple[int, int, bool]:
@@ -39,7 +39,7 @@ def test_two_processes_share_the_pieces_and_the_order_is_kept() -> None:
 @pytest.mark.parametrize("n", [1, 4])
 def test_one_core_or_one_piece_needs_no_copy(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if n > 1:
-        monkeypatch.setattr(side_by_side, "N_AT_ONCE", 1)
+        monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)
     assert {pid for _, pid, _ in side_by_side.side_by_side(squares(n), [])} == {os.getpid()}
 
 

@@ -1,0 +1,66 @@
+"""A copy of this process (fork) that works beside it: runs, effects and compiled laws need not be sent."""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import signal
+import sys
+import warnings
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkProcess
+from typing import Any, Final
+
+N_AT_ONCE = 2
+"""Threads or processes that work at once."""
+CAN_FORK: Final = sys.platform == "linux"
+"""Elsewhere there are no copies (Windows), or none that system libraries bear (macOS)."""
+
+
+class _Here:
+    """This process."""
+
+    is_copy = False
+
+
+def is_copy() -> bool:
+    """Whether this process is a copy: nobody reads what it says."""
+    return _Here.is_copy
+
+
+def copied(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Connection]:
+    """A copy that does some work, and our end of a line to it.
+
+    It ends with its work, with this process, or where the work ends as the line does. To be called while no other
+    thread works, as a lock that one of them holds would be held in the copy for ever.
+
+    Parameters
+    ----------
+    work : callable
+        Takes its end of the line, then the arguments.
+    """
+    context = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_as_copy, args=(ours, theirs, work, arguments), daemon=True)
+    with warnings.catch_warnings():  # other threads wait for work meanwhile, and hold no lock
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process.start()
+    theirs.close()
+    return process, ours
+
+
+def ended(process: ForkProcess, line: Connection) -> None:
+    """See to it that a copy has ended; nothing happens where it has."""
+    line.close()
+    process.kill()
+    process.join()
+
+
+def _as_copy(ours: Connection, theirs: Connection, work: Callable[..., None], arguments: tuple[Any, ...]) -> None:
+    ours.close()  # or the line would never end
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process, which ends this one
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    gc.freeze()  # what was there already is not looked through, which would copy it
+    _Here.is_copy = True
+    work(theirs, *arguments)
