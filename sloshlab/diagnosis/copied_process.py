@@ -39,6 +39,8 @@ def copied(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Con
     ----------
     work : callable
         Takes its end of the line, then the arguments.
+    arguments : object
+        Whatever there is; nothing of them is sent.
     """
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
