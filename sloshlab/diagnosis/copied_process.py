@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import multiprocessing
+import os
 import signal
 import sys
 import warnings
@@ -16,6 +18,10 @@ N_AT_ONCE = 2
 """Threads or processes that work at once."""
 CAN_FORK: Final = sys.platform == "linux"
 """Elsewhere there are no copies (Windows), or none that system libraries bear (macOS)."""
+
+
+_PR_SET_PDEATHSIG: Final = 1
+"""Signal for when the process that made this one ends (prctl(2))."""
 
 
 class _Here:
@@ -44,7 +50,7 @@ def copied(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Con
     """
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
-    process = context.Process(target=_as_copy, args=(ours, theirs, work, arguments), daemon=True)
+    process = context.Process(target=_as_copy, args=(os.getpid(), ours, theirs, work, arguments), daemon=True)
     with warnings.catch_warnings():  # other threads wait for work meanwhile, and hold no lock
         warnings.simplefilter("ignore", DeprecationWarning)
         process.start()
@@ -59,7 +65,12 @@ def ended(process: ForkProcess, line: Connection) -> None:
     process.join()
 
 
-def _as_copy(ours: Connection, theirs: Connection, work: Callable[..., None], arguments: tuple[Any, ...]) -> None:
+def _as_copy(
+    first: int, ours: Connection, theirs: Connection, work: Callable[..., None], arguments: tuple[Any, ...]
+) -> None:
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != first:  # it had ended before it was said that this one shall end with it
+        return
     ours.close()  # or the line would never end
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process, which ends this one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -90,3 +93,22 @@ def test_candidates_come_back_as_themselves_and_arrays_as_they_were() -> None:
     for i, (candidate, values, _) in enumerate(found):
         assert candidate is CANDIDATES[i]
         np.testing.assert_array_equal(values, np.arange(5.0) / 7.0 + i)
+
+
+def test_the_copy_ends_with_the_process_that_made_it_however_that_ends(tmp_path: Path) -> None:
+    script = tmp_path / "killed.py"
+    script.write_text(
+        "import os, time\n"
+        "from sloshlab.diagnosis.side_by_side import side_by_side\n"
+        "def piece():\n"
+        "    print(os.getpid(), flush=True)\n"
+        "    time.sleep(60.0)\n"
+        "side_by_side([piece] * 4, [])\n"
+    )
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert len({process.stdout.readline() for _ in range(2)}) == 2
+        process.kill()
+        killed = time.monotonic()
+        assert process.stdout.read() == ""  # when nobody has its other end any more
+        assert time.monotonic() - killed < 30.0
