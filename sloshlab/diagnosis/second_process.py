@@ -44,6 +44,13 @@ class SecondProcess:
     observed : sequence of Observation
     candidates : sequence of Candidate
         Those of which it can be asked.
+
+    Attributes
+    ----------
+    n_done : int
+        How often it has done its work.
+    ending : weakref.finalize
+        Ends it, when called or when the model ends; nothing of it is kept then.
     """
 
     def __init__(
@@ -51,6 +58,7 @@ class SecondProcess:
     ) -> None:
         self.observed, self.candidates = _Numbered(observed), _Numbered(candidates)
         self.n_done = 0
+        self.ending = weakref.finalize(model, self._end)
         self._is_busy = threading.Lock()
         n = sum(one.spectra.size for one in self.observed.all)
         self._shared: FloatArray = np.frombuffer(mmap(-1, 8 * max(1, n)), np.float64)
@@ -73,8 +81,7 @@ class SecondProcess:
         finally:
             self._is_busy.release()
 
-    def close(self) -> None:
-        """End it; nothing happens where it has ended."""
+    def _end(self) -> None:
         ended(self._process, self._line)
 
 
@@ -111,10 +118,9 @@ def second_process(
         unknown = [one for one in candidates if one not in present.candidates]
         if not unseen and not unknown:
             return present
-        present.close()
+        present.ending()
         observed, candidates = [*present.observed.all, *unseen], [*present.candidates.all, *unknown]
     found = _PRESENT[model] = SecondProcess(work, model, observed, candidates)
-    weakref.finalize(model, found.close)
     return found
 
 

@@ -63,6 +63,10 @@ def test_it_is_made_anew_for_an_effect_that_it_has_not_seen(case: Decays) -> Non
     anew = made(problem)
     assert anew is not known
     assert known.done(problem.runs[:1], case.believed, ()) is None  # it has ended
+    forgotten = weakref.ref(known)
+    del known
+    gc.collect()
+    assert forgotten() is None  # and holds no memory until the model ends
     assert made(case.fits.problem([case.pool[CUBIC]])) is anew
     alike = Candidate(case.pool[CUBIC].effect, case.pool[CUBIC].surroundings)  # equal, and yet another one
     assert made(case.fits.problem([alike])) is not anew
