@@ -41,7 +41,7 @@ _THREE_MODES: Final = (
     "modal_masses_kg = [0.8956, 1.0692, 0.9655]",
     "tip_mode_shape = [1.0, 1.0, 1.0]",
 )
-"""Of the beam; within the band of a lower rate there are two."""
+"""Of the beam; where fewer than every second sample is kept, two of them are within the band."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,8 @@ class TankCase:
     maps_from : tuple of str
         Patterns of the sweeps that gave the maps of the liquid, where `twin` names maps.
     work_known_below_g : float
-        Work per cycle at higher levels is left out of the maps.
+        At higher levels the maps have the W̄ of this one at the same frequency: work that goes on growing with the
+        square of the level.
     """
 
     name: str
@@ -84,6 +85,7 @@ class TankCase:
 
 
 _STRONG_SWEEPS: Final = tuple(f"shaker/fill_0.50_sweep_{level}g*.nc" for level in ("3.00", "4.00", "5.00", "6.00"))
+_LONG_STROKE_SWEEPS: Final = ("long_stroke/fill_0.50_long_stroke_sweep_*.nc",)
 _ALL_SWEEPS: Final = ("shaker/fill_0.50_sweep_1.50g.nc", "shaker/fill_0.50_sweep_2.00g.nc", *_STRONG_SWEEPS)
 
 CASES: Final = (
@@ -137,12 +139,33 @@ CASES: Final = (
         work_known_below_g=3.2,
     ),
     TankCase(
+        "long_stroke_maps",
+        "long_stroke/rig_fill_0.50.toml",
+        _LONG_STROKE_SWEEPS,
+        _MAPS.format(_MAPS_FILE, "true"),
+        "dissipation that grows no more at high accelerations",
+        12,
+        below_hz=16.0,
+        within_s=(3.0, 43.0),
+        maps_from=(*_ALL_SWEEPS, *_LONG_STROKE_SWEEPS),
+        work_known_below_g=3.2,
+    ),
+    TankCase(
+        "beam_maps",
+        "beam/rig_beam.toml",
+        ("transients/beam_decay_*.nc", "beam/decay_sloshing_repeat_[12].nc"),
+        _MAPS.format(_MAPS_FILE, "true"),
+        "break-up after some cycles",
+        4,
+        maps_from=_ALL_SWEEPS,
+    ),
+    TankCase(
         "beam_frozen",
         "beam/rig_beam.toml",
         ("transients/beam_decay_*.nc", "beam/decay_sloshing_repeat_[12].nc"),
         _FROZEN,
-        "dissipation above a threshold",
-        4,
+        "dissipation above a threshold, effective mass, break-up after some cycles",
+        2,
     ),
 )
 
@@ -183,19 +206,36 @@ def make_case(recordings: Path, case: TankCase, folder: Path) -> None:
         raise InputError(str(recordings), got=f"no {case.recordings[0]}", allowed="those of the numerical tank")
     with atomic_file.filled_folder(folder) as complete:
         rig = (recordings / case.rig).read_text().replace(_FROZEN, case.twin)
-        for numbers in _THREE_MODES:
+        for numbers in _THREE_MODES if case.every > 2 else ():
             rig = rig.replace(numbers, numbers.rpartition(",")[0] + "]")
         (complete / "rig.toml").write_text(rig)
         if _MAPS_FILE in case.twin:
             settings = ShakerSettings.checked(p=6, m=24, boundaries="measured", allow_incomplete=False)
             sweeps = [file for pattern in case.maps_from for file in sorted(recordings.glob(pattern))]
             maps = analyse_shaker(sweeps, [recordings / _OF_SWEEPS], settings).maps
-            is_known = maps["u_bar"] * maps["omega_bar"] ** 2 < case.work_known_below_g
-            write_dataset(maps.assign(w_bar=maps["w_bar"].where(is_known)), complete / _MAPS_FILE)
+            maps = maps.assign(w_bar=constant_beyond(maps["w_bar"], case.work_known_below_g))
+            write_dataset(maps, complete / _MAPS_FILE)
         (complete / "recordings").mkdir()
         for file in chosen:
             part = part_of(read_recording(file), *case.within_s)
             write_recording(at_lower_rate(part, case.every, case.below_hz), complete / "recordings" / file.name)
+
+
+def constant_beyond(w_bar: xr.DataArray, level_g: float) -> xr.DataArray:
+    """A map whose W̄ beyond a level is, at every frequency, the last that is known below it.
+
+    A twin fills what a map does not know with what is measured nearest, which may be at another frequency and
+    lower, as if saturation were known.
+
+    Parameters
+    ----------
+    w_bar : xarray.DataArray, shape (omega_bar, u_bar)
+    level_g : float
+        Acceleration amplitude ω̄² ū in g; infinite for the map as it is.
+    """
+    is_beyond = (w_bar["omega_bar"] ** 2 * w_bar["u_bar"]).transpose(*w_bar.dims) >= level_g
+    last_known = w_bar.where(~is_beyond).to_pandas().ffill(axis="columns")
+    return w_bar.where(~is_beyond, w_bar.copy(data=last_known.to_numpy()))
 
 
 def part_of(recording: xr.Dataset, from_s: float, to_s: float) -> xr.Dataset:

@@ -22,6 +22,10 @@ SUDDEN_STARTS: Final = (
 """Frequency in Hz and levels in g, up to what the stroke allows."""
 SUDDEN_STARTS_BETWEEN: Final = ((9.5, (3.0,)), (10.5, (2.5, 4.5)), (11.5, (3.5, 6.0)), (12.5, (5.0,)))
 """Between those, for the validation of what was trained on them."""
+LONG_STROKE: Final = "long_stroke"
+LONG_STROKE_M: Final = 0.025
+LONG_STROKE_SWEEPS: Final = ((3.0, 3), (4.0, 1), (5.0, 1), (6.0, 1), (7.0, 1), (8.0, 2))
+"""Levels in g, beyond what the other shaker's stroke allows at 9 … 11.5 Hz, and how often each."""
 OTHER_ACCELERATIONS_G: Final = (0.5, 1.5, 3.0, 4.0, 6.0)
 """From below the threshold over the rise and the maximum to the decline, within what the source shows."""
 
@@ -84,6 +88,7 @@ BEAM_RIG: Final = "beam/rig_beam.toml"
 SDOF_RIG: Final = "sdof/rig_sdof.toml"
 TRANSIENTS_RIG: Final = f"{TRANSIENTS}/{rig_name(HALF_FULL)}"
 SMALLER_DECAYS_RIG: Final = f"{TRANSIENTS}/rig_beam.toml"
+LONG_STROKE_RIG: Final = f"{LONG_STROKE}/{rig_name(HALF_FULL)}"
 
 
 def _shaker_rig(fill_level: float) -> str:
@@ -94,6 +99,7 @@ RIG_TEXTS: Final[Mapping[str, str]] = {
     **{_shaker_rig(fill): rig_text(fill) for fill in (OTHER_FILLS[0], HALF_FULL, OTHER_FILLS[1])},
     TRANSIENTS_RIG: rig_text(HALF_FULL),
     SMALLER_DECAYS_RIG: _BEAM_TEXT,
+    LONG_STROKE_RIG: rig_text(HALF_FULL).replace("the electrodynamic shaker", "a shaker of twice the stroke"),
     BEAM_RIG: _BEAM_TEXT,
     SDOF_RIG: _SDOF_TEXT,
 }
@@ -135,7 +141,8 @@ class NumericalRun:
 def numerical_runs() -> list[NumericalRun]:
     """All runs of the campaign."""
     listed = [*_half_full_runs(), *_other_fill_runs(), *_beam_runs(), *_sdof_runs()]
-    listed += [*_sudden_starts(), *_smaller_decays()]  # new ones at the end: seeds follow from the place
+    # new ones at the end: seeds follow from the place
+    listed += [*_sudden_starts(), *_smaller_decays(), *_long_stroke_sweeps()]
     return [NumericalRun(name, rig, number, settings) for number, (name, rig, settings) in enumerate(listed)]
 
 
@@ -236,6 +243,28 @@ def _smaller_decays() -> list[_Listed]:
         )
         for deflection_m in (0.0065, 0.0100)
         for repeat in (1, 2, 3)
+    ]
+
+
+def _long_stroke_sweeps() -> list[_Listed]:
+    """Slow sweeps over the beam's frequency on a shaker of twice the stroke, as fast as the others."""
+    settings = {
+        "experiment": "shaker_sweep",
+        "configuration": "sloshing",
+        "start_hz": 9.0,
+        "stop_hz": 11.5,
+        "duration_s": 45.0,
+        "stroke_limit_m": LONG_STROKE_M,
+    }
+    return [
+        (
+            f"{LONG_STROKE}/fill_{HALF_FULL:.2f}_{LONG_STROKE}_sweep_{level_g:.2f}g"
+            + f"_repeat_{repeat}" * (n_repeats > 1),
+            LONG_STROKE_RIG,
+            {**settings, "acceleration_g": level_g, "repeat": repeat},
+        )
+        for level_g, n_repeats in LONG_STROKE_SWEEPS
+        for repeat in range(1, n_repeats + 1)
     ]
 
 

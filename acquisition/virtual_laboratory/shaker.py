@@ -22,9 +22,11 @@ FloatArray = NDArray[np.float64]
 Law = Literal["octave", "linear", "stepped", "vfa", "constant"]
 
 STROKE_LIMIT_M: Final = 0.0125
+"""Of the electrodynamic shaker of the source."""
 IMPACT_PHASE_RAD: Final = 1.35 * np.pi
 """Where in the cycle the liquid meets the roof: on the way down, soon after ü = −a₀."""
 
+_LONGEST_STROKE_M = 0.5
 _KNOT_STEP_S = 0.05
 _JOIN_SHARPNESS = 20.0
 _START_RAMP_S, _STOP_RAMP_S = 1.5, 1.0
@@ -51,6 +53,8 @@ class SweepPlan:
         Length of the run, ramps included.
     n_steps
         Dwells of a stepped run.
+    stroke_limit_m
+        Largest displacement amplitude of the shaker.
     """
 
     acceleration_g: float
@@ -59,6 +63,7 @@ class SweepPlan:
     stop_hz: float = 20.0
     duration_s: float = 240.0
     n_steps: int = 24
+    stroke_limit_m: float = STROKE_LIMIT_M
 
     def __post_init__(self) -> None:
         for name in ("acceleration_g", "start_hz", "stop_hz"):
@@ -68,6 +73,10 @@ class SweepPlan:
             raise InputError("sweep: duration_s", got=f"{self.duration_s:g}", allowed="5 … 7200 s")
         if not 2 <= self.n_steps <= 1000:
             raise InputError("sweep: n_steps", got=str(self.n_steps), allowed="2 … 1000")
+        if not 0 < self.stroke_limit_m <= _LONGEST_STROKE_M:
+            raise InputError(
+                "sweep: stroke_limit_m", got=f"{self.stroke_limit_m:g}", allowed=f"> 0 and ≤ {_LONGEST_STROKE_M:g}"
+            )
         if self.law not in ("octave", "linear", "stepped", "vfa", "constant"):
             raise InputError("sweep: law", got=repr(self.law), allowed="octave, linear, stepped, vfa, constant")
         if self.law == "constant":
@@ -247,7 +256,7 @@ def shaken(plan: SweepPlan, imperfections: Imperfections | None = None) -> Motio
     phi = make_interp_spline(time_s, plan.initial_phase_rad + faults.start_phase_rad + turned + wander, k=5)
     omega_true = phi.derivative()(time_s)
     level = plan.level_g(time_s) * GRAVITY_M_PER_S2 * (1 + faults.amplitude_ripple * _slow_noise(time_s, slow))
-    stroke = STROKE_LIMIT_M * omega_true**2
+    stroke = plan.stroke_limit_m * omega_true**2
     acceleration = (level**-_JOIN_SHARPNESS + stroke**-_JOIN_SHARPNESS) ** (-1 / _JOIN_SHARPNESS)
     if faults.ramps:
         acceleration = acceleration * _ramps(time_s, plan.duration_s)
@@ -272,12 +281,12 @@ def _check_sudden_start(plan: SweepPlan) -> None:
         got = f"{plan.start_hz:g} and {plan.stop_hz:g} Hz"
         raise InputError("sudden start: start_hz and stop_hz", got=got, allowed="one frequency")
     stroke_m = plan.acceleration_g * GRAVITY_M_PER_S2 / (2 * np.pi * plan.start_hz) ** 2
-    if stroke_m > STROKE_LIMIT_M:
-        highest_g = STROKE_LIMIT_M * (2 * np.pi * plan.start_hz) ** 2 / GRAVITY_M_PER_S2
+    if stroke_m > plan.stroke_limit_m:
+        highest_g = plan.stroke_limit_m * (2 * np.pi * plan.start_hz) ** 2 / GRAVITY_M_PER_S2
         raise InputError(
             "sudden start: stroke",
             got=f"{1e3 * stroke_m:.4g} mm for {plan.acceleration_g:g} g at {plan.start_hz:g} Hz",
-            allowed=f"at most {1e3 * STROKE_LIMIT_M:g} mm, that is {highest_g:.3g} g",
+            allowed=f"at most {1e3 * plan.stroke_limit_m:g} mm, that is {highest_g:.3g} g",
             remedy="less acceleration or a higher frequency",
         )
 

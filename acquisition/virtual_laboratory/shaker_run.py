@@ -23,6 +23,7 @@ from acquisition.virtual_laboratory.sensors import (
     reading,
 )
 from acquisition.virtual_laboratory.shaker import (
+    STROKE_LIMIT_M,
     Imperfections,
     Kinematics,
     Law,
@@ -108,6 +109,7 @@ def virtual_shaker_run(
     stop_hz: float = 20.0,
     duration_s: float = 240.0,
     n_steps: int = 24,
+    stroke_limit_m: float = STROKE_LIMIT_M,
     sampling_rate_hz: float = 512.0,
     seed: int = 0,
     laboratory: Laboratory | None = None,
@@ -134,13 +136,15 @@ def virtual_shaker_run(
     configuration : {'sloshing', 'frozen', 'empty'}
         What the tank holds.
     acceleration_g : float
-        Amplitude in g where the stroke limit of 12.5 mm allows it; of a VFA run the largest.
+        Amplitude in g where the stroke limit allows it; of a VFA run the largest.
     direction : {'up', 'down'}
         From `start_hz` to `stop_hz` or back.
     law : {'octave', 'linear', 'stepped'}
         How the frequency goes.
     start_hz, stop_hz, duration_s, n_steps, sampling_rate_hz : float
         Of the sweep and of the recorder; `n_steps` of a stepped run.
+    stroke_limit_m : float
+        Largest displacement of the shaker; by default that of the source's, 12.5 mm.
     seed : int
         Of everything that differs between repeats.
     laboratory : Laboratory, optional
@@ -197,6 +201,7 @@ def virtual_shaker_run(
         stop_hz=last,
         duration_s=duration_s,
         n_steps=n_steps,
+        stroke_limit_m=stroke_limit_m,
     )
     time_s = _sample_times(duration_s, sampling_rate_hz, max(start_hz, stop_hz))
     flags = _lost_samples(time_s, lost)
@@ -270,7 +275,14 @@ def _check_choice(what: str, got: str, allowed: tuple[str, ...]) -> None:
 def _numerical_motion(experiment: str, plan: SweepPlan, seed: int, imperfect: bool) -> TankMotion:
     if experiment in TONES:
         make = TONES[experiment]
-        return make(plan.acceleration_g, plan.start_hz, plan.stop_hz, plan.duration_s, seed=seed)
+        return make(
+            plan.acceleration_g,
+            plan.start_hz,
+            plan.stop_hz,
+            plan.duration_s,
+            seed=seed,
+            stroke_limit_m=plan.stroke_limit_m,
+        )
     generator = np.random.default_rng([seed, 1])
     return shaken(plan, Imperfections.drawn(generator, impact_phase_rad=None) if imperfect else None)
 

@@ -100,7 +100,13 @@ class ToneMotion:
 
 
 def random_motion(
-    rms_g: float, lowest_hz: float, highest_hz: float, duration_s: float, *, seed: int
+    rms_g: float,
+    lowest_hz: float,
+    highest_hz: float,
+    duration_s: float,
+    *,
+    seed: int,
+    stroke_limit_m: float = STROKE_LIMIT_M,
 ) -> ToneMotion:
     """Noise whose acceleration has a flat spectrum in a band and none outside.
 
@@ -112,6 +118,8 @@ def random_motion(
     duration_s : float
     seed : int
         Of amplitudes and phases.
+    stroke_limit_m : float
+        Largest displacement of the shaker.
 
     Raises
     ------
@@ -130,11 +138,18 @@ def random_motion(
     size = generator.rayleigh(size=frequency_hz.size)  # Gaussian noise: Rayleigh amplitudes, any phase
     amplitude = rms_g * GRAVITY_M_PER_S2 * size * np.sqrt(2 / np.sum(size**2))
     phase = generator.uniform(-np.pi, np.pi, frequency_hz.size)
-    return _within_stroke(ToneMotion.of_tones(frequency_hz, amplitude, phase, duration_s), "random motion")
+    motion = ToneMotion.of_tones(frequency_hz, amplitude, phase, duration_s)
+    return _within_stroke(motion, stroke_limit_m, "random motion")
 
 
 def two_tone_motion(
-    acceleration_g: float, first_hz: float, second_hz: float, duration_s: float, *, seed: int
+    acceleration_g: float,
+    first_hz: float,
+    second_hz: float,
+    duration_s: float,
+    *,
+    seed: int,
+    stroke_limit_m: float = STROKE_LIMIT_M,
 ) -> ToneMotion:
     """Two tones of the same acceleration amplitude.
 
@@ -147,6 +162,8 @@ def two_tone_motion(
     duration_s : float
     seed : int
         Of the phases.
+    stroke_limit_m : float
+        Largest displacement of the shaker.
 
     Raises
     ------
@@ -157,7 +174,8 @@ def two_tone_motion(
     phase = np.random.default_rng([seed, 1]).uniform(-np.pi, np.pi, 2)
     amplitude = np.full(2, acceleration_g * GRAVITY_M_PER_S2)
     frequency_hz = np.array([first_hz, second_hz])
-    return _within_stroke(ToneMotion.of_tones(frequency_hz, amplitude, phase, duration_s), "two tones")
+    motion = ToneMotion.of_tones(frequency_hz, amplitude, phase, duration_s)
+    return _within_stroke(motion, stroke_limit_m, "two tones")
 
 
 def _check_tones(level_g: float, lowest_hz: float, highest_hz: float, duration_s: float) -> None:
@@ -169,14 +187,14 @@ def _check_tones(level_g: float, lowest_hz: float, highest_hz: float, duration_s
         raise InputError("duration_s", got=f"{duration_s:g}", allowed="5 … 600 s")
 
 
-def _within_stroke(motion: ToneMotion, what: str) -> ToneMotion:
+def _within_stroke(motion: ToneMotion, limit_m: float, what: str) -> ToneMotion:
     time_s = np.arange(round(motion.duration_s * _KNOTS_PER_S)) / _KNOTS_PER_S
     stroke_m = float(np.abs(motion.at(time_s).displacement).max())
-    if stroke_m > STROKE_LIMIT_M:
+    if stroke_m > limit_m:
         raise InputError(
             f"{what}: stroke",
             got=f"{1e3 * stroke_m:.4g} mm",
-            allowed=f"at most {1e3 * STROKE_LIMIT_M:g} mm",
+            allowed=f"at most {1e3 * limit_m:g} mm",
             remedy="less acceleration or higher frequencies",
         )
     return motion

@@ -26,9 +26,10 @@ PARAMETERS: Final = (
     Parameter("calming_s", "s", 0.0, 1e9, 0.0),
     Parameter("sharpness", "1", 1.0, 100.0, 30.0),
     Parameter("averaging_s", "s", 1e-3, 100.0, 0.2),
+    Parameter("saturation_exponent", "1", 0.0, 10.0, 2.0),
 )
 """Of every law that has both, side by side; a break-up time of a millisecond or less is none."""
-_SATURATION, _BREAK_UP, _AGITATED, _CALMING, _SHARPNESS, AVERAGING = range(len(PARAMETERS))
+_SATURATION, _BREAK_UP, _AGITATED, _CALMING, _SHARPNESS, AVERAGING, _EXPONENT = range(len(PARAMETERS))
 
 
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
@@ -39,9 +40,9 @@ def level_g(mean_square):
 
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
 def share_by_saturation(parameters, at, level):
-    """(a_s/â)² beyond a_s, else one; `at` is where `PARAMETERS` begin."""
+    """(a_s/â)ⁿ beyond a_s, else one; `at` is where `PARAMETERS` begin. With n = 2 work per cycle stops growing."""
     if level > parameters[at + _SATURATION]:
-        return (parameters[at + _SATURATION] / level) ** 2
+        return (parameters[at + _SATURATION] / level) ** parameters[at + _EXPONENT]
     return 1.0
 
 

@@ -66,7 +66,7 @@ LIQUID_DAMPING = register(
             at_rest(values["break_up_s"]),
         ),
         uses_acceleration=True,
-        equation="−s [c (a_s/â)² beyond a_s + (m_l/π) Ω W̄_peak 2b/(1 + b²)] v, b = (â/a_t − 1)/rise beyond a_t, "
+        equation="−s [c (a_s/â)ᵐ beyond a_s + (m_l/π) Ω W̄_peak 2b/(1 + b²)] v, b = (â/a_t − 1)/rise beyond a_t, "
         "ṡ = p (1 − s)/τ − (1 − p) s/τ_calm, p = rⁿ/(1 + rⁿ), r = â/a_agitated; â from the mean square of a",
     )
 )

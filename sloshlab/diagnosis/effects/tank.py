@@ -15,7 +15,7 @@ from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, forc
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.liquid_effects import AIR_CUSHION, FARADAY_WAVE, LATERAL_MODE, LIQUID_DAMPING, LIQUID_LOSS
 from sloshlab.twin.structure_forces import COULOMB_FRICTION, MASS_ERROR, QUADRATIC_DRAG, VISCOUS_DAMPING
-from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS, VARYING_MASS
+from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS, VARYING_MASS, VISCOUS_MAP
 from sloshlab.twin.terms import Term
 
 _CONTACT_HZ: Final = 50.0
@@ -192,7 +192,7 @@ SLOSHING = register(
 )
 
 
-_DAMPERS: Final = ("viscous_damping", "liquid_damping", "viscous_map")
+_DAMPERS: Final = ("viscous_damping", "liquid_damping", VISCOUS_MAP.name)
 _OF_MOVING_LIQUID: Final = (*_DAMPERS, "effective_mass_map")
 """Forces of the baseline that stand for moving liquid: liquid that has not broken up yet has none of them."""
 
@@ -289,6 +289,43 @@ SATURATION = register(
         _LEVELS,
         _damps,
         spoken_for_by=("odd in velocity", "onset"),
+    )
+)
+
+
+def _knows_work(at: Surroundings) -> bool:
+    """Whether work per cycle was measured over the level: a fitted damper has no level from which it falls."""
+    return any(term.place == "tank" and term.name == VISCOUS_MAP.name for term in at.twin.terms)
+
+
+GRADUAL_SATURATION = register(
+    Effect(
+        "gradual_saturation",
+        "tank",
+        "the damping of the liquid times (a_s/â)ⁿ beyond a_s: work per cycle grows less, or falls where n > 2",
+        (
+            EffectParameter("threshold_g", 0.02, 50.0),
+            EffectParameter("exponent", 0.2, 4.0),
+            EffectParameter("averaging_s", 0.01, 5.0, may_rest=True),
+        ),
+        lambda at: [
+            {"threshold_g": share * _largest_g(at), "exponent": 1.0, "averaging_s": 2 / at.frequency_hz}
+            for share in (0.3, 0.5, 0.7)
+        ],
+        _changed_liquid(
+            lambda term, numbers, at: term.changed(
+                saturation_g=numbers["threshold_g"],
+                saturation_exponent=numbers["exponent"],
+                averaging_s=numbers["averaging_s"],
+            ),
+            (VISCOUS_MAP.name,),
+        ),
+        ("breakup_delay", "liquid_sloshing"),
+        _LEVELS,
+        _knows_work,
+        spoken_for_by=("odd in velocity", "onset"),
+        includes=("high_g_saturation",),
+        variant_of="high_g_saturation",
     )
 )
 

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded_oscillators import DAMPING, LIQUID_KG, MASS_KG, OMEGA, RATE_HZ, STIFFNESS, decays, effect, rig
+import xarray as xr
+from recorded_oscillators import DAMPING, LIQUID_KG, MASS_KG, OMEGA, RATE_HZ, RIG, STIFFNESS, decays, effect, rig
 from recorded_oscillators import surroundings as surroundings_of
 from scipy.interpolate import CubicSpline
 
@@ -20,7 +21,7 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, candidates, known_effects
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.rig import Structure
+from sloshlab.rig import Rig, Structure
 from sloshlab.twin.liquid_effects import LIQUID_DAMPING
 from sloshlab.twin.tank_forces import FADING_MASS
 
@@ -345,6 +346,43 @@ def built_up(level: np.ndarray, agitated_g: float, time_constant_s: float, calmi
 
 def test_a_delayed_break_up_builds_the_damping_of_the_liquid_up_and_it_stays(damped: RigModel) -> None:
     numbers = {"time_constant_s": 0.4, "agitated_g": 2.0, "averaging_s": 0.12, "sharpness": 4.0}
+@pytest.fixture(scope="module")
+def with_maps(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
+    """The twin's liquid has W̄ = 1.8 everywhere and no effective mass."""
+    folder = tmp_path_factory.mktemp("maps")
+    grid = {"omega_bar": [1.0, 3.0], "u_bar": [0.0, 2.0]}
+    constant = {name: (tuple(grid), np.full((2, 2), value)) for name, value in (("w_bar", 1.8), ("beta", 0.0))}
+    xr.Dataset(constant, grid).to_netcdf(folder / "maps.nc")
+    text = RIG.replace("TANK_MODEL", "viscous") + 'maps = "maps.nc"\nmetric = "map"\n'
+    (folder / "rig.toml").write_text(text, encoding="utf-8")
+    return RigModel(Rig.from_toml(folder / "rig.toml"), folder, decays((START_M,), DURATION_S))
+
+
+@pytest.mark.parametrize("exponent", [0.6, 3.0])
+def test_measured_work_falls_gradually_beyond_its_threshold(with_maps: RigModel, exponent: float) -> None:
+    """−(m_l/π) Ω W̄ (a_s/â)ⁿ v beyond a_s, the map's −(m_l/π) Ω W̄ v below."""
+    numbers = {"threshold_g": 2.2, "exponent": exponent, "averaging_s": 0.12}
+    m = moved(with_maps, "tank.gradual_saturation", numbers)
+    level = level_g(m, 0.12, start=0.0)
+    share = np.minimum(1.0, (2.2 / np.maximum(level, 1e-3)) ** exponent)
+    expected = -LIQUID_KG / np.pi * tracked_omega(m, 0.2) * 1.8 * share * m["v"]
+    known = smooth(m) & (m["t"] > 0.3)  # what the map follows begins with a small motion of 10 Hz
+    assert np.abs(added(m) - expected)[known].max() < 0.03 * np.abs(expected).max()
+    assert (level[known] > 2.6).any()
+    assert (level[known] < 2.1).any()
+
+
+def test_a_gradual_saturation_is_of_measured_work_alone(
+    frozen: RigModel, damped: RigModel, with_maps: RigModel
+) -> None:
+    """A damper that is fitted has no level from which it falls; sloshing with a peak describes what does."""
+    sought = [
+        "tank.gradual_saturation" in {one.key for one in candidates(surroundings_of(model))}
+        for model in (frozen, damped, with_maps)
+    ]
+    assert sought == [False, False, True]
+
+
     m = moved(damped, "tank.breakup_delay", numbers)
     built = built_up(level_g(m, 0.12), 2.0, 0.4, np.inf)
     known = smooth(m)
@@ -415,3 +453,4 @@ def test_a_lateral_mode_is_sought_where_the_tank_rocks_alone(
     there = candidates(replace(at, rig=at.rig.model_copy(update={"structure": held})))
     assert ("tank.lateral_mode" in {one.key for one in there}) == sought
     assert "tank.effective_mass" in {one.key for one in there}
+        "tank.gradual_saturation",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipelines.tank_diagnosis import CASES, TankCase, at_lower_rate, make_case, part_of
+from pipelines.tank_diagnosis import CASES, TankCase, at_lower_rate, constant_beyond, make_case, part_of
 from sloshlab.errors import InputError
 from sloshlab.recording import read_recording
 
@@ -64,6 +64,21 @@ def test_a_lower_rate_keeps_the_noise_per_band_and_nothing_above_what_is_asked()
     power = np.abs(np.fft.rfft(lower.force.values)) ** 2 / lower.force.size
     assert power[frequency < 12.0].mean() == pytest.approx(lower.force.attrs["noise_std"] ** 2, rel=0.05)
     assert power[frequency > 22.0].mean() < 1e-3 * power[frequency < 12.0].mean()
+
+
+def test_work_beyond_a_level_is_that_of_the_last_known_one_at_the_same_frequency() -> None:
+    """ω̄² ū is 0.5, 1, 1.5, 2 g in the first row and four times that in the second; gaps below the level stay."""
+    measured = xr.DataArray(
+        [[np.nan, 7.0, 5.0, 4.0], [6.0, 9.0, 3.0, 2.0]],
+        {"omega_bar": [1.0, 2.0], "u_bar": [0.5, 1.0, 1.5, 2.0]},
+        ("omega_bar", "u_bar"),
+    )
+    known = constant_beyond(measured, 1.6)
+    assert known.sel(omega_bar=1.0).values[1:].tolist() == [7.0, 5.0, 5.0]
+    assert np.isnan(known.sel(omega_bar=1.0).values[0])
+    assert np.isnan(known.sel(omega_bar=2.0).values).all()
+    assert constant_beyond(measured, 3.0).sel(omega_bar=2.0).values.tolist() == [6.0, 6.0, 6.0, 6.0]
+    xr.testing.assert_identical(constant_beyond(measured, np.inf), measured)
 
 
 def test_a_part_of_a_recording_begins_with_zero() -> None:

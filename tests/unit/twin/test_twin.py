@@ -244,21 +244,23 @@ def test_a_constant_map_of_work_is_the_damper_of_appendix_e() -> None:
 
 
 def test_the_forces_of_a_map_come_late_where_liquid_breaks_up_late_and_fall_where_it_saturates() -> None:
-    """Beside the same motion without: s = 1 − e^(−pt/τ) at a constant level, times (a_s/â)²."""
+    """Beside the same motion without: s = 1 − e^(−pt/τ) at a constant level, times (a_s/â)² or another power."""
     known = {"liquid_mass_kg": 0.12, "height_m": 0.03, "start_frequency_hz": 10.0, "table": w_bar_map(1.2)}
     level_g = 0.003 * (2 * np.pi * 10) ** 2 / 9.80665
     agitated = {"break_up_s": 0.5, "agitated_g": level_g, "calming_s": 1e9, "sharpness": 4.0, "averaging_s": 0.01}
     run = harmonic(0.003, 10.0, 4.0, 2000.0)
     for kind in (VISCOUS_MAP, EFFECTIVE_MASS_MAP):
-        plain, late, saturated = (
+        beyond = {"saturation_g": level_g / 2, "averaging_s": 1.0}
+        plain, late, saturated, gradual = (
             Twin(None, (kind(**known, **numbers),)).simulate(run).forces_n[:, 0]
-            for numbers in ({}, agitated, {"saturation_g": level_g / 2, "averaging_s": 1.0})
+            for numbers in ({}, agitated, beyond, {**beyond, "saturation_exponent": 0.5})
         )
         time, large = np.arange(plain.size) / 2000.0, np.abs(plain) > 0.5 * np.abs(plain).max()
         share = late[large] / plain[large]
         # the running mean of 10 ms lets p swing about a half within the cycle
         assert np.abs(share - (1 - np.exp(-time[large] / 1.0)))[time[large] > 0.3].max() < 0.05
         assert np.abs(saturated[large] / plain[large] - 0.25)[time[large] > 3.5].max() < 0.03
+        assert np.abs(gradual[large] / plain[large] - 0.5**0.5)[time[large] > 3.5].max() < 0.02
 
 
 @pytest.mark.parametrize("rate_hz", [40.0, 64.0, 2000.0])

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 import subprocess
 import sys
@@ -88,6 +89,10 @@ def test_the_runs_are_those_that_were_asked_for() -> None:
     assert random == [(0.1, 90), (0.2, 90), (0.4, 90)]
     sdof = [run.settings for run in runs if run.rig.startswith("sdof")]
     assert {one["initial_displacement_m"] for one in sdof} == {0.064}
+    long_stroke = [run.settings for run in runs if run.name.startswith("long_stroke")]
+    assert sorted(one["acceleration_g"] for one in long_stroke) == [3, 3, 3, 4, 5, 6, 7, 8, 8]
+    for one in long_stroke:  # within the stroke at the lowest frequency
+        assert one["acceleration_g"] * 9.81 / (2 * math.pi * one["start_hz"]) ** 2 < one["stroke_limit_m"]
     transients = [run.settings for run in runs if run.name.startswith("transients")]
     kinds = [one["experiment"] for one in transients]
     assert {kind: kinds.count(kind) for kind in kinds} == {
@@ -107,6 +112,7 @@ def test_runs_that_were_there_before_keep_their_seeds() -> None:
     assert runs["beam/decay_sloshing_repeat_1"] == 31
     assert runs["sdof/decay_sloshing"] == 38
     assert min(number for name, number in runs.items() if name.startswith("transients")) == 39
+    assert min(number for name, number in runs.items() if name.startswith("long_stroke")) == 85
 
 
 def test_repeats_share_everything_but_seed_and_repeat() -> None:

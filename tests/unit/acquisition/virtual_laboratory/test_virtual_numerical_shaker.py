@@ -157,6 +157,9 @@ def test_a_sudden_start_beyond_the_stroke_is_refused():
     SweepPlan(0.999 * highest_g, "constant", 8.0, 8.0)
     with pytest.raises(InputError, match=r"stroke: got 12\.51 mm for .*; allowed: at most 12\.5 mm, that is 3\.2"):
         SweepPlan(1.001 * highest_g, "constant", 8.0, 8.0)
+    SweepPlan(1.999 * highest_g, "constant", 8.0, 8.0, stroke_limit_m=2 * STROKE_LIMIT_M)
+    with pytest.raises(InputError, match=r"allowed: at most 25 mm, that is 6\.4"):
+        SweepPlan(2.001 * highest_g, "constant", 8.0, 8.0, stroke_limit_m=2 * STROKE_LIMIT_M)
     with pytest.raises(InputError, match="one frequency"):
         SweepPlan(0.1, "constant", 8.0, 9.0)
 

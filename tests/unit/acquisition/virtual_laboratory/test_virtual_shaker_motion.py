@@ -61,6 +61,17 @@ def test_a_high_level_starts_on_the_stroke_limit_and_joins_its_iso_acceleration_
     assert 0.96 * 6 * 9.81 < np.abs(acceleration[about]).max() < 6 * 9.81
 
 
+def test_a_shaker_of_longer_stroke_reaches_a_level_at_lower_frequencies():
+    time_s = np.arange(0, 60, 1 / 2048)
+    reached = {}
+    for stroke_limit_m in (0.0125, 0.03):
+        plan = SweepPlan(6.0, start_hz=8.2, stop_hz=8.4, duration_s=60.0, stroke_limit_m=stroke_limit_m)
+        u, _, acceleration = moved(shaken(plan), time_s)
+        reached[stroke_limit_m] = np.abs(u).max(), np.abs(acceleration).max()
+    assert reached[0.0125][0] == pytest.approx(0.0125, rel=1e-4)
+    assert reached[0.03][1] == pytest.approx(6 * 9.81, rel=1e-3)  # 0.0222 m at 8.2 Hz
+
+
 @pytest.mark.parametrize(
     ("plan", "expected_hz"),
     [
@@ -132,6 +143,9 @@ def test_imperfections_are_seen_and_stay_small():
         ({"acceleration_g": 1.0, "duration_s": 1e9}, "duration_s"),
         ({"acceleration_g": 1.0, "law": "sideways"}, "law"),
         ({"acceleration_g": 1.0, "n_steps": 1}, "n_steps"),
+        ({"acceleration_g": 1.0, "stroke_limit_m": 0.0}, "stroke_limit_m: got 0; allowed: > 0 and ≤ 0.5"),
+        ({"acceleration_g": 1.0, "stroke_limit_m": math.nan}, "stroke_limit_m"),
+        ({"acceleration_g": 1.0, "stroke_limit_m": 25.0}, "stroke_limit_m"),
     ],
 )
 def test_impossible_plans_are_refused(settings, match):

@@ -75,6 +75,11 @@ def test_what_the_shaker_cannot_do_is_refused(rig):
         random_motion(2.0, 5.0, 20.0, 30.0, seed=1)
     with pytest.raises(InputError, match="two tones: stroke"):
         two_tone_motion(4.0, 7.0, 9.0, 10.0, seed=1)
+    with pytest.raises(InputError, match=r"random motion: stroke: .*at most 20 mm"):
+        random_motion(2.0, 5.0, 20.0, 30.0, seed=1, stroke_limit_m=0.02)
+    longer = two_tone_motion(4.0, 7.0, 9.0, 10.0, seed=1, stroke_limit_m=0.04)
+    time_s = np.linspace(0, 10, 20_000)
+    assert 0.0125 < np.abs(longer.at(time_s).displacement).max() <= 0.04
     with pytest.raises(InputError, match="start_hz and stop_hz"):
         two_tone_motion(1.0, 12.0, 9.0, 10.0, seed=1)
     with pytest.raises(InputError, match="no law"):
