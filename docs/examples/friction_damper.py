@@ -1,7 +1,6 @@
 """A banded rotary friction damper diagnosed with a twin of its own: ``python friction_damper.py FOLDER CASE``.
 
-Three amplitudes at one tension of the band become the recordings of CASE; the middle one chooses nothing. With
-``--own-effect`` the effect of `friction_damper_effects.py` is tried beside the vocabulary.
+Three amplitudes at one tension of the band become the recordings of CASE; the middle one chooses nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ import xarray as xr
 from sloshlab.recording import write_recording
 
 TWIN = Path(__file__).with_name("friction_damper_twin.py")
-EFFECTS = Path(__file__).with_name("friction_damper_effects.py")
 NAME = "dataset-2__characterization_datasets__0.5Hz30lbtension{}amplitude.json"
 AMPLITUDES = ("0.5", "1", "1.5")
 EVERY = 32
@@ -62,23 +60,18 @@ def recording(displacement: np.ndarray, force: np.ndarray, rate_hz: float, ampli
     return xr.Dataset(channels, coords={"time": np.arange(force.size) / rate_hz}, attrs=attributes)
 
 
-def diagnosed(case: Path, *, report: bool = True, own_effect: bool = False) -> dict[str, Any]:
-    """The diagnosis of the case, as ``sloshlab diagnose CASE --twin … [--effects …]`` makes it."""
+def diagnosed(case: Path, *, report: bool = True) -> dict[str, Any]:
+    """The diagnosis of the case, as ``sloshlab diagnose CASE --twin …`` makes it."""
     from pipelines.diagnose import diagnose_case
 
-    known = (EFFECTS,) if own_effect else ()
-    return diagnose_case(
-        case, None, command="docs/examples/friction_damper.py", report=report, twin=TWIN, effects=known
-    )
+    return diagnose_case(case, None, command="docs/examples/friction_damper.py", report=report, twin=TWIN)
 
 
 def main(arguments: list[str]) -> None:
     """Write the case, diagnose it, say what was found."""
-    own_effect = "--own-effect" in arguments
-    places = [one for one in arguments if not one.startswith("--")]
-    folder = Path(places[0] if places else os.environ["SLOSHLAB_EXTERNAL_DATA"])
-    case = write_case(folder, Path(places[1] if len(places) > 1 else "friction_damper_case"))
-    found = diagnosed(case, own_effect=own_effect)
+    folder = Path(arguments[0] if arguments else os.environ["SLOSHLAB_EXTERNAL_DATA"])
+    case = write_case(folder, Path(arguments[1] if len(arguments) > 1 else "friction_damper_case"))
+    found = diagnosed(case)
     sys.stdout.write("\n".join(found["lines"]) + "\n")
 
 

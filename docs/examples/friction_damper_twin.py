@@ -10,20 +10,28 @@ from scipy.interpolate import CubicSpline
 
 from sloshlab.diagnosis.user_twin import AddedForce, Compared, FreeTwin, Parameter, Response, TwinRun
 
+STEPS_PER_SAMPLE = 4  # of forces with memory: between two samples the actuator moves as far as a play is wide
+
 
 def damper(run: TwinRun, values: Mapping[str, float], added: AddedForce) -> Response:
-    """The force along the recorded motion; forces with memory by Heun's method, a step per sample."""
+    """The force along the recorded motion; forces with memory by Heun's method."""
     motion = CubicSpline(run.time_s, run.channels["displacement_actuator"])
-    x, v, a = (motion(run.time_s, order) for order in range(3))
+    n_steps = STEPS_PER_SAMPLE if added.n_states else 1
+    step = 1 / (run.sampling_rate_hz * n_steps)
+    time_s = run.time_s[0] + step * np.arange((run.n_samples - 1) * n_steps + 1)
+    along = list(zip(time_s.tolist(), motion(time_s).tolist(), motion(time_s, 1).tolist(), strict=True))
     states, missing = added.start(), np.empty(run.n_samples)
-    for i, (t, here, speed) in enumerate(zip(run.time_s.tolist(), x.tolist(), v.tolist(), strict=True)):
-        missing[i], rates = added.with_rates(t, here, speed, states)
-        if added.n_states and i + 1 < run.n_samples:
-            step = 1 / run.sampling_rate_hz
-            _, next_rates = added.with_rates(t + step, float(x[i + 1]), float(v[i + 1]), states + step * rates)
-            states = states + step / 2 * (rates + next_rates)
-    force = values["viscous damping"] * v + values["stiffness"] * x + added.mass_kg * a - missing
-    return Response({"force_damper": force}, np.stack([x, v, a], axis=1))
+    with np.errstate(over="ignore", invalid="ignore"):  # a force that runs away is no answer, and says so
+        for i, now in enumerate(along):
+            force, rates = added.with_rates(*now, states)
+            if i % n_steps == 0:
+                missing[i // n_steps] = force
+            if added.n_states and i + 1 < len(along):
+                _, next_rates = added.with_rates(*along[i + 1], states + step * rates)
+                states = states + step / 2 * (rates + next_rates)
+    x, v, a = (motion(run.time_s, order) for order in range(3))
+    force_n = values["viscous damping"] * v + values["stiffness"] * x + added.mass_kg * a - missing
+    return Response({"force_damper": force_n}, np.stack([x, v, a], axis=1))
 
 
 TWIN = FreeTwin(

@@ -14,7 +14,7 @@ from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, WORK_COLOUR
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.mismatch import ChannelMismatch, mismatches
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.verdict.wording import named_and_placed
+from sloshlab.diagnosis.verdict.wording import form_and_place
 
 FloatArray = NDArray[np.float64]
 _MOST_ROWS = 14
@@ -240,7 +240,7 @@ def extended_label(diagnosis: Diagnosis) -> str:
 
 def words(one: Explanation, between: str = " + ") -> str:
     """Effects of an explanation and where they act."""
-    return between.join(plain(named_and_placed(candidate), 64) for candidate in one.fit.candidates)
+    return between.join(plain(form_and_place(candidate), 64) for candidate in one.fit.candidates)
 
 
 def _handy(values: FloatArray, units: str) -> tuple[float, str]:

@@ -17,7 +17,7 @@ from sloshlab.diagnosis.evidence import ALONE, CANNOT_TELL
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.units import named_and_units
 from sloshlab.diagnosis.verdict.interval import interval
-from sloshlab.diagnosis.verdict.wording import named_and_placed
+from sloshlab.diagnosis.verdict.wording import form_and_place, named_and_placed
 
 _MOST_EXPLANATIONS: Final = 14
 _MOST_LEFT_OUT: Final = 12
@@ -311,7 +311,7 @@ def limits_table(diagnosis: Diagnosis) -> Table:
 
 def _named(one: Explanation) -> str:
     """Effects of an explanation and where they act."""
-    return " + ".join(named_and_placed(candidate) for candidate in one.fit.candidates)
+    return " + ".join(form_and_place(candidate) for candidate in one.fit.candidates)
 
 
 def _standing(diagnosis: Diagnosis, one: Explanation, alternatives: Collection[tuple[str, ...]]) -> str:

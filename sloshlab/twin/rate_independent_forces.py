@@ -1,7 +1,7 @@
-"""Losses that do not depend on how fast a cycle is run through: structural damping and Bouc–Wen hysteresis.
+"""Losses that do not depend on how fast a cycle is run through: structural damping, hysteresis, friction and play.
 
-Reid's law and the hysteresis turn where the velocity does; the engine finds that instant, so that no step looks
-across it. Relaxing springs are linear and turn nowhere.
+They turn where the velocity does, friction behind a play where its slider starts and where the play ends, too; the
+engine finds these instants, so that no step looks across them. Relaxing springs are linear and turn nowhere.
 """
 
 from __future__ import annotations
@@ -116,3 +116,49 @@ HYSTERESIS = register(
     )
 )
 """β, γ and δ of the usual form enter only as these two products; α is the stiffness where z is small."""
+
+
+@law
+def _behind_play(motion, parameters, memory, rates):
+    """−k max(|e| − p/2, 0) sgn e, at most F; ė = v, zero while the slider follows.
+
+    The switches are the signs of v, of what is beyond the play and of what is beyond the friction.
+    """
+    behind = memory[0]
+    slips = memory[3] > 0.0
+    rates[0] = 0.0 if slips and behind * memory[1] > 0.0 else motion[VELOCITY]
+    force = parameters[0] if slips else parameters[2] * (abs(behind) - 0.5 * parameters[1])
+    if memory[2] < 0.0:
+        force = 0.0
+    return -force if behind > 0.0 else force
+
+
+@law
+def _behind_play_events(motion, parameters, memory, values):
+    beyond = abs(memory[0]) - 0.5 * parameters[1]
+    values[0] = motion[VELOCITY]
+    values[1] = beyond
+    values[2] = parameters[2] * beyond - parameters[0]
+    return 0.0
+
+
+FRICTION_BEHIND_PLAY = register(
+    ForceKind(
+        "friction_behind_play",
+        ("structure",),
+        (
+            Parameter("force_n", "N", 0.0, 1e7),
+            Parameter("play_m", "m", 0.0, 10.0),
+            Parameter("stiffness_n_per_m", "N m-1", 0.0, 1e12),
+        ),
+        _behind_play,
+        events=_behind_play_events,
+        n_switches=3,
+        memory=lambda values, table: (0.0,),
+        equation="−k max(|e| − p/2, 0) sgn e, at most F; ė = v, zero where the slider follows",
+    )
+)
+"""A slider with dry friction F that is moved through a stiffness k with a play p; e is how far it is behind.
+
+After a reversal the force unloads, the play is crossed at no force, and the stiffness loads again.
+"""

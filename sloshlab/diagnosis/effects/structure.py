@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from sloshlab.diagnosis.candidate import Numbers, Surroundings
 from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, force_effect
-from sloshlab.twin.rate_independent_forces import HYSTERESIS, LINEAR_STRUCTURAL_DAMPING, STRUCTURAL_DAMPING
+from sloshlab.twin.rate_independent_forces import (
+    FRICTION_BEHIND_PLAY,
+    HYSTERESIS,
+    LINEAR_STRUCTURAL_DAMPING,
+    STRUCTURAL_DAMPING,
+)
 from sloshlab.twin.structure_forces import (
     ASYMMETRIC_FRICTION,
     CLEARANCE,
@@ -173,6 +178,30 @@ BOUC_WEN = force_effect(
     separated_by="slow loops of several amplitudes",
     spoken_for_by=("takes energy", "memory", "rate-independent"),
     includes=("coulomb_friction", "stiffness_change"),
+)
+
+
+def _is_of_a_user(at: Surroundings) -> bool:
+    """Whether the twin is a user's own: dampers and joints have play, the rigs of the vocabulary have none."""
+    return at.rig is None
+
+
+BEHIND_PLAY = force_effect(
+    FRICTION_BEHIND_PLAY,
+    "structure",
+    lambda at: [
+        {
+            "force_n": share * at.force_n,
+            "play_m": 0.1 * at.displacement_m,
+            "stiffness_n_per_m": 5 * share * at.force_n / at.displacement_m,
+        }
+        for share in (0.2, 1.0)
+    ],
+    look_alikes=("hysteresis", "coulomb_friction", "clearance"),
+    separated_by="slow reversals at several amplitudes, with the force read while it is low",
+    needs=_is_of_a_user,
+    spoken_for_by=("takes energy", "memory", "rate-independent"),
+    includes=("coulomb_friction",),
 )
 CUBIC = force_effect(
     CUBIC_STIFFNESS,

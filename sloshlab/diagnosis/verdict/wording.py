@@ -62,9 +62,24 @@ def named_and_placed(candidate: Candidate) -> str:
     ----------
     candidate : Candidate
     """
-    name = candidate.effect.known_as.replace("_", " ")
+    return _placed(candidate.effect.known_as, candidate)
+
+
+def form_and_place(candidate: Candidate) -> str:
+    """The same, with the form of an effect that has several.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    """
+    effect = candidate.effect
+    return _placed(f"{effect.known_as} ({effect.name})" if effect.variant_of else effect.name, candidate)
+
+
+def _placed(name: str, candidate: Candidate) -> str:
+    words = name.replace("_", " ")
     place = candidate.channel.replace("+", " and ").replace("<", " from ")
-    return f"{name} of {place}" if place else f"{name} in the {candidate.effect.block}"
+    return f"{words} of {place}" if place else f"{words} in the {candidate.effect.block}"
 
 
 def where_of(found: Findings) -> str:

@@ -18,6 +18,7 @@ VOCABULARY = [
     ("quadratic_drag", ("structure", "tank"), {"drag_n_s2_per_m2"}),
     ("structural_damping", ("structure",), {"loss_factor"}),
     ("hysteresis", ("structure",), {"stiffness_n_per_m", "beta_gamma", "beta_delta"}),
+    ("friction_behind_play", ("structure",), {"force_n", "play_m", "stiffness_n_per_m"}),
     ("cubic_stiffness", ("structure",), {"stiffness_n_per_m3"}),
     ("quadratic_stiffness", ("structure",), {"stiffness_n_per_m2"}),
     ("stiffness_change", ("structure",), {"stiffness_n_per_m"}),

@@ -72,6 +72,16 @@ def bouc_wen(m: Motion) -> np.ndarray:
     return -z
 
 
+def behind_play(m: Motion) -> np.ndarray:
+    """A stop operator: the slider is at most half the play and F/k behind, and pulled by what exceeds the play."""
+    force_n, play_m, k = 0.5, 0.004, 600.0
+    most, behind = 0.5 * play_m + force_n / k, [0.0]
+    for step in np.diff(m["x"]):
+        behind.append(float(np.clip(behind[-1] + step, -most, most)))
+    e = np.array(behind)
+    return -k * np.maximum(np.abs(e) - 0.5 * play_m, 0.0) * np.sign(e)
+
+
 def relaxing_springs(m: Motion) -> np.ndarray:
     """−ηk Σ c (y − s x), ẏ = v − r y: eight rates about ω₀; c and s by loss and storage at ω₀."""
     loss, k = 0.02, MASS_KG * OMEGA**2
@@ -159,6 +169,10 @@ MEMORYLESS: dict[str, tuple[dict[str, float], Series]] = {
     "structure.hysteresis": (
         {"stiffness_n_per_m": 100.0, "beta_gamma": 80.0, "beta_delta": -40.0, "exponent": 1.6},
         bouc_wen,
+    ),
+    "structure.friction_behind_play": (
+        {"force_n": 0.5, "play_m": 0.004, "stiffness_n_per_m": 600.0},
+        behind_play,
     ),
     "structure.cubic_stiffness": ({"stiffness_n_per_m3": 3e5}, lambda m: -3e5 * m["x"] ** 3),
     "structure.quadratic_stiffness": ({"stiffness_n_per_m2": -9e3}, lambda m: 9e3 * m["x"] ** 2),
@@ -332,20 +346,6 @@ def test_saturation_makes_the_damping_of_the_liquid_fall_with_the_square(damped:
     assert (level[known & (m["t"] > 1.0)] < 2.1).any()
 
 
-def built_up(level: np.ndarray, agitated_g: float, time_constant_s: float, calming_s: float) -> np.ndarray:
-    """ṡ = p (1 − s)/τ − (1 − p) s/τ_calm, p = r⁴/(1 + r⁴), r the level over that which agitates."""
-    violent = 1.0 / (1.0 + (agitated_g / np.maximum(level, 1e-3)) ** 4)
-    built = np.zeros(level.size)
-    for i in range(1, level.size):
-        p = violent[i - 1]
-        rate = p / time_constant_s + (1.0 - p) / calming_s
-        rest = p / time_constant_s / rate
-        built[i] = rest + (built[i - 1] - rest) * np.exp(-rate / RATE_HZ)
-    return built
-
-
-def test_a_delayed_break_up_builds_the_damping_of_the_liquid_up_and_it_stays(damped: RigModel) -> None:
-    numbers = {"time_constant_s": 0.4, "agitated_g": 2.0, "averaging_s": 0.12, "sharpness": 4.0}
 @pytest.fixture(scope="module")
 def with_maps(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
     """The twin's liquid has W̄ = 1.8 everywhere and no effective mass."""
@@ -383,6 +383,20 @@ def test_a_gradual_saturation_is_of_measured_work_alone(
     assert sought == [False, False, True]
 
 
+def built_up(level: np.ndarray, agitated_g: float, time_constant_s: float, calming_s: float) -> np.ndarray:
+    """ṡ = p (1 − s)/τ − (1 − p) s/τ_calm, p = r⁴/(1 + r⁴), r the level over that which agitates."""
+    violent = 1.0 / (1.0 + (agitated_g / np.maximum(level, 1e-3)) ** 4)
+    built = np.zeros(level.size)
+    for i in range(1, level.size):
+        p = violent[i - 1]
+        rate = p / time_constant_s + (1.0 - p) / calming_s
+        rest = p / time_constant_s / rate
+        built[i] = rest + (built[i - 1] - rest) * np.exp(-rate / RATE_HZ)
+    return built
+
+
+def test_a_delayed_break_up_builds_the_damping_of_the_liquid_up_and_it_stays(damped: RigModel) -> None:
+    numbers = {"time_constant_s": 0.4, "agitated_g": 2.0, "averaging_s": 0.12, "sharpness": 4.0}
     m = moved(damped, "tank.breakup_delay", numbers)
     built = built_up(level_g(m, 0.12), 2.0, 0.4, np.inf)
     known = smooth(m)
@@ -425,11 +439,21 @@ def test_a_liquid_that_meets_the_ceiling_takes_energy_and_leaves_a_lighter_tank_
     assert np.abs(m["x"][late]).max() < 0.9 * np.abs(before["x"][late]).max()
 
 
+def test_friction_behind_play_is_sought_in_machines_of_a_user_alone(frozen: RigModel) -> None:
+    at = surroundings_of(frozen)
+    machine = replace(at, rig=None, blocks=("structure", "sensor"))  # type: ignore[arg-type]
+    sought = [
+        "structure.friction_behind_play" in {one.key for one in candidates(place)} for place in (at, machine)
+    ]
+    assert sought == [False, True]
+
+
 def test_every_force_of_the_vocabulary_is_held_to_its_equation() -> None:
     held = {
         *MEMORYLESS,
         "tank.liquid_sloshing",
         "tank.high_g_saturation",
+        "tank.gradual_saturation",
         "tank.breakup_delay",
         "tank.ceiling_impact",
     }
@@ -453,4 +477,3 @@ def test_a_lateral_mode_is_sought_where_the_tank_rocks_alone(
     there = candidates(replace(at, rig=at.rig.model_copy(update={"structure": held})))
     assert ("tank.lateral_mode" in {one.key for one in there}) == sought
     assert "tank.effective_mass" in {one.key for one in there}
-        "tank.gradual_saturation",
