@@ -116,7 +116,7 @@ def test_signals_at_many_moments(laboratory: Path, tmp_path: Path) -> None:
         elif process.returncode == INTERRUPTED:
             assert written is None
             assert stderr.strip() == "sloshlab: interrupted; nothing half-written"
-        else:  # the interpreter was still loading the command
+        else:  # the interpreter was still loading the command, or ending after it
             assert process.returncode == -signal.SIGINT
-            assert written is None
+            assert written is None or complete <= set(written)
     assert INTERRUPTED in codes
