@@ -28,7 +28,8 @@ class DiagnosedModel(Protocol):
     blocks : tuple of str
         Of `sloshlab.diagnosis.candidate.BLOCKS`, those in which something may be missing.
     may_be_copied : bool
-        Whether a copy of this process simulates the same; code of others may not bear to be copied as it runs.
+        Whether a copy of this process simulates the same and costs little memory; code of others may not bear to
+        be copied as it runs.
     """
 
     runs: tuple[CaseRun, ...]

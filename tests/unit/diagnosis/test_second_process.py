@@ -9,12 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from decays_under_friction import COULOMB, CUBIC, STRIBECK, Decays
+from recorded_oscillators import decays, rig
 
-from sloshlab.diagnosis import copied_process
+from sloshlab.diagnosis import copied_process, rig_model
 from sloshlab.diagnosis import second_process as module
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem, residuals_of_runs
+from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.second_process import SecondProcess
+from sloshlab.recording import channels
 
 pytestmark = pytest.mark.skipif(not copied_process.CAN_FORK, reason="no copies of a process here")
 
@@ -111,3 +114,15 @@ def test_there_is_none_for_code_of_others_for_little_work_or_on_one_core(
         changed.setattr(copied_process, "N_AT_ONCE", 1)
         assert process_of(problem) is None
     assert process_of(problem) is not None
+
+
+def test_there_is_none_where_copies_of_the_recordings_would_take_the_memory(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    runs = decays((0.02, 0.01), 2.0)
+    n_readings = sum(run.recording[name].size for run in runs for name in channels(run.recording))
+    may_be = []
+    for most in (n_readings, n_readings - 1):
+        monkeypatch.setattr(rig_model, "_MOST_READINGS_TO_COPY", most)
+        may_be.append(RigModel(rig(tmp_path), tmp_path, runs).may_be_copied)
+    assert may_be == [True, False]
