@@ -1,7 +1,7 @@
 """A public friction damper on an actuator: friction with memory behind a play, by the vocabulary alone.
 
 Its authors write of "hysteretic and backlash effects" and of about 0.16 in of travel at low force. The tension of
-36 lb was looked at once, when all was written; that of 30 lb is the one with which the form was developed.
+36 lb was looked at when the form was fixed, and chose nothing; that of 30 lb is the one it was developed with.
 """
 
 from __future__ import annotations
