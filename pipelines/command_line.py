@@ -7,6 +7,7 @@ run, so that ``sloshlab --help`` stays quick.
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -84,7 +85,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def main() -> NoReturn:
     """Entry point of the ``sloshlab`` command."""
-    sys.exit(run())
+    code = run()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is done is done: nothing is left to interrupt
+    sys.exit(code)
 
 
 if __name__ == "__main__":

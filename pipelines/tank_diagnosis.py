@@ -86,6 +86,7 @@ class TankCase:
 
 _STRONG_SWEEPS: Final = tuple(f"shaker/fill_0.50_sweep_{level}g*.nc" for level in ("3.00", "4.00", "5.00", "6.00"))
 _LONG_STROKE_SWEEPS: Final = ("long_stroke/fill_0.50_long_stroke_sweep_*.nc",)
+_DECAYS_OF_THE_BEAM: Final = ("transients/beam_decay_*.nc", "beam/decay_sloshing_repeat_[12].nc")
 _ALL_SWEEPS: Final = ("shaker/fill_0.50_sweep_1.50g.nc", "shaker/fill_0.50_sweep_2.00g.nc", *_STRONG_SWEEPS)
 
 CASES: Final = (
@@ -153,7 +154,7 @@ CASES: Final = (
     TankCase(
         "beam_maps",
         "beam/rig_beam.toml",
-        ("transients/beam_decay_*.nc", "beam/decay_sloshing_repeat_[12].nc"),
+        _DECAYS_OF_THE_BEAM,
         _MAPS.format(_MAPS_FILE, "true"),
         "break-up after some cycles",
         4,
@@ -162,7 +163,7 @@ CASES: Final = (
     TankCase(
         "beam_frozen",
         "beam/rig_beam.toml",
-        ("transients/beam_decay_*.nc", "beam/decay_sloshing_repeat_[12].nc"),
+        _DECAYS_OF_THE_BEAM,
         _FROZEN,
         "dissipation above a threshold, effective mass, break-up after some cycles",
         2,
