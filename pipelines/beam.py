@@ -101,7 +101,7 @@ def _loaded(paths: Sequence[Path], kind: str) -> list[Loaded]:
     for path in paths:
         run = loaded(path, read_recording(path), kind)
         own = run.attributes.run_id, group_of(run.attributes)
-        same = next((one for one in runs if (one.attributes.run_id, group_of(one.attributes)) == own), None)
+        same = next((run for run in runs if (run.attributes.run_id, group_of(run.attributes)) == own), None)
         if same is not None:
             raise AnalysisError(f"{path}: run_id", got=f"{own[0]!r}, as in {same.path}",
                                 allowed="one run_id per run", remedy="give every run once")  # fmt: skip

@@ -165,7 +165,9 @@ def _with_update(dataset: xr.Dataset, experiment: BeamExperiment) -> xr.Dataset:
         "natural_frequency_hz": modelled,
     }
     added = {name: ("mode", values) for name, values in over_mode.items()}
-    return dataset.merge(described(xr.Dataset({**added, **{name: ((), one) for name, one in scalars.items()}})))
+    return dataset.merge(
+        described(xr.Dataset({**added, **{name: ((), scalar) for name, scalar in scalars.items()}}))
+    )
 
 
 def spectra_dataset(experiment: BeamExperiment) -> xr.Dataset:

@@ -270,7 +270,7 @@ class BeamExperiment:
         """Groups of all runs: measured configurations first, frozen before sloshing, then twins in their order."""
         measured = {run.group for run in self.runs if not run.is_simulated}
         twins = dict.fromkeys(run.group for run in self.runs if run.is_simulated)
-        return (*(one for one in CONFIGURATIONS if one in measured), *twins)
+        return (*(configuration for configuration in CONFIGURATIONS if configuration in measured), *twins)
 
     def first_of(self, group: str) -> BeamRun | None:
         """The first free run of a group."""
@@ -297,7 +297,9 @@ def group_of(attributes: RunAttributes) -> str:
     if not more.get("simulated_from"):
         return attributes.configuration
     forces = [one.strip() for one in str(more.get("simulated_forces", "")).split(",")]
-    liquid = [one.removesuffix("(tank)").strip().replace("_", " ") for one in forces if one.endswith("(tank)")]
+    liquid = [
+        force.removesuffix("(tank)").strip().replace("_", " ") for force in forces if force.endswith("(tank)")
+    ]
     liquid = [_SHORT.get(one, one) for one in liquid]
     rig, what = PurePath(attributes.rig).stem, ", ".join(liquid) or "frozen"
     return f"twin {what}" if rig == what else f"twin {rig}: {what}"

@@ -293,8 +293,8 @@ def picked(results: Sequence[CaseResult]) -> Pick:
         If no case could be trained.
     """
     trained = sorted(
-        (one for one in results if one.is_trained),
-        key=lambda one: (one.validation_mse, one.n_parameters),
+        (result for result in results if result.is_trained),
+        key=lambda result: (result.validation_mse, result.n_parameters),
     )
     if not trained:
         raise AnalysisError("study", got="no case that could be trained", remedy="see the reasons in its table")

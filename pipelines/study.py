@@ -99,7 +99,7 @@ def study(
         "inputs": {path.name: sha256_of(path) for path in inputs},
         "versions": versions(),
     }
-    flags = (*runs.flags, *(f"{one.case.name}: {one.ended}" for one in results if not one.is_trained))
+    flags = (*runs.flags, *(f"{result.case.name}: {result.ended}" for result in results if not result.is_trained))
     found = StudiedModels(tuple(results), pick, settings, runs.rate.reason, flags, provenance)
     with atomic_file.filled_folder(folder) as complete:
         write_dataset(dataset_of(results), complete / "study.nc")
@@ -120,18 +120,18 @@ def study(
 def dataset_of(results: list[CaseResult]) -> xr.Dataset:
     """One row per case, the best first; errors are infinite where a case could not be trained."""
     variables: dict[str, list[Any]] = {
-        "study_case": [one.case.name for one in results],
-        "structure": [one.case.structure for one in results],
-        "network": [one.case.network for one in results],
-        "n_input_delays": [one.case.delays for one in results],
-        "n_output_delays": [one.case.output_delays for one in results],
-        "n_neurons": [one.case.neurons for one in results],
-        "n_parameters": [one.n_parameters for one in results],
-        "n_epochs": [one.n_epochs for one in results],
-        "training_s": [one.seconds for one in results],
-        "training_rms_n": [math.sqrt(one.training_mse) for one in results],
-        "validation_rms_n": [math.sqrt(one.validation_mse) for one in results],
-        "ended": [one.ended for one in results],
+        "study_case": [result.case.name for result in results],
+        "structure": [result.case.structure for result in results],
+        "network": [result.case.network for result in results],
+        "n_input_delays": [result.case.delays for result in results],
+        "n_output_delays": [result.case.output_delays for result in results],
+        "n_neurons": [result.case.neurons for result in results],
+        "n_parameters": [result.n_parameters for result in results],
+        "n_epochs": [result.n_epochs for result in results],
+        "training_s": [result.seconds for result in results],
+        "training_rms_n": [math.sqrt(result.training_mse) for result in results],
+        "validation_rms_n": [math.sqrt(result.validation_mse) for result in results],
+        "ended": [result.ended for result in results],
     }
     columns: dict[str, Any] = {}
     for name, values in variables.items():

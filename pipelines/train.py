@@ -318,5 +318,5 @@ def validate_model(
 
 
 def _quality(model: ReducedOrderModel, runs: Sequence[LiquidSignals]) -> FitQuality:
-    simulated = [model.simulate(one.velocity_m_per_s, one.dynamic_force_n) for one in runs]
-    return fit_quality(np.concatenate([one.dynamic_force_n for one in runs]), np.concatenate(simulated))
+    simulated = [model.simulate(run.velocity_m_per_s, run.dynamic_force_n) for run in runs]
+    return fit_quality(np.concatenate([run.dynamic_force_n for run in runs]), np.concatenate(simulated))

@@ -84,9 +84,9 @@ def score_trial(folder: Path, output: Path, *, key: Path | None) -> dict[str, An
     """
     score = score_of(folder, key)
     write_report(score, output)
-    lines = [f"{name}: {one.successes} of {one.n}" for name, one in score.rates.items()]
+    lines = [f"{name}: {rate.successes} of {rate.n}" for name, rate in score.rates.items()]
     lines.append(f"written: {output / 'blind_trial.md'}")
-    rates = {name: one.value for name, one in score.rates.items() if one.n}
+    rates = {name: rate.value for name, rate in score.rates.items() if rate.n}
     return {"lines": lines, "purpose": score.purpose, "rates": rates}
 
 

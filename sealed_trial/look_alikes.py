@@ -86,10 +86,10 @@ def possible_look_alikes(plan: TestPlan, rig: HiddenRig) -> list[LookAlike]:
     """Those that hold for a plan and a rig."""
     tank_model = "viscous" if rig.tank_damping_kg_per_s else "frozen"
     return [
-        one
-        for one in LOOK_ALIKES
-        if plan.name in one.plans
-        and plan.kind in one.truth.kinds
-        and one.truth.tank_model in ("", tank_model)
-        and not (one.truth.is_friction and rig.coulomb_n)
+        alike
+        for alike in LOOK_ALIKES
+        if plan.name in alike.plans
+        and plan.kind in alike.truth.kinds
+        and alike.truth.tank_model in ("", tank_model)
+        and not (alike.truth.is_friction and rig.coulomb_n)
     ]

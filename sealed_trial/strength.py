@@ -115,8 +115,8 @@ class NoiseFloor:
 
     def _linearised(self, laboratory: Laboratory, signals: Sequence[Signals]) -> _Baseline:
         directions = (*self._of_rig(laboratory, signals), *self._of_readings(laboratory, signals))
-        orthogonal, triangle = np.linalg.qr(np.stack([one.column for one in directions], axis=1))
-        directions = tuple(replace(one, column=np.empty(0)) for one in directions)
+        orthogonal, triangle = np.linalg.qr(np.stack([direction.column for direction in directions], axis=1))
+        directions = tuple(replace(direction, column=np.empty(0)) for direction in directions)
         return _Baseline(laboratory.rig, self._stacked(signals), directions, orthogonal, triangle)
 
     def _of_rig(self, laboratory: Laboratory, signals: Sequence[Signals]) -> Iterator[_Direction]:
@@ -222,11 +222,11 @@ class NoiseFloor:
     def _retuned(self, baseline: _Baseline, target: FloatArray, damping_is_known: bool) -> _Retuned:
         difference = target - baseline.reference
         lower, upper = [], []
-        for one in baseline.directions:
-            free = "damping" in one.name and not damping_is_known
-            ratio = self._laboratory.rig.factor(one.name) / baseline.rig.factor(one.name)
-            lower.append(_LEAST_DAMPING * ratio - 1 if free else one.least)
-            upper.append(_MOST_DAMPING * ratio - 1 if free else one.most)
+        for direction in baseline.directions:
+            free = "damping" in direction.name and not damping_is_known
+            ratio = self._laboratory.rig.factor(direction.name) / baseline.rig.factor(direction.name)
+            lower.append(_LEAST_DAMPING * ratio - 1 if free else direction.least)
+            upper.append(_MOST_DAMPING * ratio - 1 if free else direction.most)
         fit = lsq_linear(
             baseline.triangle,
             baseline.orthogonal.T @ difference,

@@ -343,15 +343,15 @@ def _of_one_rate(
     return aligned
 
 
-def _refitted(one: Selected, rate: float, jitter: float) -> Grid | None:
-    if one.column.time_s is None or abs(one.grid.rate_hz / rate - 1) > 0.01:
+def _refitted(selected: Selected, rate: float, jitter: float) -> Grid | None:
+    if selected.column.time_s is None or abs(selected.grid.rate_hz / rate - 1) > 0.01:
         return None
     try:
         return uniform_grid(
-            one.column.time_s,
-            name=one.channel,
+            selected.column.time_s,
+            name=selected.channel,
             rate_hz=rate,
-            resolution_s=one.column.time_resolution_s,
+            resolution_s=selected.column.time_resolution_s,
             jitter_allowed_steps=jitter,
         )
     except RecordingError:

@@ -137,28 +137,30 @@ def _check_memory(time: CommonTime, n_channels: int) -> None:
         )
 
 
-def _placed(values: NDArray[Any], one: Selected, first: int, n_points: int, empty: float) -> NDArray[Any]:
-    if first == 0 and values.size == n_points == one.grid.n_points:
+def _placed(values: NDArray[Any], selected: Selected, first: int, n_points: int, empty: float) -> NDArray[Any]:
+    if first == 0 and values.size == n_points == selected.grid.n_points:
         return values
     placed = np.full(n_points, empty, dtype=values.dtype)
-    placed[first + one.grid.index] = values
+    placed[first + selected.grid.index] = values
     return placed
 
 
-def _converted_channel(one: Selected, section: ChannelSection, first: int, time: CommonTime) -> _Channel:
-    column = one.column
-    scaling = scaling_of(one.channel, section, column)
-    traps = [f"{one.source}: {trap}" for trap in scaling.traps]
+def _converted_channel(selected: Selected, section: ChannelSection, first: int, time: CommonTime) -> _Channel:
+    column = selected.column
+    scaling = scaling_of(selected.channel, section, column)
+    traps = [f"{selected.source}: {trap}" for trap in scaling.traps]
     in_si = converted_values(column.values, scaling)
     not_finite = ~np.isfinite(in_si)
     n_infinite = int(np.isinf(in_si).sum())
     if n_infinite:
-        traps.append(f"{one.channel}: {n_infinite} infinite values are lost")
+        traps.append(f"{selected.channel}: {n_infinite} infinite values are lost")
     in_si[not_finite] = np.nan
     if not_finite.all():
-        raise RecordingError(f"channels.{one.channel}", got="no number in the whole column", allowed="numbers")
-    clipped = _placed(clipped_samples(column.values, scaling, section), one, first, time.n_points, False)
-    values = _placed(in_si, one, first, time.n_points, np.nan)
+        raise RecordingError(
+            f"channels.{selected.channel}", got="no number in the whole column", allowed="numbers"
+        )
+    clipped = _placed(clipped_samples(column.values, scaling, section), selected, first, time.n_points, False)
+    values = _placed(in_si, selected, first, time.n_points, np.nan)
     compensated_s = section.delay_s if section.delay == "compensate" else 0.0
     if compensated_s:
         n_before = int(np.isnan(values).sum())
@@ -166,19 +168,19 @@ def _converted_channel(one: Selected, section: ChannelSection, first: int, time:
         n_more = int(np.isnan(values).sum()) - n_before
         clipped = _moved(clipped, round(compensated_s * time.rate_hz))
         traps.append(
-            f"{one.channel}: compensating its delay costs {n_more} samples at ends and gaps; they are lost"
+            f"{selected.channel}: compensating its delay costs {n_more} samples at ends and gaps; they are lost"
         )
         if np.isnan(values).all():
             raise RecordingError(
-                f"channels.{one.channel}.delay_s", got=f"{compensated_s} s", allowed="less than the recording"
+                f"channels.{selected.channel}.delay_s", got=f"{compensated_s} s", allowed="less than the recording"
             )
     mapped = MappedChannel(
-        channel=one.channel,
-        source=one.source,
+        channel=selected.channel,
+        source=selected.source,
         column=column.name,
         units_in_file=column.units,
         units_read=scaling.units_read,
-        units=channel_attributes(one.channel, section, column, scaling)["units"],
+        units=channel_attributes(selected.channel, section, column, scaling)["units"],
         factor=scaling.factor,
         offset=scaling.offset,
         sign=section.sign,
@@ -190,10 +192,10 @@ def _converted_channel(one: Selected, section: ChannelSection, first: int, time:
         maximum=float(np.nanmax(values)),
     )
     return _Channel(
-        one.channel,
+        selected.channel,
         values,
         clipped,
-        channel_attributes(one.channel, section, column, scaling),
+        channel_attributes(selected.channel, section, column, scaling),
         mapped,
         _raw_encoding(column, scaling, values, compensated_s),
         tuple(traps),

@@ -168,7 +168,9 @@ def row(case: ConvergenceCase, results: Sequence[HarmonicResult]) -> str:
     >>> row(ConvergenceCase("h/16", 3.0), two)
     '| 3 g | h/16 | 1.10 ± 0.10 | −0.200 ± 0.000 | −10 % | 0.0 % |'
     """
-    values = np.array([[one.w_bar, one.beta, one.packing_share, one.residual_share] for one in results])
+    values = np.array(
+        [[result.w_bar, result.beta, result.packing_share, result.residual_share] for result in results]
+    )
     mean = values.mean(axis=0)
     error = values.std(axis=0, ddof=1) / math.sqrt(len(results)) if len(results) > 1 else np.full(4, np.nan)
     text = (

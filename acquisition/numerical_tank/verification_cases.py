@@ -204,9 +204,9 @@ def numerical_damping(n_layers: int, numerics: Numerics | None = None) -> list[F
     water = Liquid(speed_of_sound_m_per_s=10.0)
     findings = standing_wave(n_layers, numerics=numerics, liquid=water)
     return [
-        Finding(f"{one.case}, water", one.quantity, one.measured, one.expected, math.inf)
-        for one in findings
-        if one.quantity == "decay rate / ω"
+        Finding(f"{finding.case}, water", finding.quantity, finding.measured, finding.expected, math.inf)
+        for finding in findings
+        if finding.quantity == "decay rate / ω"
     ]
 
 

@@ -111,12 +111,12 @@ def assemble(
     attributes = _attributes(journal, output, base, chosen)
     losses = [loss for placement in placements for loss in placement.losses()]
     require_readable_size(
-        sum((len(one.info.channels) + 2) * one.n_samples for one in placements),
+        sum((len(placement.info.channels) + 2) * placement.n_samples for placement in placements),
         what=f"recording {output}",
         explanation=_longest(losses, placements),
     )
     # every sample is read once to know it, and once to write it
-    advance = _advancing(watch, sum(one.n_samples for one in placements) + base.n_samples)
+    advance = _advancing(watch, sum(placement.n_samples for placement in placements) + base.n_samples)
     parts = _parts(journal, placements, chosen, str(attributes["experiment"]), advance)
     n_samples = _n_samples(parts, chosen)
     _require_size(parts, n_samples, output)
@@ -222,19 +222,21 @@ def _parts(
     base = placements[0]
     pairs = [common_motion_pairs(base, other, options.redundant, experiment) for other in placements[1:]]
     for_alignment = {name for own in pairs for pair in own for name in pair}
-    infos = [one.info for one in placements]
+    infos = [placement.info for placement in placements]
     labels = device_labels(infos)
     names = channel_names(infos, labels)
     samples = [PlacedSamples(journal, placement) for placement in placements]
-    surveys = [_survey(one, for_alignment, experiment, advance) for one in samples]
+    surveys = [_survey(sample, for_alignment, experiment, advance) for sample in samples]
     alignments = [first_source(base)]
     for other, survey, own in zip(placements[1:], surveys[1:], pairs, strict=True):
         alignments.append(_aligned(base, other, (surveys[0], survey), own, options.align))
     parts = []
-    for label, one, survey, alignment, own_names in zip(labels, samples, surveys, alignments, names, strict=True):
-        columns = zip(one.placement.info.channels, survey.channels, strict=True)
+    for label, sample, survey, alignment, own_names in zip(
+        labels, samples, surveys, alignments, names, strict=True
+    ):
+        columns = zip(sample.placement.info.channels, survey.channels, strict=True)
         stored = tuple(stored_type(channel, found) for channel, found in columns)
-        parts.append(Part(label, one, survey, alignment, own_names, stored))
+        parts.append(Part(label, sample, survey, alignment, own_names, stored))
     return parts
 
 
@@ -279,5 +281,5 @@ def _longest(losses: Sequence[Loss], placements: Sequence[SourcePlacement]) -> s
     if not losses:
         return ""
     longest = max(losses, key=lambda loss: loss.n_samples)
-    device = next(one.info.device for one in placements if one.source == longest.source)
+    device = next(placement.info.device for placement in placements if placement.source == longest.source)
     return f"the longest gap is {longest.n_samples} samples of {device} from counter {longest.counter}"

@@ -73,13 +73,13 @@ def acquisition_record(journal: Journal, parts: Sequence[Part], losses: Sequence
     named = losses[:MOST_LOSSES_NAMED]
     return {
         "devices": [_device(part) for part in parts],
-        "clocks": {part.label: [_clock(one) for one in part.placement.streams] for part in parts},
+        "clocks": {part.label: [_clock(stream) for stream in part.placement.streams] for part in parts},
         "alignment": {part.label: part.alignment.to_dict() for part in parts},
         "losses": {
             "columns": ["source", "group", "first_counter", "n_samples", "index"],
             "rows": [[one.source, one.group, one.counter, one.n_samples, one.index] for one in named],
             "n_gaps": len(losses),
-            "n_samples": sum(one.n_samples for one in losses),
+            "n_samples": sum(loss.n_samples for loss in losses),
         },
         "troubles": _troubles(journal),
         "failures": [{"source": source, "message": message} for source, message in journal.failures],
@@ -136,14 +136,14 @@ def _device(part: Part) -> dict[str, Any]:
         "clock_hz": info.clock_hz,
         "channels": list(part.names),
         "n_samples": part.placement.n_samples,
-        "n_lost": [one.n_lost for one in survey.channels],
-        "n_missing": [one.n_missing for one in survey.channels],
-        "n_clipped": [one.n_clipped for one in survey.channels],
-        "n_stuck": [sum(stop - start for start, stop in one.stuck) for one in survey.channels],
+        "n_lost": [channel.n_lost for channel in survey.channels],
+        "n_missing": [channel.n_missing for channel in survey.channels],
+        "n_clipped": [channel.n_clipped for channel in survey.channels],
+        "n_stuck": [sum(stop - start for start, stop in channel.stuck) for channel in survey.channels],
         "n_out_of_order": survey.n_late,
         "n_repeated": survey.repeats.n_samples,
         "n_repeated_differently": survey.repeats.n_conflicting,
-        "repeated_differently": [list(one) for one in survey.repeats.conflicts],
+        "repeated_differently": [list(conflict) for conflict in survey.repeats.conflicts],
         "sensor_serials": {
             name: channel.sensor_serial
             for name, channel in zip(part.names, part.channels, strict=True)
@@ -210,14 +210,14 @@ def _part_flags(part: Part, losses: Sequence[Loss]) -> Iterator[str]:
     own = [loss for loss in losses if loss.source == placement.source]
     if own:
         yield f"{label}: {_lost(own, len(placement.groups), rate_hz)}"
-    for name, one in zip(part.names, survey.channels, strict=True):
-        if one.n_missing:
-            yield f"{name}: {one.n_missing} samples without a reading, says the device"
-        if one.n_clipped:
-            yield f"{name}: {one.n_clipped} samples clipped"
-        if one.stuck:
-            start, stop = one.stuck[0]
-            n_stuck = sum(last - first for first, last in one.stuck)
+    for name, channel in zip(part.names, survey.channels, strict=True):
+        if channel.n_missing:
+            yield f"{name}: {channel.n_missing} samples without a reading, says the device"
+        if channel.n_clipped:
+            yield f"{name}: {channel.n_clipped} samples clipped"
+        if channel.stuck:
+            start, stop = channel.stuck[0]
+            n_stuck = sum(last - first for first, last in channel.stuck)
             yield (
                 f"{name}: stuck for {n_stuck} samples, first {start / rate_hz:.6g} … {stop / rate_hz:.6g} s, "
                 "while other channels moved"
@@ -259,7 +259,7 @@ def _lost(losses: Sequence[Loss], n_messages: int, rate_hz: float) -> str:
 def _gaps(losses: Sequence[Loss]) -> list[Loss]:
     """Losses by place, with those that overlap, of several messages, as one."""
     gaps: list[Loss] = []
-    for loss in sorted(losses, key=lambda one: one.index):
+    for loss in sorted(losses, key=lambda loss: loss.index):
         reached = gaps[-1].index + gaps[-1].n_samples if gaps else 0
         if gaps and loss.index < reached:
             stop = max(reached, loss.index + loss.n_samples)

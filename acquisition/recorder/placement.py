@@ -131,7 +131,7 @@ class SourcePlacement:
     @property
     def main_stream(self) -> Stream:
         """The longest stream, whose clock is known best."""
-        return max(self.streams, key=lambda one: one.n_samples)
+        return max(self.streams, key=lambda stream: stream.n_samples)
 
     def losses(self) -> Iterator[Loss]:
         """Every gap, group by group, in order of place."""
@@ -185,18 +185,18 @@ def placed_source(journal: Journal, source: int) -> SourcePlacement:
     if not streams:
         raise _no_samples(journal, info)
     n_samples = streams[-1].first_index + streams[-1].n_samples
-    groups = tuple(_placed_group(one, streams) for one in entries)
+    groups = tuple(_placed_group(entry, streams) for entry in entries)
     return SourcePlacement(source, info, n_samples, tuple(streams), groups)
 
 
 def _require_possible(journal: Journal, info: SourceInfo, entries: Sequence[Entries]) -> None:
-    if not any(len(one) for one in entries):
+    if not any(len(entry) for entry in entries):
         raise _no_samples(journal, info)
-    for one in entries:
-        if len(one) and (one.counter.min() < 0 or (one.counter + one.n_samples).max() > _LARGEST_COUNTER):
+    for entry in entries:
+        if len(entry) and (entry.counter.min() < 0 or (entry.counter + entry.n_samples).max() > _LARGEST_COUNTER):
             raise JournalError(
                 f"journal {journal.path}: {info.device}",
-                got=f"sample counters {one.counter.min()} … {one.counter.max()}",
+                got=f"sample counters {entry.counter.min()} … {entry.counter.max()}",
                 allowed=f"0 … {_LARGEST_COUNTER}",
             )
 
@@ -213,10 +213,10 @@ def _no_samples(journal: Journal, info: SourceInfo) -> JournalError:
 def _streams_in_order(entries: Sequence[Entries]) -> list[int]:
     """Streams by the arrival of their first samples."""
     first: dict[int, int] = {}
-    for one in entries:
-        numbers, places = np.unique(one.stream, return_index=True)
+    for entry in entries:
+        numbers, places = np.unique(entry.stream, return_index=True)
         for number, place in zip(numbers.tolist(), places.tolist(), strict=True):
-            arrival = int(one.host_monotonic_ns[place])
+            arrival = int(entry.host_monotonic_ns[place])
             first[number] = min(first.get(number, arrival), arrival)
     return sorted(first, key=lambda number: first[number])
 
@@ -224,8 +224,8 @@ def _streams_in_order(entries: Sequence[Entries]) -> list[int]:
 def _stream(
     info: SourceInfo, entries: Sequence[Entries], number: int, taken: int | None, *, is_complete: bool
 ) -> Stream:
-    own = [(one.counter[mask], one.n_samples[mask], one.host_monotonic_ns[mask])
-           for one in entries if (mask := one.stream == number).any()]  # fmt: skip
+    own = [(entry.counter[mask], entry.n_samples[mask], entry.host_monotonic_ns[mask])
+           for entry in entries if (mask := entry.stream == number).any()]  # fmt: skip
     firsts = [int(counter.min()) for counter, _, _ in own]
     lasts = [int((counter + n).max()) for counter, n, _ in own]
     ragged = math.ceil(RAGGED_S * info.sampling_rate_hz)

@@ -207,7 +207,7 @@ def aligned_by_host(
         except AnalysisError:
             continue
         delays.append((*names, delay))
-    delays.sort(key=lambda one: (one[2].status is not AlignmentStatus.ALIGNED, one[2].error_s))
+    delays.sort(key=lambda delay: (delay[2].status is not AlignmentStatus.ALIGNED, delay[2].error_s))
     if not delays or delays[0][2].status is not AlignmentStatus.ALIGNED:
         return replace(prior, delays=tuple(delays))
     best = delays[0][2]
@@ -299,9 +299,9 @@ def _thinned(survey: SourceSurvey, name: str, line: SourceAlignment) -> SampledS
 def described(alignments: Mapping[str, SourceAlignment]) -> list[str]:
     """One line per device that is not the time base."""
     return [
-        f"{device}: {_sentence(one)}"
-        for device, one in alignments.items()
-        if one.method is not AlignmentMethod.FIRST
+        f"{device}: {_sentence(alignment)}"
+        for device, alignment in alignments.items()
+        if alignment.method is not AlignmentMethod.FIRST
     ]
 
 

@@ -61,7 +61,7 @@ def dbc_text(layout: CanLayout) -> str:
     _require_possible(layout)
     controls = [one for one in (layout.status, layout.command) if one is not None]
     parts = ['VERSION ""', "NS_ :", "BS_:", "BU_: device host"]
-    parts += ["\n".join(_control_lines(one)) for one in controls]
+    parts += ["\n".join(_control_lines(control)) for control in controls]
     parts += ["\n".join(_message_lines(message, layout)) for message in layout.messages]
     parts += [_DEFINITIONS + "\n".join(_attribute_lines(layout, controls))]
     return "\n\n".join(parts) + "\n"
@@ -387,7 +387,9 @@ class _DatabaseReader:
         same = {(one.length, one.is_signed, one.scale, one.offset, one.unit) for one in found.values()}
         if len(same) > 1:
             self._refuse(place, "samples with different scaling", "one scaling")
-        attributes = {key: one.value for key, one in (first.dbc.attributes if first.dbc else {}).items()}
+        attributes = {
+            key: attribute.value for key, attribute in (first.dbc.attributes if first.dbc else {}).items()
+        }
         given = {key: attributes[text] for key, text in _TEXT_ATTRIBUTES.items() if attributes.get(text)}
         given |= {key: float(attributes[a]) for key, a in _FLOAT_ATTRIBUTES.items() if a in attributes}
         if first.minimum is not None and first.maximum is not None:

@@ -30,10 +30,18 @@ def sloshing_decays(folder: Path) -> list[FreeDecay]:
     ]
 
 
-def means_of_part(one: InstantaneousDamping, first_s: float, last_s: float) -> tuple[float, float]:
+def means_of_part(
+    instantaneous_damping: InstantaneousDamping, first_s: float, last_s: float
+) -> tuple[float, float]:
     """Mean frequency [Hz] and damping ratio over a part of the record."""
-    part = one.used & (one.time_s >= first_s) & (one.time_s < last_s)
-    return float(one.frequency_hz[part].mean()), float(one.damping_ratio[part].mean())
+    part = (
+        instantaneous_damping.used
+        & (instantaneous_damping.time_s >= first_s)
+        & (instantaneous_damping.time_s < last_s)
+    )
+    return float(instantaneous_damping.frequency_hz[part].mean()), float(
+        instantaneous_damping.damping_ratio[part].mean()
+    )
 
 
 def rows_of_parts(decays: list[FreeDecay]) -> list[str]:
@@ -41,7 +49,7 @@ def rows_of_parts(decays: list[FreeDecay]) -> list[str]:
     rows = []
     for number, decay in enumerate(decays, start=1):
         for first, last in PARTS_S:
-            means = [means_of_part(one, first, last) for one in decay.readings]
+            means = [means_of_part(reading, first, last) for reading in decay.readings]
             frequencies = ", ".join(f"{frequency:.3f}" for frequency, _ in means)
             damping = ", ".join(f"{100 * ratio:.2f}" for _, ratio in means)
             rows.append(f"| {number} | {first:.0f} … {last:.0f} s | {frequencies} | {damping} |")

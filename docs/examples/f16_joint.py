@@ -85,7 +85,7 @@ def diagnosed(case: Path, *, report: bool = True) -> dict[str, Any]:
 def main(arguments: list[str]) -> None:
     """Write the case, diagnose it, say what was found."""
     folder = Path(arguments[0] if arguments else os.environ["SLOSHLAB_EXTERNAL_DATA"])
-    levels = tuple(int(one) for one in arguments[2:]) or LEVELS
+    levels = tuple(int(argument) for argument in arguments[2:]) or LEVELS
     case = write_case(folder, Path(arguments[1] if len(arguments) > 1 else "aircraft_case"), levels)
     found = diagnosed(case)
     sys.stdout.write("\n".join(found["lines"]) + "\n")

@@ -41,7 +41,7 @@ def write_case(folder: Path, case: Path) -> Path:
     (case / "recordings").mkdir(parents=True, exist_ok=True)
     for number in range(N_RUNS):
         start = MULTISINE.start + number * REALISATION
-        run = recording(*(one[start : start + LENGTH] for one in voltages), name=f"realisation_{number}")
+        run = recording(*(voltage[start : start + LENGTH] for voltage in voltages), name=f"realisation_{number}")
         write_recording(run, case / "recordings" / f"realisation_{number}.nc")
     return case
 

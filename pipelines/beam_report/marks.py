@@ -32,7 +32,7 @@ def group_colour(experiment: BeamExperiment, group: str) -> str:
     """Colour of measured configurations, the same in every report, and of twins in their order."""
     if group in _CONFIGURATION_COLOURS:
         return _CONFIGURATION_COLOURS[group]
-    twins = [one for one in experiment.groups if one not in _CONFIGURATION_COLOURS]
+    twins = [group for group in experiment.groups if group not in _CONFIGURATION_COLOURS]
     return _TWIN_COLOURS[twins.index(group) % len(_TWIN_COLOURS)]
 
 
@@ -59,8 +59,8 @@ def amplitude_axis(axes: Axes, shown: tuple[float, float] | None = None) -> None
 def legend_above(figure: Figure, axes: Axes | Sequence[Axes], *, columns: int = 4) -> None:
     """One legend for all panels, each label once."""
     entries: dict[str, object] = {}
-    for one in axes if isinstance(axes, Sequence) else [axes]:
-        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
+    for axis in axes if isinstance(axes, Sequence) else [axes]:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     if entries:
         figure.legend(

@@ -127,7 +127,7 @@ def decay_table(experiment: BeamExperiment) -> Table | None:
         "release [s]",
         "transient",
         "largest a [g]",
-        *(f"ζ₁ by {one} [%]" for one in METHODS),
+        *(f"ζ₁ by {method} [%]" for method in METHODS),
     )
     note = (
         "ζ₁ at the largest, the middle and the smallest amplitude that may be used, with half the 90 % interval."
@@ -321,10 +321,10 @@ def run_table(runs: Sequence[BeamRun]) -> Table:
 def reason_table(experiment: BeamExperiment) -> Table | None:
     """Modes whose decay could not be read, and why."""
     rows = [
-        (run.name, experiment.modes.names[one.mode], one.reason)
+        (run.name, experiment.modes.names[decay.mode], decay.reason)
         for run in experiment.free_runs
-        for one in run.decays
-        if one.reason
+        for decay in run.decays
+        if decay.reason
     ]
     return Table("Modes whose decay was not read", ("run", "mode", "reason"), tuple(rows)) if rows else None
 

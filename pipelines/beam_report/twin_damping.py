@@ -82,7 +82,7 @@ def _pooled(experiment: BeamExperiment, group: str) -> PooledDamping | None:
         for run in experiment.free_runs
         if run.group == group and run.first_decay is not None
     ]
-    readings = [one for one in readings if one.used.any()]
+    readings = [reading for reading in readings if reading.used.any()]
     return pooled_damping(readings) if readings else None
 
 
@@ -133,13 +133,13 @@ def _row(amplitude: float, found: list[DecayComparison]) -> tuple[str, ...]:
     return (shown if known else f"[{shown}]", measured, *cells)
 
 
-def _largest(one: DecayComparison) -> str:
-    known = one.deviation[one.is_known]
+def _largest(decay_comparison: DecayComparison) -> str:
+    known = decay_comparison.deviation[decay_comparison.is_known]
     return f"{text(100 * float(np.abs(known).max()), 2)} %" if known.size else MISSING
 
 
-def _rms(one: DecayComparison) -> str:
-    known = one.deviation[one.is_known]
+def _rms(decay_comparison: DecayComparison) -> str:
+    known = decay_comparison.deviation[decay_comparison.is_known]
     return f"{text(100 * float(np.sqrt(np.mean(known**2))), 2)} %" if known.size else MISSING
 
 

@@ -34,7 +34,7 @@ def interval_lines(recordings: Recordings, workshop: Workshop) -> list[str]:
     runs = {"validation": validation}
     runs |= {f"sweep {level_g:g} g": recordings.sweep(level_g) for level_g in SWEEPS_G}
     runs |= {f"beam, random {level_g:g} g": recordings.beam_random(level_g) for level_g in BEAM_LEVELS_G}
-    runs |= {one.name: one for one in recordings.decays(14.6)}
+    runs |= {decay.name: decay for decay in recordings.decays(14.6)}
     for name, run in runs.items():
         ranges = [ensemble.predicted_range(run.velocity_m_per_s, probability) for probability in PROBABILITIES]
         covered = "".join(f"{100 * one.coverage(run.dynamic_force_n):6.1f} %" for one in ranges)

@@ -85,7 +85,7 @@ def _with_memory(workshop: Workshop, runs: _Runs, name: str, seed: int) -> Reduc
     steady = workshop.model(
         f"slow_{name}", [runs.slow], [runs.slow_validation], agitation=CANDIDATES[name], seed=seed
     )
-    return with_break_up(steady, [one.run() for one in (runs.slow, *runs.starts)])
+    return with_break_up(steady, [start.run() for start in (runs.slow, *runs.starts)])
 
 
 def _choice_line(name: str, model: ReducedOrderModel, runs: _Runs) -> str:

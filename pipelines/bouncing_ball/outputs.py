@@ -41,9 +41,9 @@ def write_ball(experiment: BallExperiment, folder: Path, *, command: str, report
 def _twin_table(experiment: BallExperiment) -> str:
     """The table to put into the rig file, with what is known of each number."""
     lines = [f"# bouncing ball identified at omega_bar = {experiment.omega_bar:.4g} for {experiment.rig_name}"]
-    for one in experiment.identified.intervals:
-        at = f", at the {one.at_bound} bound of its search" if one.at_bound else ""
-        lines.append(f"# {one.name}: 90 % interval {one.low:.4g} ... {one.high:.4g}{at}")
+    for interval in experiment.identified.intervals:
+        at = f", at the {interval.at_bound} bound of its search" if interval.at_bound else ""
+        lines.append(f"# {interval.name}: 90 % interval {interval.low:.4g} ... {interval.high:.4g}{at}")
     return "\n".join(lines) + "\n" + experiment.identified.ball.twin_table()
 
 
@@ -52,10 +52,10 @@ def _dataset(experiment: BallExperiment, provenance: dict[str, object]) -> xr.Da
     intervals = experiment.identified.intervals
     along = "ball_parameter"
     variables: dict[str, Any] = {
-        "ball_value": (along, [one.value for one in intervals]),
-        "ball_value_low": (along, [one.low for one in intervals]),
-        "ball_value_high": (along, [one.high for one in intervals]),
-        "ball_profile_ratio": (along, [one.profile_ratio for one in intervals]),
+        "ball_value": (along, [interval.value for interval in intervals]),
+        "ball_value_low": (along, [interval.low for interval in intervals]),
+        "ball_value_high": (along, [interval.high for interval in intervals]),
+        "ball_profile_ratio": (along, [interval.profile_ratio for interval in intervals]),
     }
     result = experiment.result
     if isinstance(result, DecayResult):
@@ -70,7 +70,7 @@ def _dataset(experiment: BallExperiment, provenance: dict[str, object]) -> xr.Da
         for name in ("omega_bar", "u_bar", "w_bar"):
             variables[name] = ("window", result.windows[name].values)
         variables["ball_w_bar"] = ("window", result.w_bar_of_ball)
-    names = np.array([one.name for one in intervals], dtype=object)
+    names = np.array([interval.name for interval in intervals], dtype=object)
     dataset = described(xr.Dataset(variables, coords={along: names}))
     return dataset.assign_attrs(
         title="Bouncing ball",

@@ -88,7 +88,7 @@ def _line_plans(experiment: BallExperiment, result: LineResult) -> tuple[Section
 
 def _sentences(experiment: BallExperiment) -> tuple[str, ...]:
     found, result = experiment.identified, experiment.result
-    known = sum(one.is_determined for one in found.intervals)
+    known = sum(interval.is_determined for interval in found.intervals)
     lines = [f"Five parameters were fitted to {found.residuals.size} values; the data hold {known} of them."]
     if isinstance(result, LineResult):
         tuned, others = summary(result.bands)

@@ -25,16 +25,16 @@ def parameter_table(experiment: BallExperiment) -> Table:
     """Values, intervals and non-dimensional form."""
     plain = experiment.identified.ball.non_dimensional(experiment.rig, experiment.omega_bar)
     rows = []
-    for one in experiment.identified.intervals:
-        label, unit, scaled, field = _PARAMETERS[one.name]
-        ends = [text(end, 4) if np.isfinite(end) else "bound" for end in (one.low, one.high)]
+    for interval in experiment.identified.intervals:
+        label, unit, scaled, field = _PARAMETERS[interval.name]
+        ends = [text(end, 4) if np.isfinite(end) else "bound" for end in (interval.low, interval.high)]
         rows.append(
             (
                 f"{label} [{unit}]",
-                text(one.value, 4),
+                text(interval.value, 4),
                 f"{ends[0]} … {ends[1]}",
-                text(one.profile_ratio, 2),
-                f"at its {one.at_bound} bound" if one.at_bound else MISSING,
+                text(interval.profile_ratio, 2),
+                f"at its {interval.at_bound} bound" if interval.at_bound else MISSING,
                 f"{scaled} = {text(getattr(plain, field), 4)}",
             )
         )

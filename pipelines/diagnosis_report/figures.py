@@ -33,7 +33,7 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
     if diagnosis.verdict.best is not None:
         rows.append((words(diagnosis.verdict.best, "\n+ "), diagnosis.verdict.best, REFERENCE_COLOUR))
     if found.ceilings:
-        rows.append(("ceiling", min(found.ceilings, key=lambda one: one.held_out), FAINT_COLOUR))
+        rows.append(("ceiling", min(found.ceilings, key=lambda ceiling: ceiling.held_out), FAINT_COLOUR))
     values = [one.held_out_rms for _, one, _ in rows]
     figure = new_figure(0.6 + 0.36 * len(rows))
     axes = figure.subplots()
@@ -137,8 +137,8 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
     readings = found.readings(found.retuned)
     named = named_channels(diagnosis)
 
-    def missed(one: Observation) -> float:
-        return float((one.residual(readings[one.run.name][one.channel]) ** 2).sum())
+    def missed(observation: Observation) -> float:
+        return float((observation.residual(readings[observation.run.name][observation.channel]) ** 2).sum())
 
     observed = max(found.held_out, key=lambda run: sum(missed(one) for one in run))
     run = observed[0].run
@@ -212,25 +212,29 @@ def _same(found: list[ChannelMismatch], wanted: ChannelMismatch) -> ChannelMisma
     return next(one for one in found if (one.run, one.channel) == (wanted.run, wanted.channel))
 
 
-def _highest(one: ChannelMismatch) -> int:
+def _highest(channel_mismatch: ChannelMismatch) -> int:
     """The band below which nearly all of the misfit lies that is no noise."""
-    inner = one.excess[1:-1] if one.excess.shape[0] > 4 else one.excess
+    inner = channel_mismatch.excess[1:-1] if channel_mismatch.excess.shape[0] > 4 else channel_mismatch.excess
     beyond = np.maximum(inner.mean(axis=0) - _EXCESS_OF_NOISE, 0.0)
     cumulative = np.cumsum(beyond)
     if cumulative[-1] <= 0:
-        return int(one.excess.shape[1]) - 1
+        return int(channel_mismatch.excess.shape[1]) - 1
     index = int(np.searchsorted(cumulative, 0.98 * cumulative[-1]))
-    return int(min(max(2 * index, 12), one.excess.shape[1] - 1))
+    return int(min(max(2 * index, 12), channel_mismatch.excess.shape[1] - 1))
 
 
-def _left(one: Observation, values: FloatArray) -> FloatArray:
-    return values if one.keeps_mean else values - float(np.nanmean(values))
+def _left(observation: Observation, values: FloatArray) -> FloatArray:
+    return values if observation.keeps_mean else values - float(np.nanmean(values))
 
 
 def named_channels(diagnosis: Diagnosis) -> list[str]:
     """Channels on which the named effects act."""
     best = diagnosis.verdict.best
-    return [one.channel.partition("<")[0] for one in best.fit.candidates if one.channel] if best else []
+    return (
+        [candidate.channel.partition("<")[0] for candidate in best.fit.candidates if candidate.channel]
+        if best
+        else []
+    )
 
 
 def extended_label(diagnosis: Diagnosis) -> str:
@@ -238,9 +242,9 @@ def extended_label(diagnosis: Diagnosis) -> str:
     return "nearest known effect" if diagnosis.verdict.kind == "unknown" else "with what was left out"
 
 
-def words(one: Explanation, between: str = " + ") -> str:
+def words(explanation: Explanation, between: str = " + ") -> str:
     """Effects of an explanation and where they act."""
-    return between.join(plain(form_and_place(candidate), 64) for candidate in one.fit.candidates)
+    return between.join(plain(form_and_place(candidate), 64) for candidate in explanation.fit.candidates)
 
 
 def _handy(values: FloatArray, units: str) -> tuple[float, str]:

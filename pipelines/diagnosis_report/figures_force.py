@@ -25,7 +25,7 @@ def missing_force(name: str, diagnosis: Diagnosis) -> ReportFigure:
     assert cut is not None
     character = diagnosis.examination.characters[place]
     forces = cut.forces(place)
-    largest = max(forces, key=lambda one: float(np.mean(one.force_n**2)))
+    largest = max(forces, key=lambda force: float(np.mean(force.force_n**2)))
     figure = new_figure(4.4)
     panels = figure.subplots(2, 2)
     _in_time(panels[0, 0], largest)
@@ -56,32 +56,40 @@ def worst_place(diagnosis: Diagnosis) -> str:
     return max(there, key=lambda place: (shares.get(place, 0.0), there[place].size_n / there[place].noise_n))
 
 
-def _in_time(axes, one: LatentForce) -> None:  # type: ignore[no-untyped-def]
-    spread = one.motion[:, 2].std() / max(one.motion[:, 1].std(), 1e-300)
-    n = min(one.time_s.size, int(_CYCLES * 2 * np.pi / spread * one.run.attributes.sampling_rate_hz))
-    power = np.convolve(one.force_n**2, np.ones(n), "valid")
-    start = int(power.argmax()) if not one.run.is_free else 0
+def _in_time(axes, latent_force: LatentForce) -> None:  # type: ignore[no-untyped-def]
+    spread = latent_force.motion[:, 2].std() / max(latent_force.motion[:, 1].std(), 1e-300)
+    n = min(
+        latent_force.time_s.size, int(_CYCLES * 2 * np.pi / spread * latent_force.run.attributes.sampling_rate_hz)
+    )
+    power = np.convolve(latent_force.force_n**2, np.ones(n), "valid")
+    start = int(power.argmax()) if not latent_force.run.is_free else 0
     part = slice(start, start + n)
-    velocity = one.motion[part, 1]
-    scale = np.abs(one.force_n[part]).max() / max(np.abs(velocity).max(), 1e-300)
-    axes.plot(one.time_s[part], scale * velocity, color="#b8c4d0", lw=1.0, label="velocity (scaled)")
-    axes.plot(one.time_s[part], one.force_n[part], color=REFERENCE_COLOUR, lw=1.0, label="missing force")
+    velocity = latent_force.motion[part, 1]
+    scale = np.abs(latent_force.force_n[part]).max() / max(np.abs(velocity).max(), 1e-300)
+    axes.plot(latent_force.time_s[part], scale * velocity, color="#b8c4d0", lw=1.0, label="velocity (scaled)")
+    axes.plot(
+        latent_force.time_s[part],
+        latent_force.force_n[part],
+        color=REFERENCE_COLOUR,
+        lw=1.0,
+        label="missing force",
+    )
     axes.set(xlabel="time [s]", ylabel="force [N]")
-    axes.set_ylim(top=1.45 * np.abs(one.force_n[part]).max())
+    axes.set_ylim(top=1.45 * np.abs(latent_force.force_n[part]).max())
     axes.legend(loc="upper right", fontsize=7, ncols=2)
 
 
-def _over(axes, one: LatentForce, order: int, label: str) -> None:  # type: ignore[no-untyped-def]
-    step = max(1, one.force_n.size // _MOST_POINTS)
-    values = one.motion[::step, order] * (1e3 if order == 0 else 1.0)
-    axes.plot(values, one.force_n[::step], ".", color=NEUTRAL_COLOUR, ms=1.5, alpha=0.5, rasterized=True)
+def _over(axes, latent_force: LatentForce, order: int, label: str) -> None:  # type: ignore[no-untyped-def]
+    step = max(1, latent_force.force_n.size // _MOST_POINTS)
+    values = latent_force.motion[::step, order] * (1e3 if order == 0 else 1.0)
+    axes.plot(values, latent_force.force_n[::step], ".", color=NEUTRAL_COLOUR, ms=1.5, alpha=0.5, rasterized=True)
     edges = np.quantile(values, np.linspace(0.005, 0.995, 31))
     middle, mean = [], []
     for low, high in pairwise(edges):
         inside = (values >= low) & (values <= high)
         if inside.sum() > 3:
             middle.append(float(values[inside].mean()))
-            mean.append(float(one.force_n[::step][inside].mean()))
+            mean.append(float(latent_force.force_n[::step][inside].mean()))
     axes.plot(middle, mean, color=REFERENCE_COLOUR, lw=1.5, label="mean")
     axes.set(xlabel=label, ylabel="missing force [N]")
     axes.legend(loc="upper right", fontsize=7)

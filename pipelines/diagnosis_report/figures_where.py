@@ -69,7 +69,11 @@ def residual_profiles(name: str, diagnosis: Diagnosis) -> ReportFigure:
     if diagnosis.verdict.best is not None:
         readings = found.readings(diagnosis.verdict.best)
         rig = getattr(found.model, "rig", None)
-        after = next(one for one in residual_maps(found.fitting, readings, rig) if one.channel == before.channel)
+        after = next(
+            residual_map
+            for residual_map in residual_maps(found.fitting, readings, rig)
+            if residual_map.channel == before.channel
+        )
     figure = new_figure(4.6)
     panels = figure.subplots(2, 2)
     for axes, attribute, label in (

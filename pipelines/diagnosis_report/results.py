@@ -24,6 +24,6 @@ class Diagnosis:
     def explanations(self) -> list[Explanation]:
         """Every explanation that was fitted, once, by its best fit; the best on held-out runs first."""
         best: dict[frozenset[str], Explanation] = {}
-        for one in sorted(self.findings.explanations, key=lambda one: one.fit.cost):
-            best.setdefault(frozenset(one.keys), one)
+        for explanation in sorted(self.findings.explanations, key=lambda explanation: explanation.fit.cost):
+            best.setdefault(frozenset(explanation.keys), explanation)
         return sorted(best.values(), key=lambda one: one.held_out)

@@ -32,7 +32,7 @@ Draw = Callable[..., ReportFigure]
 
 def page_of(diagnosis: Diagnosis) -> Page:
     """The page of the report."""
-    places = [place for place, one in diagnosis.examination.characters.items()]
+    places = [place for place, character in diagnosis.examination.characters.items()]
     where_tables = (
         tables.cut_table(diagnosis),
         tables.sensor_table(diagnosis),

@@ -81,8 +81,8 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
     everything: list[tuple[str, Explanation]] = [
         ("baseline as believed", found.believed),
         ("baseline retuned", found.retuned),
-        *[(f"{_named(one)} (ceiling)", one) for one in found.ceilings],
-        *[(_named(one), one) for one in diagnosis.explanations],
+        *[(f"{_named(ceiling)} (ceiling)", ceiling) for ceiling in found.ceilings],
+        *[(_named(explanation), explanation) for explanation in diagnosis.explanations],
     ]
     rows = [
         (label, text(one.fit.cost, 4), text(one.held_out, 4), text(one.held_out_rms, 3))
@@ -99,7 +99,7 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
 def left_out_table(diagnosis: Diagnosis) -> Table:
     """Candidates that were not fitted to the end, and why."""
     found = diagnosis.findings
-    fitted = {one.keys[0] for one in found.explanations if len(one.keys) == 1}
+    fitted = {explanation.keys[0] for explanation in found.explanations if len(explanation.keys) == 1}
     gains = sorted(found.screened.items(), key=lambda item: -item[1])
     rows = [(_beside(name, fitted), f"failed: {why}") for name, why in sorted(found.failed.items())]
     rows += [(_beside(name, fitted), text(gain, 3)) for name, gain in gains[:_MOST_LEFT_OUT]]
@@ -161,8 +161,13 @@ def sensor_table(diagnosis: Diagnosis) -> Table | None:
     if cut is None or not cut.sensors:
         return None
     rows = [
-        (one.channel, text(one.ratio, 3), text(one.disagreement_without, 3), text(one.demand_without_n2**0.5, 3))
-        for one in sorted(cut.sensors, key=lambda one: -one.ratio)
+        (
+            sensor.channel,
+            text(sensor.ratio, 3),
+            text(sensor.disagreement_without, 3),
+            text(sensor.demand_without_n2**0.5, 3),
+        )
+        for sensor in sorted(cut.sensors, key=lambda sensor: -sensor.ratio)
     ]
     header = ("channel", "difference from the others / noise", "others among themselves without it / noise",
               "force that blocks then lack [N]")  # fmt: skip
@@ -181,9 +186,13 @@ def sensor_error_table(diagnosis: Diagnosis) -> Table | None:
     if cut is None or not answers:
         return None
     rows = [
-        (one.term, f"{_share(one.share)} ({_share(one.low)} … {_share(one.high)})", _holds(one.holds))
-        for one in answers
-        if one.term != ALONE
+        (
+            answer.term,
+            f"{_share(answer.share)} ({_share(answer.low)} … {_share(answer.high)})",
+            _holds(answer.holds),
+        )
+        for answer in answers
+        if answer.term != ALONE
     ]
     caption = "Share of the variance of its error that each form explains alone, with 90 % intervals."
     return Table(f"What {cut.doubted} reads wrong", ("form", "share", "holds"), tuple(rows), caption)
@@ -193,11 +202,13 @@ def answers_table(diagnosis: Diagnosis, place: str) -> Table:
     """Answers to the physical questions on the force at one place."""
     character = diagnosis.examination.characters[place]
     rows = []
-    for one in character.answers:
-        shown = _share if one.quantity.startswith("share") else text
-        low_high = f"{shown(one.low)} … {shown(one.high)}" if math.isfinite(one.low) else MISSING
-        quantity = one.quantity + (f" [{one.units}]" if one.units != "1" else "")
-        rows.append((one.question, one.finding, quantity, shown(one.value), low_high, one.remark or MISSING))
+    for answer in character.answers:
+        shown = _share if answer.quantity.startswith("share") else text
+        low_high = f"{shown(answer.low)} … {shown(answer.high)}" if math.isfinite(answer.low) else MISSING
+        quantity = answer.quantity + (f" [{answer.units}]" if answer.units != "1" else "")
+        rows.append(
+            (answer.question, answer.finding, quantity, shown(answer.value), low_high, answer.remark or MISSING)
+        )
     caption = (
         f"The force is {text(character.size_n, 3)} N RMS beyond the block's own parameters, its noise "
         f"{text(character.noise_n, 2)} N."
@@ -222,7 +233,7 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
     if not found.explanations:
         return None
     chosen = diagnosis.explanations[:_MOST_EXPLANATIONS]
-    alternatives = {one.keys for one in diagnosis.verdict.alternatives}
+    alternatives = {alternative.keys for alternative in diagnosis.verdict.alternatives}
     rows = []
     for one in chosen:
         for_: list[str] = []
@@ -275,9 +286,9 @@ def remains_table(diagnosis: Diagnosis) -> Table:
     rows = []
     for name in names:
         shown = []
-        for one in readings:
+        for reading in readings:
             squares = [
-                observed.residual(one[observed.run.name][name])[observed.informative] ** 2
+                observed.residual(reading[observed.run.name][name])[observed.informative] ** 2
                 for run in found.held_out
                 for observed in run
                 if observed.channel == name
@@ -302,25 +313,25 @@ def limits_table(diagnosis: Diagnosis) -> Table:
         limits += [f"{one.block}: {one.remark}" for one in cut.blocks if one.remark]
         limits += [cut.remark] if cut.remark else []
     for place, character in diagnosis.examination.characters.items():
-        undecided = [one.question for one in character.answers if one.finding == CANNOT_TELL]
+        undecided = [answer.question for answer in character.answers if answer.finding == CANNOT_TELL]
         if undecided:
             limits.append(f"force at the {place}: no answer on {', '.join(undecided)}")
     rows = tuple((limit,) for limit in dict.fromkeys(limits)) or ((MISSING,),)
     return Table("Limits", ("what these recordings cannot tell",), rows)
 
 
-def _named(one: Explanation) -> str:
+def _named(explanation: Explanation) -> str:
     """Effects of an explanation and where they act."""
-    return " + ".join(form_and_place(candidate) for candidate in one.fit.candidates)
+    return " + ".join(form_and_place(candidate) for candidate in explanation.fit.candidates)
 
 
-def _standing(diagnosis: Diagnosis, one: Explanation, alternatives: Collection[tuple[str, ...]]) -> str:
+def _standing(diagnosis: Diagnosis, explanation: Explanation, alternatives: Collection[tuple[str, ...]]) -> str:
     verdict = diagnosis.verdict
-    if verdict.best is not None and one.keys == verdict.best.keys:
+    if verdict.best is not None and explanation.keys == verdict.best.keys:
         return verdict.kind if verdict.kind != "unknown" else "nearest, not adequate"
-    if one.keys in alternatives:
+    if explanation.keys in alternatives:
         return "as good"
-    is_more = verdict.best is not None and set(one.keys) > set(verdict.best.keys)
+    is_more = verdict.best is not None and set(explanation.keys) > set(verdict.best.keys)
     return "not worth one more effect" if is_more and verdict.kind != "unknown" else "worse"
 
 

@@ -171,11 +171,11 @@ def _yes(value: bool | None) -> str:
     return "not measured" if value is None else "yes" if value else "no"
 
 
-def _map_arrays(one: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    w_bar = one.w_bar.transpose("omega_bar", "u_bar").where(
-        one.measured.transpose("omega_bar", "u_bar").astype(bool)
+def _map_arrays(dataset: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
+    w_bar = dataset.w_bar.transpose("omega_bar", "u_bar").where(
+        dataset.measured.transpose("omega_bar", "u_bar").astype(bool)
     )
-    return one.omega_bar.to_numpy(), one.u_bar.to_numpy(), w_bar.to_numpy()
+    return dataset.omega_bar.to_numpy(), dataset.u_bar.to_numpy(), w_bar.to_numpy()
 
 
 def _maximum(results: Results) -> Iterator[Fact]:
@@ -321,5 +321,5 @@ def table(all_facts: Sequence[Fact]) -> str:
     """
     rows = ["| fact | measured | found | agrees |", "|---|---|---|---|"]
     verdict = {True: "yes", False: "**no**", None: "–"}
-    rows += [f"| {one.what} | {one.published} | {one.found} | {verdict[one.agrees]} |" for one in all_facts]
+    rows += [f"| {fact.what} | {fact.published} | {fact.found} | {verdict[fact.agrees]} |" for fact in all_facts]
     return "\n".join(rows)

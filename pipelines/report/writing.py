@@ -108,14 +108,14 @@ def drawn_sections(plans: Sequence[SectionPlan], progress: Progress | None = Non
     with drawing_style():
         for plan in plans:
             figures, skipped = [], []
-            for one in plan.figures:
+            for figure in plan.figures:
                 try:
-                    figures.append(one.draw(one.name))
+                    figures.append(figure.draw(figure.name))
                 except NothingToDrawError as reason:
-                    skipped.append(SkippedFigure(one.name, str(reason)))
+                    skipped.append(SkippedFigure(figure.name, str(reason)))
                 done += 1
                 if progress is not None:
-                    progress(done, total, one.name)
+                    progress(done, total, figure.name)
             sections.append(Section(plan.title, tuple(figures), tuple(skipped), plan.tables))
     return tuple(sections)
 

@@ -248,10 +248,10 @@ def _outside(runs: Sequence[ComparedRun]) -> list[str]:
     """One line per validation run whose motion the training did not cover."""
     flags = []
     for run in runs:
-        outside_s = sum(one.stop_s - one.start_s for one in run.excursions)
+        outside_s = sum(excursion.stop_s - excursion.start_s for excursion in run.excursions)
         duration_s = run.free.size / run.signals.sampling_rate_hz
         if run.role == "validation" and outside_s > LARGEST_SHARE_OUTSIDE * duration_s:
-            longest = max(run.excursions, key=lambda one: one.stop_s - one.start_s)
+            longest = max(run.excursions, key=lambda excursion: excursion.stop_s - excursion.start_s)
             flags.append(
                 f"{run.name}: {100 * outside_s / duration_s:.0f} % of the motion is outside the training, the "
                 f"longest stretch from {longest.start_s:.2f} s to {longest.stop_s:.2f} s ({longest.reason})"

@@ -58,8 +58,8 @@ def _outside(run: ComparedRun) -> MotionCycles:
     """Cycles within the excursions of a run."""
     start = run.cycles.start_s
     inside = np.zeros(start.size, bool)
-    for one in run.excursions:
-        inside |= (start >= one.start_s - 1e-9) & (start < one.stop_s - 1e-9)
+    for excursion in run.excursions:
+        inside |= (start >= excursion.start_s - 1e-9) & (start < excursion.stop_s - 1e-9)
     return MotionCycles(*(values[inside] for values in vars(run.cycles).values()))
 
 

@@ -62,14 +62,14 @@ class StudiedModels:
     @property
     def trained(self) -> list[CaseResult]:
         """Results with a model."""
-        return [one for one in self.results if one.is_trained]
+        return [result for result in self.results if result.is_trained]
 
 
 def page_of(found: StudiedModels) -> Page:
     """The page of the report."""
     n_failed = len(found.results) - len(found.trained)
     failed = f" {n_failed} could not be trained." if n_failed else ""
-    seconds = sum(one.seconds for one in found.results)
+    seconds = sum(result.seconds for result in found.results)
     summary = (
         f"Picked: {found.pick.reason}.",
         f"{len(found.results)} models were trained in {seconds / 60:.0f} minutes of computation.{failed}",
@@ -168,20 +168,20 @@ def case_table(found: StudiedModels) -> Table:
     """All cases, the best first."""
     smallest = found.pick.best.validation_mse**0.5
     rows = []
-    for one in found.results:
-        error = math.sqrt(one.validation_mse)
+    for result in found.results:
+        error = math.sqrt(result.validation_mse)
         behind = f"{100 * (error / smallest - 1):+.1f}".replace("-", "−") if math.isfinite(error) else "–"
         rows.append(
             (
-                one.case.name,
+                result.case.name,
                 text(error, 4),
                 behind,
-                text(math.sqrt(one.training_mse), 4),
-                text(one.mean_mse, 4),
-                str(one.n_parameters),
-                str(one.n_epochs),
-                text(one.seconds, 2),
-                one.ended,
+                text(math.sqrt(result.training_mse), 4),
+                text(result.mean_mse, 4),
+                str(result.n_parameters),
+                str(result.n_epochs),
+                text(result.seconds, 2),
+                result.ended,
             )
         )
     return Table(

@@ -193,14 +193,16 @@ def excursion_table(validated: ValidatedModel) -> Table:
     """When and where runs leave the training."""
     rows = []
     for run in validated.judged:
-        for one in sorted(run.excursions, key=lambda one: one.start_s - one.stop_s)[:_MOST_EXCURSIONS]:
+        for excursion in sorted(run.excursions, key=lambda excursion: excursion.start_s - excursion.stop_s)[
+            :_MOST_EXCURSIONS
+        ]:
             rows.append(
                 (
                     run.name,
-                    f"{one.start_s:.2f} … {one.stop_s:.2f}",
-                    one.reason,
-                    text(one.frequency_hz),
-                    text(one.speed_m_per_s),
+                    f"{excursion.start_s:.2f} … {excursion.stop_s:.2f}",
+                    excursion.reason,
+                    text(excursion.frequency_hz),
+                    text(excursion.speed_m_per_s),
                 )
             )
     return Table(

@@ -134,7 +134,7 @@ def detection(score: Score) -> Figure | None:
 
 def gains(score: Score) -> Figure | None:
     """Held-out error before and after, case by case, over the ceiling."""
-    chosen = [one for one in score.gains if one.ceiling > 0]
+    chosen = [gain for gain in score.gains if gain.ceiling > 0]
     if not chosen:
         return None
     chosen = sorted(chosen, key=lambda one: (CLASSES.index(one.kind), -one.retuned / one.ceiling))

@@ -48,13 +48,15 @@ def _percent(value: float) -> str:
     return "–" if math.isnan(value) else f"{100 * value:.0f} %"
 
 
-def _share(one: Rate) -> list[str]:
-    interval = f"{_percent(one.low)} … {_percent(one.high)}" if one.n else "–"
-    return [f"{one.successes} of {one.n}", _percent(one.value), interval]
+def _share(rate: Rate) -> list[str]:
+    interval = f"{_percent(rate.low)} … {_percent(rate.high)}" if rate.n else "–"
+    return [f"{rate.successes} of {rate.n}", _percent(rate.value), interval]
 
 
 def _rates(score: Score) -> str:
-    return _table(["", "cases", "share", "interval"], [[name, *_share(one)] for name, one in score.rates.items()])
+    return _table(
+        ["", "cases", "share", "interval"], [[name, *_share(rate)] for name, rate in score.rates.items()]
+    )
 
 
 def _numbers(score: Score) -> str:
@@ -80,7 +82,7 @@ def _spread(values: Sequence[float], unit: str) -> str:
 
 
 def _rivals(score: Score) -> str:
-    rows = [[name, *_share(one)] for name, one in score.rivals.items()]
+    rows = [[name, *_share(rival)] for name, rival in score.rivals.items()]
     text = "The class of a case, guessed without its signals, is right for:"
     return "## Rivals\n\n" + text + "\n\n" + _table(["", "cases", "share", "interval"], rows)
 
@@ -89,8 +91,12 @@ def _gains(gains: Sequence[Gain]) -> str:
     if not gains:
         return ""
     rows = [
-        [one.case, CLASS_WORDS[one.kind], *(f"{v:.3g}" for v in (one.floor, one.retuned, one.after, one.ceiling))]
-        for one in gains
+        [
+            gain.case,
+            CLASS_WORDS[gain.kind],
+            *(f"{v:.3g}" for v in (gain.floor, gain.retuned, gain.after, gain.ceiling)),
+        ]
+        for gain in gains
     ]
     head = ["case", "class", "noise floor", "retuned", "as diagnosed", "ceiling"]
     return "## Held-out errors, case by case\n\n" + _table(head, rows)

@@ -145,7 +145,7 @@ def scored(
     held = tuple(one for mark in marks if mark.right for one in _held(truths[mark.case], given[mark.case]))
     gains = tuple(one for mark in marks if (one := _gain(mark, given[mark.case])) is not None)
     right = {mark.case for mark in marks if mark.column == "right name"}
-    ratios = [one.after / one.ceiling for one in gains if one.case in right and one.ceiling > 0]
+    ratios = [gain.after / gain.ceiling for gain in gains if gain.case in right and gain.ceiling > 0]
     visible = [mark for mark in marks if mark.kind in ("single", "masked", "look_alike", "outside")]
     return Score(
         purpose=purpose,

@@ -117,10 +117,10 @@ class IdentifiedBall:
     def flags(self) -> tuple[str, ...]:
         """What a reader must know: parameters at the bounds of the search."""
         return tuple(
-            f"bouncing ball: {one.name} sits at the {one.at_bound} bound {one.value:.4g} of its search; the data "
-            "may not hold it, or no ball of this kind suits them"
-            for one in self.intervals
-            if one.at_bound
+            f"bouncing ball: {interval.name} sits at the {interval.at_bound} bound {interval.value:.4g} of its "
+            "search; the data may not hold it, or no ball of this kind suits them"
+            for interval in self.intervals
+            if interval.at_bound
         )
 
 
@@ -241,7 +241,7 @@ def _local(search: _Search, start: FloatArray, n_evaluations: int, free: npt.NDA
             least_squares(of_free, inside, bounds=(0.0, 1.0), diff_step=step, x_scale=0.1, max_nfev=n_steps)
         )
         inside = results[-1].x
-    result = min(results, key=lambda one: one.cost)
+    result = min(results, key=lambda result: result.cost)
     fixed[free] = result.x
     result.x = fixed
     return result

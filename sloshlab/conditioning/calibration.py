@@ -285,15 +285,15 @@ def _apparent_masses(
 
 def _combined(masses: Sequence[ApparentMass]) -> tuple[float, float]:
     """Mean over runs; its standard deviation from the runs' own or their scatter, whichever is larger."""
-    values = np.array([one.mass_kg for one in masses])
-    within = math.sqrt(sum(one.mass_std_kg**2 for one in masses)) / len(masses)
+    values = np.array([mass.mass_kg for mass in masses])
+    within = math.sqrt(sum(mass.mass_std_kg**2 for mass in masses)) / len(masses)
     between = float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else 0.0
     return float(values.mean()), max(within, between)
 
 
 def _combined_delay(masses: Sequence[ApparentMass]) -> tuple[float, float]:
-    values = np.array([one.delay_s for one in masses])
-    within = math.sqrt(sum(one.delay_std_s**2 for one in masses)) / len(masses)
+    values = np.array([mass.delay_s for mass in masses])
+    within = math.sqrt(sum(mass.delay_std_s**2 for mass in masses)) / len(masses)
     between = float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else 0.0
     return float(values.mean()), max(within, between)
 

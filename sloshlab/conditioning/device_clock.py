@@ -263,7 +263,7 @@ def _lower_tail(places: FloatArray, minima: FloatArray) -> tuple[float, float]:
         spreads, middles = _spread_and_middle(draws - height[:, None] - slope[:, None] * places)
         candidates.append((float(np.quantile(spreads, _SPREAD_QUANTILE)), shape, float(np.median(middles))))
     # a narrow spread high above the line means that the shortest latency is rarely met
-    possible = [one for one in candidates if spread[0] <= one[0]] or candidates[:1]
+    possible = [candidate for candidate in candidates if spread[0] <= candidate[0]] or candidates[:1]
     _, shape, unit_middle = possible[-1]
     return shape, float(middle[0]) / unit_middle
 

@@ -63,19 +63,23 @@ def _as_large_as_nothing(found: Findings, pair: Explanation) -> list[str]:
     """
     problem, scale = FreeRunProblem(found.model, found.fitting, pair.fit.candidates), Scale.of(found)
     nothing = []
-    for one in pair.fit.candidates:
-        without = {**pair.fit.values, **{f"{one.key}.{name}": 0.0 for name in one.sizes}}
+    for candidate in pair.fit.candidates:
+        without = {**pair.fit.values, **{f"{candidate.key}.{name}": 0.0 for name in candidate.sizes}}
         residual = problem.residual(problem.theta_of(without))
         lost = (huber_cost(residual) - pair.fit.misfit) / scale.fitting if np.isfinite(residual).all() else np.inf
-        if lost < LEAST_MORE or not (is_told_from_nothing(pair, one) or _is_clear(found, pair, one, scale)):
-            nothing.append(one.key)
+        if lost < LEAST_MORE or not (
+            is_told_from_nothing(pair, candidate) or _is_clear(found, pair, candidate, scale)
+        ):
+            nothing.append(candidate.key)
     return nothing
 
 
 def _is_clear(found: Findings, pair: Explanation, effect: Candidate, scale: Scale) -> bool:
     """Whether one of two effects removes what is clear, or half, of what the other one leaves, fitted alone."""
     rest = {key for key in pair.keys if key != effect.key}
-    alone = [at_its_best(found, one) for one in found.explanations if set(one.keys) == rest]
+    alone = [
+        at_its_best(found, explanation) for explanation in found.explanations if set(explanation.keys) == rest
+    ]
     return bool(alone) and all(has_gained(pair, one, scale) and is_there(one, pair) for one in alone)
 
 
@@ -88,7 +92,8 @@ def _without(found: Findings, pair: Explanation, nothing: Sequence[str]) -> Find
     why = f"fitted, but the size of {' and of '.join(nothing)} is not told from nothing"
     return replace(
         found,
-        explanations=[one for one in found.explanations if len(one.keys) < len(pair.keys)],
-        ceilings=found.ceilings + [one for one in found.explanations if len(one.keys) >= len(pair.keys)],
+        explanations=[explanation for explanation in found.explanations if len(explanation.keys) < len(pair.keys)],
+        ceilings=found.ceilings
+        + [explanation for explanation in found.explanations if len(explanation.keys) >= len(pair.keys)],
         failed={**found.failed, " + ".join(pair.keys): why},
     )

@@ -49,7 +49,7 @@ class BlockJacobian:
         """
         ends = np.cumsum([0, *sizes]).tolist()
         rows = [slice(first, end) for first, end in pairwise(ends)]
-        return cls.of_blocks([dict(enumerate(column[one] for one in rows)) for column in columns], sizes)
+        return cls.of_blocks([dict(enumerate(column[row] for row in rows)) for column in columns], sizes)
 
     @classmethod
     def of_blocks(cls, columns: Sequence[Mapping[int, FloatArray]], sizes: Sequence[int]) -> BlockJacobian:
@@ -107,7 +107,7 @@ class BlockJacobian:
         """Every row times its weight."""
         return BlockJacobian(
             self.n_columns,
-            tuple(replace(one, values=one.values * weights[one.rows, None]) for one in self.blocks),
+            tuple(replace(block, values=block.values * weights[block.rows, None]) for block in self.blocks),
         )
 
     def normal_equations(self, weights: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -120,30 +120,30 @@ class BlockJacobian:
         residual : ndarray, shape (n_rows,)
         """
         normal, gradient = np.zeros((self.n_columns, self.n_columns)), np.zeros(self.n_columns)
-        for one in self.blocks:
-            own = weights[one.rows]
-            values = one.values * own[:, None]
-            normal[np.ix_(one.columns, one.columns)] += values.T @ values
-            gradient[one.columns] += values.T @ (own * residual[one.rows])
+        for block in self.blocks:
+            own = weights[block.rows]
+            values = block.values * own[:, None]
+            normal[np.ix_(block.columns, block.columns)] += values.T @ values
+            gradient[block.columns] += values.T @ (own * residual[block.rows])
         return normal, gradient
 
     def normal(self) -> FloatArray:
         """Jᵀ J, shape (n_columns, n_columns)."""
         found = np.zeros((self.n_columns, self.n_columns))
-        for one in self.blocks:
-            found[np.ix_(one.columns, one.columns)] += one.values.T @ one.values
+        for block in self.blocks:
+            found[np.ix_(block.columns, block.columns)] += block.values.T @ block.values
         return found
 
     def transposed_times(self, vector: FloatArray) -> FloatArray:
         """Jᵀ r, shape (n_columns,)."""
         found = np.zeros(self.n_columns)
-        for one in self.blocks:
-            found[one.columns] += one.values.T @ vector[one.rows]
+        for block in self.blocks:
+            found[block.columns] += block.values.T @ vector[block.rows]
         return found
 
     def times(self, vector: FloatArray) -> FloatArray:
         """J s, one value per row."""
-        return np.concatenate([one.values @ vector[one.columns] for one in self.blocks] or [np.zeros(0)])
+        return np.concatenate([block.values @ vector[block.columns] for block in self.blocks] or [np.zeros(0)])
 
     def correct(self, step: FloatArray, change: FloatArray) -> None:
         """The least change after which the matrix says of a step what was seen, zeros kept; in place.
@@ -166,9 +166,9 @@ class BlockJacobian:
         >>> found.times(np.array([1.0, 1.0])).tolist(), found.times(np.array([1.0, 0.0])).tolist()
         ([5.0, 4.0], [3.0, 0.0])
         """
-        for one in self.blocks:
-            own = step[one.columns]
+        for block in self.blocks:
+            own = step[block.columns]
             length = float(own @ own)
             if length > 0:
-                missed = change[one.rows] - one.values @ own
-                one.values[...] += np.multiply.outer(missed, own / length)
+                missed = change[block.rows] - block.values @ own
+                block.values[...] += np.multiply.outer(missed, own / length)

@@ -363,7 +363,8 @@ def _require_sound(candidate: Candidate) -> None:
     """Starts that name every parameter, within its bounds, and an extension for each."""
     names = {parameter.name for parameter in candidate.effect.parameters}
     starts = [
-        dict(one) for one in candidate.effect.starts(replace(candidate.surroundings, channel=candidate.channel))
+        dict(start)
+        for start in candidate.effect.starts(replace(candidate.surroundings, channel=candidate.channel))
     ]
     if not names or not starts:
         raise InputError(

@@ -156,12 +156,12 @@ def _of_a_force(examination: Examination, place: str) -> str:
     if examination.cut is None or character is None or not character.is_there:
         return ""
     phases, squares = [], []
-    for one in examination.cut.forces(place):
-        velocity, acceleration = one.motion[:, 1], one.motion[:, 2]
+    for force in examination.cut.forces(place):
+        velocity, acceleration = force.motion[:, 1], force.motion[:, 2]
         scale = float(acceleration.std()) / max(float(velocity.std()), 1e-300)
-        own, *_ = np.linalg.lstsq(one.motion, one.force_n)
+        own, *_ = np.linalg.lstsq(force.motion, force.force_n)
         phases.append(np.arctan2(scale * velocity, acceleration))
-        squares.append((one.force_n - one.motion @ own) ** 2)
+        squares.append((force.force_n - force.motion @ own) ** 2)
     return _in_the_cycle(np.concatenate(phases), np.concatenate(squares))
 
 
@@ -230,7 +230,7 @@ def examination_facts(examination: Examination, found: Findings) -> dict[str, An
         facts["characters"][place] = {
             "force_rms_n": _number(character.size_n),
             "noise_rms_n": _number(character.noise_n),
-            "answers": [_answer(one) for one in character.answers],
+            "answers": [_answer(answer) for answer in character.answers],
         }
     if examination.sensor:
         facts["characters"]["sensor"] = {
@@ -247,9 +247,14 @@ def examination_facts(examination: Examination, found: Findings) -> dict[str, An
     return facts
 
 
-def _answer(one: Answer) -> dict[str, Any]:
-    told = {"question": one.question, "finding": one.finding, "quantity": one.quantity, "units": one.units}
-    return {**told, **(_estimate(one.value, one.low, one.high) or {}), "remark": one.remark}
+def _answer(answer: Answer) -> dict[str, Any]:
+    told = {
+        "question": answer.question,
+        "finding": answer.finding,
+        "quantity": answer.quantity,
+        "units": answer.units,
+    }
+    return {**told, **(_estimate(answer.value, answer.low, answer.high) or {}), "remark": answer.remark}
 
 
 def _estimate(value: float, low: float, high: float) -> dict[str, float] | None:
@@ -264,7 +269,9 @@ def _number(value: float) -> float | None:
 
 def _evidence(examination: Examination, found: Findings) -> dict[str, Any]:
     effects = {
-        one.effect.known_as: one for explanation in found.explanations for one in explanation.fit.candidates
+        candidate.effect.known_as: candidate
+        for explanation in found.explanations
+        for candidate in explanation.fit.candidates
     }
     told = {}
     for candidate in effects.values():

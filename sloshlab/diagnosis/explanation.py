@@ -70,22 +70,29 @@ class Explanation:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of its effects, sorted."""
-        return tuple(sorted(one.effect.known_as for one in self.fit.candidates))
+        return tuple(sorted(candidate.effect.known_as for candidate in self.fit.candidates))
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Blocks, names and channels of its effects."""
-        return tuple(one.key for one in self.fit.candidates)
+        return tuple(candidate.key for candidate in self.fit.candidates)
 
     @property
     def named_in_blocks(self) -> tuple[str, ...]:
         """Blocks and names of its effects, sorted; several channels may have the same."""
-        return tuple(sorted(f"{one.effect.block}.{one.effect.known_as}" for one in self.fit.candidates))
+        return tuple(
+            sorted(f"{candidate.effect.block}.{candidate.effect.known_as}" for candidate in self.fit.candidates)
+        )
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Channels on which its effects act."""
-        return tuple(name for one in self.fit.candidates if one.channel for name in channels_of(one.channel))
+        return tuple(
+            name
+            for candidate in self.fit.candidates
+            if candidate.channel
+            for name in channels_of(candidate.channel)
+        )
 
     @property
     def rests_on_a_bound(self) -> bool:
@@ -93,16 +100,16 @@ class Explanation:
         return any(
             bound != 0
             and not parameter.may_rest
-            and abs(self.fit.values[f"{one.key}.{parameter.name}"] - bound) <= 1e-6 * abs(bound)
-            for one in self.fit.candidates
-            for parameter in one.effect.parameters
-            for bound in one.bounds(parameter)
+            and abs(self.fit.values[f"{candidate.key}.{parameter.name}"] - bound) <= 1e-6 * abs(bound)
+            for candidate in self.fit.candidates
+            for parameter in candidate.effect.parameters
+            for bound in candidate.bounds(parameter)
         )
 
     @property
     def n_numbers(self) -> int:
         """Numbers of its effects."""
-        return sum(len(one.effect.parameters) for one in self.fit.candidates)
+        return sum(len(candidate.effect.parameters) for candidate in self.fit.candidates)
 
 
 @dataclass(frozen=True, eq=False)

@@ -146,9 +146,9 @@ def force_character(
     seed : int
         Of the draws for intervals.
     """
-    shifted = [_with_damping(one, damping_shift) for one in forces]
+    shifted = [_with_damping(force, damping_shift) for force in forces]
     parts = stretches(shifted)
-    noise = float(np.sqrt(np.mean([one.standard_error_n**2 for one in forces])))
+    noise = float(np.sqrt(np.mean([force.standard_error_n**2 for force in forces])))
     fit = _Regression(parts, own_tolerances, np.random.default_rng(seed))
     size = float(np.sqrt(np.mean(fit.beyond_own**2)))
     found = windows(parts, fit.beyond_spring_of_parts, float(own_tolerances[1]))
@@ -172,9 +172,16 @@ def force_character(
     return ForceCharacter(forces[0].place, size, noise, answers, found)
 
 
-def _with_damping(one: LatentForce, shift: float) -> LatentForce:
-    force = one.force_n - shift * one.motion[:, 1]
-    return LatentForce(one.run, one.place, force, one.standard_error_n, one.time_s, one.motion)
+def _with_damping(latent_force: LatentForce, shift: float) -> LatentForce:
+    force = latent_force.force_n - shift * latent_force.motion[:, 1]
+    return LatentForce(
+        latent_force.run,
+        latent_force.place,
+        force,
+        latent_force.standard_error_n,
+        latent_force.time_s,
+        latent_force.motion,
+    )
 
 
 class _Regression:

@@ -75,18 +75,18 @@ def windows(parts: Sequence[Stretch], forces: Sequence[FloatArray], own_damping:
         Standard deviation of the block's own damping [N s/m].
     """
     rows = []
-    for number, (one, beyond) in enumerate(zip(parts, forces, strict=True)):
-        cycles = float(one.time_s[-1] - one.time_s[0]) * float(np.median(one.omega)) / (2 * np.pi)
-        n = int(min(max(1.0, cycles / _CYCLES), max(1, one.time_s.size // _FEWEST_SAMPLES)))
-        for piece in np.array_split(np.arange(one.time_s.size), n):
-            v, a, force = one.v[piece], one.a[piece], one.force_n[piece]
+    for number, (part, beyond) in enumerate(zip(parts, forces, strict=True)):
+        cycles = float(part.time_s[-1] - part.time_s[0]) * float(np.median(part.omega)) / (2 * np.pi)
+        n = int(min(max(1.0, cycles / _CYCLES), max(1, part.time_s.size // _FEWEST_SAMPLES)))
+        for piece in np.array_split(np.arange(part.time_s.size), n):
+            v, a, force = part.v[piece], part.a[piece], part.force_n[piece]
             rms_v, rms_a = float(np.sqrt(np.mean(v**2))), float(np.sqrt(np.mean(a**2)))
             omega = max(rms_a / max(rms_v, 1e-300), 1e-12)
             period = 2 * np.pi / omega
             power = float(np.mean(force * v))
             rows.append(
                 (
-                    float(one.level_g[piece].mean()), np.sqrt(2) * rms_v / omega, omega, power,
+                    float(part.level_g[piece].mean()), np.sqrt(2) * rms_v / omega, omega, power,
                     float(np.sqrt(np.mean(beyond[piece] ** 2))), rms_v, -power * period,
                     own_damping * rms_v**2 * period, number,
                 )
@@ -132,7 +132,7 @@ def work_exponents(found: Windows, generator: np.random.Generator) -> WorkExpone
         return WorkExponents(None, None, {"amplitude": few, "frequency": few})
     logs = [np.log(values[sure]) for values in (found.work_j, found.amplitude_m, found.omega)]
     weight = found.work_j[sure] / np.hypot(doubt[sure], 0.2 * found.work_j[sure])
-    spans = [_span(one) for one in logs[1:]]
+    spans = [_span(log) for log in logs[1:]]
     free = [span > np.log(least) for span, least in zip(spans, (_LEAST_SPAN, _LEAST_FREQUENCY_SPAN), strict=True)]
     why = {"amplitude": "the amplitudes are too alike", "frequency": "the frequencies are too alike"}
     if not any(free):
@@ -188,11 +188,11 @@ def onset(
         Whether the force is there at the smallest level already.
         None where the levels are too alike.
     """
-    everywhere = np.concatenate([one.level_g for one in parts])
+    everywhere = np.concatenate([part.level_g for part in parts])
     moves = everywhere > _AT_REST * everywhere.max()
     level = everywhere
-    force = np.concatenate([one.force_n for one in parts])
-    motion = np.concatenate([one.own for one in parts]) * np.where(own > 0, 4 * own, 0.0)
+    force = np.concatenate([part.force_n for part in parts])
+    motion = np.concatenate([part.own for part in parts]) * np.where(own > 0, 4 * own, 0.0)
     if _span(np.log(level[moves])) < np.log(_LEAST_SPAN):
         return None
     edges = np.quantile(level[moves], np.linspace(0, 1, _N_LEVELS + 1))
@@ -216,7 +216,7 @@ def onset(
             count = upper
         return count
 
-    starts = np.cumsum([0, *[one.level_g.size for one in parts]])
+    starts = np.cumsum([0, *[part.level_g.size for part in parts]])
     blocks = [np.arange(a, b) for a, b in pairwise(starts)]
     best = reached(np.arange(level.size))
     draws = []
@@ -252,9 +252,9 @@ def orders(
     """
     per_run = len(beyond) // len(forces)
     shares = []
-    for number, one in enumerate(forces):
+    for number, force in enumerate(forces):
         series = np.concatenate(beyond[number * per_run : (number + 1) * per_run])
-        found = _shares_of_orders(one, series)
+        found = _shares_of_orders(force, series)
         if found is not None:
             shares += found
     if len(shares) < 2:
@@ -272,10 +272,10 @@ def orders(
     return {order: (float(value[i]), float(low[i]), float(high[i])) for i, order in enumerate(ORDERS)}
 
 
-def _shares_of_orders(one: LatentForce, series: FloatArray) -> list[FloatArray] | None:
+def _shares_of_orders(latent_force: LatentForce, series: FloatArray) -> list[FloatArray] | None:
     """Per piece of the run: shares of the orders, and the power that they are shares of."""
-    v, a = one.motion[:, 1], one.motion[:, 2]
-    rate = one.run.attributes.sampling_rate_hz
+    v, a = latent_force.motion[:, 1], latent_force.motion[:, 2]
+    rate = latent_force.run.attributes.sampling_rate_hz
     omega = float(a.std() / max(v.std(), 1e-300))
     moves = np.flatnonzero(np.abs(v) > _AT_REST * np.abs(v).max())
     if not moves.size:

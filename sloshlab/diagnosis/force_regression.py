@@ -66,11 +66,11 @@ def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
     forces : sequence of LatentForce
         Of one place.
     """
-    largest = max((float(np.abs(one.motion[:, 0]).max()) for one in forces), default=1.0)
+    largest = max((float(np.abs(force.motion[:, 0]).max()) for force in forces), default=1.0)
     found = []
-    for number, one in enumerate(forces):
-        x, v, a = one.motion.T
-        rate = one.run.attributes.sampling_rate_hz
+    for number, force in enumerate(forces):
+        x, v, a = force.motion.T
+        rate = force.run.attributes.sampling_rate_hz
         omega = float(a.std() / max(v.std(), 1e-300))
         cycle = max(4, round(min(2 * np.pi / max(omega, 1e-300) * rate, x.size)))  # a run may not move at all
         running = (uniform_filter1d(part**2, cycle, mode="nearest") for part in (a, v))
@@ -80,8 +80,8 @@ def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
         local = np.sqrt(power_a / np.maximum(power_v, 1e-300))
         played = np.stack([_play(x, share * largest) for share in _PLAYS], axis=1)
         lately = _lately(power_a, _FORGETTING_CYCLES * cycle)
-        first = x if one.place == STRUCTURE else a
-        columns = (one.time_s, one.force_n, x, v, a, first, level, local, played, lately)
+        first = x if force.place == STRUCTURE else a
+        columns = (force.time_s, force.force_n, x, v, a, first, level, local, played, lately)
         for part in np.array_split(np.arange(x.size), _N_STRETCHES):
             found.append(Stretch(number, *(column[part] for column in columns)))
     return found
@@ -118,22 +118,22 @@ class Sizes:
     def of(cls, parts: Sequence[Stretch]) -> Sizes:
         """Of all stretches."""
         return cls(
-            max(float(np.abs(one.first).max()) for one in parts) or 1.0,
-            max(float(np.abs(one.v).max()) for one in parts) or 1.0,
-            float(np.sqrt(np.mean(np.concatenate([one.force_n for one in parts]) ** 2))) or 1.0,
-            max(float(one.time_s[-1]) for one in parts) or 1.0,
+            max(float(np.abs(part.first).max()) for part in parts) or 1.0,
+            max(float(np.abs(part.v).max()) for part in parts) or 1.0,
+            float(np.sqrt(np.mean(np.concatenate([part.force_n for part in parts]) ** 2))) or 1.0,
+            max(float(part.time_s[-1]) for part in parts) or 1.0,
         )
 
 
 PARITIES: Final = ("even in both", "odd in the first", "odd in the velocity", "odd in both")
 
 
-def state_features(one: Stretch, sizes: Sizes) -> tuple[FloatArray, NDArray[np.int64]]:
+def state_features(stretch: Stretch, sizes: Sizes) -> tuple[FloatArray, NDArray[np.int64]]:
     """T_i(p) T_j(q) with i + j ≤ 5, tanh(q/0.05), tanh(q/0.008), and the parity of each: an index into `PARITIES`.
 
     T_1(p) alone is left to the block's own stiffness and mass.
     """
-    p, q = one.first / sizes.first, one.v / sizes.velocity
+    p, q = stretch.first / sizes.first, stretch.v / sizes.velocity
     first, second = (_chebyshev(part) for part in (p, q))
     columns = [np.tanh(q / width) for width in _SHARP]
     parity = [2] * len(columns)
@@ -153,19 +153,19 @@ def _chebyshev(values: FloatArray) -> list[FloatArray]:
     return found
 
 
-def memory_features(one: Stretch, sizes: Sizes) -> FloatArray:
+def memory_features(stretch: Stretch, sizes: Sizes) -> FloatArray:
     """Plays of x, and friction and damping that follow how violent the last cycles were."""
-    q = one.v / sizes.velocity
+    q = stretch.v / sizes.velocity
     sharp = np.tanh(q / _SHARP[0])
-    plays = one.played / np.maximum(np.abs(one.played).max(axis=0), 1e-300)
-    late = one.lately[:, None] * np.stack([q, sharp, one.first / sizes.first], axis=1)
+    plays = stretch.played / np.maximum(np.abs(stretch.played).max(axis=0), 1e-300)
+    late = stretch.lately[:, None] * np.stack([q, sharp, stretch.first / sizes.first], axis=1)
     return np.concatenate([plays, late], axis=1)
 
 
-def time_features(one: Stretch, sizes: Sizes) -> FloatArray:
+def time_features(stretch: Stretch, sizes: Sizes) -> FloatArray:
     """The linear ones, growing along the run."""
-    t = one.time_s / sizes.time_s
-    linear = np.stack([one.first / sizes.first, one.v / sizes.velocity, np.ones_like(t)], axis=1)
+    t = stretch.time_s / sizes.time_s
+    linear = np.stack([stretch.first / sizes.first, stretch.v / sizes.velocity, np.ones_like(t)], axis=1)
     return np.asarray(t[:, None] * linear)
 
 
@@ -197,8 +197,8 @@ def solved(
     columns : optional
         Those that are used; the others are zero.
     """
-    xx = np.sum([one.xx for one in parts], axis=0)
-    xy = np.sum([one.xy for one in parts], axis=0)
+    xx = np.sum([part.xx for part in parts], axis=0)
+    xy = np.sum([part.xy for part in parts], axis=0)
     chosen = np.arange(xy.size)[columns]
     found = np.zeros(xy.size)
     lift = np.diag(1 / prior[chosen] ** 2)
@@ -209,6 +209,6 @@ def solved(
 def left_over(parts: Sequence[Sums], numbers: FloatArray) -> float:
     """Sum of squares that a regression leaves."""
     total = 0.0
-    for one in parts:
-        total += one.yy - 2 * float(numbers @ one.xy) + float(numbers @ one.xx @ numbers)
+    for part in parts:
+        total += part.yy - 2 * float(numbers @ part.xy) + float(numbers @ part.xx @ numbers)
     return max(total, 0.0)

@@ -196,11 +196,11 @@ class ForceStarts:
 
         def force(numbers: FloatArray) -> FloatArray | None:
             inside = np.clip(numbers, *bounds.T).tolist()
-            named = {one.name: value for one, value in zip(parameters, inside, strict=True)}
+            named = {parameter.name: value for parameter, value in zip(parameters, inside, strict=True)}
             return self._force(candidate, named, place)
 
         starts = [np.array([start[name] for name in names]) for start in candidate.starts()]
-        tuned = next((k for k, one in enumerate(parameters) if one.name == _TUNED), -1)
+        tuned = next((k for k, parameter in enumerate(parameters) if parameter.name == _TUNED), -1)
         if tuned >= 0:
             starts = [_with(starts[0], tuned, frequency) for frequency in _about(starts, tuned)]
         begun = sorted((_sized(force, start, place) for start in starts), key=lambda one: one[0])
@@ -212,7 +212,7 @@ class ForceStarts:
         if sought := [np.array([one[name] for name in names]) for one in candidate.sought_at()]:
             grown = np.array([parameter.name in candidate.sizes for parameter in parameters])
             others = _sought(force, sought, place, grown, first)
-            share, numbers = min([(share, numbers), *others], key=lambda one: one[0])
+            share, numbers = min([(share, numbers), *others], key=lambda other: other[0])
         if share < 1.0 - _LEAST_EXPLAINED:
             share, numbers = _descended(left, numbers, then, _CLOSE if sought else _FAR)
         if not share < 1.0 - _LEAST_EXPLAINED:
@@ -225,7 +225,7 @@ class ForceStarts:
 
     def _at(self, block: str) -> _Place | None:
         if block not in self._places:
-            self._places[block] = _Place.of([one for one in self._forces if one.place in (block, EITHER)])
+            self._places[block] = _Place.of([force for force in self._forces if force.place in (block, EITHER)])
         return self._places[block]
 
     def _force(self, candidate: Candidate, numbers: Mapping[str, float], place: _Place) -> FloatArray | None:

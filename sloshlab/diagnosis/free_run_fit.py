@@ -340,7 +340,7 @@ def fitted_from(
     n_iterations : int
         At most, per stage.
     """
-    start = begun(problem, [Start(one) for one in starts], n_iterations=n_iterations)
+    start = begun(problem, [Start(start) for start in starts], n_iterations=n_iterations)
     return start.fit if start.fit.trouble else finished(start, n_iterations=n_iterations)
 
 

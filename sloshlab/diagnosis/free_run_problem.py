@@ -79,7 +79,7 @@ class FreeRunFit:
         The covariance C = (JᵀJ + P)⁻¹, P one for each number of the baseline, is C JᵀJ C + C P C.
         """
         i = self.names.index(name)
-        n_baseline = len(self.names) - sum(len(one.effect.parameters) for one in self.candidates)
+        n_baseline = len(self.names) - sum(len(candidate.effect.parameters) for candidate in self.candidates)
         of_belief = float((self.covariance[i, :n_baseline] ** 2).sum())
         of_noise = max(float(self.covariance[i, i]) - of_belief, 0.0)
         return float(np.sqrt(of_noise) * self.scales[i]), float(np.sqrt(of_belief) * self.scales[i])
@@ -118,11 +118,19 @@ class FreeRunProblem:
         ]
         self.names = tuple(
             [parameter.name for parameter in self._baseline]
-            + [f"{one.key}.{parameter.name}" for one in self.candidates for parameter in one.effect.parameters]
+            + [
+                f"{candidate.key}.{parameter.name}"
+                for candidate in self.candidates
+                for parameter in candidate.effect.parameters
+            ]
         )
         self.scales = np.array(
             [parameter.tolerance for parameter in self._baseline]
-            + [one.scale(parameter.name) for one in self.candidates for parameter in one.effect.parameters]
+            + [
+                candidate.scale(parameter.name)
+                for candidate in self.candidates
+                for parameter in candidate.effect.parameters
+            ]
         )
         self.centres = np.array(
             [parameter.believed for parameter in self._baseline] + [0.0] * (len(self.names) - len(self._baseline))
@@ -137,7 +145,9 @@ class FreeRunProblem:
         )
         driving = {name for run in self.runs for name in model.driving(run[0].run)}
         self._seen_by = [(one.channel,) if one.channel else () for one in self._baseline] + [
-            _only_channels(one, driving) for one in self.candidates for _ in one.effect.parameters
+            _only_channels(candidate, driving)
+            for candidate in self.candidates
+            for _ in candidate.effect.parameters
         ]
         bounds = [
             (
@@ -145,7 +155,11 @@ class FreeRunProblem:
                 one.believed + one.most_tolerances * one.tolerance,
             )
             for one in self._baseline
-        ] + [one.bounds(parameter) for one in self.candidates for parameter in one.effect.parameters]
+        ] + [
+            candidate.bounds(parameter)
+            for candidate in self.candidates
+            for parameter in candidate.effect.parameters
+        ]
         self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
         ends = np.cumsum([0] + [one.spectra.size for run in self.runs for one in run])
         self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
@@ -316,9 +330,12 @@ def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str,
 def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:
     """What the candidates add, with their numbers taken from the values."""
     total = NOTHING
-    for one in candidates:
-        numbers = {parameter.name: values[f"{one.key}.{parameter.name}"] for parameter in one.effect.parameters}
-        total = total + one.extension(numbers)
+    for candidate in candidates:
+        numbers = {
+            parameter.name: values[f"{candidate.key}.{parameter.name}"]
+            for parameter in candidate.effect.parameters
+        }
+        total = total + candidate.extension(numbers)
     return total
 
 

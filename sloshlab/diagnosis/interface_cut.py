@@ -115,7 +115,7 @@ class InterfaceCut:
     @property
     def places(self) -> tuple[str, ...]:
         """Where forces can be told."""
-        return tuple(dict.fromkeys(one.place for run in self.runs for one in run.forces))
+        return tuple(dict.fromkeys(force.place for run in self.runs for force in run.forces))
 
 
 def interface_cut(
@@ -152,10 +152,10 @@ def _forces(model: RigModel, run: Sequence[Observation], values: Mapping[str, fl
         return None
 
 
-def _weighted(one: Observation, series: FloatArray, values: Mapping[str, float]) -> FloatArray:
+def _weighted(observation: Observation, series: FloatArray, values: Mapping[str, float]) -> FloatArray:
     """Spectra in standard deviations of a series in true units."""
-    spectra = one.of(series) * values.get(f"gain of {one.channel}", 1.0)
-    return np.asarray(np.clip(spectra / np.sqrt(one.variance), -_LARGEST_RATIO, _LARGEST_RATIO))
+    spectra = observation.of(series) * values.get(f"gain of {observation.channel}", 1.0)
+    return np.asarray(np.clip(spectra / np.sqrt(observation.variance), -_LARGEST_RATIO, _LARGEST_RATIO))
 
 
 def _disagreements(
@@ -199,7 +199,8 @@ def _sensor_checks(
 def _doubted(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
     """The channel whose absence lets the others agree, or why none can be named."""
     groups = [
-        [one for one in sensors if one.channel.startswith("force") is of_force] for of_force in (False, True)
+        [sensor for sensor in sensors if sensor.channel.startswith("force") is of_force]
+        for of_force in (False, True)
     ]
     for group in groups:
         worst = max((one.ratio for one in group), default=0.0)
@@ -226,7 +227,7 @@ def _demand_n2(model: RigModel, forces: RunForces) -> float:
     """Mean square of what the blocks lack beyond noise and their own parameters; never zero."""
     sizes = [
         max(own.power_n2, _RESOLVED * own.standard_error_n**2)
-        for own in (beyond_own_parameters(model, forces, one) for one in forces.forces)
+        for own in (beyond_own_parameters(model, forces, force) for force in forces.forces)
     ]
     return float(sum(sizes))
 
@@ -242,7 +243,7 @@ def _blocks(
     doubted: str,
     seed: int,
 ) -> tuple[BlockCut, ...]:
-    places = tuple(dict.fromkeys(one.place for forces in found for one in forces.forces))
+    places = tuple(dict.fromkeys(force.place for forces in found for force in forces.forces))
     parts = _parts(model, runs, found, places, doubted)
     shares = _shares(parts, seed)
     cuts = [_excitation(runs, found)]
@@ -287,8 +288,8 @@ _FED: Final = {
 def _of_place(
     place: str, forces: Sequence[LatentForce], shares: Mapping[str, tuple[float, float, float]]
 ) -> BlockCut:
-    size = float(np.sqrt(np.mean(np.concatenate([one.force_n for one in forces]) ** 2)))
-    noise = float(np.sqrt(np.mean([one.standard_error_n**2 for one in forces])))
+    size = float(np.sqrt(np.mean(np.concatenate([force.force_n for force in forces]) ** 2)))
+    noise = float(np.sqrt(np.mean([force.standard_error_n**2 for force in forces])))
     remark = "no force was measured between them: the two cannot be told apart by this" if place == EITHER else ""
     nan = float("nan")
     share, low, high = shares.get(place, (nan, nan, nan))

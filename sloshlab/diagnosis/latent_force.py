@@ -101,7 +101,7 @@ class RunForces:
 
     def at(self, place: str) -> LatentForce | None:
         """The force at a place, if it can be told there."""
-        return next((one for one in self.forces if one.place == place), None)
+        return next((force for force in self.forces if force.place == place), None)
 
 
 def run_forces(
@@ -184,18 +184,20 @@ def shown_by(
     return shown
 
 
-def _missed(one: Observation, reading: FloatArray, values: Mapping[str, float], is_free: bool) -> FloatArray:
+def _missed(
+    observation: Observation, reading: FloatArray, values: Mapping[str, float], is_free: bool
+) -> FloatArray:
     """Recorded minus simulated in true units, zero where lost, faded out at the ends."""
-    recorded_ = np.asarray(one.run.recording[one.channel].values, np.float64)
+    recorded_ = np.asarray(observation.run.recording[observation.channel].values, np.float64)
     n = min(recorded_.size, reading.size)
     difference = np.zeros(recorded_.size)
-    known = one.known[:n]
+    known = observation.known[:n]
     difference[:n][known] = (recorded_[:n] - reading[:n])[known]
-    if not one.keeps_mean:
+    if not observation.keeps_mean:
         difference[:n][known] -= difference[:n][known].mean()
     if is_free:
         difference[0] = 2 * difference[1] - difference[2]  # the first sample may still be held
-    return difference * _fade(recorded_.size, is_free) / values.get(f"gain of {one.channel}", 1.0)
+    return difference * _fade(recorded_.size, is_free) / values.get(f"gain of {observation.channel}", 1.0)
 
 
 def _fade(n: int, is_free: bool) -> FloatArray:
@@ -214,15 +216,15 @@ def _kept(n: int, is_free: bool) -> slice:
     return slice(m // 4 if is_free else m, n - m)
 
 
-def _noise_power(one: Observation, frequency_hz: FloatArray) -> FloatArray:
+def _noise_power(observation: Observation, frequency_hz: FloatArray) -> FloatArray:
     """E|FFT|² of the noise of a channel, by its variance per coefficient.
 
     Slow motion is no accelerometer's, and that of a base is known by its accelerometer alone.
     """
-    variance = np.interp(frequency_hz, one.frequencies_hz, np.median(one.variance, axis=0))
-    if _order(one.channel) == 2 or (_order(one.channel) == 0 and not one.run.is_free):
+    variance = np.interp(frequency_hz, observation.frequencies_hz, np.median(observation.variance, axis=0))
+    if _order(observation.channel) == 2 or (_order(observation.channel) == 0 and not observation.run.is_free):
         variance = variance * (1 + (_SLOW_HZ / np.maximum(frequency_hz, 1e-3 * _SLOW_HZ)) ** 4)
-    return np.asarray(variance * one.known.size)
+    return np.asarray(variance * observation.known.size)
 
 
 def _on_structure(
@@ -335,9 +337,9 @@ def _on_shaker(
     frequency = frequencies_hz(n, rate)
     sampled = min(n, simulation.places.shape[0])
     motions = [one for one in observed if _order(one.channel) == 2]
-    good = [one for one in motions if one in believed] or motions
+    good = [motion for motion in motions if motion in believed] or motions
     mean = np.mean([missed[one.channel] for one in good], axis=0) if good else np.zeros(n)
-    left = {one.channel: missed[one.channel] - mean for one in motions}
+    left = {motion.channel: missed[motion.channel] - mean for motion in motions}
     measured = _measured(observed, believed, missed)
     if measured is None:
         return (), left
@@ -367,7 +369,7 @@ def _measured(
 ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]] | None:
     """What the force of the structure on the tank is missed by, and the power of its noise over frequency."""
     forces = [one for one in believed if one.channel.startswith("force")]
-    cells = [one for one in forces if one.channel.startswith("force_cell")]
+    cells = [force for force in forces if force.channel.startswith("force_cell")]
     chosen = cells or forces[:1]
     if not chosen:
         return None
@@ -379,8 +381,8 @@ def _measured(
     return total, (frequency, noise)
 
 
-def _sign(one: Observation) -> float:
-    return -1.0 if one.run.recording[one.channel].attrs.get("block_from") == "tank" else 1.0
+def _sign(observation: Observation) -> float:
+    return -1.0 if observation.run.recording[observation.channel].attrs.get("block_from") == "tank" else 1.0
 
 
 def _unequal_cells(

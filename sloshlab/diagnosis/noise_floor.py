@@ -121,24 +121,33 @@ def _noise_of_drives(
     return found
 
 
-def _louder(one: Observation, noise: Mapping[tuple[str, str], FloatArray], driving: Sequence[str]) -> Observation:
+def _louder(
+    observation: Observation, noise: Mapping[tuple[str, str], FloatArray], driving: Sequence[str]
+) -> Observation:
     """An observation of a sensor with the noise of drives in its variance.
 
     Slow displacements of a base are lost with the drift that integration removes; what is left of them besides its
     noise is known to a few times that only.
     """
-    variance = one.variance + noise.get((one.run.name, one.channel), 0.0)
-    return replace(one, variance=np.where(slow_displacements(one, driving), _SLOWLY**2, 1.0) * variance)
+    variance = observation.variance + noise.get((observation.run.name, observation.channel), 0.0)
+    return replace(
+        observation, variance=np.where(slow_displacements(observation, driving), _SLOWLY**2, 1.0) * variance
+    )
 
 
-def _quieted(one: Observation, of_sensor: Observation, noise: Mapping[tuple[str, str], FloatArray]) -> Observation:
+def _quieted(
+    observation: Observation, of_sensor: Observation, noise: Mapping[tuple[str, str], FloatArray]
+) -> Observation:
     """An observation that counts for nothing where there is nothing but the noise of drives.
 
     There a simulation shows noise that the recording has not, and is nearer to it the less of a resonance it has:
     it would be fitted with more damping, less participation, and a frequency beyond the bands that are compared.
     """
-    is_noise = noise.get((one.run.name, one.channel), 0.0) > _MOSTLY * of_sensor.variance
-    return replace(one, variance=np.where(is_noise & ~one.informative, FOR_NOTHING, 1.0) * one.variance)
+    is_noise = noise.get((observation.run.name, observation.channel), 0.0) > _MOSTLY * of_sensor.variance
+    return replace(
+        observation,
+        variance=np.where(is_noise & ~observation.informative, FOR_NOTHING, 1.0) * observation.variance,
+    )
 
 
 @dataclass(frozen=True, eq=False)

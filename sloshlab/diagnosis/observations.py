@@ -150,7 +150,7 @@ def observations(
     return found
 
 
-def slow_displacements(one: Observation, driving: Sequence[str]) -> NDArray[np.bool_]:
+def slow_displacements(observation: Observation, driving: Sequence[str]) -> NDArray[np.bool_]:
     """Coefficients of displacements and velocities that integration of an accelerometer hardly tells.
 
     Parameters
@@ -159,9 +159,11 @@ def slow_displacements(one: Observation, driving: Sequence[str]) -> NDArray[np.b
     driving : sequence of str
         Channels that drive the simulation.
     """
-    quantity = one.run.recording[one.channel].attrs["quantity"]
-    is_lost = quantity in ("displacement", "velocity") and _is_integrated(one.run, driving)
-    return np.broadcast_to((one.frequencies_hz < _SLOWEST_INTEGRATED_HZ) & is_lost, one.spectra.shape)
+    quantity = observation.run.recording[observation.channel].attrs["quantity"]
+    is_lost = quantity in ("displacement", "velocity") and _is_integrated(observation.run, driving)
+    return np.broadcast_to(
+        (observation.frequencies_hz < _SLOWEST_INTEGRATED_HZ) & is_lost, observation.spectra.shape
+    )
 
 
 def noise_of_sensor(run: CaseRun, name: str) -> float:
@@ -242,7 +244,11 @@ def with_scatter(
     scatter: dict[str, FloatArray] = {}
     for observation in group[0]:
         name = observation.channel
-        parts = [one[name] for one in residuals if name in one and one[name].shape == observation.spectra.shape]
+        parts = [
+            residual[name]
+            for residual in residuals
+            if name in residual and residual[name].shape == observation.spectra.shape
+        ]
         if len(parts) != n:
             continue
         stacked = np.stack(parts)
@@ -273,7 +279,9 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
     weighted = []
     for observation in target:
         alike = [
-            one for one in sources if one.channel == observation.channel and one.n_bands == observation.n_bands
+            source
+            for source in sources
+            if source.channel == observation.channel and source.n_bands == observation.n_bands
         ]
         if not any(one.informative.any() for one in alike):
             weighted.append(observation)

@@ -150,7 +150,7 @@ def _motion_per_block(observed: Sequence[Observation]) -> tuple[FloatArray, Floa
 
 
 def _sorted_by(
-    one: Observation, residual: FloatArray, motion: tuple[FloatArray, FloatArray, FloatArray] | None
+    observation: Observation, residual: FloatArray, motion: tuple[FloatArray, FloatArray, FloatArray] | None
 ) -> _Block:
     excess = np.minimum(residual**2, _LARGEST) - 1.0
     missing = np.full(excess.shape[0], np.nan)
@@ -158,7 +158,7 @@ def _sorted_by(
         return _Block(excess, np.full(excess.shape, np.nan), missing, missing)
     amplitude, frequency, purity = motion
     pure = np.where(purity > _NARROW, frequency, np.nan)
-    order = one.frequencies_hz[None, :] / pure[:, None]
+    order = observation.frequencies_hz[None, :] / pure[:, None]
     return _Block(excess, order, amplitude / GRAVITY_M_PER_S2, 2 * np.pi * pure)
 
 
@@ -183,25 +183,25 @@ def _phase(observed: Sequence[Observation]) -> FloatArray | None:
     return np.asarray(np.where(size > 0.03 * size.max(), phase, np.nan))
 
 
-def _in_time(one: Observation, values: FloatArray) -> FloatArray:
+def _in_time(observation: Observation, values: FloatArray) -> FloatArray:
     """Squares of the residual over its noise, less one, per sample."""
-    recorded = np.asarray(one.run.recording[one.channel].values, np.float64)
+    recorded = np.asarray(observation.run.recording[observation.channel].values, np.float64)
     n = min(recorded.size, values.size)
     rest = np.full(recorded.size, np.nan)
-    rest[:n] = np.where(one.known[:n], recorded[:n] - values[:n], np.nan)
-    if not one.keeps_mean:
+    rest[:n] = np.where(observation.known[:n], recorded[:n] - values[:n], np.nan)
+    if not observation.keeps_mean:
         rest -= np.nanmean(rest)
-    return np.asarray(np.minimum(rest**2 / float(np.median(one.variance)), _LARGEST) - 1.0)
+    return np.asarray(np.minimum(rest**2 / float(np.median(observation.variance)), _LARGEST) - 1.0)
 
 
 def _maps(
     channel: str, blocks: Sequence[_Block], phases: Sequence[tuple[FloatArray, FloatArray]], rig: Rig | None
 ) -> ResidualMaps:
-    excess = np.concatenate([one.excess.ravel() for one in blocks])
-    order = np.concatenate([one.order.ravel() for one in blocks])
-    per_block = np.concatenate([one.excess.mean(axis=1) for one in blocks])
-    level = np.concatenate([one.level_g for one in blocks])
-    omega = np.concatenate([one.omega for one in blocks])
+    excess = np.concatenate([block.excess.ravel() for block in blocks])
+    order = np.concatenate([block.order.ravel() for block in blocks])
+    per_block = np.concatenate([block.excess.mean(axis=1) for block in blocks])
+    level = np.concatenate([block.level_g for block in blocks])
+    omega = np.concatenate([block.omega for block in blocks])
     over_phase = None
     if phases:
         turned, squares = (np.concatenate([pair[i] for pair in phases]) for i in range(2))

@@ -276,7 +276,7 @@ class RigModel:
 
         Faults of sensors stay out: they are no part of what is simulated.
         """
-        run = next((one for one in self.runs if one.attributes.configuration == "sloshing"), self.runs[0])
+        run = next((run for run in self.runs if run.attributes.configuration == "sloshing"), self.runs[0])
         return self._varied(run, values, extension)
 
     def _varied(

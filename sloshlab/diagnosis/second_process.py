@@ -72,7 +72,9 @@ class SecondProcess:
             return None
         try:
             of_runs = [[self.observed.number_of(one) for one in run] for run in runs]
-            self._line.send((of_runs, dict(values), [self.candidates.number_of(one) for one in candidates]))
+            self._line.send(
+                (of_runs, dict(values), [self.candidates.number_of(candidate) for candidate in candidates])
+            )
             n = self._line.recv()
             self.n_done += n is not None
             return None if n is None else self._shared[:n].copy()
@@ -115,7 +117,7 @@ def second_process(
         return None
     if present is not None:
         unseen = [one for one in observed if one not in present.observed]
-        unknown = [one for one in candidates if one not in present.candidates]
+        unknown = [candidate for candidate in candidates if candidate not in present.candidates]
         if not unseen and not unknown:
             return present
         present.ending()

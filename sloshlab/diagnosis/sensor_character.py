@@ -84,16 +84,16 @@ def sensor_character(
 
 def said(answers: Sequence[SensorAnswer]) -> dict[str, bool]:
     """Terms that hold, and that do not."""
-    return {one.term: one.holds for one in answers if one.holds is not None}
+    return {answer.term: answer.holds for answer in answers if answer.holds is not None}
 
 
-def _forms(one: Observation, error: FloatArray) -> Mapping[str, FloatArray]:
+def _forms(observation: Observation, error: FloatArray) -> Mapping[str, FloatArray]:
     """Columns that the error may be a sum of, shape (n, k) each."""
-    recording = one.run.recording
-    rate = one.run.attributes.sampling_rate_hz
-    reading = np.nan_to_num(np.asarray(recording[one.channel].values, np.float64))
+    recording = observation.run.recording
+    rate = observation.run.attributes.sampling_rate_hz
+    reading = np.nan_to_num(np.asarray(recording[observation.channel].values, np.float64))
     truth = reading - error
-    truth = truth - (0.0 if one.keeps_mean else truth.mean())
+    truth = truth - (0.0 if observation.keeps_mean else truth.mean())
     time = np.arange(truth.size) / rate
     time = time - time.mean()
     slope = np.gradient(truth) * rate
@@ -114,8 +114,8 @@ def _forms(one: Observation, error: FloatArray) -> Mapping[str, FloatArray]:
     others = [
         np.nan_to_num(np.asarray(recording[name].values, np.float64))
         for name in channels(recording)
-        if name != one.channel
-        and recording[name].attrs.get("quantity") != recording[one.channel].attrs["quantity"]
+        if name != observation.channel
+        and recording[name].attrs.get("quantity") != recording[observation.channel].attrs["quantity"]
     ]
     if others:
         forms[TALKS] = np.stack([other - other.mean() for other in others], axis=1)

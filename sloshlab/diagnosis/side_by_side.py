@@ -47,7 +47,7 @@ def side_by_side(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[C
     """
     if len(pieces) < 2 or not CAN_FORK or works_alone():
         return [piece() for piece in pieces]
-    known = {id(one): one for one in candidates}
+    known = {id(candidate): candidate for candidate in candidates}
     taken = multiprocessing.get_context("fork").Value("i", 0)
     copy, line = copied(_take_what_is_left, pieces, taken, known)
     try:

@@ -84,13 +84,15 @@ def pooled_damping(
     """
     used = [
         (
-            np.round(bins_per_decade * np.log10(one.acceleration_amplitude_m_per_s2[one.used])).astype(np.int64),
-            one.damping_ratio[one.used],
-            one.damping_ratio_std[one.used],
-            one.frequency_hz[one.used],
-            one.frequency_hz_std[one.used],
+            np.round(bins_per_decade * np.log10(reading.acceleration_amplitude_m_per_s2[reading.used])).astype(
+                np.int64
+            ),
+            reading.damping_ratio[reading.used],
+            reading.damping_ratio_std[reading.used],
+            reading.frequency_hz[reading.used],
+            reading.frequency_hz_std[reading.used],
         )
-        for one in readings
+        for reading in readings
     ]
     bins = np.unique(np.concatenate([part[0] for part in used])) if used else np.array([], dtype=np.int64)
     if not bins.size:

@@ -44,7 +44,7 @@ class BreakUp:
     at_rest: float
 
     def __post_init__(self) -> None:
-        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        values = {field_.name: getattr(self, field_.name) for field_ in fields(self)}
         wrong = [name for name, value in values.items() if not 0 < value < 1e6]
         if wrong or self.at_rest >= 1:
             name = wrong[0] if wrong else "at_rest"
@@ -67,7 +67,7 @@ class BreakUp:
         [0.01, 0.01, 0.01]
         """
         shares = np.empty(velocity_m_per_s.size)
-        parameters = np.array([getattr(self, one.name) for one in fields(self)])
+        parameters = np.array([getattr(self, field_.name) for field_ in fields(self)])
         _follow(np.ascontiguousarray(velocity_m_per_s, np.float64), 1 / sampling_rate_hz, parameters, shares)
         return shares
 

@@ -73,7 +73,7 @@ def with_break_up(model: ReducedOrderModel, runs: Sequence[Run]) -> ReducedOrder
     starts = tried[np.argsort(costs)[:_N_REFINED]]
     found = [least_squares(errors, start, bounds=(low, high), diff_step=1e-3) for start in starts]
     best = min(found, key=lambda one: float(one.cost))
-    values = dict(zip((one.name for one in fields(BreakUp)), np.exp(best.x).tolist(), strict=True))
+    values = dict(zip((field_.name for field_ in fields(BreakUp)), np.exp(best.x).tolist(), strict=True))
     return replace(model, break_up=BreakUp(**values))
 
 

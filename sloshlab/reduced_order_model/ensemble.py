@@ -132,7 +132,7 @@ class Ensemble:
     facts: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if len({(one.network, one.delays, one.sampling_rate_hz) for one in self.members}) != 1:
+        if len({(member.network, member.delays, member.sampling_rate_hz) for member in self.members}) != 1:
             raise InputError("ensemble", got="models of different structure or rate", allowed="all the same")
         if len(self.members) < 2:
             raise InputError("members of an ensemble", got=str(len(self.members)), allowed="at least 2")
@@ -144,7 +144,7 @@ class Ensemble:
 
     def simulate(self, x: ArrayLike, start: ArrayLike | None = None) -> FloatArray:
         """Return the mean of the members' free runs; parameters as for a single model."""
-        return np.asarray(np.mean([one.simulate(x, start) for one in self.members], axis=0))
+        return np.asarray(np.mean([member.simulate(x, start) for member in self.members], axis=0))
 
     def predicted_range(
         self, x: ArrayLike, probability: float = 0.9, start: ArrayLike | None = None
@@ -161,7 +161,7 @@ class Ensemble:
             Outputs to start from, of models with feedback.
         """
         reach = self.residual.reach_of(probability)
-        mean, std = _mean_and_std([one.simulate(x, start) for one in self.members])
+        mean, std = _mean_and_std([member.simulate(x, start) for member in self.members])
         half = reach * np.sqrt(std**2 + self.residual.variance(mean, self.sampling_rate_hz))
         return PredictedRange(mean, mean - half, mean + half, std, probability)
 
@@ -287,7 +287,7 @@ def residual_spread(members: Sequence[ReducedOrderModel], runs: Sequence[Run]) -
     """
     errors, variances, levels = [], [], []
     for run in runs:
-        mean, std = _mean_and_std([one.simulate(run.x, run.y) for one in members])
+        mean, std = _mean_and_std([member.simulate(run.x, run.y) for member in members])
         known = np.isfinite(mean) & np.isfinite(run.y)
         errors.append((run.y - mean)[known])
         variances.append(std[known] ** 2)

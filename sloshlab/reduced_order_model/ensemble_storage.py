@@ -37,12 +37,14 @@ def save_ensemble(ensemble: Ensemble, path: str | os.PathLike[str]) -> None:
         file.network = first.network.kind
         file.network_settings = json.dumps(first.network.settings(), sort_keys=True)
         file.facts = json.dumps(
-            {"ensemble": ensemble.facts, "members": [one.facts for one in members]}, sort_keys=True
+            {"ensemble": ensemble.facts, "members": [member.facts for member in members]}, sort_keys=True
         )
-        file.agitation = json.dumps([one.agitation and one.agitation.facts() for one in members], sort_keys=True)
+        file.agitation = json.dumps(
+            [member.agitation and member.agitation.facts() for member in members], sort_keys=True
+        )
         for name, dimensions, values, kind in (
-            ("theta", ("member", "parameter"), np.stack([one.theta for one in members]), "f8"),
-            ("scaling", ("member", "scaling_value"), np.array([_scaling(one) for one in members]), "f8"),
+            ("theta", ("member", "parameter"), np.stack([member.theta for member in members]), "f8"),
+            ("scaling", ("member", "scaling_value"), np.array([_scaling(member) for member in members]), "f8"),
             ("sampling_rate_hz", ("one",), np.array([first.sampling_rate_hz]), "f8"),
             ("input_delays", ("input_delay",), np.array(first.delays.inputs), "i4"),
             ("output_delays", ("output_delay",), np.array(first.delays.outputs), "i4"),

@@ -61,12 +61,12 @@ def chosen_rate(signals: Sequence[LiquidSignals], *, share: float = SHARE) -> Mo
     The band up to which 99 % of the variance lies needs 2.5 samples per period; the recording is thinned by the
     largest whole number that leaves so many.
     """
-    rates = {round(one.sampling_rate_hz, 6) for one in signals}
+    rates = {round(signal.sampling_rate_hz, 6) for signal in signals}
     if len(rates) != 1:
         got = ", ".join(f"{rate:g}" for rate in sorted(rates))
         raise AnalysisError("sampling rates of the runs", got=f"{got} Hz", allowed="one rate")
     rate_hz = signals[0].sampling_rate_hz
-    frequency, power = _mean_spectrum([one.dynamic_force_n for one in signals], rate_hz)
+    frequency, power = _mean_spectrum([signal.dynamic_force_n for signal in signals], rate_hz)
     cumulative = np.cumsum(power) / power.sum()
     highest = float(frequency[int(np.searchsorted(cumulative, share))])
     every = max(1, math.floor(rate_hz / (SAMPLES_PER_PERIOD * max(highest, frequency[1]))))

@@ -86,7 +86,7 @@ def departures(simulation: Simulation) -> list[Departure]:
         found += [
             _departure(reason, chosen, term, simulation)
             for reason in REASONS
-            if (chosen := [one for one in excursions if one.reason == reason])
+            if (chosen := [excursion for excursion in excursions if excursion.reason == reason])
         ]
     return found
 
@@ -133,10 +133,10 @@ def _departure(reason: str, excursions: list[Excursion], term: Term, simulation:
     omega, speed = 2 * math.pi * worst.frequency_hz / root, worst.speed_m_per_s * root
     return Departure(
         reason,
-        root * sum(one.stop_s - one.start_s for one in excursions),
+        root * sum(excursion.stop_s - excursion.start_s for excursion in excursions),
         simulation.time_s.size / simulation.sampling_rate_hz,
-        tuple(root * one.start_s for one in excursions),
-        tuple(root * one.stop_s for one in excursions),
+        tuple(root * excursion.start_s for excursion in excursions),
+        tuple(root * excursion.stop_s for excursion in excursions),
         root * worst.start_s,
         omega * math.sqrt(height_m / GRAVITY_M_PER_S2),
         speed / (omega * height_m),

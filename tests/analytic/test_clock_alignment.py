@@ -172,7 +172,7 @@ def test_without_real_time_the_signals_alone_align(aligned: Aligned, tmp_path: P
     with read_journal(tmp_path / "fast.journal") as journal:
         summary = assemble(journal, tmp_path / "fast.nc")
     clocks = summary.record["clocks"]
-    assert [one[0]["status"] for one in clocks.values()] == ["not_real_time", "not_real_time"]
+    assert [clock[0]["status"] for clock in clocks.values()] == ["not_real_time", "not_real_time"]
     error_s = np.abs(stated_places_s(read_recording(tmp_path / "fast.nc")) - true_places_s()).max()
     assert error_s < LARGEST_ALIGNMENT_ERROR_S
 

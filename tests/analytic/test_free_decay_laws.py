@@ -41,10 +41,12 @@ def test_linear_decay_without_noise(damping_ratio: float, reading: int) -> None:
 
 
 def test_amplitudes_are_those_of_the_envelope() -> None:
-    for one in analyse_free_decay(linear_decay(0.02, 3.0), RATE_HZ).readings:
-        expected = 68.0 * np.exp(-0.02 / np.sqrt(1 - 0.02**2) * OMEGA * one.time_s)
+    for reading in analyse_free_decay(linear_decay(0.02, 3.0), RATE_HZ).readings:
+        expected = 68.0 * np.exp(-0.02 / np.sqrt(1 - 0.02**2) * OMEGA * reading.time_s)
         # the vertex of a parabola over a quarter of a cycle lies 0.1 % low, an envelope's mean log is exact
-        assert one.acceleration_amplitude_m_per_s2[one.used] == pytest.approx(expected[one.used], rel=1e-2)
+        assert reading.acceleration_amplitude_m_per_s2[reading.used] == pytest.approx(
+            expected[reading.used], rel=1e-2
+        )
 
 
 @pytest.fixture(scope="module")

@@ -137,7 +137,7 @@ def write_journal(
             (at, source, end - BLOCK, counts[end - BLOCK : end]) for at, end in zip(arrivals, ends, strict=True)
         ]
     with JournalWriter(path, {"attributes": ATTRIBUTES}, [device.info() for device in devices]) as journal:
-        for at, source, counter, counts in sorted(deliveries, key=lambda one: one[:3]):
+        for at, source, counter, counts in sorted(deliveries, key=lambda delivery: delivery[:3]):
             ns = round(at * 1e9)
             journal.append(source, Block(0, 40 + source, int(counter), counts, None, ORIGIN_NS + ns, UTC_NS + ns))
         for source, device in enumerate(devices):

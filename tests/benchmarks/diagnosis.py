@@ -22,7 +22,7 @@ def diagnosis_figures(folder: Path) -> dict[str, float]:
     seal(trial, seed=SEED, n_cases=N_CASES, key=None)
     outcomes = run_trial(trial, n_workers=1, time_limit_s=900.0)
     return {
-        MEDIAN_LABEL: float(np.median([one.wall_s for one in outcomes])),
-        LONGEST_LABEL: max(one.wall_s for one in outcomes),
-        MEMORY_LABEL: max(one.memory_mib for one in outcomes) / 1024,
+        MEDIAN_LABEL: float(np.median([outcome.wall_s for outcome in outcomes])),
+        LONGEST_LABEL: max(outcome.wall_s for outcome in outcomes),
+        MEMORY_LABEL: max(outcome.memory_mib for outcome in outcomes) / 1024,
     }

@@ -193,7 +193,9 @@ def tables(outcomes: Mapping[str, Outcome | None]) -> str:
         text += f"\n## {part}\n\n| fault | {' | '.join(TRANSPORTS)} |\n|---|{'---|' * len(TRANSPORTS)}\n"
         for fault in faults:
             for intensity in FAULTS[fault]:
-                row = [_cell(outcomes[Case(fault, intensity, one).name]) for one in TRANSPORTS.values()]
+                row = [
+                    _cell(outcomes[Case(fault, intensity, transport).name]) for transport in TRANSPORTS.values()
+                ]
                 text += f"| {_title(fault, intensity, notes)} | {' | '.join(row)} |\n"
         text += "".join(f"\n({number}) {note}.\n" for number, note in enumerate(notes, start=1))
     return text + "\n"

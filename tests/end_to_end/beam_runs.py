@@ -120,7 +120,7 @@ def _beam_recording(
         for name, place in PLACES_M.items()
     }
     channels: dict[str, Any] = {"acceleration_root": (root, 0.0)}
-    channels |= {name: (one, PLACES_M[name]) for name, one in values.items()}
+    channels |= {name: (value, PLACES_M[name]) for name, value in values.items()}
     variables = {
         name: _channel(one + generator.normal(0, 0.01, one.size), "acceleration", x_m=place)
         for name, (one, place) in channels.items()

@@ -50,8 +50,8 @@ def relative_rms(recovered: np.ndarray, law: np.ndarray) -> float:
     return float(np.sqrt(np.mean((recovered - law)[drawn] ** 2) / np.mean(law[drawn] ** 2)))
 
 
-def grid_of(one: xr.Dataset, amplitude: str) -> tuple[np.ndarray, np.ndarray]:
-    omega_bar, second = np.meshgrid(one.omega_bar, one[amplitude], indexing="ij")
+def grid_of(dataset: xr.Dataset, amplitude: str) -> tuple[np.ndarray, np.ndarray]:
+    omega_bar, second = np.meshgrid(dataset.omega_bar, dataset[amplitude], indexing="ij")
     # v̄ = Ω u₀/√(gh) = ω̄ ū
     return omega_bar, second / omega_bar if amplitude == "v_bar" else second
 

@@ -101,9 +101,9 @@ def test_losses_end_in_exit_3_and_are_told_twice(bench: Path, lab: Path) -> None
         assert devices.command.exit_code() == 0
     places = json.loads((lab / "truth.json").read_text())["device_1"]["places"]
     is_lost = np.zeros(N_SAMPLES, bool)
-    for one in places:
-        assert one["fault"] == "drop"
-        is_lost[one["counter"] : one["counter"] + one["n_samples"]] = True
+    for place in places:
+        assert place["fault"] == "drop"
+        is_lost[place["counter"] : place["counter"] + place["n_samples"]] = True
     assert np.flatnonzero(is_lost).tolist() == [*range(96, 112), *range(2000, 2016)]
     expected, found = stored(bench / "run.nc"), stored(lab / "new.nc")
     np.testing.assert_array_equal(found["quality"].values, np.where(is_lost, LOST, 0))

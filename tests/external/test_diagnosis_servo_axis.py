@@ -62,10 +62,10 @@ class Axis:
             longest_run_s=6.12,
             blocks=self.model.blocks,
         )
-        [effect] = [one for one in known_effects() if one.name == "asymmetric_friction"]
+        [effect] = [effect for effect in known_effects() if effect.name == "asymmetric_friction"]
         candidate = Candidate(effect, surroundings)
         problem = FreeRunProblem(self.model, self.fitted, (candidate,))
-        self.extended = fitted_from(problem, [{**self.model.believed, **one} for one in candidate.starts()])
+        self.extended = fitted_from(problem, [{**self.model.believed, **start} for start in candidate.starts()])
 
     def error(self, fit: FreeRunFit) -> float:
         problem = FreeRunProblem(self.model, [self.held_out], fit.candidates)

@@ -141,7 +141,7 @@ class TestReceiver:
                 assert block.stream == 3
                 assert seen.isdisjoint(places.tolist())
                 seen |= set(places.tolist())
-        assert [one for one in deliveries if isinstance(one, End)] == [End(3, 600)]
+        assert [delivery for delivery in deliveries if isinstance(delivery, End)] == [End(3, 600)]
         if not corrupted and not lost:
             assert seen == set(range(600))
 
@@ -150,7 +150,7 @@ class TestReceiver:
     def test_any_frames_make_troubles_at_most(self, frames: list[tuple[int, bytes]]) -> None:
         receiver = CanReceiver(LAYOUT)
         deliveries = receiver.take(batch_of(frames), 0, 0) + receiver.finish(1)
-        assert not any(isinstance(one, Block | End) for one in deliveries)
+        assert not any(isinstance(delivery, Block | End) for delivery in deliveries)
 
     @settings(max_examples=20, deadline=None, derandomize=True)
     @given(
@@ -183,9 +183,11 @@ MOST_WAITING = 4096 + 8
 
 def n_frames_of(deliveries: list[Delivery]) -> int:
     """Frames that they account for, each with one sample."""
-    n_delivered = sum(len(one.counts) for one in deliveries if isinstance(one, Block))
+    n_delivered = sum(len(delivery.counts) for delivery in deliveries if isinstance(delivery, Block))
     uncertain = TroubleKind.UNCERTAIN_COUNTER
-    return n_delivered + sum(one.count for one in deliveries if isinstance(one, Trouble) and one.kind is uncertain)
+    return n_delivered + sum(
+        delivery.count for delivery in deliveries if isinstance(delivery, Trouble) and delivery.kind is uncertain
+    )
 
 
 def sealed(body: bytes) -> bytes:

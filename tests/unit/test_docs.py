@@ -35,7 +35,7 @@ def section_of(command: str) -> str:
 def parameters_of(command: str) -> list[click.Parameter]:
     """Parameters of a command, or of all steps of one that has steps."""
     steps = getattr(COMMANDS[command], "commands", {}).values()
-    return [parameter for one in steps or [COMMANDS[command]] for parameter in one.params]
+    return [parameter for step in steps or [COMMANDS[command]] for parameter in step.params]
 
 
 def tracked_text_files() -> list[Path]:

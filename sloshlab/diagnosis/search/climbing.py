@@ -97,7 +97,7 @@ def climbed(fits: Fits, known: Sequence[Explanation]) -> list[Explanation]:
 def _thrown(best: Explanation) -> Candidate | None:
     """The effect whose numbers are thrown: one of several numbers alone, of two the one that comes in jumps."""
     if len(best.keys) > 1:
-        return next((one for one in best.fit.candidates if one.comes_in_jumps), None)
+        return next((candidate for candidate in best.fit.candidates if candidate.comes_in_jumps), None)
     last = best.fit.candidates[-1]
     return last if len(last.effect.parameters) > 1 else None
 
@@ -143,7 +143,7 @@ def _places_about(
     fit: FreeRunFit, thrown: Candidate, turn: int, spreads: Sequence[float]
 ) -> list[dict[str, float]]:
     """Values of a fit, some numbers larger or smaller by factors drawn evenly; others at every turn."""
-    names = [f"{thrown.key}.{one.name}" for one in thrown.effect.parameters]
+    names = [f"{thrown.key}.{parameter.name}" for parameter in thrown.effect.parameters]
     spread = spreads[turn % len(spreads)]
     factors = np.exp(spread * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PLACES)))
     return [

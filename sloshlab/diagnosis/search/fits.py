@@ -204,7 +204,7 @@ class Fits:
         other, _ = fitted(problem, near, n_iterations=3, shares=STAGES[-2:])
         return best.values if other.trouble or other.cost > best.cost else other.values
 
-    def is_complete(self, one: Explanation) -> bool:
+    def is_complete(self, explanation: Explanation) -> bool:
         """Whether repeats have next to nothing in common of what is left, and what was not repeated leaves little.
 
         Of a run without a repeat half of its channels tell: what moves shows in most of them, what is wrong with a
@@ -213,14 +213,16 @@ class Fits:
         """
         repeated = {run for test in self.tests if len(test) > 1 for run in test}
         alone: dict[str, list[float]] = {}
-        for (run, _), left in one.by_run.items():
+        for (run, _), left in explanation.by_run.items():
             if run not in repeated:
                 alone.setdefault(run, []).append(left)
-        return self.shares_little(one) and all(float(np.median(left)) < _LITTLE_ALONE for left in alone.values())
+        return self.shares_little(explanation) and all(
+            float(np.median(left)) < _LITTLE_ALONE for left in alone.values()
+        )
 
-    def shares_little(self, one: Explanation) -> bool:
+    def shares_little(self, explanation: Explanation) -> bool:
         """Whether repeats have next to nothing in common of what is left; False where no test was repeated."""
-        shared = one.shared_by_repeats
+        shared = explanation.shared_by_repeats
         return bool(shared) and all(
             max(left) < _LITTLE_IN_A_CHANNEL and float(np.mean(left)) < _LITTLE_IN_COMMON for left in shared
         )
@@ -240,7 +242,7 @@ class Fits:
 
 def cheapest(explanations: Sequence[Explanation]) -> Explanation | None:
     """The one with the lowest cost on the fitted runs; None of none."""
-    return min(explanations, key=lambda one: one.fit.cost, default=None)
+    return min(explanations, key=lambda explanation: explanation.fit.cost, default=None)
 
 
 class _WithEffects(FreeRunProblem):

@@ -60,7 +60,7 @@ class InPlace:
             self.fits.told(f"{what}: {candidate.key} in place of {special.effect.name}", 0, 1)
             problem = self.fits.problem((*base.candidates, candidate))
             sizes = of_many_sizes(candidate)
-            starts = [{**at, **one} for at in (best.fit.values, self.fits.eased(base)) for one in sizes]
+            starts = [{**at, **size} for at in (best.fit.values, self.fits.eased(base)) for size in sizes]
             costs = costs_at(problem, starts, _SOFT)
             name = f"{candidate.effect.block}.{candidate.effect.name}"
             if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
@@ -90,17 +90,17 @@ class InPlace:
         tried = {frozenset(one.keys) for one in known}
         nearest_ones: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
         for replaced in pair.fit.candidates:
-            others = tuple(one for one in pair.fit.candidates if one is not replaced)
+            others = tuple(candidate for candidate in pair.fit.candidates if candidate is not replaced)
             near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
             for candidate in pool:
-                keys = frozenset((candidate.key, *(one.key for one in others)))
+                keys = frozenset((candidate.key, *(other.key for other in others)))
                 if keys in tried or len(keys) < len(pair.keys) or not _look_alike(candidate, replaced):
                     continue
                 self.fits.told(f"exchanging {replaced.key} for {candidate.key}", 0, 1)
                 problem = self.fits.problem((*others, candidate))
                 sizes = of_many_sizes(candidate)
                 places = [pair.fit.values, {**pair.fit.values, **self.fits.model.believed}]
-                start = nearest(problem, [{**at, **one} for at in places for one in sizes], _SOFT)
+                start = nearest(problem, [{**at, **size} for at in places for size in sizes], _SOFT)
                 cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
                 if cost < most:
                     near.append((cost, problem, start))
@@ -130,7 +130,7 @@ class InPlace:
             self.fits.told(f"one effect in place of all: {candidate.key}", i, len(chosen))
             problem = self.fits.problem((candidate,))
             sizes = of_many_sizes(candidate)
-            start = nearest(problem, [{**wider.values, **one} for one in sizes], _SOFT)
+            start = nearest(problem, [{**wider.values, **size} for size in sizes], _SOFT)
             cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
             if cost < most:
                 near.append((cost, problem, start))
@@ -148,7 +148,9 @@ class InPlace:
         last = best.fit.candidates[-1]
         specials = [one for one in kept if one is best or is_special_case(one.fit.candidates[-1], last)]
         found = []
-        for special in {one.keys[-1]: one for one in sorted(specials, key=lambda one: -one.fit.cost)}.values():
+        for special in {
+            special.keys[-1]: special for special in sorted(specials, key=lambda special: -special.fit.cost)
+        }.values():
             known = {one.keys[-1] for one in kept if one in specials or one.fit.cost < special.fit.cost + _AS_GOOD}
             found += self._more_general(base, special, pool, known, what)
         return found
@@ -201,16 +203,16 @@ class InPlace:
             tried[keys] = min(one.fit.cost, tried.get(keys, np.inf))
         pieces: list[Callable[[], FreeRunFit]] = []
         for general in wider.fit.candidates:
-            others = [one for one in wider.fit.candidates if one is not general]
+            others = [candidate for candidate in wider.fit.candidates if candidate is not general]
             for special in pool:
                 if not is_special_case(special, general):
                     continue
                 self.fits.told(f"polishing {special.key} in place of {general.effect.name}", 0, 1)
                 problem = self.fits.problem((*others, special))
                 sizes = as_its_general_form(special, general, wider.fit)
-                start = nearest(problem, [{**wider.fit.values, **one} for one in sizes], _SOFT)
+                start = nearest(problem, [{**wider.fit.values, **size} for size in sizes], _SOFT)
                 at_start = huber_cost(problem.residual(problem.theta_of(start)))
-                if at_start < tried.get(frozenset((special.key, *(one.key for one in others))), np.inf):
+                if at_start < tried.get(frozenset((special.key, *(other.key for other in others))), np.inf):
                     pieces.append(partial(_fitted_closely, problem, start))
         return self.fits.all_fitted(pieces, [*wider.fit.candidates, *pool])
 

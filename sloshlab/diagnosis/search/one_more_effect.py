@@ -120,12 +120,14 @@ class OneMoreEffect:
     ) -> list[FreeRunFit]:
         """Fits to the end on all runs; far from the recordings, of the best one from other sizes, too."""
 
-        def to_the_end(i: int, one: BegunFit) -> FreeRunFit:
+        def to_the_end(i: int, begun_fit: BegunFit) -> FreeRunFit:
             n = len(going_on)
-            self.fits.told(f"{what}: {one.fit.candidates[-1].key}, to the end", n + i, 2 * n)
+            self.fits.told(f"{what}: {begun_fit.fit.candidates[-1].key}, to the end", n + i, 2 * n)
             if self.few is not self.fits:
-                one = on_more_runs(one, self.fits.problem(one.fit.candidates), base.values, jacobian)
-            return finished(one, shares)
+                begun_fit = on_more_runs(
+                    begun_fit, self.fits.problem(begun_fit.fit.candidates), base.values, jacobian
+                )
+            return finished(begun_fit, shares)
 
         pieces = [partial(to_the_end, i, one) for i, one in enumerate(going_on)]
         done = self.fits.side_by_side(pieces, [of for one in going_on for of in one.fit.candidates])
@@ -141,4 +143,4 @@ class OneMoreEffect:
         name = f"{last.key}.{last.effect.parameters[0].name}"
         pieces = [partial(from_another_size, problem, fit, name, factor, shares) for factor in SCANNED]
         others = self.fits.side_by_side(pieces, fit.candidates)
-        return min([fit, *(one for one in others if not one.trouble)], key=lambda one: one.cost)
+        return min([fit, *(other for other in others if not other.trouble)], key=lambda other: other.cost)

@@ -65,7 +65,7 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
     draws = np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)
     reached = fits.side_by_side([partial(from_draw, i, draw) for i, draw in enumerate(draws)], candidates)
     ends = [best.fit, *(fit for fit in reached if not fit.trouble)]
-    lowest = min(ends, key=lambda one: one.misfit)
+    lowest = min(ends, key=lambda end: end.misfit)
     better = best
     if lowest.misfit < best.fit.misfit - _CHANCE:
         fit, _ = fitted(plain, lowest.values, n_iterations=6, shares=STAGES[-2:])
@@ -73,21 +73,26 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
             better = fits.judged(fit)
             ends.append(fit)
     most = max((1 + _AS_GOOD) * lowest.misfit, lowest.misfit + _CHANCE)
-    spread = _spread([one for one in ends if one.misfit < most], better)
+    spread = _spread([end for end in ends if end.misfit < most], better)
     problem = fits.problem_of(better.fit)
     scatter = scatter_of_runs(problem, better.fit, fits.jacobian(better.fit))
-    others = [one for one in found.explanations if one is not best]
+    others = [explanation for explanation in found.explanations if explanation is not best]
     return replace(found, explanations=[replace(better, spread=spread, scatter=scatter), *others])
 
 
 def _spread(ends: list[FreeRunFit], best: Explanation) -> dict[str, float]:
     """Root mean square distance of the effects' numbers from those of the best, larger where few fits tell it."""
-    others = [one for one in ends if one is not best.fit]
+    others = [end for end in ends if end is not best.fit]
     if not others:
         return {}
     few = float(t.ppf(0.95, len(others)) / norm.ppf(0.95))
-    names = [f"{one.key}.{number.name}" for one in best.fit.candidates for number in one.effect.parameters]
+    names = [
+        f"{candidate.key}.{number.name}"
+        for candidate in best.fit.candidates
+        for number in candidate.effect.parameters
+    ]
     return {
-        name: few * float(np.sqrt(np.mean([(one.values[name] - best.fit.values[name]) ** 2 for one in others])))
+        name: few
+        * float(np.sqrt(np.mean([(other.values[name] - best.fit.values[name]) ** 2 for other in others])))
         for name in names
     }

@@ -99,41 +99,47 @@ class Refinement:
             With one effect each.
         """
         rivals = _best_by_effect(known)
-        rivals = [one for one in rivals if one.fit.cost - rivals[0].fit.cost < LEAST_TO_BUILD_ON][:_MOST_RIVALS]
+        rivals = [rival for rival in rivals if rival.fit.cost - rivals[0].fit.cost < LEAST_TO_BUILD_ON][
+            :_MOST_RIVALS
+        ]
         if len(rivals) < 2 or not self.fits.is_strained(rivals[0].fit):
             return []
         return self._each_from_believed(rivals)
 
     def _each_from_believed(self, chosen: Sequence[Explanation]) -> list[Explanation]:
-        def piece(i: int, one: Explanation) -> list[Explanation]:
-            self.fits.told(f"fitting {one.keys[-1]} from what is believed", i, len(chosen))
-            return self._from_believed(one)
+        def piece(i: int, explanation: Explanation) -> list[Explanation]:
+            self.fits.told(f"fitting {explanation.keys[-1]} from what is believed", i, len(chosen))
+            return self._from_believed(explanation)
 
         pieces = [partial(piece, i, one) for i, one in enumerate(chosen)]
         found = self.fits.side_by_side(pieces, [of for one in chosen for of in one.fit.candidates])
         return [better for of_one in found for better in of_one]
 
-    def _from_believed(self, one: Explanation) -> list[Explanation]:
+    def _from_believed(self, explanation: Explanation) -> list[Explanation]:
         """An effect fitted with the baseline as believed, from some sizes; none where that is no better."""
-        sizes = self._sized(one, _OTHER_SIZES)
+        sizes = self._sized(explanation, _OTHER_SIZES)
         places = [[{**self.fits.model.believed, **numbers} for numbers in sizes]]
-        frequency = f"{one.keys[-1]}.frequency_hz"
-        if frequency in one.fit.values:
-            moved = [x * one.fit.values[frequency] for x in _OTHER_FREQUENCIES]
+        frequency = f"{explanation.keys[-1]}.frequency_hz"
+        if frequency in explanation.fit.values:
+            moved = [x * explanation.fit.values[frequency] for x in _OTHER_FREQUENCIES]
             places += [[{**size, frequency: other_hz} for size in places[0]] for other_hz in moved]
-        problem = self.fits.problem_of(one.fit)
+        problem = self.fits.problem_of(explanation.fit)
         own, *others = (nearest(problem, starts, STAGES[0]) for starts in places)
-        return self._better_from(one, [own, *self._promising(one, others)])
+        return self._better_from(explanation, [own, *self._promising(explanation, others)])
 
-    def _promising(self, one: Explanation, starts: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
+    def _promising(
+        self, explanation: Explanation, starts: Sequence[Mapping[str, float]]
+    ) -> list[Mapping[str, float]]:
         """Where the best of several beginnings are after two stages on one repeat of every test."""
-        problem = self.fits.of_one_repeat.problem_of(one.fit)
+        problem = self.fits.of_one_repeat.problem_of(explanation.fit)
 
         def beginning(start: Mapping[str, float]) -> tuple[FreeRunFit, float]:
             first = begun(problem, [Start(start)])
             return first.fit, first.cost
 
-        reached = self.fits.side_by_side([partial(beginning, start) for start in starts], one.fit.candidates)
+        reached = self.fits.side_by_side(
+            [partial(beginning, start) for start in starts], explanation.fit.candidates
+        )
         fits = [
             (cost, {**start, **fit.values})
             for (fit, cost), start in zip(reached, starts, strict=True)
@@ -141,17 +147,19 @@ class Refinement:
         ]
         return [values for _, values in sorted(fits, key=lambda each: each[0])[:_MOST_PROMISING]]
 
-    def _sized(self, one: Explanation, factors: Sequence[float]) -> list[dict[str, float]]:
+    def _sized(self, explanation: Explanation, factors: Sequence[float]) -> list[dict[str, float]]:
         """The numbers of its effect, without those of the baseline, larger by factors."""
-        effect = {name: value for name, value in one.fit.values.items() if name not in self.fits.model.believed}
-        return [one.fit.candidates[-1].sized(effect, factor) for factor in factors]
+        effect = {
+            name: value for name, value in explanation.fit.values.items() if name not in self.fits.model.believed
+        }
+        return [explanation.fit.candidates[-1].sized(effect, factor) for factor in factors]
 
-    def _better_from(self, one: Explanation, places: Sequence[Mapping[str, float]]) -> list[Explanation]:
+    def _better_from(self, explanation: Explanation, places: Sequence[Mapping[str, float]]) -> list[Explanation]:
         """The best of fits of the same effects from several places; none where that is no better."""
-        problem = self.fits.problem_of(one.fit)
+        problem = self.fits.problem_of(explanation.fit)
         pieces = [partial(_fitted_from, problem, place) for place in places]
-        best = min(self.fits.side_by_side(pieces, one.fit.candidates), key=lambda fit: fit.cost)
-        return [self.fits.judged(best)] if not best.trouble and best.cost < one.fit.cost else []
+        best = min(self.fits.side_by_side(pieces, explanation.fit.candidates), key=lambda fit: fit.cost)
+        return [self.fits.judged(best)] if not best.trouble and best.cost < explanation.fit.cost else []
 
     def polished(
         self, base: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
@@ -196,7 +204,7 @@ class Refinement:
             self.fits.told(f"taking away one of two effects: {candidate.key} is left", 0, 1)
             return fitted(self.fits.problem((candidate,)), values, shares=STAGES[-2:])[0]
 
-        pieces = [partial(left_alone, one) for one in pair.fit.candidates]
+        pieces = [partial(left_alone, candidate) for candidate in pair.fit.candidates]
         return self.fits.all_fitted(pieces, pair.fit.candidates)
 
     def retuned_from(self, known: Sequence[Explanation], retuned: Explanation) -> Explanation:
@@ -226,9 +234,9 @@ def _with_good_gains(base: FreeRunFit, known: Sequence[Explanation]) -> list[Exp
     return [one for one in ranked if base.cost - one.fit.cost >= least]
 
 
-def _is_simple(one: Explanation) -> bool:
+def _is_simple(explanation: Explanation) -> bool:
     """Whether its effect has one number."""
-    return len(one.fit.candidates[-1].effect.parameters) == 1
+    return len(explanation.fit.candidates[-1].effect.parameters) == 1
 
 
 def _best_by_effect(known: Sequence[Explanation]) -> list[Explanation]:

@@ -138,7 +138,7 @@ class Screening:
                     )
             if not looks:
                 return None
-            looks.sort(key=lambda one: -float(one.gains.max()))
+            looks.sort(key=lambda look: -float(look.gains.max()))
             gains_of = np.max([look.gains for look in looks], axis=0)
             much_larger = None if is_near or base.candidates else self._much_larger(candidate, residual, shares[0])
             return Promise(candidate, gains_of, looks, by_force, much_larger)
@@ -149,7 +149,7 @@ class Screening:
         for candidate, promise in zip(others, promises, strict=True):
             if promise is None:
                 self.fits.failed[candidate.key] = "does not run from any start"
-        promised = [one for one in promises if one is not None]
+        promised = [promise for promise in promises if promise is not None]
         return [
             replace(one, starts=self._starts(base, one, shares[0], is_near=is_near))
             for one in self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
@@ -161,38 +161,38 @@ class Screening:
         if not sizes:
             return None
         problem, believed = self.fits.problem((candidate,)), self.fits.model.believed
-        costs = costs_at(problem, [{**believed, **one} for one in sizes], share)
+        costs = costs_at(problem, [{**believed, **size} for size in sizes], share)
         least = int(np.argmin(costs))
         return sizes[least] if costs[least] < huber_cost(problem.softness(share) * residual) else None
 
-    def _starts(self, base: FreeRunFit, one: Promise, share: float, *, is_near: bool) -> list[Start]:
+    def _starts(self, base: FreeRunFit, promise: Promise, share: float, *, is_near: bool) -> list[Start]:
         """Where a candidate is fitted from."""
-        extended = self.fits.problem((*base.candidates, one.candidate))
-        like = self._at_its_size(base, extended, one)
+        extended = self.fits.problem((*base.candidates, promise.candidate))
+        like = self._at_its_size(base, extended, promise)
         if is_near:
-            sets = [*([like] if like else []), *(look.resized for look in one.looks)]
+            sets = [*([like] if like else []), *(look.resized for look in promise.looks)]
             return [Start({**base.values, **numbers}, is_near=True) for numbers in sets[:_MOST_STARTS]]
-        starts = self._from_afar(base, extended, one, share)
-        if like and one.is_like_the_force:
+        starts = self._from_afar(base, extended, promise, share)
+        if like and promise.is_like_the_force:
             starts.append(Start({**base.values, **like}, is_near=True))
         return starts
 
-    def _at_its_size(self, base: FreeRunFit, problem: FreeRunProblem, one: Promise) -> dict[str, float]:
+    def _at_its_size(self, base: FreeRunFit, problem: FreeRunProblem, promise: Promise) -> dict[str, float]:
         """Numbers with which a candidate's force is like the missing one, at the best size beside a fit."""
-        sets = _like_the_force(one)
+        sets = _like_the_force(promise)
         if len(sets) < 2:
             return sets[0] if sets else {}
         costs = costs_at(problem, [{**base.values, **numbers} for numbers in sets], 0.0)
         return sets[int(np.argmin(costs))]
 
-    def _from_afar(self, base: FreeRunFit, problem: FreeRunProblem, one: Promise, share: float) -> list[Start]:
+    def _from_afar(self, base: FreeRunFit, problem: FreeRunProblem, promise: Promise, share: float) -> list[Start]:
         """A start with the baseline as believed and one with its numbers in a fit, each the nearest of several."""
-        looks = one.looks
+        looks = promise.looks
         believed = base.values if base.candidates else self.fits.model.believed
-        larger = [one.much_larger] if one.much_larger else []
+        larger = [promise.much_larger] if promise.much_larger else []
         far = [{**believed, **numbers} for numbers in (*larger, *(look.start for look in looks[:_MOST_STARTS]))]
         places = [base.values, *([self.fits.eased(base)] if self.fits.is_strained(base) else [])]
-        sets = [looks[0].resized, *_like_the_force(one)]
+        sets = [looks[0].resized, *_like_the_force(promise)]
         close = [{**place, **numbers} for place in places for numbers in sets]
         return [
             Start(nearest(problem, far, share), is_near=bool(base.candidates)),
@@ -225,15 +225,15 @@ class Screening:
         return chosen
 
 
-def _like_the_force(one: Promise) -> list[dict[str, float]]:
+def _like_the_force(promise: Promise) -> list[dict[str, float]]:
     """Numbers with which a candidate's force is like the missing one; none where they are not known.
 
     What comes in jumps is tried wherever it was like it, and at other sizes, too: the baseline beside which it was
     sought hides some of it, and from one place no way leads to another.
     """
-    if one.by_force is None:
+    if promise.by_force is None:
         return []
-    if not one.candidate.comes_in_jumps:
-        return [one.by_force.numbers]
-    places = (one.by_force.numbers, *one.by_force.others)
-    return [one.candidate.sized(numbers, size) for numbers in places for size in _SIZES_IN_JUMPS]
+    if not promise.candidate.comes_in_jumps:
+        return [promise.by_force.numbers]
+    places = (promise.by_force.numbers, *promise.by_force.others)
+    return [promise.candidate.sized(numbers, size) for numbers in places for size in _SIZES_IN_JUMPS]

@@ -33,9 +33,9 @@ def as_its_general_form(special: Candidate, general: Candidate, fit: FreeRunFit)
     starts = special.starts()
     [*names] = starts[0]
     alike = [
-        fit.values[f"{general.key}.{one.name}"]
-        for one in general.effect.parameters
-        if _unit(one.name) == _unit(names[0])
+        fit.values[f"{general.key}.{parameter.name}"]
+        for parameter in general.effect.parameters
+        if _unit(parameter.name) == _unit(names[0])
     ]
     if len(names) == 1 and alike:
         starts += [{names[0]: sign * float(np.mean(alike))} for sign in (1.0, -1.0)]
@@ -57,7 +57,7 @@ def of_growing_sizes(candidate: Candidate) -> list[dict[str, float]]:
 def with_smaller_ones(candidate: Candidate) -> list[dict[str, float]]:
     """Starts of an effect, and at a tenth of their size too: the step from the full one may lead nowhere."""
     starts = candidate.starts()
-    return [*starts, *(candidate.sized(one, 0.1) for one in starts)]
+    return [*starts, *(candidate.sized(start, 0.1) for start in starts)]
 
 
 def resized(candidate: Candidate, start: dict[str, float], factor: float) -> dict[str, float]:

@@ -91,7 +91,7 @@ def findings_of(
         is_complete = best is not None and fits.is_complete(best)
     if not is_complete:
         pairs = _second_effects(fits, found, retuned, surroundings, pool)
-        found += [*pairs, *climbed(fits, [one for one in pairs if len(one.keys) > 1])]
+        found += [*pairs, *climbed(fits, [pair for pair in pairs if len(pair.keys) > 1])]
     found += refinement.polished(retuned_fit, found, pool)
     retuned = refinement.retuned_from(found, retuned)
     any_force = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
@@ -162,7 +162,7 @@ def _second_effects(
         pair = cheapest(pairs)
     if pair is not None and best.fit.cost - pair.fit.cost > LEAST_TO_BUILD_ON:
         alone += more.in_place.one_for_all(pair.fit, retuned.fit, pool)
-    alone += Refinement(fits).take_away([one for one in pairs if one.keys[:-1] == best.keys])
+    alone += Refinement(fits).take_away([pair for pair in pairs if pair.keys[:-1] == best.keys])
     cost = min((one.fit.cost for one in alone), default=best.fit.cost)
     if cost < best.fit.cost:
         alone += more.in_place.look_alikes(retuned.fit, alone, pool, "fitting one effect")
@@ -181,7 +181,7 @@ def _special_case_of(best: Explanation, known: Sequence[Explanation], retuned: E
     least = _SHARE_OF_A_SPECIAL_CASE * (retuned.fit.cost - best.fit.cost)
     general = best.fit.candidates[-1]
     specials = [one for one in known if is_special_case(one.fit.candidates[-1], general)]
-    return cheapest([one for one in specials if retuned.fit.cost - one.fit.cost > least])
+    return cheapest([special for special in specials if retuned.fit.cost - special.fit.cost > least])
 
 
 def _possible_beside(best: Explanation, at: Surroundings, pool: Sequence[Candidate]) -> list[Candidate]:

@@ -127,7 +127,7 @@ class UserTwinModel:
 
     def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
         """Write parameters and added forces as TOML; the module itself stays where it is."""
-        known = {one.name: values.get(one.name, one.believed) for one in self.parameters}
+        known = {parameter.name: values.get(parameter.name, parameter.believed) for parameter in self.parameters}
         save_extended(self.name, known, extension, path)
 
     def _truth(
@@ -244,16 +244,22 @@ class UserTwinModel:
     def _own(self, run: CaseRun, values: Mapping[str, float]) -> dict[str, float]:
         """Values of the user's parameters under the user's names."""
         return {
-            one.name: values.get(f"{one.name} in {run.name}" if one.each_run else one.name, one.believed)
-            for one in self.described.parameters
+            parameter.name: values.get(
+                f"{parameter.name} in {run.name}" if parameter.each_run else parameter.name, parameter.believed
+            )
+            for parameter in self.described.parameters
         }
 
     def _parameters(self) -> list[BaselineParameter]:
         found = []
-        for one in self.described.parameters:
-            found += [self._parameter(one, f"{one.name} in {run.name}") for run in self.runs if one.each_run]
-            if not one.each_run:
-                found.append(self._parameter(one, one.name))
+        for parameter in self.described.parameters:
+            found += [
+                self._parameter(parameter, f"{parameter.name} in {run.name}")
+                for run in self.runs
+                if parameter.each_run
+            ]
+            if not parameter.each_run:
+                found.append(self._parameter(parameter, parameter.name))
         for name, shown in self._shown.items():
             if shown.gain_tolerance:
                 found.append(BaselineParameter(f"gain of {name}", 1.0, shown.gain_tolerance, is_reading=True))
@@ -271,8 +277,8 @@ class UserTwinModel:
         return found
 
     @staticmethod
-    def _parameter(one: Parameter, name: str) -> BaselineParameter:
-        return BaselineParameter(name, float(one.believed), float(one.tolerance), one.units)
+    def _parameter(parameter: Parameter, name: str) -> BaselineParameter:
+        return BaselineParameter(name, float(parameter.believed), float(parameter.tolerance), parameter.units)
 
     def _check_channels(self, run: CaseRun) -> None:
         present = channels(run.recording)

@@ -49,23 +49,29 @@ def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Ex
     alike = [best]
     shares_noise = bool(found.surroundings.driving)
     seen = {best.named_in_blocks}
-    for one in sorted(found.explanations, key=lambda one: -scale.evidence(one)):
-        if len(one.keys) > len(best.keys) or one.named_in_blocks in seen or not np.isfinite(one.held_out):
+    for explanation in sorted(found.explanations, key=lambda explanation: -scale.evidence(explanation)):
+        if (
+            len(explanation.keys) > len(best.keys)
+            or explanation.named_in_blocks in seen
+            or not np.isfinite(explanation.held_out)
+        ):
             continue
-        if one.rests_on_a_bound or (includes(one, best) and not _differs(one, best)):
+        if explanation.rests_on_a_bound or (includes(explanation, best) and not _differs(explanation, best)):
             continue
-        if scale.held_out_gain(found.retuned, one) < _LEAST_SHARE * scale.held_out_gain(found.retuned, best):
+        if scale.held_out_gain(found.retuned, explanation) < _LEAST_SHARE * scale.held_out_gain(
+            found.retuned, best
+        ):
             continue
-        is_alike = scale.evidence(best) - scale.evidence(one) < LEAST_SEPARATION
-        is_alike = is_alike or (_differs(one, best) and not _shows_less(one, best, scale))
-        has_as_many = len(one.keys) == len(best.keys)
-        is_little = _is_within_scatter(one, best) and not has_surely_gained(best, one, scale)
+        is_alike = scale.evidence(best) - scale.evidence(explanation) < LEAST_SEPARATION
+        is_alike = is_alike or (_differs(explanation, best) and not _shows_less(explanation, best, scale))
+        has_as_many = len(explanation.keys) == len(best.keys)
+        is_little = _is_within_scatter(explanation, best) and not has_surely_gained(best, explanation, scale)
         is_alike = is_alike or (shares_noise and has_as_many and is_little)
-        is_kin = _is_case_of(one, best) or _is_case_of(best, one)
-        is_less = is_kin and is_clearly_better(best, one, scale)
-        if is_alike or (not is_less and _is_alike_at_one_frequency(found, one, best)):
-            alike.append(one)
-            seen.add(one.named_in_blocks)
+        is_kin = _is_case_of(explanation, best) or _is_case_of(best, explanation)
+        is_less = is_kin and is_clearly_better(best, explanation, scale)
+        if is_alike or (not is_less and _is_alike_at_one_frequency(found, explanation, best)):
+            alike.append(explanation)
+            seen.add(explanation.named_in_blocks)
     return alike
 
 
@@ -74,44 +80,46 @@ def _shows_less(general: Explanation, special: Explanation, scale: Scale) -> boo
     return has_gained(special, general, scale) and not _is_within_scatter(general, special)
 
 
-def _is_within_scatter(one: Explanation, best: Explanation) -> bool:
+def _is_within_scatter(explanation: Explanation, best: Explanation) -> bool:
     """Whether an explanation leaves hardly more than another in every channel of every run."""
-    return largest_strength(one.by_run, best.by_run) < _WITHIN_SCATTER
+    return largest_strength(explanation.by_run, best.by_run) < _WITHIN_SCATTER
 
 
-def _is_alike_at_one_frequency(found: Findings, one: Explanation, best: Explanation) -> bool:
+def _is_alike_at_one_frequency(found: Findings, explanation: Explanation, best: Explanation) -> bool:
     """Look-alikes of one frequency that differ by less than the noise floor, or by little of what they explain.
 
     What tells them apart then are beginnings and ends of runs, on which no name should rest; a structure with more
     modes tells them apart at the frequencies of the others.
     """
     at = found.surroundings
-    if not at.has_one_frequency or at.n_modes > 1 or len(one.keys) != 1 or len(best.keys) != 1:
+    if not at.has_one_frequency or at.n_modes > 1 or len(explanation.keys) != 1 or len(best.keys) != 1:
         return False
-    this, other = one.fit.candidates[0].effect, best.fit.candidates[0].effect
+    this, other = explanation.fit.candidates[0].effect, best.fit.candidates[0].effect
     if this.name not in other.look_alikes and other.name not in this.look_alikes:
         return False
     powers = [{term for term in effect.spoken_for_by if term.startswith("work")} for effect in (this, other)]
     little = _LITTLE_OF_ONE_POWER if powers[0] and powers[0] == powers[1] else _LITTLE
     return all(
         left - best.by_run[cell] < max(1.0, little * (found.retuned.by_run[cell] - best.by_run[cell]))
-        for cell, left in one.by_run.items()
+        for cell, left in explanation.by_run.items()
     )
 
 
 def includes(wider: Explanation, narrower: Explanation) -> bool:
     """Whether every effect of the narrower is one of the wider, or a special case of one of them."""
     held = {
-        f"{one.effect.block}.{name}"
-        for one in wider.fit.candidates
-        for name in (one.effect.known_as, *one.effect.includes)
+        f"{candidate.effect.block}.{name}"
+        for candidate in wider.fit.candidates
+        for name in (candidate.effect.known_as, *candidate.effect.includes)
     }
     return held >= set(narrower.named_in_blocks)
 
 
 def _is_case_of(narrower: Explanation, wider: Explanation) -> bool:
     """Whether every effect of the narrower, in whatever block, is a special case of one of the wider."""
-    return set(narrower.names) <= {name for one in wider.fit.candidates for name in one.effect.includes}
+    return set(narrower.names) <= {
+        name for candidate in wider.fit.candidates for name in candidate.effect.includes
+    }
 
 
 def _differs(wider: Explanation, narrower: Explanation) -> bool:
@@ -130,7 +138,9 @@ def _differs(wider: Explanation, narrower: Explanation) -> bool:
 
 def equals_of(best: Explanation) -> list[tuple[str, ...]]:
     """Names of explanations that are the same force, alone or beside other effects."""
-    in_structure = [one.effect.name for one in best.fit.candidates if one.effect.block == "structure"]
+    in_structure = [
+        candidate.effect.name for candidate in best.fit.candidates if candidate.effect.block == "structure"
+    ]
     found = []
     for one, two in _EQUALS.items():
         for this, other in ((one, two), (two, one)):

@@ -64,10 +64,10 @@ class Scale:
         """On runs that chose nothing."""
         return (before.held_out - after.held_out) / self.held_out
 
-    def evidence(self, one: Explanation) -> float:
+    def evidence(self, explanation: Explanation) -> float:
         """Log-likelihood of both, less what its numbers cost."""
-        likelihood = -one.fit.cost / self.fitting - one.held_out / self.held_out
-        return likelihood - self.per_number * one.n_numbers
+        likelihood = -explanation.fit.cost / self.fitting - explanation.held_out / self.held_out
+        return likelihood - self.per_number * explanation.n_numbers
 
 
 def has_gained(more: Explanation, less: Explanation, scale: Scale) -> bool:
@@ -108,11 +108,13 @@ def is_there(less: Explanation, more: Explanation) -> bool:
     return explains_half(less, more) or largest_strength(less.by_run, more.by_run) >= _CLEAR
 
 
-def at_its_best(found: Findings, one: Explanation) -> Explanation:
+def at_its_best(found: Findings, explanation: Explanation) -> Explanation:
     """With the least that any fit of the same effects leaves of each run; jumps of friction leave many valleys."""
-    alike = [one, *(other for other in found.explanations if set(other.keys) == set(one.keys))]
-    by_run = {place: min(other.by_run.get(place, left) for other in alike) for place, left in one.by_run.items()}
-    return replace(one, by_run=by_run, held_out=min(other.held_out for other in alike))
+    alike = [explanation, *(other for other in found.explanations if set(other.keys) == set(explanation.keys))]
+    by_run = {
+        place: min(other.by_run.get(place, left) for other in alike) for place, left in explanation.by_run.items()
+    }
+    return replace(explanation, by_run=by_run, held_out=min(other.held_out for other in alike))
 
 
 def strength(before: Explanation, after: Explanation) -> float:

@@ -22,7 +22,7 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
     found : Findings
     verdict : Verdict
     """
-    ceiling = min([*found.ceilings, *found.explanations, found.retuned], key=lambda one: one.held_out)
+    ceiling = min([*found.ceilings, *found.explanations, found.retuned], key=lambda ceiling: ceiling.held_out)
     after = verdict.best if verdict.kind in ("named", "indistinguishable") else None
     return {
         "format": 1,
@@ -65,9 +65,9 @@ def _as_known(key: str) -> str:
 
 def _names_of_alternatives(verdict: Verdict) -> list[list[str]]:
     """Every set of names once; an effect may be in it in two blocks, or with two lines of the mains."""
-    sets = [one.names for one in verdict.alternatives]
-    sets += [names for one in verdict.alternatives for names in equals_of(one)]
-    return [list(one) for one in dict.fromkeys(sets)]
+    sets = [alternative.names for alternative in verdict.alternatives]
+    sets += [names for alternative in verdict.alternatives for names in equals_of(alternative)]
+    return [list(fromkey) for fromkey in dict.fromkeys(sets)]
 
 
 def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:

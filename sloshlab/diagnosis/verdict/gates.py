@@ -82,7 +82,9 @@ def verdict_of(found: Findings) -> Verdict:
     found : Findings
     """
     scale = Scale.of(found)
-    ceiling = min([*found.explanations, *found.ceilings, found.retuned], key=lambda one: one.held_out)
+    ceiling = min(
+        [*found.explanations, *found.ceilings, found.retuned], key=lambda explanation: explanation.held_out
+    )
     gain = scale.held_out_gain(found.retuned, ceiling)
     probabilities = _probabilities(found, scale)
     described = _in_need_of_all(found, scale)
@@ -109,11 +111,11 @@ def verdict_of(found: Findings) -> Verdict:
         adequacy,
         statement_of(found, named, alternatives, kind),
         separating_experiment_of(alternatives) if kind == "indistinguishable" else "",
-        _certain(probabilities, *(label_of(one) for one in alternatives)),
+        _certain(probabilities, *(label_of(alternative) for alternative in alternatives)),
     )
 
 
-def leaves_more(found: Findings, one: Explanation) -> bool:
+def leaves_more(found: Findings, explanation: Explanation) -> bool:
     """Whether an explanation leaves what repeats of a test have in common, or too much where none tell.
 
     Parameters
@@ -121,28 +123,28 @@ def leaves_more(found: Findings, one: Explanation) -> bool:
     found : Findings
     one : Explanation
     """
-    shared = one.shared_by_repeats
+    shared = explanation.shared_by_repeats
     if any(max(left) > _MOST_IN_A_CHANNEL or float(np.mean(left)) > _MOST_IN_COMMON for left in shared):
         return True
-    is_told = not np.isnan(_in_common_where_judged(found, one))
-    return found.has_repeats and not is_told and one.rms_without_bursts > LARGEST_REMAINDER
+    is_told = not np.isnan(_in_common_where_judged(found, explanation))
+    return found.has_repeats and not is_told and explanation.rms_without_bursts > LARGEST_REMAINDER
 
 
-def _leaves_much(found: Findings, one: Explanation) -> bool:
+def _leaves_much(found: Findings, explanation: Explanation) -> bool:
     """Whether an explanation leaves more than may be called complete where no repeats tell the noise."""
-    return not found.has_repeats and one.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
+    return not found.has_repeats and explanation.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
 
 
-def _in_common_where_judged(found: Findings, one: Explanation) -> float:
+def _in_common_where_judged(found: Findings, explanation: Explanation) -> float:
     """Mean of what repeats of held-out tests have in common; NaN where none of them is repeated."""
-    left = [in_common for (test, _), in_common in one.repeating.items() if test in found.judged_tests]
+    left = [in_common for (test, _), in_common in explanation.repeating.items() if test in found.judged_tests]
     return float(np.mean(left)) if left else float("nan")
 
 
 def _in_need_of_all(found: Findings, scale: Scale) -> list[Explanation]:
     """What shows more than each of its parts: one effect may bring the gain of chance, another one the size."""
     described = [*found.explanations, *found.ceilings]
-    parts = [(frozenset(one.keys), one) for one in found.explanations]
+    parts = [(frozenset(explanation.keys), explanation) for explanation in found.explanations]
     return [
         one
         for one in described
@@ -203,7 +205,11 @@ def _shortest_sufficient(found: Findings, scale: Scale, adequate_rms: float) -> 
 
 def _best_of(found: Findings, scale: Scale, n: int) -> Explanation | None:
     """The best explanation of so many effects, special cases in their place; None of none."""
-    known = [one for one in found.explanations if np.isfinite(one.held_out) and not one.rests_on_a_bound]
+    known = [
+        explanation
+        for explanation in found.explanations
+        if np.isfinite(explanation.held_out) and not explanation.rests_on_a_bound
+    ]
     alike = [one for one in known if len(one.keys) == n]
     return _without_excess(max(alike, key=scale.evidence), alike, scale) if alike else None
 
@@ -243,22 +249,22 @@ def _is_bettered(
         return False
     if named.held_out_rms > ADEQUATE * max(ceiling.held_out_rms, 1.0):
         return True
-    return any(shows_more(one, at_its_best(found, named), scale) for one in others)
+    return any(shows_more(other, at_its_best(found, named), scale) for other in others)
 
 
 def _probabilities(found: Findings, scale: Scale) -> dict[str, float]:
     """Weights of the explanations by their likelihood on held-out runs and their number of parameters."""
     scores: dict[str, float] = {"none": -found.retuned.held_out / scale.held_out}
-    for one in found.explanations:
-        if np.isfinite(one.held_out):
-            label = label_of(one)
-            score = -one.held_out / scale.held_out - scale.per_number * one.n_numbers
+    for explanation in found.explanations:
+        if np.isfinite(explanation.held_out):
+            label = label_of(explanation)
+            score = -explanation.held_out / scale.held_out - scale.per_number * explanation.n_numbers
             scores[label] = max(scores.get(label, -np.inf), score)
-    named = {key for one in found.explanations for key in one.keys}
-    for one in found.ceilings:
-        if np.isfinite(one.held_out):
-            beside = sum(len(each.effect.parameters) for each in one.fit.candidates if each.key in named)
-            score = -one.held_out / scale.held_out - scale.per_number * (_NUMBERS_OF_THE_UNKNOWN + beside)
+    named = {key for explanation in found.explanations for key in explanation.keys}
+    for ceiling in found.ceilings:
+        if np.isfinite(ceiling.held_out):
+            beside = sum(len(each.effect.parameters) for each in ceiling.fit.candidates if each.key in named)
+            score = -ceiling.held_out / scale.held_out - scale.per_number * (_NUMBERS_OF_THE_UNKNOWN + beside)
             scores["unknown"] = max(scores.get("unknown", -np.inf), score)
     top = max(scores.values())
     weights = {name: float(np.exp(max(score - top, -700.0))) for name, score in scores.items()}
@@ -275,9 +281,9 @@ def _certain(probabilities: dict[str, float], *decided: str) -> dict[str, float]
     return shared
 
 
-def label_of(one: Explanation) -> str:
+def label_of(explanation: Explanation) -> str:
     """Names of an explanation as one label."""
-    return " + ".join(one.names)
+    return " + ".join(explanation.names)
 
 
 def with_place(found: Findings, verdict: Verdict, seen: str = "", block: str = "") -> Verdict:

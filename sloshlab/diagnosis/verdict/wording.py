@@ -30,7 +30,7 @@ def unknown_statement(found: Findings, named: Explanation | None, block: str = "
     where = block or where_of(found)
     closest = ""
     if named is not None and explained_share(found, named) >= _LEAST_SHARE:
-        nearest = " and ".join(named_and_placed(one) for one in named.fit.candidates)
+        nearest = " and ".join(named_and_placed(candidate) for candidate in named.fit.candidates)
         same = "".join(f" (the same as {' with '.join(one).replace('_', ' ')})" for one in equals_of(named))
         share = f"{100 * explained_share(found, named):.0f} % of what can be explained"
         closest = f"; the nearest known effect is {nearest}{same}, which explains {share}"
@@ -43,7 +43,7 @@ def statement_of(found: Findings, best: Explanation, alternatives: Sequence[Expl
     named = " and ".join(_described(best, candidate) for candidate in best.fit.candidates)
     text = f"Left out: {named}; explains {100 * explained_share(found, best):.0f} % of what can be explained"
     if kind == "indistinguishable":
-        others = [" + ".join(one.names).replace("_", " ") for one in alternatives[1:]]
+        others = [" + ".join(alternative.names).replace("_", " ") for alternative in alternatives[1:]]
         others += [" + ".join(equal).replace("_", " ") for equal in equals_of(best)]
         text += f"; cannot be told from {' or '.join(dict.fromkeys(others))}"
     return text + "."
@@ -51,7 +51,7 @@ def statement_of(found: Findings, best: Explanation, alternatives: Sequence[Expl
 
 def separating_experiment_of(alternatives: Sequence[Explanation]) -> str:
     """Experiments that would tell explanations apart."""
-    effects = [candidate.effect for one in alternatives for candidate in one.fit.candidates]
+    effects = [candidate.effect for alternative in alternatives for candidate in alternative.fit.candidates]
     return "; or ".join(dict.fromkeys(effect.separated_by for effect in effects if effect.separated_by))
 
 
@@ -84,14 +84,14 @@ def _placed(name: str, candidate: Candidate) -> str:
 
 def where_of(found: Findings) -> str:
     """The block whose correction helps most."""
-    options = [one for one in (*found.ceilings, *found.explanations) if len(one.keys) == 1]
-    best = min(options, key=lambda one: one.held_out, default=None)
+    options = [ceiling for ceiling in (*found.ceilings, *found.explanations) if len(ceiling.keys) == 1]
+    best = min(options, key=lambda option: option.held_out, default=None)
     return best.fit.candidates[0].effect.block if best else "structure"
 
 
 def explained_share(found: Findings, best: Explanation) -> float:
     """Share of what any description explains of the held-out runs beyond the retuned baseline."""
-    ceiling = min(one.held_out_rms for one in (*found.ceilings, *found.explanations, best))
+    ceiling = min(ceiling.held_out_rms for ceiling in (*found.ceilings, *found.explanations, best))
     possible = found.retuned.held_out_rms**2 - ceiling**2
     gained = found.retuned.held_out_rms**2 - best.held_out_rms**2
     return min(max(gained / possible, 0.0), 1.0) if possible > 0 else 0.0

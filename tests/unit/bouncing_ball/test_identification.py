@@ -40,13 +40,13 @@ def test_linear_least_squares_and_its_intervals() -> None:
     assert SPACE.point(found.ball) == pytest.approx(expected, abs=2e-5)
     left = error - matrix @ inverse @ matrix.T @ error
     half = student_t.ppf(0.95, 35) * np.sqrt(left @ left / 35 * np.diag(inverse))
-    for i, one in enumerate(found.intervals):
+    for i, interval in enumerate(found.intervals):
         moved = expected.copy()
         moved[i] = expected[i] + half[i]
-        assert one.high == pytest.approx(SPACE.parameter(i, moved), rel=2e-3)
-        assert one.low < one.value < one.high
-        assert one.profile_ratio == pytest.approx(1.0, abs=0.02)
-        assert one.is_determined
+        assert interval.high == pytest.approx(SPACE.parameter(i, moved), rel=2e-3)
+        assert interval.low < interval.value < interval.high
+        assert interval.profile_ratio == pytest.approx(1.0, abs=0.02)
+        assert interval.is_determined
     assert found.flags == ()
     assert found.rms == pytest.approx(np.sqrt(left @ left / 40), rel=1e-4)
 
@@ -79,7 +79,7 @@ def test_a_parameter_that_the_data_do_not_hold_has_no_ends() -> None:
         return matrix @ (SPACE.point(ball) - 0.5) + error
 
     intervals = identified(residuals, SPACE, SETTINGS).intervals
-    assert [one.is_determined for one in intervals] == [True, True, False, True, True]
+    assert [interval.is_determined for interval in intervals] == [True, True, False, True, True]
     assert (intervals[2].low, intervals[2].high) == (-np.inf, np.inf)
 
 

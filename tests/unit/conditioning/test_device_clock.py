@@ -43,7 +43,7 @@ def simulated(
     clock = fitted_device_clock(counter, arrived_ns, RATE_HZ)
     origin_s = (clock.host_origin_ns - HOST_NS) * 1e-9
     ends = counter[[0, -1]]
-    stated_s = np.array([clock.host_s(float(one)) for one in ends]) + origin_s
+    stated_s = np.array([clock.host_s(float(end)) for end in ends]) + origin_s
     return clock, stated_s - taken_s[[0, -1]]
 
 

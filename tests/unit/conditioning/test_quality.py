@@ -8,7 +8,7 @@ from sloshlab.conditioning.quality import quality_of
 
 
 def by_name(quality, name):
-    return next(one for one in quality.channels if one.name == name)
+    return next(channel for channel in quality.channels if channel.name == name)
 
 
 def test_a_good_run():

@@ -45,6 +45,9 @@ class Decays:
 
     def fit(self, *keys: str, n_iterations: int = 4, **numbers: float) -> Explanation:
         candidates = [self.pool[key] for key in keys]
-        start = {**self.believed, **{name: value for one in candidates for name, value in one.starts()[0].items()}}
+        start = {
+            **self.believed,
+            **{name: value for candidate in candidates for name, value in candidate.starts()[0].items()},
+        }
         fit, _ = fitted(self.fits.problem(candidates), {**start, **numbers}, n_iterations=n_iterations)
         return self.fits.judged(fit)

@@ -144,7 +144,7 @@ def judged(*parts: Any, **more: Any) -> Verdict:
 
 
 def names(verdict: Verdict) -> list[tuple[str, ...]]:
-    return [one.names for one in verdict.alternatives]
+    return [alternative.names for alternative in verdict.alternatives]
 
 
 BASELINE = left(500.0, 500.0)

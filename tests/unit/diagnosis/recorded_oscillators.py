@@ -205,4 +205,6 @@ def surroundings(model: RigModel) -> Surroundings:
 
 def effect(key: str) -> Any:
     """A registered effect by block and name."""
-    return next(one for one in known_effects() if f"{one.block}.{one.name}" == key)
+    return next(
+        known_effect for known_effect in known_effects() if f"{known_effect.block}.{known_effect.name}" == key
+    )

@@ -47,7 +47,11 @@ def drawn(
         asked.append(best.keys)
         own = {name: spread.get(name, 1e-3) for name in best.fit.names}
         return replace(
-            found, explanations=[replace(one, spread=own) if one is best else one for one in found.explanations]
+            found,
+            explanations=[
+                replace(explanation, spread=own) if explanation is best else explanation
+                for explanation in found.explanations
+            ],
         )
 
     monkeypatch.setattr(answer, "redrawn", redrawn)
@@ -95,7 +99,7 @@ def test_where_one_of_two_may_be_nothing_all_pairs_are_given_up(
     found, verdict = answered(findings(BASELINE, [PAIR, other, single]))
     assert verdict.kind == kind
     assert asked == ([PAIR.keys, single.keys] if kind == "named" else [PAIR.keys])
-    assert [one.keys for one in found.explanations] == [single.keys]
+    assert [explanation.keys for explanation in found.explanations] == [single.keys]
     [(pair, why)] = found.failed.items()
     assert pair == " + ".join(PAIR.keys)
     assert "structure.quadratic_drag is not told from nothing" in why
@@ -119,7 +123,7 @@ def test_one_of_two_that_may_be_nothing_stands_where_it_removes_what_is_clear(
     pair = replace(PAIR, held_out_rms=1.0)
     retuned = left(500.0, 500.0, squares=20.0, rms=5.0)
     found, _ = answered(findings(retuned, [pair, left(200.0, 200.0, beside, squares=squares, rms=rms)]))
-    assert any(one.keys == PAIR.keys for one in found.explanations) is is_named
+    assert any(explanation.keys == PAIR.keys for explanation in found.explanations) is is_named
     assert bool(found.failed) is not is_named
 
 

@@ -99,7 +99,7 @@ def test_the_compliance_of_the_base_comes_back(tmp_path: Path) -> None:
     model = model_of(tmp_path)
     at = replace(surroundings(model), frequency_hz=10.0)
     candidate = Candidate(effect("excitation.base_rocking"), at)
-    assert candidate.key in [one.key for one in candidates(at)]
+    assert candidate.key in [candidate.key for candidate in candidates(at)]
     free = ("damping of mode 1", "damping of mode 2")
     held = {name: value for name, value in model.believed.items() if name not in free}
     [run] = model.runs

@@ -51,7 +51,7 @@ def test_columns_are_made_of_the_blocks_that_are_given() -> None:
     expected = np.zeros((sum(SIZES), 3))
     expected[:4, 0], expected[7:, 1] = first, last
     np.testing.assert_array_equal(as_dense(found), expected)
-    assert [one.columns.tolist() for one in found.blocks] == [[0], [], [1]]
+    assert [block.columns.tolist() for block in found.blocks] == [[0], [], [1]]
 
 
 def test_a_part_has_some_blocks_and_the_columns_in_the_order_asked_for() -> None:
@@ -81,8 +81,8 @@ def test_weights_go_to_rows_and_leave_the_matrix_as_it_was() -> None:
 
 def test_columns_that_a_block_does_not_see_are_not_kept() -> None:
     blocks = in_blocks(dense()).blocks
-    assert [one.columns.tolist() for one in blocks] == [[0, 2], [1, 2], [0, 1, 2]]
-    assert [one.values.shape for one in blocks] == [(4, 2), (3, 2), (5, 3)]
+    assert [block.columns.tolist() for block in blocks] == [[0, 2], [1, 2], [0, 1, 2]]
+    assert [block.values.shape for block in blocks] == [(4, 2), (3, 2), (5, 3)]
 
 
 def test_a_matrix_without_columns_or_rows_is_one() -> None:

@@ -94,7 +94,7 @@ def test_of_two_effects_the_one_in_jumps_is_thrown(case: Decays, monkeypatch: py
     assert climbing.climbed(case.fits, [pair]) == []
     sudden = replace(case.pool[ASYMMETRIC].effect, sought_at=lambda at: [{}])
     candidates = (pair.fit.candidates[0], replace(pair.fit.candidates[1], effect=sudden))
-    assert [one.comes_in_jumps for one in candidates] == [False, True]
+    assert [candidate.comes_in_jumps for candidate in candidates] == [False, True]
     thrown: list[dict[str, float]] = []
 
     def looked_at(problem: FreeRunProblem, starts: Any, share: float) -> Any:

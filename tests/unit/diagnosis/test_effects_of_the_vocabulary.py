@@ -59,12 +59,12 @@ LOOK_ALIKES = [
 
 def built_in() -> list[Effect]:
     """Effects of the program, without those of users."""
-    return [one for one in known_effects() if one.extension.__module__.startswith("sloshlab.")]
+    return [effect for effect in known_effects() if effect.extension.__module__.startswith("sloshlab.")]
 
 
 def named(name: str) -> list[Effect]:
     """Effects of a name, one per block."""
-    return [one for one in known_effects() if one.name == name and one.equation]
+    return [effect for effect in known_effects() if effect.name == name and effect.equation]
 
 
 @pytest.mark.parametrize(("name", "blocks", "parameters"), VOCABULARY, ids=[name for name, _, _ in VOCABULARY])
@@ -83,12 +83,12 @@ def test_no_effect_of_the_program_is_outside_the_vocabulary() -> None:
 def test_another_form_of_an_effect_answers_with_its_name_block_and_parameters() -> None:
     required = {name: parameters for name, _, parameters in VOCABULARY}
     forms = [one for one in built_in() if one.variant_of]
-    assert {"fading_mass", "linear_structural_damping", "mains_hum_60"} <= {one.name for one in forms}
-    for one in forms:
-        [original] = [other for other in named(one.variant_of) if other.block == one.block]
+    assert {"fading_mass", "linear_structural_damping", "mains_hum_60"} <= {form.name for form in forms}
+    for form in forms:
+        [original] = [other for other in named(form.variant_of) if other.block == form.block]
         assert not original.variant_of
-        assert one.known_as == original.known_as == original.name
-        assert required[original.name] <= {parameter.name for parameter in one.parameters}
+        assert form.known_as == original.known_as == original.name
+        assert required[original.name] <= {parameter.name for parameter in form.parameters}
 
 
 @pytest.mark.parametrize(("one", "other"), LOOK_ALIKES)
@@ -108,10 +108,10 @@ def test_what_moves_a_frequency_with_the_level_is_tried_in_place_of_what_does_so
 
 
 def test_whatever_has_a_look_alike_says_what_separates_it_and_names_known_ones() -> None:
-    names = {one.name for one in known_effects()}
-    for one in known_effects():
-        assert bool(one.separated_by) or not one.look_alikes, one.name
-        assert {part for name in one.look_alikes for part in name.split(" + ")} <= names, one.name
+    names = {effect.name for effect in known_effects()}
+    for effect in known_effects():
+        assert bool(effect.separated_by) or not effect.look_alikes, effect.name
+        assert {part for name in effect.look_alikes for part in name.split(" + ")} <= names, effect.name
 
 
 def test_blocks_and_names_are_checked() -> None:

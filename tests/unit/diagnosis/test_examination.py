@@ -142,10 +142,10 @@ def test_the_facts_are_strict_json(friction: tuple[Any, Examination]) -> None:
 
 
 def test_every_effect_says_which_tests_speak_for_it() -> None:
-    for one in known_effects():
-        terms = SENSOR_TERMS if one.block == "sensor" else FORCE_TERMS
-        assert one.spoken_for_by, one.name
-        assert set(one.spoken_for_by) <= set(terms), one.name
+    for known_effect in known_effects():
+        terms = SENSOR_TERMS if known_effect.block == "sensor" else FORCE_TERMS
+        assert known_effect.spoken_for_by, known_effect.name
+        assert set(known_effect.spoken_for_by) <= set(terms), known_effect.name
 
 
 @pytest.mark.parametrize(

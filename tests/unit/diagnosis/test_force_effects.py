@@ -377,7 +377,7 @@ def test_a_gradual_saturation_is_of_measured_work_alone(
 ) -> None:
     """A damper that is fitted has no level from which it falls; sloshing with a peak describes what does."""
     sought = [
-        "tank.gradual_saturation" in {one.key for one in candidates(surroundings_of(model))}
+        "tank.gradual_saturation" in {candidate.key for candidate in candidates(surroundings_of(model))}
         for model in (frozen, damped, with_maps)
     ]
     assert sought == [False, False, True]
@@ -443,7 +443,8 @@ def test_friction_behind_play_is_sought_in_machines_of_a_user_alone(frozen: RigM
     at = surroundings_of(frozen)
     machine = replace(at, rig=None, blocks=("structure", "sensor"))  # type: ignore[arg-type]
     sought = [
-        "structure.friction_behind_play" in {one.key for one in candidates(place)} for place in (at, machine)
+        "structure.friction_behind_play" in {candidate.key for candidate in candidates(place)}
+        for place in (at, machine)
     ]
     assert sought == [False, True]
 
@@ -457,7 +458,11 @@ def test_every_force_of_the_vocabulary_is_held_to_its_equation() -> None:
         "tank.breakup_delay",
         "tank.ceiling_impact",
     }
-    built_in = [one for one in known_effects() if one.extension.__module__.startswith("sloshlab.")]
+    built_in = [
+        known_effect
+        for known_effect in known_effects()
+        if known_effect.extension.__module__.startswith("sloshlab.")
+    ]
     assert {f"{one.block}.{one.name}" for one in built_in if one.block in ("structure", "tank")} == held
 
 

@@ -57,7 +57,7 @@ def of_runs(tmp_path: Path, runs: list[CaseRun]) -> tuple[ForceStarts, dict[str,
         FreeRunProblem(model, fitting), FreeRunFit((), model.believed, 0.0, 0.0), model.rig
     )
     starts = ForceStarts(model, fitting, model.believed)
-    return starts, {one.key: one for one in candidates(surroundings)}
+    return starts, {candidate.key: candidate for candidate in candidates(surroundings)}
 
 
 def test_gap_and_stiffness_of_a_contact_come_from_its_force(tmp_path: Path) -> None:

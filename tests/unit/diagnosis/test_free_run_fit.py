@@ -288,8 +288,8 @@ def test_a_step_goes_where_the_model_is_least_within_the_bounds(seed: int) -> No
 
     least = np.inf
     for rests in product((None, low, high), repeat=3):
-        held = np.array([one is not None for one in rests])
-        at = np.array([theta[i] if one is None else one[i] for i, one in enumerate(rests)])
+        held = np.array([rest is not None for rest in rests])
+        at = np.array([theta[i] if rest is None else rest[i] for i, rest in enumerate(rests)])
         free = ~held
         if free.any():
             left = gradient[free] + hessian[np.ix_(free, held)] @ (at - theta)[held]

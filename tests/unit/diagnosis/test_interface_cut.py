@@ -77,7 +77,7 @@ def test_a_wrong_gain_is_found_by_the_forces_that_it_would_need(tmp_path: Path) 
     assert not said(answers)[SLOW]
     assert not said(answers)[LATE]
     assert not said(answers)[CLIPS]
-    assert next(one.share for one in answers if one.term == GAIN) > 0.99
+    assert next(answer.share for answer in answers if answer.term == GAIN) > 0.99
 
 
 def test_two_motions_that_differ_a_little_name_nobody_for_sure(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def test_a_force_of_the_liquid_comes_back_in_the_tank(tmp_path: Path) -> None:
 
 def test_without_the_force_between_them_the_place_stays_open(tmp_path: Path) -> None:
     found = forces_of(tmp_path, in_tank=True, measured=False)
-    assert [one.place for one in found.forces] == [EITHER]
+    assert [force.place for force in found.forces] == [EITHER]
     [at] = found.forces
     assert np.std(at.force_n - course(at.time_s)) < 0.12 * np.std(at.force_n)
 
@@ -91,8 +91,8 @@ def test_the_stated_error_is_the_error(tmp_path: Path) -> None:
 
 def test_nothing_missing_asks_for_no_force(tmp_path: Path) -> None:
     found = forces_of(tmp_path, in_tank=False, pushed=False)
-    for one in found.forces:
-        assert one.power_n2 < 0.5 * one.standard_error_n**2 + 1e-4
+    for force in found.forces:
+        assert force.power_n2 < 0.5 * force.standard_error_n**2 + 1e-4
 
 
 def test_an_error_of_the_release_is_no_force(tmp_path: Path) -> None:

@@ -176,11 +176,11 @@ def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
     [rests] = observations(run, ["acceleration_tip"])
     sensor, place = rests.variance, ("quiet", "acceleration_tip")
 
-    def counts_for_less(one: Observation, share: float) -> bool:
+    def counts_for_less(observation: Observation, share: float) -> bool:
         noise = {place: share * sensor}
-        louder = _louder(one, noise, ())
+        louder = _louder(observation, noise, ())
         np.testing.assert_allclose(louder.variance, (1 + share) * sensor)
-        [factor] = np.unique((_quieted(louder, one, noise).variance / louder.variance).round(6))
+        [factor] = np.unique((_quieted(louder, observation, noise).variance / louder.variance).round(6))
         assert factor in (1.0, 100.0)
         return bool(factor > 1.0)
 

@@ -51,10 +51,10 @@ def test_no_channel_is_believed_beyond_quantisation() -> None:
 def test_a_residual_of_the_noise_alone_is_of_unit_size() -> None:
     decay = decays((0.01,), 6.0)[0]
     clean = decays((0.01,), 6.0, noise={})[0]
-    for one in observations(decay, list(NOISE)[:2]):
-        residual = one.residual(clean.recording[one.channel].values)
+    for observation in observations(decay, list(NOISE)[:2]):
+        residual = observation.residual(clean.recording[observation.channel].values)
         # the transform keeps energy: as many degrees of freedom as samples, fewer than coefficients
-        assert 0.85 < np.sum(residual**2) / one.known.sum() < 1.1, one.channel
+        assert 0.85 < np.sum(residual**2) / observation.known.sum() < 1.1, observation.channel
 
 
 def test_lost_and_clipped_samples_are_masked_on_both_sides() -> None:
@@ -91,10 +91,10 @@ def test_the_end_of_a_shorter_simulation_is_taken_as_zero() -> None:
     np.testing.assert_allclose(one.of(short), lapped_spectra(faded(mean_free, one), one.n_bands), atol=1e-9)
 
 
-def faded(values: np.ndarray, one: Observation) -> np.ndarray:
+def faded(values: np.ndarray, observation: Observation) -> np.ndarray:
     """Raised cosines: half a block in and out, a release comes in sixteen times faster."""
-    n = one.n_bands // 2
-    n_in = n // 16 if one.run.is_free else n
+    n = observation.n_bands // 2
+    n_in = n // 16 if observation.run.is_free else n
     rising = 0.5 - 0.5 * np.cos(np.pi * np.arange(n_in) / n_in)
     falling = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, n + 1) / n)
     return values * np.concatenate([rising, np.ones(values.size - n_in - n), falling])
@@ -136,7 +136,7 @@ def test_an_equal_error_in_all_repeats_is_no_scatter() -> None:
 
 
 def test_a_test_without_repeats_is_weighted_as_its_channels_scatter_elsewhere() -> None:
-    group = [observations(one, ["acceleration_tip"]) for one in repeats(6, 0.05)]
+    group = [observations(repeat, ["acceleration_tip"]) for repeat in repeats(6, 0.05)]
     raw = [{"acceleration_tip": one[0].spectra - group[0][0].spectra} for one in group]
     weighted = [one for each in with_scatter(group, raw) for one in each]
     [target] = with_typical_scatter(observations(run(3.0 * TONE, noise=0.02), ["acceleration_tip"]), weighted)

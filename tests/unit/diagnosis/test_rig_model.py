@@ -52,7 +52,7 @@ def damped(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
 
 
 def fluctuations(model: RigModel) -> list[str]:
-    return [one.name for one in model.parameters if one.name.startswith("damping of the liquid")]
+    return [parameter.name for parameter in model.parameters if parameter.name.startswith("damping of the liquid")]
 
 
 def test_a_liquid_that_damps_has_a_number_in_every_run_in_which_it_moves(damped: RigModel, tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_the_liquid_may_damp_more_in_one_run_and_as_believed_in_the_others(dampe
 
 
 def participations(model: RigModel) -> list[str]:
-    return [one.name for one in model.parameters if one.name.startswith("base participation")]
+    return [parameter.name for parameter in model.parameters if parameter.name.startswith("base participation")]
 
 
 def test_the_base_drives_the_modes_of_a_beam_by_shares_of_their_own(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ NORMAL = {
 
 def test_masses_frequencies_losses_and_gains_may_be_off_by_what_is_normal(damped: RigModel) -> None:
     """Believed value and tolerance, at most 1.25 of them; what belongs to one run may be off by four."""
-    found = {one.name: one for one in damped.parameters}
+    found = {parameter.name: parameter for parameter in damped.parameters}
     for name, (believed, tolerance) in NORMAL.items():
         assert found[name].believed == pytest.approx(believed)
         assert found[name].tolerance == pytest.approx(tolerance)
@@ -169,7 +169,11 @@ def test_gains_of_the_sensors_that_drive_say_how_far_the_tank_moved(
     for name in SENSORS:
         expected = run.recording[name].values * (3.0 if name == faulty else 1.0)
         assert np.abs(read[name] - expected)[100:-100].max() < 1e-3 * np.abs(expected).max()
-    assert not any(one.is_reading for one in model.parameters if one.name in values and one.name in driving(model))
+    assert not any(
+        parameter.is_reading
+        for parameter in model.parameters
+        if parameter.name in values and parameter.name in driving(model)
+    )
 
 
 def test_sensors_drive_by_their_noise(tmp_path: Path) -> None:

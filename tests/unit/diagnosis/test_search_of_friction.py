@@ -398,13 +398,13 @@ def test_screening_keeps_what_explains_and_begins_it_near(case: Decays, monkeypa
     promises = Screening(case.fits).chosen(
         case.baseline, jacobian, list(case.pool.values()), "", (0.3, 0.1, 0.03, 0.01, 0.0), is_near=False
     )
-    keys = [one.candidate.key for one in promises]
+    keys = [promise.candidate.key for promise in promises]
     assert COULOMB in keys
     assert sought == keys
     assert len(keys) < len(case.pool)
-    for one in promises:
-        assert any(start.is_near for start in one.starts)
-        assert (one.gains > 0).any()
+    for promise in promises:
+        assert any(start.is_near for start in promise.starts)
+        assert (promise.gains > 0).any()
 
 
 class Repeated(Decays):

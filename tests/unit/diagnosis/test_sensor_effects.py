@@ -35,8 +35,8 @@ def fault(model: RigModel, name: str, numbers: Mapping[str, float], channel: str
     return found
 
 
-def read(one: SensorFault, values: np.ndarray, recorded: np.ndarray | None = None) -> np.ndarray:
-    return one.reading(values, RATE, {}, values if recorded is None else recorded)
+def read(sensor_fault: SensorFault, values: np.ndarray, recorded: np.ndarray | None = None) -> np.ndarray:
+    return sensor_fault.reading(values, RATE, {}, values if recorded is None else recorded)
 
 
 def test_gain_makes_the_reading_larger_by_its_ratio(model: RigModel) -> None:
@@ -238,15 +238,15 @@ def test_starts_are_of_the_size_of_their_channel(model: RigModel) -> None:
 def test_a_channel_that_alone_drives_is_offered_only_faults_that_can_be_undone(model: RigModel) -> None:
     at = surroundings(model)
     assert at.driving == ("acceleration_root",)
-    for one in known_effects():
+    for known_effect in known_effects():
         if (
-            one.block != "sensor"
-            or one.name == "cross_talk"
-            or not one.extension.__module__.startswith("sloshlab.")
+            known_effect.block != "sensor"
+            or known_effect.name == "cross_talk"
+            or not known_effect.extension.__module__.startswith("sloshlab.")
         ):
             continue
-        [made] = Candidate(one, at, CHANNEL).extension(dict(one.starts(at)[0])).faults
-        assert ("acceleration_root" in one.places(at)) == (made.undone is not None), one.name
+        [made] = Candidate(known_effect, at, CHANNEL).extension(dict(known_effect.starts(at)[0])).faults
+        assert ("acceleration_root" in known_effect.places(at)) == (made.undone is not None), known_effect.name
 
 
 def test_a_fault_of_the_base_accelerometer_changes_what_drives(model: RigModel) -> None:
@@ -265,17 +265,17 @@ def test_a_fault_changes_its_own_channel_and_no_other(tmp_path: Path) -> None:
     before = pair.simulate(
         run, pair.believed, Candidate(effect("sensor.sensor_gain"), at, CHANNEL).extension({"ratio": 0.0})
     )
-    for one in known_effects():
+    for known_effect in known_effects():
         if (
-            one.block != "sensor"
-            or one.name == "cross_talk"
-            or not one.extension.__module__.startswith("sloshlab.")
+            known_effect.block != "sensor"
+            or known_effect.name == "cross_talk"
+            or not known_effect.extension.__module__.startswith("sloshlab.")
         ):
             continue
-        candidate = Candidate(one, at, CHANNEL)
+        candidate = Candidate(known_effect, at, CHANNEL)
         numbers = {name.rpartition(".")[2]: value for name, value in candidate.starts()[-1].items()}
-        if one.name == "sensor_clipping":
+        if known_effect.name == "sensor_clipping":
             numbers = {"limit": 0.5 * at.peaks[CHANNEL]}
         after = pair.simulate(run, pair.believed, candidate.extension(numbers))
-        assert not np.array_equal(after[CHANNEL], before[CHANNEL]), one.name
+        assert not np.array_equal(after[CHANNEL], before[CHANNEL]), known_effect.name
         np.testing.assert_array_equal(after["displacement_tank"], before["displacement_tank"])

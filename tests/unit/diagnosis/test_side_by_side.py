@@ -19,7 +19,7 @@ from sloshlab.diagnosis.candidate import Candidate, known_effects
 from sloshlab.diagnosis.copied_process import is_copy
 
 assert effects.__all__
-CANDIDATES = [Candidate(one, cast(Any, None)) for one in known_effects()[:3]]
+CANDIDATES = [Candidate(effect, cast(Any, None)) for effect in known_effects()[:3]]
 pytestmark = pytest.mark.skipif(not copied_process.CAN_FORK, reason="no copies of a process here")
 
 

@@ -54,10 +54,12 @@ def test_a_force_of_the_page_is_a_candidate_and_acts_as_it_says(tmp_path: Path) 
     [own] = load_user_effects(example(tmp_path, "leaking_damper.py"))
     model = RigModel(rig(tmp_path), tmp_path, decays((0.01,), 2.0))
     at = surroundings(model)
-    assert own in [one.effect for one in candidates(at)]
+    assert own in [candidate.effect for candidate in candidates(at)]
     [run] = model.runs
     slow = Candidate(own, at).extension({"damping_n_s_per_m": 1.0, "speed_m_per_s": 50.0})
-    viscous = next(one for one in known_effects() if (one.block, one.name) == ("structure", "viscous_damping"))
+    viscous = next(
+        effect for effect in known_effects() if (effect.block, effect.name) == ("structure", "viscous_damping")
+    )
     same = Candidate(viscous, at).extension({"damping_n_s_per_m": 1.0})
     leaking = Candidate(own, at).extension({"damping_n_s_per_m": 1.0, "speed_m_per_s": 0.05})
     x = [model.simulate(run, model.believed, one)["displacement_tank"] for one in (slow, same, leaking)]

@@ -301,10 +301,12 @@ def test_friction_of_a_closed_form_is_found(twin: MechanicalTwin | FreeTwin) -> 
         **{**vars(twin), "parameters": wrong, "compared": {"displacement_cart": Compared("m", 0.0)}}
     )
     model = UserTwinModel(described, [run])
-    [effect] = [one for one in known_effects() if (one.name, one.block) == ("coulomb_friction", "structure")]
+    [effect] = [
+        effect for effect in known_effects() if (effect.name, effect.block) == ("coulomb_friction", "structure")
+    ]
     candidate = Candidate(effect, surroundings(model))
     problem = FreeRunProblem(model, [observations(run, model.compared(run))], (candidate,))
-    fit = fitted_from(problem, [{**model.believed, **one} for one in candidate.starts()[1:]], n_iterations=4)
+    fit = fitted_from(problem, [{**model.believed, **start} for start in candidate.starts()[1:]], n_iterations=4)
     name = "structure.coulomb_friction.force_n"
     width = max(4 * fit.standard_error(name), 0.01 * FRICTION_N)
     assert fit.values[name] == pytest.approx(FRICTION_N, abs=width)
@@ -315,7 +317,7 @@ class TestModel:
     def test_gain_offset_and_faults_of_a_channel(self) -> None:
         twin = MechanicalTwin((STIFF,), (), {"displacement_cart": Compared("m", 0.02, 1e-4)}, undriven)
         model = UserTwinModel(twin, [released(np.zeros(N), "one"), released(np.zeros(N), "two")])
-        assert [(one.name, one.tolerance) for one in model.parameters] == [
+        assert [(parameter.name, parameter.tolerance) for parameter in model.parameters] == [
             ("stiffness", 30.0),
             ("gain of displacement_cart", 0.02),
             ("offset of displacement_cart in one", 1e-4),
@@ -357,7 +359,7 @@ class TestModel:
         from sloshlab.diagnosis.candidate import candidates
 
         model = UserTwinModel(RELEASED, [released(np.zeros(N))])
-        offered = {one.effect.block for one in candidates(surroundings(model))}
+        offered = {candidate.effect.block for candidate in candidates(surroundings(model))}
         assert offered == {"structure", "sensor"}
         assert model.moving_mass_kg == pytest.approx(MASS_KG)
 
@@ -464,4 +466,4 @@ class TestBadInput:
         (tmp_path / "twin.py").write_text(GOOD)
         twin = load_user_twin(tmp_path / "twin.py")
         assert isinstance(twin, MechanicalTwin)
-        assert [one.name for one in twin.parameters] == ["k"]
+        assert [parameter.name for parameter in twin.parameters] == ["k"]

@@ -14,7 +14,7 @@ assert effects.__all__
 
 
 def explained_by(*keys: str) -> Explanation:
-    pool = {f"{one.block}.{one.name}": one for one in known_effects()}
+    pool = {f"{effect.block}.{effect.name}": effect for effect in known_effects()}
     chosen = tuple(Candidate(pool[key], None) for key in keys)  # type: ignore[arg-type]
     return Explanation(FreeRunFit(chosen, {}, 0.0, 0.0), 0.0, 0.0)
 

@@ -30,7 +30,7 @@ assert effects.__all__
     ],
 )
 def test_a_form_is_said_where_forms_are_compared(key: str, channel: str, answer: str, compared: str) -> None:
-    [effect] = [one for one in known_effects() if f"{one.block}.{one.name}" == key]
+    [effect] = [effect for effect in known_effects() if f"{effect.block}.{effect.name}" == key]
     candidate = Candidate(effect, None, channel)  # type: ignore[arg-type]
     assert named_and_placed(candidate) == answer
     assert form_and_place(candidate) == compared

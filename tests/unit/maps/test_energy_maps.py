@@ -29,7 +29,7 @@ def windows_of(levels=(0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0), n=40):
     u0 = level * 9.81 / omega**2
     w_bar = w_bar_law(omega / SCALE, level)
     columns = {
-        "run": np.repeat([f"run {one}" for one in levels], n),
+        "run": np.repeat([f"run {level}" for level in levels], n),
         "frequency_hz": frequency,
         "amplitude_m": u0,
         "acceleration_g": level,

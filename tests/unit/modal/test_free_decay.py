@@ -21,26 +21,26 @@ def test_ringing_after_the_release_is_marked_and_kept() -> None:
     assert clean.release.transient_end_s == clean.release.release_s == 0.0
     # e^{-t/0.06} falls from 20 to 2 % of the mode's amplitude of 50 in 0.06 ln 20 = 0.18 s: two cycles, or three
     assert decay.release.transient_end_s == pytest.approx(0.2, abs=0.11)
-    for one, without in zip(decay.readings, clean.readings, strict=True):
-        assert one.trust[0] == Trust.RELEASE
-        assert one.trust.size == without.trust.size
-        assert not (one.trust[one.time_s > 0.6] == Trust.RELEASE).any()
+    for reading, without in zip(decay.readings, clean.readings, strict=True):
+        assert reading.trust[0] == Trust.RELEASE
+        assert reading.trust.size == without.trust.size
+        assert not (reading.trust[reading.time_s > 0.6] == Trust.RELEASE).any()
 
 
 def test_what_lies_before_the_release_is_left_out() -> None:
     held = np.random.default_rng(1).normal(0, 0.05, 700)
     decay = analyse_free_decay(np.concatenate([held, DECAY]), RATE_HZ)
     assert decay.release.release_s == pytest.approx(1.4, abs=0.01)
-    assert all(one.time_s.min() > 1.4 for one in decay.readings)
+    assert all(reading.time_s.min() > 1.4 for reading in decay.readings)
     fit = decay.local_sine_fit
     assert fit.damping_ratio[fit.used] == pytest.approx(0.8 / np.hypot(0.8, 20 * np.pi), rel=0.05)
 
 
 def test_the_end_in_noise_is_marked() -> None:
     noisy = DECAY + np.random.default_rng(2).normal(0, 2.0, DECAY.size)
-    for one in analyse_free_decay(noisy, RATE_HZ).readings:
-        assert (one.trust[one.time_s > 5.0] != Trust.USED).all()
-        assert (one.trust == Trust.USED).sum() > 3
+    for reading in analyse_free_decay(noisy, RATE_HZ).readings:
+        assert (reading.trust[reading.time_s > 5.0] != Trust.USED).all()
+        assert (reading.trust == Trust.USED).sum() > 3
 
 
 def test_edges_of_the_envelope_are_marked() -> None:
@@ -111,15 +111,19 @@ def test_a_motion_that_friction_holds_is_read_until_there(level: float) -> None:
     motion, end_s = held_by_friction(0.9)
     decay = analyse_free_decay(motion + level, RATE_HZ)
     assert decay.release.rest_s == pytest.approx(end_s, abs=1.5 / RATE_HZ)
-    for one in decay.readings:
-        assert one.used.any()
-        assert one.time_s.max() <= end_s
-        for values in (one.damping_ratio_std, one.frequency_hz_std, one.acceleration_amplitude_m_per_s2):
+    for reading in decay.readings:
+        assert reading.used.any()
+        assert reading.time_s.max() <= end_s
+        for values in (
+            reading.damping_ratio_std,
+            reading.frequency_hz_std,
+            reading.acceleration_amplitude_m_per_s2,
+        ):
             assert np.isfinite(values).all()
         # friction of a constant force takes 4 X x_f per cycle: ζ = 2 x_f/(π X), to first order in x_f/X
-        clear = one.used & (one.acceleration_amplitude_m_per_s2 > 20.0)
-        assert one.damping_ratio[clear] == pytest.approx(
-            2 * 0.9 / (np.pi * one.acceleration_amplitude_m_per_s2[clear]), rel=0.06
+        clear = reading.used & (reading.acceleration_amplitude_m_per_s2 > 20.0)
+        assert reading.damping_ratio[clear] == pytest.approx(
+            2 * 0.9 / (np.pi * reading.acceleration_amplitude_m_per_s2[clear]), rel=0.06
         )
 
 
@@ -136,9 +140,9 @@ def test_where_the_phase_asks_for_an_extremum_that_is_not_there_the_decrement_is
 def test_a_sensor_that_is_silent_for_a_while_is_no_division_by_zero() -> None:
     """A parabola through zeros has no curvature."""
     silent = np.where((TIME_S > 2.0) & (TIME_S < 2.6), 0.0, DECAY)
-    for one in analyse_free_decay(silent, RATE_HZ).readings:
-        assert np.isfinite(one.damping_ratio_std).all()
-        assert np.isfinite(one.frequency_hz_std).all()
+    for reading in analyse_free_decay(silent, RATE_HZ).readings:
+        assert np.isfinite(reading.damping_ratio_std).all()
+        assert np.isfinite(reading.frequency_hz_std).all()
 
 
 def test_a_mode_that_is_not_there_is_not_taken_for_the_foot_of_another() -> None:

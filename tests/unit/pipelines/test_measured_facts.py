@@ -20,7 +20,7 @@ def maps(top=1.65, omega_at=3.8, u_at=0.25):
     coords = {"omega_bar": OMEGA_BAR, "u_bar": U_BAR}
     dims = ("omega_bar", "u_bar")
     values = {"w_bar": w_bar, "beta": np.full(w_bar.shape, -0.1), "measured": np.ones(w_bar.shape, np.int8)}
-    return xr.Dataset({name: (dims, one) for name, one in values.items()}, coords)
+    return xr.Dataset({name: (dims, value) for name, value in values.items()}, coords)
 
 
 def windows(levels, beta=-0.154, runs=("sweep",)):

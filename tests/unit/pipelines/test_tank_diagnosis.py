@@ -26,7 +26,7 @@ def test_a_case_has_its_recordings_and_what_is_believed(case: TankCase, reposito
     assert len(recordings) >= 5
     maps = ["maps.nc"] if "maps" in case.name else []
     assert sorted(path.name for path in folder.iterdir()) == [*maps, "recordings", "rig.toml"]
-    band_hz = 0.5 * min(one.attrs["sampling_rate_hz"] for one in recordings)
+    band_hz = 0.5 * min(recording.attrs["sampling_rate_hz"] for recording in recordings)
     assert all(f < band_hz for f in rig.get("structure", {}).get("frequencies_hz", []))
 
 

@@ -85,8 +85,10 @@ def sudden_run(level_g: float, seed: int) -> Run:
 def test_a_known_break_up_is_recovered():
     runs = [sudden_run(level_g, seed) for seed, level_g in enumerate((1.3, 1.6, 2.0, 3.0, 5.0))]
     found = with_break_up(steady_model(), runs)
-    for one in fields(BreakUp):
-        assert getattr(found.break_up, one.name) == pytest.approx(getattr(TRUE, one.name), rel=0.15), one.name
+    for field_ in fields(BreakUp):
+        assert getattr(found.break_up, field_.name) == pytest.approx(getattr(TRUE, field_.name), rel=0.15), (
+            field_.name
+        )
     unseen = sudden_run(2.5, 9)
     assert np.nanstd(unseen.y - found.simulate(unseen.x)) < 0.07
     assert np.nanstd(unseen.y - steady_model().simulate(unseen.x)) > 0.3

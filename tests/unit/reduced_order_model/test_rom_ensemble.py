@@ -59,8 +59,8 @@ def test_intervals_cover_what_they_say_at_every_level():
         for part in (loud, ~loud):
             assert found.coverage(np.where(part, unseen.y, np.nan)) == pytest.approx(probability, abs=0.05)
     assert len(records) == len(ensemble.members) == 4
-    assert len({one.theta.tobytes() for one in ensemble.members}) == 4
-    mean = np.mean([one.simulate(unseen.x) for one in ensemble.members], axis=0)
+    assert len({member.theta.tobytes() for member in ensemble.members}) == 4
+    mean = np.mean([member.simulate(unseen.x) for member in ensemble.members], axis=0)
     assert np.array_equal(ensemble.simulate(unseen.x)[1:], mean[1:])
 
 
@@ -155,12 +155,12 @@ def test_a_saved_ensemble_is_the_same_and_gives_the_same_bytes(ensemble, tmp_pat
     assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
     assert again.residual == ensemble.residual
     assert again.facts == ensemble.facts
-    assert [one.facts for one in again.members] == [{"n": 0}, {"n": 1}, {"n": 2}]
+    assert [member.facts for member in again.members] == [{"n": 0}, {"n": 1}, {"n": 2}]
     x = np.sin(np.arange(200.0))
-    for one, other in zip(
+    for var, other in zip(
         vars(again.predicted_range(x)).values(), vars(ensemble.predicted_range(x)).values(), strict=True
     ):
-        assert np.array_equal(one, other, equal_nan=True)
+        assert np.array_equal(var, other, equal_nan=True)
 
 
 def test_damaged_ensembles_are_refused_in_one_line(ensemble, tmp_path):

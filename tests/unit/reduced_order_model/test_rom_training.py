@@ -157,8 +157,8 @@ def test_no_epoch_raises_the_training_error(delays):
 
     trained([feedback_run(300, 1)], [feedback_run(100, 2)], delays, n_epochs=8, n_starts=2, told=told)
     assert len(errors) == 2
-    for one in errors.values():
-        stages = [one[:9], one[9:]] if delays.outputs else [one]
+    for error in errors.values():
+        stages = [error[:9], error[9:]] if delays.outputs else [error]
         assert all(np.all(np.diff(stage) < 0) for stage in stages)
 
 
@@ -185,7 +185,7 @@ def test_a_training_that_overfits_ends_and_the_best_model_is_kept():
 def test_the_validation_error_ends_a_training_when_it_rises_or_wavers(errors, n_taken, reason):
     stop = EarlyStop(3)
     reasons = [stop.reason(float(error)) for error in errors]
-    first = next((k + 1 for k, one in enumerate(reasons) if one), None)
+    first = next((k + 1 for k, reason in enumerate(reasons) if reason), None)
     assert first == n_taken
     assert reason in reasons
 
@@ -197,7 +197,7 @@ def test_the_validation_error_ends_a_training_when_it_rises_or_wavers(errors, n_
 def test_a_training_that_creeps_ends_when_it_gains_less_than_wanted(fall, n_taken):
     stop = EarlyStop(3, least_gain=0.01)
     reasons = [stop.reason(fall**k) for k in range(30)]
-    first = next((k + 1 for k, one in enumerate(reasons) if one), None)
+    first = next((k + 1 for k, reason in enumerate(reasons) if reason), None)
     assert first == n_taken
     if n_taken:
         assert reasons[n_taken - 1] == "validation error only 0.6 % lower after 6 epochs"

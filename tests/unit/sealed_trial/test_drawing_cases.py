@@ -65,12 +65,12 @@ def test_every_effect_of_the_vocabulary_can_be_hidden() -> None:
             plan = drawn_plan(name, rig, generator)
             found |= {effect.name for effect in possible(SINGLES, plan, rig)}
             looks = possible_look_alikes(plan, rig)
-            found |= {one.truth.name for one in looks}
+            found |= {look.truth.name for look in looks}
             assert looks
             assert len({effect.block for effect in possible(SINGLES, plan, rig)}) > 1
             assert possible(UNKNOWN_PHYSICS, plan, rig)
-            for one in looks:
-                assert (one.truth.name,) in one.equals
+            for look in looks:
+                assert (look.truth.name,) in look.equals
     assert found == VOCABULARY
 
 
@@ -206,8 +206,8 @@ def test_what_moves_less_than_it_must_is_not_drawn(
 def test_the_same_seed_draws_the_same_case() -> None:
     first, second = (CaseDrawing([5]).case(3, "case_004", "nothing") for _ in range(2))
     assert first.truth == second.truth
-    for one, other in zip(first.signals, second.signals, strict=True):
-        assert all(np.array_equal(one[name], other[name]) for name in one)
+    for signal, other in zip(first.signals, second.signals, strict=True):
+        assert all(np.array_equal(signal[name], other[name]) for name in signal)
 
 
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0])

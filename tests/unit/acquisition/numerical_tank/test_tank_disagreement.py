@@ -8,7 +8,7 @@ from acquisition.numerical_tank.disagreement import up_and_down
 
 def test_way_up_begins_quietly_and_the_top_is_the_same_on_both_ways() -> None:
     results = up_and_down(0, levels_g=(0.1, 3.0), n_cycles=10, layers=8)
-    assert [one.acceleration_g for one in results] == [0.1, 3.0]
+    assert [result.acceleration_g for result in results] == [0.1, 3.0]
     quiet, violent = results
     assert quiet.up == pytest.approx(0.0, abs=0.1)
     assert violent.up == violent.down

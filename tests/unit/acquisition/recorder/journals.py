@@ -104,7 +104,7 @@ def made(
     """The recording that these deliveries become, read back; counts as they are on disk in `raw`."""
     import netCDF4
 
-    numbered = [one if isinstance(one, tuple) else (0, one) for one in deliveries]
+    numbered = [delivery if isinstance(delivery, tuple) else (0, delivery) for delivery in deliveries]
     path = folder / "run.journal"
     path.unlink(missing_ok=True)
     write(path, infos or [device()], numbered, **more)

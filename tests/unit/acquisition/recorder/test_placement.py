@@ -136,7 +136,7 @@ def test_an_incredible_tail_is_told_and_not_shown(tmp_path: Path) -> None:
 
 
 def test_groups_are_placed_each_by_its_own_counter(tmp_path: Path) -> None:
-    sent = [one for k in range(0, 320, 16) for one in both_groups(k, k + 16)]
+    sent = [group for k in range(0, 320, 16) for group in both_groups(k, k + 16)]
     del sent[9]  # group 1 of the block from 64
     result = made(tmp_path, ended(sent, 320), TWO_GROUPS)
     np.testing.assert_array_equal(result.raw["force_cell_1"], np.arange(320))
@@ -146,7 +146,7 @@ def test_groups_are_placed_each_by_its_own_counter(tmp_path: Path) -> None:
 
 
 def test_a_sample_that_all_messages_lost_is_one_lost_sample(tmp_path: Path) -> None:
-    sent = [one for k in range(0, 320, 16) for one in both_groups(k, k + 16)]
+    sent = [group for k in range(0, 320, 16) for group in both_groups(k, k + 16)]
     # both of 64 … 79, and the second of 128 … 143
     lost = [sent.pop(17), sent.pop(9), sent.pop(8)]
     assert [(one.group, one.counter) for one in lost] == [(1, 128), (1, 64), (0, 64)]
@@ -159,7 +159,7 @@ def test_a_sample_that_all_messages_lost_is_one_lost_sample(tmp_path: Path) -> N
 
 
 def test_messages_that_lost_the_same_samples_are_said_at_once(tmp_path: Path) -> None:
-    sent = [one for k in range(0, 320, 16) for one in both_groups(k, k + 16)]
+    sent = [group for k in range(0, 320, 16) for group in both_groups(k, k + 16)]
     del sent[8:10], sent[20:24]
     result = made(tmp_path, ended(sent, 320), TWO_GROUPS)
     assert result.summary.flags == (
@@ -177,7 +177,7 @@ def test_gaps_of_messages_that_overlap_are_one(tmp_path: Path) -> None:
 
 
 def test_ragged_ends_of_a_running_device_are_cut_to_what_all_groups_have(tmp_path: Path) -> None:
-    sent = [one for k in range(5000, 5320, 16) for one in both_groups(k, k + 16)]
+    sent = [group for k in range(5000, 5320, 16) for group in both_groups(k, k + 16)]
     result = made(tmp_path, sent[1:-1], TWO_GROUPS)
     np.testing.assert_array_equal(result.raw["force_cell_1"], np.arange(5016, 5304))
     assert result.flags == ""
@@ -185,7 +185,7 @@ def test_ragged_ends_of_a_running_device_are_cut_to_what_all_groups_have(tmp_pat
 
 
 def test_a_journal_cut_short_keeps_the_last_block_of_every_group(tmp_path: Path) -> None:
-    sent = [one for k in range(0, 320, 16) for one in both_groups(k, k + 16)]
+    sent = [group for k in range(0, 320, 16) for group in both_groups(k, k + 16)]
     result = made(tmp_path, sent[:-1], TWO_GROUPS, is_closed=False)
     assert result.raw["force_cell_1"][-1] == 319
     assert (result.raw["acceleration_roof_1"][304:] == FILL).all()

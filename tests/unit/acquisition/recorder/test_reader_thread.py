@@ -39,5 +39,5 @@ def test_what_a_source_still_holds_is_asked_for_once_before_it_is_closed() -> No
     reader.start()
     assert reader.join(PATIENCE_S)
     *delivered, finished = queue.take(0.0)
-    assert [one.counter for item in delivered for one in item.deliveries] == [0, 10, 20]
+    assert [delivery.counter for item in delivered for delivery in item.deliveries] == [0, 10, 20]
     assert finished == Finished(0, None)

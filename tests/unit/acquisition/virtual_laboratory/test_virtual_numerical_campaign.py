@@ -94,12 +94,12 @@ def test_the_runs_are_those_that_were_asked_for() -> None:
     for one in long_stroke:  # within the stroke at the lowest frequency
         assert one["acceleration_g"] * 9.81 / (2 * math.pi * one["start_hz"]) ** 2 < one["stroke_limit_m"]
     transients = [run.settings for run in runs if run.name.startswith("transients")]
-    kinds = [one["experiment"] for one in transients]
+    kinds = [transient["experiment"] for transient in transients]
     assert {kind: kinds.count(kind) for kind in kinds} == {
         "sudden_start": 40,
         "beam_free": 6,
     }
-    sudden = [one for one in transients if one["experiment"] == "sudden_start"]
+    sudden = [transient for transient in transients if transient["experiment"] == "sudden_start"]
     starts = [(one["start_hz"], one["acceleration_g"]) for one in sudden]
     assert len(set(starts)) == 20
     assert sum(frequency_hz % 1 == 0.5 for frequency_hz, _ in starts) == 12  # for validation, between the others

@@ -96,8 +96,8 @@ def test_every_block_knows_its_clock_beyond_its_wrap(fd: bool) -> None:
     blocks = [one for one in received(described, stream_of(described, start, 1200)) if isinstance(one, Block)]
     assert len(blocks) >= 4
     first = start * TICKS
-    assert {(one.clock_ticks or 0) - one.counter * TICKS for one in blocks} == {0}
-    assert max(one.clock_ticks or 0 for one in blocks) > 2**32 > first
+    assert {(block.clock_ticks or 0) - block.counter * TICKS for block in blocks} == {0}
+    assert max(block.clock_ticks or 0 for block in blocks) > 2**32 > first
 
 
 def test_block_is_dated_by_its_own_last_frame() -> None:

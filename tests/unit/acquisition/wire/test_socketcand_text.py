@@ -50,7 +50,9 @@ def frames_of(batch):
 @FUZZ
 @given(FRAMES, st.lists(st.sampled_from(list(UNUSUAL)), max_size=5), st.randoms())
 def test_unusual_messages_among_usual_ones(frames, unusual, random):
-    usual = [(text_of(*one), (one[0], one[1] if one[0] else one[1] & 0x7FF, one[2])) for one in frames]
+    usual = [
+        (text_of(*frame), (frame[0], frame[1] if frame[0] else frame[1] & 0x7FF, frame[2])) for frame in frames
+    ]
     messages = usual + [(text, UNUSUAL[text]) for text in unusual]
     random.shuffle(messages)
     parsed = parse_socketcand(b"".join(text for text, _ in messages))
