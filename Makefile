@@ -58,10 +58,10 @@ tank-campaign: setup  ## compute the recordings of raw_data/numerical_tank again
 	$(BIN)/sloshlab virtual campaign --liquid numerical -o raw_data/numerical_tank
 
 pictures: setup  ## the snapshots and the film of the numerical tank in docs/images again (minutes)
-	$(BIN)/python -m pipelines.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml
+	$(BIN)/python -m studies.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml
 
 tank-diagnosis: setup  ## what twins with simpler liquids leave out of the numerical tank's recordings (minutes)
-	$(BIN)/python -m pipelines.tank_diagnosis raw_data/numerical_tank $(RESULTS)/tank_diagnosis
+	$(BIN)/python -m studies.tank_diagnosis raw_data/numerical_tank $(RESULTS)/tank_diagnosis
 
 trial: setup  ## a blind trial, sealed, diagnosed and scored (hours; goes on where it was stopped)
 	test -f $(RESULTS)/trial/commitments.json || $(BIN)/sloshlab trial seal -o $(RESULTS)/trial --seed $(TRIAL_SEED) --key $(TRIAL_KEY)

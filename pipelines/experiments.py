@@ -7,7 +7,9 @@ import time
 from pathlib import Path
 from typing import Final
 
-from pipelines.command_line import DONE_BUT_FLAGGED, INPUT_IS_BAD, run
+from pipelines.command_line import run
+from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD
+from pipelines.sweep.folder import recordings_and_rigs
 from sloshlab.errors import InputError, SloshlabError
 
 _MINUTES_PER_BALL: Final = 1
@@ -15,10 +17,9 @@ _MINUTES_PER_BALL: Final = 1
 
 def shaker_arguments(folder: Path, output: Path, rigs_folder: Path | None = None) -> list[str]:
     """Arguments of `sloshlab shaker` for all runs and rigs of a folder; the rig filled half comes first."""
-    recordings = sorted(str(path) for path in folder.glob("*.nc"))
-    rigs = sorted((rigs_folder or folder).glob("rig*.toml"), key=lambda path: ("0.50" not in path.name, path.name))
+    recordings, rigs = recordings_and_rigs(folder, rigs_folder)
     options = [part for rig in rigs for part in ("--rig", str(rig))]
-    return ["shaker", *recordings, *options, "-o", str(output)]
+    return ["shaker", *map(str, recordings), *options, "-o", str(output)]
 
 
 def main() -> int:
@@ -68,7 +69,7 @@ def beam_arguments(folder: Path, output: Path) -> list[str]:
 
 def _beam(folder: Path, output: Path) -> int:
     """Damping, modes, twins of the sloshing runs, and report; a flagged result is a result."""
-    from pipelines.beam_twins import simulated_twins
+    from pipelines.structure.twins import simulated_twins
 
     arguments = beam_arguments(folder, output)
     rig = Path(arguments[arguments.index("--rig") + 1])
@@ -160,7 +161,7 @@ def _study(folder: Path, output: Path) -> int:
 
 def _replay(folder: Path, output: Path) -> int:
     """Every recording through simulated devices; any difference is a failure."""
-    from pipelines.replayed_campaign import replayed_campaign
+    from pipelines.recording.replayed_campaign import replayed_campaign
 
     summary = replayed_campaign(folder, output)
     for line in [*summary["lines"], *(f"differs: {flag}" for flag in summary["flags"])]:

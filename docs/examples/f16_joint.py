@@ -77,7 +77,7 @@ def recording(wing: np.ndarray, payload: np.ndarray, rate_hz: float, level: int)
 
 def diagnosed(case: Path, *, report: bool = True) -> dict[str, Any]:
     """The diagnosis of the case, as the command ``sloshlab diagnose CASE --twin f16_joint_twin.py`` makes it."""
-    from pipelines.diagnose import diagnose_case
+    from pipelines.diagnosis.diagnose import diagnose_case
 
     return diagnose_case(case, None, command="docs/examples/f16_joint.py", report=report, twin=TWIN)
 

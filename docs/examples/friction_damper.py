@@ -62,7 +62,7 @@ def recording(displacement: np.ndarray, force: np.ndarray, rate_hz: float, ampli
 
 def diagnosed(case: Path, *, report: bool = True) -> dict[str, Any]:
     """The diagnosis of the case, as ``sloshlab diagnose CASE --twin …`` makes it."""
-    from pipelines.diagnose import diagnose_case
+    from pipelines.diagnosis.diagnose import diagnose_case
 
     return diagnose_case(case, None, command="docs/examples/friction_damper.py", report=report, twin=TWIN)
 

@@ -69,7 +69,7 @@ def recording(reference: np.ndarray, position: np.ndarray, force: np.ndarray, re
 
 def diagnosed(case: Path, *, report: bool = True) -> dict[str, Any]:
     """The diagnosis of the case, as the command ``sloshlab diagnose CASE --twin servo_axis_twin.py`` makes it."""
-    from pipelines.diagnose import diagnose_case
+    from pipelines.diagnosis.diagnose import diagnose_case
 
     return diagnose_case(case, None, command="docs/examples/servo_axis.py", report=report, twin=TWIN)
 

@@ -67,7 +67,7 @@ def recording(force: np.ndarray, displacement: np.ndarray, *, name: str) -> xr.D
 
 def diagnosed(case: Path, *, report: bool = True) -> dict[str, Any]:
     """The diagnosis of the case, as the command ``sloshlab diagnose CASE --twin silverbox_twin.py`` makes it."""
-    from pipelines.diagnose import diagnose_case
+    from pipelines.diagnosis.diagnose import diagnose_case
 
     return diagnose_case(case, None, command="docs/examples/silverbox_diagnosis.py", report=report, twin=TWIN)
 

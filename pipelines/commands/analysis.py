@@ -38,8 +38,8 @@ def shaker(
     as_json: Json = False,
 ) -> None:
     """Sweeps or VFA runs of a tank on the shaker: windows, maps and a report."""
-    from pipelines.outputs import write_experiment
-    from pipelines.shaker import ShakerSettings, analyse_shaker
+    from pipelines.sweep.outputs import write_experiment
+    from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 
     if boundaries not in ("measured", "law"):
         raise typer.BadParameter(f"{boundaries!r} is neither 'measured' nor 'law'", param_hint="--boundaries")
@@ -65,8 +65,8 @@ def work(
     as_json: Json = False,
 ) -> None:
     """Any sweep with one force and one motion channel, no tank needed."""
-    from pipelines.outputs import write_experiment
-    from pipelines.work import WorkSettings, analyse_work
+    from pipelines.sweep.outputs import write_experiment
+    from pipelines.sweep.work import WorkSettings, analyse_work
 
     motions = {"acceleration": acceleration, "velocity": velocity, "displacement": displacement}
     if sum(map(bool, motions.values())) != 1:
@@ -103,12 +103,12 @@ def beam(
     as_json: Json = False,
 ) -> None:
     """Beam or guided tank, frozen and sloshing: modal accelerations, damping, spectra and a report."""
-    from pipelines.beam import analyse_beam, checked_settings
-    from pipelines.beam_outputs import write_beam
+    from pipelines.structure.analysis import analyse_beam, checked_settings
+    from pipelines.structure.outputs import write_beam
 
     settings = checked_settings(modes=modes, n_cycles=cycles, segment_s=segment_s)
     if rom or ball_table:
-        from pipelines.beam_twins import tank_models, twins_of_runs
+        from pipelines.structure.twins import tank_models, twins_of_runs
 
         twins = output / "twins"
         runs = [*twins_of_runs(runs, rig, twins, tank_models(rom or [], ball_table or [], twins)), *runs]
@@ -134,9 +134,9 @@ def ball(
     as_json: Json = False,
 ) -> None:
     """A bouncing ball in place of the liquid, from free decays or from runs on the shaker."""
-    from pipelines.bouncing_ball.outputs import write_ball
-    from pipelines.bouncing_ball.settings import BallSettings
-    from pipelines.bouncing_ball.stages import analyse_ball
+    from pipelines.ball.outputs import write_ball
+    from pipelines.ball.settings import BallSettings
+    from pipelines.ball.stages import analyse_ball
     from sloshlab.bouncing_ball.identification import SearchSettings
 
     if damper not in ("contact", "always"):

@@ -43,7 +43,7 @@ def diagnose(
     as_json: Json = False,
 ) -> None:
     """What physics the simulation of a case left out, or that nothing is missing."""
-    from pipelines.diagnose import diagnose_case
+    from pipelines.diagnosis.diagnose import diagnose_case
 
     finish(
         diagnose_case(

@@ -62,7 +62,7 @@ def virtual(
 ) -> None:
     """A run of the virtual laboratory."""
     from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
-    from pipelines import virtual as laboratory
+    from pipelines.recording import virtual as laboratory
 
     if experiment == "campaign":
         computed = CampaignSettings(seed, layers, workers, only, checkpoints)
@@ -114,9 +114,9 @@ def record(
     as_json: Json = False,
 ) -> None:
     """Live devices – serial, CAN, simulated – to one recording, through a crash-safe journal."""
-    from pipelines.live_view import LiveView
-    from pipelines.record import RecordSettings
-    from pipelines.record import record as record_run
+    from pipelines.recording.live_view import LiveView
+    from pipelines.recording.record import RecordSettings
+    from pipelines.recording.record import record as record_run
 
     settings = RecordSettings(
         sources=tuple(sources),
@@ -150,7 +150,7 @@ def recover(
     as_json: Json = False,
 ) -> None:
     """A journal left by a crash to a recording: everything up to the last complete block."""
-    from pipelines.recover import recover as recover_journal
+    from pipelines.recording.recover import recover as recover_journal
 
     summary = recover_journal(journal, output, overwrite, align=align, redundant=redundant or ())
     finish(summary, as_json)
@@ -197,8 +197,8 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """A recording, the virtual rig or a test pattern, played as serial or CAN devices."""
-    from pipelines.replay import ReplaySettings
-    from pipelines.replay import replay as play
+    from pipelines.recording.replay import ReplaySettings
+    from pipelines.recording.replay import replay as play
 
     settings = ReplaySettings(
         source=source,

@@ -70,8 +70,8 @@ def train(
     as_json: Json = False,
 ) -> None:
     """Reduced-order model of the liquid from runs on the shaker, and its validation report."""
-    from pipelines.train import ModelSettings, train_and_report
-    from pipelines.training_runs import RunFiles
+    from pipelines.liquid_model.train import ModelSettings, train_and_report
+    from pipelines.liquid_model.training_runs import RunFiles
     from sloshlab.reduced_order_model.training import TrainingSettings
 
     files = RunFiles.of(runs, still or [], rig)
@@ -97,8 +97,8 @@ def validate(
     as_json: Json = False,
 ) -> None:
     """Validation report of a model that is there already, on runs that it was not trained on."""
-    from pipelines.train import validate_model
-    from pipelines.training_runs import RunFiles
+    from pipelines.liquid_model.train import validate_model
+    from pipelines.liquid_model.training_runs import RunFiles
 
     files = RunFiles((), tuple(runs), tuple(still or []), rig)
     finish(validate_model(rom, files, test or [], output, command_as_given()), as_json)
@@ -119,9 +119,9 @@ def study(
     as_json: Json = False,
 ) -> None:
     """Sensitivity study: many models, picked by validation error; goes on where it was stopped."""
-    from pipelines.study import StudySettings
-    from pipelines.study import study as carried_out
-    from pipelines.training_runs import RunFiles
+    from pipelines.liquid_model.study import StudySettings
+    from pipelines.liquid_model.study import study as carried_out
+    from pipelines.liquid_model.training_runs import RunFiles
     from sloshlab.reduced_order_model.training import TrainingSettings
 
     files = RunFiles.of(runs, still or [], rig)
@@ -160,7 +160,7 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     """The twin of a rig file, driven by the motion, the base motion or the release of a recorded run."""
-    from pipelines.simulate import SimulationSettings, simulate_run
+    from pipelines.twin.simulate import SimulationSettings, simulate_run
 
     settings = SimulationSettings(rig, run_file, output, block, configuration, twin, save_twin, steps, seed)
     finish(simulate_run(settings), as_json)

@@ -32,7 +32,7 @@ def import_(
     as_json: Json = False,
 ) -> None:
     """CSV, MAT, UFF-58, TDMS, LVM, MF4, CAN logs or netCDF to one recording."""
-    from pipelines.importing import describe_sources, import_run
+    from pipelines.recording.importing import describe_sources, import_run
 
     if describe:
         finish(describe_sources(sources), as_json)
@@ -45,6 +45,6 @@ def import_(
 @app.command()
 def check(runs: Recordings, as_json: Json = False) -> None:
     """Channels, rates, gaps, clipping and the agreement of redundant sensors."""
-    from pipelines.checking import check_runs
+    from pipelines.recording.checking import check_runs
 
     finish(check_runs(runs), as_json)

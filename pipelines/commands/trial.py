@@ -38,7 +38,7 @@ def seal(
     as_json: Json = False,
 ) -> None:
     """Draw hidden cases, publish commitments, lock the truths away."""
-    from pipelines.trial import seal_trial
+    from pipelines.diagnosis.trial import seal_trial
 
     finish(seal_trial(output, seed=seed, n_cases=cases, key=key, development=development), as_json)
 
@@ -52,7 +52,7 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Diagnose every case in a process of its own; goes on where it was stopped."""
-    from pipelines.trial import run_cases
+    from pipelines.diagnosis.trial import run_cases
 
     finish(run_cases(folder, n_workers=workers, time_limit_s=time_limit, reports=reports), as_json)
 
@@ -60,6 +60,6 @@ def run(
 @trial.command()
 def score(folder: Trial, output: OutputFolder, key: Key = None, as_json: Json = False) -> None:
     """Open the truths, check the commitments, count."""
-    from pipelines.trial import score_trial
+    from pipelines.diagnosis.trial import score_trial
 
     finish(score_trial(folder, output, key=key), as_json)

@@ -1,9 +1,6 @@
-"""One self-contained HTML file per experiment, and every figure as a PNG.
+"""The shell of every report: one self-contained HTML file, and every figure as a PNG.
 
-`selection` computes what a figure shows, `axes` arranges, the `figures_*` modules draw; `tables` and
-`summary` say the same in numbers and words, and `writing` puts the page together.
+`page` puts sections of figures and tables together and writes them; `figure`, `sections` and `tables` are what
+it takes; `style`, `axes` and `numbers` give all reports one look. `outputs` writes results as netCDF, `progress`
+shows how long work takes. What the report of one experiment shows stands in the room of that experiment.
 """
-
-from pipelines.report.writing import write_report
-
-__all__ = ["write_report"]

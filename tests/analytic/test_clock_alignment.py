@@ -27,7 +27,7 @@ from acquisition.recorder.journal import read_journal
 from acquisition.virtual_laboratory.sensors import Laboratory
 from acquisition.virtual_laboratory.shaker import SweepPlan
 from acquisition.virtual_laboratory.shaker_run import virtual_shaker
-from pipelines.shaker import ShakerSettings, analyse_shaker
+from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 from sloshlab.recording import LOST, read_recording
 from sloshlab.rig import Rig
 

@@ -80,8 +80,8 @@ def write_chirp(path: Path, duration_s: float) -> None:
 
 
 def _analysis(recording: str, folder: str) -> Callable[[], object]:
-    from pipelines.outputs import write_experiment
-    from pipelines.shaker import ShakerSettings, analyse_shaker
+    from pipelines.sweep.outputs import write_experiment
+    from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 
     settings = ShakerSettings.checked(p=6, m=24, boundaries="measured", allow_incomplete=False)
 

@@ -17,7 +17,7 @@ import netCDF4
 import numpy as np
 import serial
 
-from pipelines.replay import ReplaySettings, replay
+from pipelines.recording.replay import ReplaySettings, replay
 
 PATIENCE_S = 30.0
 START, STOP, SEND_CALIBRATION = 0x81, 0x82, 0x83

@@ -84,7 +84,7 @@ def test_the_device_waits_for_as_many_clients_as_told_and_serves_them_all(record
 
 
 def test_what_a_device_waits_for_is_said_and_it_waits_on(recording, tmp_path, monkeypatch):
-    monkeypatch.setattr("pipelines.replay._PATIENCE_S", 0.0)
+    monkeypatch.setattr("pipelines.recording.replay._PATIENCE_S", 0.0)
     reminded = Queue()
     url = f"{address('socketcand', tmp_path)}&device=adapter"
     with playing(recording[0], url, wait_clients=2, remind=reminded.put) as (ready, _):

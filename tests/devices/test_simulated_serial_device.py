@@ -148,7 +148,7 @@ def test_two_devices_begin_together(tmp_path):
 
 
 def test_who_starts_one_of_two_devices_is_told_of_the_other(tmp_path, monkeypatch):
-    monkeypatch.setattr("pipelines.replay._PATIENCE_S", 0.0)
+    monkeypatch.setattr("pipelines.recording.replay._PATIENCE_S", 0.0)
     reminded = Queue()
     urls = [f"serial:{tmp_path / 'one'}?device=one", "serial:socket://127.0.0.1:0?device=two"]
     pattern = "pattern:channels=1&sampling_rate_hz=100&duration_s=1"

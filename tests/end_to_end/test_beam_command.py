@@ -14,9 +14,9 @@ from short_runs import DONE_BUT_FLAGGED, refusal
 
 from acquisition.virtual_laboratory.cantilever import fitted_to
 from pipelines import experiments
-from pipelines.beam import analyse_beam, checked_settings
-from pipelines.beam_outputs import write_beam
 from pipelines.command_line import run
+from pipelines.structure.analysis import analyse_beam, checked_settings
+from pipelines.structure.outputs import write_beam
 from sloshlab.recording import LOST, write_recording
 
 

@@ -14,16 +14,16 @@ from typing import Any
 import pytest
 from short_runs import DONE_BUT_FLAGGED, INTERRUPTED, contents, leftovers, shaker_arguments
 
-import pipelines.outputs
 import pipelines.report
-import pipelines.sweep_stages
+import pipelines.report.outputs
+import pipelines.sweep.stages
 from pipelines.command_line import run
 from sloshlab import atomic_file
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent to a process of its own")
 PLACES = {
-    "after the first run": (pipelines.sweep_stages, "evaluate_windows"),
-    "before windows.nc": (pipelines.outputs, "write_dataset"),
+    "after the first run": (pipelines.sweep.stages, "evaluate_windows"),
+    "before windows.nc": (pipelines.report.outputs, "write_dataset"),
     "while a file is closed": (atomic_file.os, "chmod"),
     "before the report": (pipelines.report, "write_report"),
 }
@@ -68,7 +68,7 @@ def test_an_interrupt_told_as_another_error_is_one(
                 signal.raise_signal(signal.SIGINT)
         raise SystemError("returned a result with an exception set")
 
-    monkeypatch.setattr(pipelines.sweep_stages, "evaluate_windows", failing)
+    monkeypatch.setattr(pipelines.sweep.stages, "evaluate_windows", failing)
     if is_interrupted:
         assert run(arguments_for(laboratory, tmp_path / "out")) == INTERRUPTED
     else:

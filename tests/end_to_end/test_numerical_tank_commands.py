@@ -15,8 +15,8 @@ from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, assert_one_l
 from acquisition.numerical_tank.computed_force import ComputedForce
 from acquisition.virtual_laboratory.campaign import rig_text
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, SDOF_RIG
-from pipelines import virtual
 from pipelines.command_line import run
+from pipelines.recording import virtual
 from sloshlab.recording import read_recording
 
 COARSE = ["--liquid", "numerical", "--layers", "8", "--duration-s", "5"]

@@ -31,7 +31,7 @@ from live_commands import (
 )
 from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, assert_one_line, refusal
 
-import pipelines.record
+import pipelines.recording.record
 from pipelines.command_line import run
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals and signals")
@@ -215,7 +215,7 @@ def test_ctrl_c_while_the_recording_is_assembled(name: str, bench: Path, lab: Pa
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patches:
-        patches.setattr(pipelines.record, name, interrupted)
+        patches.setattr(pipelines.recording.record, name, interrupted)
         source = ["--source", f"file:{bench / 'run.nc'}"]
         assert run(record_arguments(source, bench, lab / "new.nc")) == INTERRUPTED
     captured = capsys.readouterr()
@@ -229,8 +229,9 @@ def test_ctrl_c_while_the_recording_is_assembled(name: str, bench: Path, lab: Pa
 def test_a_signal_while_the_recording_is_assembled(bench: Path, lab: Path) -> None:
     """The same with a real signal; the assembly of this process waits for it."""
     program = (
-        "import sys, pathlib, time, pipelines.record;"
-        "pipelines.record.assemble = lambda *_, **__: (pathlib.Path(sys.argv.pop()).touch(), time.sleep(60));"
+        "import sys, pathlib, time, pipelines.recording.record;"
+        "pipelines.recording.record.assemble ="
+        " lambda *_, **__: (pathlib.Path(sys.argv.pop()).touch(), time.sleep(60));"
         "from pipelines.command_line import run; sys.exit(run(sys.argv[1:-1]))"
     )
     arguments = record_arguments(["--source", f"file:{bench / 'run.nc'}"], bench, lab / "new.nc")

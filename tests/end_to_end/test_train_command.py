@@ -12,11 +12,11 @@ import pytest
 import xarray as xr
 from short_runs import DONE_BUT_FLAGGED, contents, edited, refusal, rig_text, short_run
 
-import pipelines.study
+import pipelines.liquid_model.study
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from pipelines.command_line import run
-from pipelines.rom_report import outputs
-from pipelines.sensitivity_study import StudyCase
+from pipelines.liquid_model import outputs
+from pipelines.liquid_model.sensitivity_study import StudyCase
 from sloshlab.recording import read_recording
 from sloshlab.reduced_order_model.storage import load_model
 
@@ -237,7 +237,7 @@ STUDIED = (StudyCase("nfir", 4, 0, 2), StudyCase("nfir", 8, 0, 4), StudyCase("no
 
 @pytest.fixture
 def small_study(folder, tmp_path, monkeypatch) -> list[str]:
-    monkeypatch.setitem(pipelines.study.CASES, "source", STUDIED)
+    monkeypatch.setitem(pipelines.liquid_model.study.CASES, "source", STUDIED)
     runs = [str(folder / f"{name}.nc") for name in ("train", "valid")]
     options = ("--cases", "source", "--epochs", "2", "--rate-hz", "170", "--rig", str(folder / "rig.toml"))
     return ["study", *runs, *options, *still(folder), "-o", str(tmp_path / "study"), "--json"]

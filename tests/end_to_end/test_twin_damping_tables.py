@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 from beam_runs import BEAM_RIG, beam_decay, beam_random
 
-from pipelines.beam import analyse_beam, checked_settings
-from pipelines.beam_report.twin_damping import decay_comparisons, decay_table, random_table
-from pipelines.beam_results import BeamExperiment
+from pipelines.structure.analysis import analyse_beam, checked_settings
+from pipelines.structure.results import BeamExperiment
+from pipelines.structure.twin_damping import decay_comparisons, decay_table, random_table
 from sloshlab.recording import write_recording
 
 REPEATS = (4.1e-4, 4.3e-4)

@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from acquisition.virtual_laboratory.structure_run import virtual_structure_run
-from pipelines.beam import analyse_beam, checked_settings
+from pipelines.structure.analysis import analyse_beam, checked_settings
 from sloshlab.modal.rig_modes import stated_modes
 from sloshlab.rig import Rig
 

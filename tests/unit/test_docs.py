@@ -12,7 +12,7 @@ import pytest
 import typer.main
 import yaml
 
-from pipelines.command_line import app
+from pipelines.commands.application import app
 from sloshlab import __version__
 from sloshlab.quantities import QUANTITIES
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from acquisition.devices.recorded_signal import RecordedSignal
-from pipelines.outputs import write_dataset
+from pipelines.report.outputs import write_dataset
 from sloshlab.recording import read_recording, write_recording
 
 attributes = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.beam_report.tables import mean_at_common_amplitudes
-from pipelines.beam_results import group_of
+from pipelines.structure.results import group_of
+from pipelines.structure.tables import mean_at_common_amplitudes
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping
 from sloshlab.recording import RunAttributes
 

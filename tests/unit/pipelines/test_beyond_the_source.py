@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipelines.beyond_the_source.recordings import cycle_works_j, part, upward_crossings_s
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
+from studies.beyond_the_source.recordings import cycle_works_j, part, upward_crossings_s
 
 RATE_HZ, START_S, OMEGA = 128.0, 1.0, 2 * np.pi * 10.87
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipelines.measured_facts.__main__ import main
-from pipelines.measured_facts.table import Results, facts
+from studies.measured_facts.__main__ import main
+from studies.measured_facts.table import Results, facts
 
 OMEGA_BAR = np.linspace(2.0, 6.0, 81)
 U_BAR = np.linspace(0.02, 0.46, 89)

@@ -15,21 +15,21 @@ from PIL import Image
 from acquisition.numerical_tank.forced_motion import HarmonicMotion
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import Box, Liquid, filled_tank
-from pipelines.measured_facts.map_readings import facts_of, half_filled
-from pipelines.numerical_tank_figures import writing
-from pipelines.numerical_tank_figures.__main__ import main
-from pipelines.numerical_tank_figures.film import FRAME_MS, film, slowdown
-from pipelines.numerical_tank_figures.maps import maps_figure
-from pipelines.numerical_tank_figures.plates import conditions_plate, cycle_plate, shaking_title
-from pipelines.numerical_tank_figures.snapshots import FRAMES_PER_CYCLE, Shaking, Snapshot, snapshots
-from pipelines.numerical_tank_figures.tank_drawing import (
+from sloshlab.errors import InputError
+from sloshlab.rig import Rig
+from studies.measured_facts.map_readings import facts_of, half_filled
+from studies.numerical_tank_figures import writing
+from studies.numerical_tank_figures.__main__ import main
+from studies.numerical_tank_figures.film import FRAME_MS, film, slowdown
+from studies.numerical_tank_figures.maps import maps_figure
+from studies.numerical_tank_figures.plates import conditions_plate, cycle_plate, shaking_title
+from studies.numerical_tank_figures.snapshots import FRAMES_PER_CYCLE, Shaking, Snapshot, snapshots
+from studies.numerical_tank_figures.tank_drawing import (
     condition_text,
     draw_outline,
     draw_particles,
     top_speed_m_per_s,
 )
-from sloshlab.errors import InputError
-from sloshlab.rig import Rig
 
 HEIGHT_M, LENGTH_M = 0.0272, 0.1172
 RIG = f"""

@@ -17,12 +17,12 @@ import netCDF4
 import numpy as np
 import pytest
 
-import pipelines.record
+import pipelines.recording.record
 from acquisition.recorder.journal import JournalWriter, read_journal
 from acquisition.recorder.status import NobodyWatching, RecorderStatus
 from acquisition.sources.interface import Block, Channel, Delivery, End, Source, SourceInfo
-from pipelines.record import RecordSettings, record
-from pipelines.run_attributes import checked_run_attributes
+from pipelines.recording.record import RecordSettings, record
+from pipelines.recording.run_attributes import checked_run_attributes
 from sloshlab.errors import (
     InputError,
     JournalError,
@@ -351,7 +351,7 @@ def test_an_interrupt_before_the_first_sample_leaves_nothing(place: Path, monkey
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipelines.record, "Recorder", interrupted)
+    monkeypatch.setattr(pipelines.recording.record, "Recorder", interrupted)
     with pytest.raises(KeyboardInterrupt):
         record(settings_for(place), open_source=opening(FakeSource("fake:a")))
     assert list(place.iterdir()) == []
@@ -373,7 +373,9 @@ class FullDisk:
 
 
 def test_a_full_disk_leaves_the_journal_and_says_how_to_go_on(place: Path, monkeypatch) -> None:
-    monkeypatch.setattr(pipelines.record, "JournalWriter", functools.partial(JournalWriter, open_file=FullDisk))
+    monkeypatch.setattr(
+        pipelines.recording.record, "JournalWriter", functools.partial(JournalWriter, open_file=FullDisk)
+    )
     # every second counter, so that nothing is joined and some blocks are complete
     steps = [[block(20 * k)] for k in range(500)]
     with pytest.raises(
@@ -399,7 +401,7 @@ def test_the_journal_stays_when_the_recording_cannot_be_written(
     def fail(*_: object, **__: object) -> None:
         raise problem
 
-    monkeypatch.setattr(pipelines.record, "assemble", fail)
+    monkeypatch.setattr(pipelines.recording.record, "assemble", fail)
     recovery = rf"{message}.*every sample is in .*run\.journal; .*sloshlab recover .*run\.journal -o .*run\.nc$"
     with pytest.raises(error, match=recovery):
         record(settings_for(place), open_source=opening(FakeSource("fake:a", complete())))
@@ -419,7 +421,7 @@ def compressed_streams(data: bytes) -> Iterator[tuple[int, int]]:
 
 
 def test_a_recording_that_cannot_be_read_back_keeps_the_journal(place: Path, monkeypatch) -> None:
-    original = pipelines.record.assemble
+    original = pipelines.recording.record.assemble
 
     def damaging(journal, output: Path, **more):
         summary = original(journal, output, **more)
@@ -429,7 +431,7 @@ def test_a_recording_that_cannot_be_read_back_keeps_the_journal(place: Path, mon
         output.write_bytes(data)
         return summary
 
-    monkeypatch.setattr(pipelines.record, "assemble", damaging)
+    monkeypatch.setattr(pipelines.recording.record, "assemble", damaging)
     # the damaged recording is in the way of the recovered one
     with pytest.raises(JournalError, match=r"cannot be read back.*sloshlab recover .* --overwrite$"):
         record(settings_for(place), open_source=opening(FakeSource("fake:a", complete())))

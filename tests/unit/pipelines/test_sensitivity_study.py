@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipelines.sensitivity_study import (
+from pipelines.liquid_model.sensitivity_study import (
     MODEL_NAME,
     RESULT_NAME,
     SOURCE_CASES,

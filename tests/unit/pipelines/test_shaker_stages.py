@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipelines.shaker import w_bar_bias_of_delay
-from pipelines.sweep_stages import not_measured
+from pipelines.sweep.shaker import w_bar_bias_of_delay
+from pipelines.sweep.stages import not_measured
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.quality import quality_of
 from sloshlab.rig import Liquid, Rig, Tank

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipelines.tank_diagnosis import CASES, TankCase, at_lower_rate, constant_beyond, make_case, part_of
 from sloshlab.errors import InputError
 from sloshlab.recording import read_recording
+from studies.tank_diagnosis import CASES, TankCase, at_lower_rate, constant_beyond, make_case, part_of
 
 RECORDINGS = "raw_data/numerical_tank"
 

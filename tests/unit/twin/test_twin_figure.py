@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipelines.twin_figure import main
+from studies.twin_figure import main
 
 
 def test_the_figure_of_the_twin_is_written_and_small(tmp_path: Path) -> None:

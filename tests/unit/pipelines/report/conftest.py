@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from synthetic_experiment import shaker_experiment, work_experiment
 
-from pipelines.report import write_report
-from pipelines.results import SweepExperiment
+from pipelines.sweep.report import write_report
+from pipelines.sweep.results import SweepExperiment
 
 Drawn = tuple[SweepExperiment, Path]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipelines.results import Excerpt, RigResult, RunResult, SweepExperiment
+from pipelines.sweep.results import Excerpt, RigResult, RunResult, SweepExperiment
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.clipping import Clipping
 from sloshlab.conditioning.gaps import Gap
@@ -166,10 +166,15 @@ def shaker_experiment(
         dry = DryMass(0.6123, 3e-4, 0.6184, -4e-7, 3e-7, 1.01, 5e-4, ("empty", "frozen"))
         rigs.append(RigResult(name, the_rig, dry, windows, liquid_maps(the_rig)))
         runs += own
-    everything = xr.concat([one.windows for one in rigs], dim="window", combine_attrs="drop")
+    everything = xr.concat([rig.windows for rig in rigs], dim="window", combine_attrs="drop")
+    provenance = {
+        "command": f"sloshlab shaker {run_prefix}",
+        "inputs": {run.path.name: run.sha256 for run in runs},
+        "versions": {"python": "3.11"},
+    }
     return SweepExperiment(
         title, "shaker", tuple(runs), tuple(rigs), everything, rigs[0].maps.dataset, SETTINGS,
-        provenance={"command": f"sloshlab shaker {run_prefix}", "versions": {"python": "3.11"}}, flags=flags,
+        provenance=provenance, flags=flags,
     )  # fmt: skip
 
 

@@ -20,14 +20,15 @@ from synthetic_experiment import (
     work_experiment,
 )
 
-from pipelines.report import figures_maps, figures_quality, selection, summary, tables
-from pipelines.report.axes import dimensional_plane, iso_levels_g, scaled_plane
 from pipelines.report.figure import NothingToDrawError
-from pipelines.report.figures_response import responses, vertex
-from pipelines.report.figures_signals import signal_panels
-from pipelines.report.figures_work import fill_curves, work_bars
 from pipelines.report.style import drawing_style, new_figure
-from pipelines.results import RunResult
+from pipelines.report.tables import channel_table, provenance_table
+from pipelines.sweep import figures_maps, figures_quality, selection, summary, tables
+from pipelines.sweep.figures_response import responses, vertex
+from pipelines.sweep.figures_signals import signal_panels
+from pipelines.sweep.figures_work import fill_curves, work_bars
+from pipelines.sweep.planes import dimensional_plane, iso_levels_g, scaled_plane
+from pipelines.sweep.results import RunResult
 
 
 def runs_at(*levels: float, **options: object) -> list[RunResult]:
@@ -122,10 +123,10 @@ def test_every_table_row_is_as_long_as_its_header() -> None:
     experiment = shaker_experiment(extra=True)
     shown = [
         tables.run_table(experiment.runs), tables.dry_mass_table(experiment.rigs), tables.beta_table(experiment),
-        tables.regime_table(experiment.windows), tables.parameter_table(experiment),
-        tables.channel_table(experiment.runs), tables.agreement_table(experiment.runs),
+        tables.regime_table(experiment.windows), tables.settings_table(experiment),
+        channel_table(experiment.runs), tables.agreement_table(experiment.runs),
         tables.identity_table(experiment), tables.validation_table(experiment),
-        tables.provenance_table(experiment),
+        provenance_table(experiment.provenance),
         tables.resonance_table(work_experiment().runs), tables.work_level_table(work_experiment().runs),
     ]  # fmt: skip
     for table in shown:

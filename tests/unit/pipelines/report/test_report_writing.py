@@ -15,11 +15,11 @@ import pytest
 from PIL import Image
 from synthetic_experiment import shaker_experiment
 
-from pipelines.report import write_report
-from pipelines.report.sections import planned_sections, rig_prefixes
+from pipelines.report.page import drawn_sections
 from pipelines.report.style import DOTS_PER_INCH, WIDTH_INCH
-from pipelines.report.writing import drawn_sections, report_html
-from pipelines.results import SweepExperiment
+from pipelines.sweep.report import report_html, write_report
+from pipelines.sweep.results import SweepExperiment
+from pipelines.sweep.sections import planned_sections, rig_prefixes
 
 Drawn = Callable[[str], tuple[SweepExperiment, Path]]
 

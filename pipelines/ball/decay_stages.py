@@ -1,0 +1,193 @@
+"""A ball from free decays of a guided tank, by ζ(a)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from pipelines.ball.results import BallExperiment, DecayResult, ForceTrace
+from pipelines.ball.settings import BallSettings
+from pipelines.report.progress import amounts
+from pipelines.sweep.stages import naming, require_usable
+from sloshlab.bouncing_ball.ball import BouncingBall
+from sloshlab.bouncing_ball.free_decay import (
+    DampingCurve,
+    damping_shares,
+    measured_curve,
+    natural_frequency_hz,
+    simulated_curve,
+    simulated_decay,
+    steady_loss_factor,
+)
+from sloshlab.bouncing_ball.from_free_decay import identify_from_decay
+from sloshlab.bouncing_ball.guide import FrozenDecay, Guide, guide_from_decay
+from sloshlab.bouncing_ball.harmonic_response import hysteresis, response_map
+from sloshlab.errors import AnalysisError
+from sloshlab.recording import RunAttributes, channels, read_recording
+from sloshlab.rig import Rig
+from sloshlab.twin.twin import Simulation
+
+FloatArray = npt.NDArray[np.float64]
+
+MAP_AMPLITUDE_M = (0.0025, 0.1)
+MAP_FREQUENCY_RAD_PER_S = (1.57, 62.83)
+"""Ranges of the source's maps (2.1.2)."""
+_SAME_RELEASE, _GUIDE_AGREES = 0.05, 0.05
+
+
+def ball_from_decays(
+    described: Sequence[tuple[Path, RunAttributes]], rig_as_believed: Rig, rig_path: Path, settings: BallSettings
+) -> BallExperiment:
+    """The ball whose ζ(a) is that of the sloshing decays, on the guide that the frozen ones show.
+
+    Raises
+    ------
+    InputError
+        If there is no sloshing decay, releases differ, or a decay cannot be read.
+    """
+    sloshing = [(path, run) for path, run in described if run.configuration == "sloshing"]
+    if not sloshing:
+        raise AnalysisError(
+            "runs for a ball", got="no sloshing decay", allowed="at least one", remedy="record one"
+        )
+    release = _release_m(sloshing)
+    frozen = _frozen([(path, run) for path, run in described if run.configuration == "frozen"], rig_as_believed,
+                     settings)  # fmt: skip
+    rig = frozen.guide.on(rig_as_believed) if frozen else rig_as_believed
+    recordings, curves = [], []
+    for path, _ in sloshing:
+        with naming(path):
+            recordings.append(_recording(path))
+            curves.append(_curve(recordings[-1], settings))
+    measured, rate = _pooled(curves), float(recordings[0].attrs["sampling_rate_hz"])
+    duration = recordings[0].sizes["time"] / rate
+    with amounts("search of the ball") as advance:
+        found = identify_from_decay(
+            measured, rig, initial_displacement_m=release, duration_s=duration, sampling_rate_hz=rate,
+            damping_in_flight=settings.damping_in_flight, settings=settings.search, progress=advance,
+        )  # fmt: skip
+    decay = simulated_decay(found.ball, rig, release, duration, sampling_rate_hz=rate)
+    result = DecayResult(
+        measured=measured,
+        simulated=simulated_curve(decay, measured.frequency_hz),
+        initial_displacement_m=release,
+        trace=_measured_trace(recordings[0], rig),
+        simulated_trace=_simulated_trace(decay, rig),
+        shares=damping_shares(found.ball, rig, release, 2 * duration),
+        frozen=frozen,
+        **_steady(found.ball, rig, measured),
+        **_response(found.ball, rig, settings.n_map),
+    )
+    omega_bar = 2 * np.pi * measured.frequency_hz / rig.frequency_scale_rad_per_s
+    inputs = (*(path for path, _ in described), rig_path)
+    flags = (*found.flags, *_guide_flags(frozen, rig_as_believed))
+    return BallExperiment(rig, rig_path.name, inputs, found, float(omega_bar), result, flags)
+
+
+def _frozen(runs: Sequence[tuple[Path, RunAttributes]], rig: Rig, settings: BallSettings) -> FrozenDecay | None:
+    """The first frozen decay, read; None without one."""
+    for path, run in runs[:1]:
+        with naming(path):
+            acceleration, rate = _acceleration(_recording(path))
+            return guide_from_decay(
+                acceleration, rate, rig, initial_displacement_m=_release_m([(path, run)]),
+                lowest_acceleration_g=settings.lowest_acceleration_g,
+            )  # fmt: skip
+    return None
+
+
+def _guide_flags(frozen: FrozenDecay | None, rig: Rig) -> tuple[str, ...]:
+    """Numbers of the guide that the rig file states otherwise."""
+    if frozen is None:
+        return ()
+    stated, seen = dataclasses.asdict(Guide.of_rig(rig)), dataclasses.asdict(frozen.guide)
+    return tuple(
+        f"rig: structure.{name} is stated as {stated[name]:.4g}; frozen decay: {seen[name]:.4g}, used here"
+        for name in stated
+        if abs(seen[name] - stated[name]) > _GUIDE_AGREES * max(abs(stated[name]), 1e-9)
+    )
+
+
+def _curve(recording: xr.Dataset, settings: BallSettings) -> DampingCurve:
+    acceleration, rate = _acceleration(recording)
+    return measured_curve(acceleration, rate, lowest_acceleration_g=settings.lowest_acceleration_g)
+
+
+def _release_m(runs: Sequence[tuple[Path, RunAttributes]]) -> float:
+    """The release that all runs share."""
+    stated = [run.initial_displacement_m for _, run in runs]
+    given = [value for value in stated if value]
+    if len(given) != len(stated) or np.ptp(given) > _SAME_RELEASE * abs(given[0]):
+        raise AnalysisError(
+            "initial_displacement_m of the decays",
+            got=", ".join("nothing" if value is None else f"{value:g}" for value in stated),
+            allowed="the same release, stated in every run",
+            remedy="give decays of one release, or state it with the attribute initial_displacement_m",
+        )
+    return float(np.mean(given))
+
+
+def _recording(path: Path) -> xr.Dataset:
+    recording = read_recording(path)
+    require_usable(recording, path)
+    return recording
+
+
+def _acceleration(recording: xr.Dataset) -> tuple[FloatArray, float]:
+    """Acceleration of the tank, the mean of its channels, and the rate."""
+    names = channels(recording, "acceleration")
+    if not names:
+        raise AnalysisError("channels", got="no acceleration", allowed="at least one on the tank")
+    mean = np.mean([recording[name].values for name in names], axis=0)
+    return np.asarray(mean, dtype=np.float64), float(recording.attrs["sampling_rate_hz"])
+
+
+def _pooled(curves: Sequence[DampingCurve]) -> DampingCurve:
+    """All decays in one, amplitudes falling."""
+    amplitude = np.concatenate([curve.acceleration_m_per_s2 for curve in curves])
+    order = np.argsort(-amplitude, kind="stable")
+    damping = np.concatenate([curve.damping_ratio for curve in curves])
+    frequency = float(np.mean([curve.frequency_hz for curve in curves]))
+    return DampingCurve(amplitude[order], damping[order], frequency)
+
+
+def _measured_trace(recording: xr.Dataset, rig: Rig) -> ForceTrace:
+    """F_S = M_dry ü − F_ext (1.7); NaN without a force channel."""
+    acceleration, rate = _acceleration(recording)
+    names = channels(recording, "force")
+    force = np.full(acceleration.shape, np.nan)
+    if names:
+        force = rig.tank.dry_mass_kg * acceleration - np.sum([recording[name].values for name in names], axis=0)
+        force -= np.nanmean(force)
+    return ForceTrace(np.arange(acceleration.size) / rate, acceleration, force)
+
+
+def _simulated_trace(decay: Simulation, rig: Rig) -> ForceTrace:
+    force = decay.tank_force_n - rig.liquid_mass_kg * decay.acceleration_m_per_s2
+    return ForceTrace(decay.time_s, decay.acceleration_m_per_s2, force - force.mean())
+
+
+def _steady(ball: BouncingBall, rig: Rig, measured: DampingCurve) -> dict[str, FloatArray]:
+    ends = measured.acceleration_m_per_s2.min(), measured.acceleration_m_per_s2.max()
+    acceleration = np.geomspace(*ends, 30)
+    return {
+        "steady_acceleration_m_per_s2": acceleration,
+        "steady_loss_factor": steady_loss_factor(ball, rig, acceleration),
+    }
+
+
+def _response(ball: BouncingBall, rig: Rig, n_map: int) -> dict[str, object]:
+    """The map over the source's ranges, and the loop where η at f₀ is largest."""
+    amplitudes = np.geomspace(*MAP_AMPLITUDE_M, n_map)
+    frequencies = np.linspace(*MAP_FREQUENCY_RAD_PER_S, n_map) / (2 * np.pi)
+    with amounts("maps of the ball") as advance:
+        response = response_map(ball, rig, amplitudes, frequencies, progress=advance)
+    frequency = natural_frequency_hz(rig)
+    line = response["loss_factor"].interp(frequency_hz=frequency).values
+    amplitude = float(amplitudes[int(np.nanargmax(line))])
+    return {"response": response, "loop": (amplitude, frequency, *hysteresis(ball, rig, amplitude, frequency))}

@@ -1,0 +1,95 @@
+"""Writing a ball: the [twin] table of a rig file, netCDF, and the report."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipelines.ball.results import BallExperiment, DecayResult
+from pipelines.report.outputs import sha256_of, versions, write_dataset
+from sloshlab import atomic_file
+from sloshlab.bouncing_ball.frequency_error import summary
+from sloshlab.quantities import described
+
+
+def write_ball(experiment: BallExperiment, folder: Path, *, command: str, report: bool = True) -> dict[str, Any]:
+    """Write `ball.toml`, `ball.nc` and the report; return the summary of the command.
+
+    All files appear together, complete, or none does.
+    """
+    provenance: dict[str, object] = {
+        "command": command,
+        "inputs": {path.name: sha256_of(path) for path in experiment.inputs},
+        "versions": versions(),
+    }
+    with atomic_file.filled_folder(folder) as complete:
+        atomic_file.write_bytes(complete / "ball.toml", _twin_table(experiment).encode())
+        write_dataset(_dataset(experiment, provenance), complete / "ball.nc")
+        if report:
+            from pipelines.ball.sections import page_of
+            from pipelines.report.page import write_page
+
+            write_page(page_of(dataclasses.replace(experiment, provenance=provenance)), complete)
+    return _summary(experiment, folder, report)
+
+
+def _twin_table(experiment: BallExperiment) -> str:
+    """The table to put into the rig file, with what is known of each number."""
+    lines = [f"# bouncing ball identified at omega_bar = {experiment.omega_bar:.4g} for {experiment.rig_name}"]
+    for interval in experiment.identified.intervals:
+        at = f", at the {interval.at_bound} bound of its search" if interval.at_bound else ""
+        lines.append(f"# {interval.name}: 90 % interval {interval.low:.4g} ... {interval.high:.4g}{at}")
+    return "\n".join(lines) + "\n" + experiment.identified.ball.twin_table()
+
+
+def _dataset(experiment: BallExperiment, provenance: dict[str, object]) -> xr.Dataset:
+    """Parameters, and measured and simulated curve."""
+    intervals = experiment.identified.intervals
+    along = "ball_parameter"
+    variables: dict[str, Any] = {
+        "ball_value": (along, [interval.value for interval in intervals]),
+        "ball_value_low": (along, [interval.low for interval in intervals]),
+        "ball_value_high": (along, [interval.high for interval in intervals]),
+        "ball_profile_ratio": (along, [interval.profile_ratio for interval in intervals]),
+    }
+    result = experiment.result
+    if isinstance(result, DecayResult):
+        curve = result.measured
+        variables["acceleration_amplitude_m_per_s2"] = ("measured_value", curve.acceleration_m_per_s2)
+        variables["damping_ratio"] = ("measured_value", curve.damping_ratio)
+        simulated = result.simulated.at(curve.acceleration_m_per_s2)
+        variables["ball_damping_ratio"] = ("measured_value", simulated)
+        for name in ("loss_factor", "work_j", "work_j_std"):
+            variables[name] = result.response[name]
+    else:
+        for name in ("omega_bar", "u_bar", "w_bar"):
+            variables[name] = ("window", result.windows[name].values)
+        variables["ball_w_bar"] = ("window", result.w_bar_of_ball)
+    names = np.array([interval.name for interval in intervals], dtype=object)
+    dataset = described(xr.Dataset(variables, coords={along: names}))
+    return dataset.assign_attrs(
+        title="Bouncing ball",
+        rig=experiment.rig_name,
+        tuned_omega_bar=experiment.omega_bar,
+        damping_in_flight=experiment.identified.ball.damping_in_flight,
+        inputs=json.dumps(provenance["inputs"], sort_keys=True),
+        versions=json.dumps(provenance["versions"], sort_keys=True),
+    )
+
+
+def _summary(experiment: BallExperiment, folder: Path, report: bool) -> dict[str, Any]:
+    ball, found = experiment.identified.ball, experiment.identified
+    numbers: dict[str, Any] = {**dataclasses.asdict(ball), "rms": found.rms, "evaluations": found.n_evaluations}
+    lines = [f"ball: {folder / 'ball.toml'}", f"curves: {folder / 'ball.nc'}"]
+    if not isinstance(experiment.result, DecayResult):
+        tuned, others = summary(experiment.result.bands)
+        numbers |= {"relative_error_tuned": tuned, "relative_error_elsewhere": others}
+        lines.append(f"relative error of W̄: {tuned:.2f} at ω̄ = {experiment.omega_bar:g}, {others:.2f} elsewhere")
+    if report:
+        lines.append(f"report: {folder / 'report.html'}")
+    return {"lines": lines, "flags": list(experiment.flags), "output": str(folder), **numbers}

@@ -1,0 +1,87 @@
+"""The command `diagnose`: what physics the simulation of a case left out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipelines.diagnosis.results import Diagnosis
+from pipelines.report.free_place import require_free_folder
+from pipelines.report.outputs import sha256_of, versions
+from pipelines.report.progress import amounts
+from sloshlab import atomic_file
+from sloshlab.diagnosis.answer import answered
+from sloshlab.diagnosis.case import Case, read_case
+from sloshlab.diagnosis.examination import examination_facts, examined, owning_block, seen_at
+from sloshlab.diagnosis.explanation import explained_extension
+from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.search import findings_of
+from sloshlab.diagnosis.user_effects import load_user_effects
+from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
+from sloshlab.diagnosis.verdict import verdict_facts, with_place
+
+
+def diagnose_case(
+    folder: Path,
+    output: Path | None,
+    *,
+    command: str,
+    report: bool = True,
+    twin: Path | None = None,
+    effects: Sequence[Path] = (),
+) -> dict[str, Any]:
+    """Diagnose a case; write ``verdict.json`` and the report; return what is to be said.
+
+    Parameters
+    ----------
+    folder : Path
+    output : Path, optional
+        ``diagnosis/`` in the case folder by default. All files appear together, complete, or none does.
+    command : str
+        What the user typed, for the report.
+    report : bool
+        False leaves the report and its figures out.
+    twin : Path, optional
+        Python module of a user's own twin; its code is run.
+    effects : sequence of Path
+        Python modules with effects of a user's own; their code is run.
+    """
+    target = output or folder / "diagnosis"
+    case = read_case(folder, with_rig=twin is None)
+    require_free_folder(target, "diagnosis")
+    own = [effect for file in effects for effect in load_user_effects(file)]
+    model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
+    with amounts("diagnosing") as advance:
+        found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
+        found, verdict = answered(found, lambda what, done, of: advance(done, max(of, 1)))
+    examination = examined(found)
+    verdict = with_place(found, verdict, seen_at(examination, verdict.best), owning_block(examination))
+    facts = {**verdict_facts(found, verdict), **examination_facts(examination, found)}
+    diagnosis = Diagnosis(found, verdict, examination, _provenance(case, command, twin, effects))
+    with atomic_file.filled_folder(target) as complete:
+        atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
+        best = verdict.best or found.retuned
+        found.model.save_extended(best.fit.values, explained_extension(best), complete / "extended_twin.toml")
+        found.model.save_extended(found.retuned.fit.values, NOTHING, complete / "retuned_twin.toml")
+        if report:
+            from pipelines.diagnosis.sections import page_of
+            from pipelines.report.page import write_page
+
+            write_page(page_of(diagnosis), complete)
+    lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
+    if own:
+        lines.append("effects of your own: " + ", ".join(f"{one.block}.{one.name}" for one in own))
+    if report:
+        lines.append(f"report: {target / 'report.html'}")
+    return {"lines": lines, "flags": list(found.split.limits), **facts}
+
+
+def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:
+    files = [twin or case.folder / "rig.toml", *effects, *sorted((case.folder / "recordings").glob("*.nc"))]
+    return {
+        "command": command,
+        "inputs": {file.name: sha256_of(file) for file in files},
+        "versions": versions(),
+    }

@@ -1,0 +1,263 @@
+"""Figures of a diagnosis: held-out errors, evidence per candidate, where the mismatch is, before and after."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.results import Diagnosis
+from pipelines.report.axes import power_of_ten
+from pipelines.report.figure import NothingToDrawError, ReportFigure
+from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, WORK_COLOURS, new_figure, plain, png_bytes
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.mismatch import ChannelMismatch, mismatches
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.verdict.wording import form_and_place
+
+FloatArray = NDArray[np.float64]
+_MOST_ROWS = 14
+_SHOWN_CYCLES = 10
+FAINT_COLOUR = "#b8c4d0"
+_EXCESS_OF_NOISE = 1.0
+
+
+def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
+    """Believed, retuned, named and ceiling on runs that chose nothing."""
+    found = diagnosis.findings
+    rows: list[tuple[str, Explanation, str]] = [
+        ("as believed", found.believed, NEUTRAL_COLOUR),
+        ("retuned", found.retuned, NEUTRAL_COLOUR),
+    ]
+    if diagnosis.verdict.best is not None:
+        rows.append((words(diagnosis.verdict.best, "\n+ "), diagnosis.verdict.best, REFERENCE_COLOUR))
+    if found.ceilings:
+        rows.append(("ceiling", min(found.ceilings, key=lambda ceiling: ceiling.held_out), FAINT_COLOUR))
+    values = [one.held_out_rms for _, one, _ in rows]
+    figure = new_figure(0.6 + 0.36 * len(rows))
+    axes = figure.subplots()
+    axes.barh(range(len(rows)), values, color=[colour for _, _, colour in rows], height=0.6)
+    axes.axvline(1.0, color="black", lw=1.0, ls="--")
+    axes.set_yticks(range(len(rows)), [label for label, _, _ in rows])
+    axes.invert_yaxis()
+    axes.set(
+        xscale="log",
+        xlabel="error on held-out runs / noise floor",
+        xlim=(0.6 * min(1.0, *values), 1.6 * max(values)),
+    )
+    plain_ticks_within_decades(axes.xaxis)
+    for i, value in enumerate(values):
+        beside = max(value, 1.0) if 0.75 < value < 1.0 else value
+        axes.annotate(f"{value:.2f}", (beside, i), (4, 0), textcoords="offset points", va="center", fontsize=8)
+    runs = ", ".join(run.name for run in found.split.held_out)
+    sought = "" if found.ceilings else " No ceiling was sought, because nothing stands out of the noise any more."
+    caption = (
+        "Root mean square of the residuals of short-time spectra over their noise, where the recording stands out "
+        f"of the noise, on runs that chose nothing ({runs}). The dashed line is the noise floor.{sought}"
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
+    """What each explanation leaves, on fitted and on held-out runs."""
+    found, everything = diagnosis.findings, diagnosis.explanations
+    if not everything:
+        raise NothingToDrawError("no candidate promised anything")
+    n_singles = sum(len(one.keys) == 1 for one in everything)
+    pairs = [one for one in everything if len(one.keys) > 1][: max(_MOST_ROWS - n_singles, 3)]
+    chosen = [one for one in everything if len(one.keys) == 1 or one in pairs]
+    rows = [*[(words(one, "\n+ "), one) for one in chosen], ("baseline retuned", found.retuned)]
+    left = np.array(
+        [(one.held_out / found.n_held_out, one.fit.misfit / found.n_fitting) for _, one in rows], np.float64
+    )
+    left = np.where(np.isfinite(left), left, np.nan)
+    n_lines = sum(label.count("\n") + 1 for label, _ in rows)
+    figure = new_figure(0.9 + 0.15 * len(rows) + 0.13 * n_lines)
+    axes = figure.subplots()
+    place = np.arange(len(rows))
+    axes.barh(place - 0.18, left[:, 0], 0.34, color=REFERENCE_COLOUR, label="held-out runs")
+    axes.barh(place + 0.18, left[:, 1], 0.34, color=NEUTRAL_COLOUR, label="fitted runs")
+    axes.set_yticks(place, [label for label, _ in rows], fontsize=7)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    limits = (0.7 * float(np.nanmin(left)), 1.3 * float(np.nanmax(left)))
+    axes.set(xscale="log", xlabel="mean square that is left / noise", xlim=limits)
+    plain_ticks_within_decades(axes.xaxis)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    caption = (
+        "What each explanation leaves of the recordings, over all coefficients; the best on held-out runs is on "
+        "top. All single effects that were fitted to the end and the best pairs: "
+        f"{len(chosen)} of {len(everything)}."
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def where(name: str, diagnosis: Diagnosis) -> ReportFigure:
+    """Misfit over time and frequency, before and after, of the channel that misses most."""
+    found = diagnosis.findings
+    before = mismatches(found.fitting, found.readings(found.retuned))
+    named = named_channels(diagnosis)
+    worst = max(before, key=lambda one: (one.channel in named, one.total))
+    if worst.total <= 0:
+        raise NothingToDrawError("the retuned baseline misses nothing")
+    both = [("baseline retuned", worst)]
+    if diagnosis.verdict.best is not None:
+        after = mismatches(found.fitting, found.readings(diagnosis.verdict.best))
+        both.append((extended_label(diagnosis), _same(after, worst)))
+    top = _highest(worst)
+    figure = new_figure(3.0)
+    panels = np.atleast_1d(figure.subplots(1, len(both), sharey=True))
+    largest = float(np.log10(1 + worst.excess[:, : top + 1].max()))
+    for axes, (title, one) in zip(panels, both, strict=True):
+        mesh = axes.pcolormesh(
+            one.time_s,
+            one.frequency_hz[: top + 1],
+            np.log10(1 + one.excess[:, : top + 1]).T,
+            cmap=WORK_COLOURS,
+            vmin=0.0,
+            vmax=max(largest, 0.1),
+            shading="nearest",
+            rasterized=True,
+        )
+        axes.set(title=title, xlabel="time [s]")
+        axes.grid(False)
+    panels[0].set_ylabel("frequency [Hz]")
+    figure.colorbar(mesh, ax=list(panels), label="log₁₀(1 + misfit beyond noise)")
+    caption = (
+        f"Where {plain(worst.channel)} of {plain(worst.run)} is missed: squares of the weighted "
+        "residuals beyond their "
+        "expectation, per block and band."
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
+    """The held-out run that is missed most, recorded and simulated, with what is left."""
+    found = diagnosis.findings
+    readings = found.readings(found.retuned)
+    named = named_channels(diagnosis)
+
+    def missed(observation: Observation) -> float:
+        return float((observation.residual(readings[observation.run.name][observation.channel]) ** 2).sum())
+
+    observed = max(found.held_out, key=lambda run: sum(missed(one) for one in run))
+    run = observed[0].run
+    shown = sorted(observed, key=lambda one: (one.channel not in named, -missed(one)))[:2]
+    steps: list[tuple[str, dict[str, FloatArray], str, Any]] = [
+        ("baseline retuned", readings[run.name], NEUTRAL_COLOUR, "-")
+    ]
+    if diagnosis.verdict.best is not None:
+        after = found.readings(diagnosis.verdict.best)[run.name]
+        steps.append((extended_label(diagnosis), after, REFERENCE_COLOUR, (0, (4, 1.5))))
+    time = np.asarray(run.recording["time"].values, np.float64)
+    figure = new_figure(1.9 * len(shown) + 0.4)
+    grid = np.atleast_2d(figure.subplots(len(shown), 2, sharex="col"))
+    for (left, right), one in zip(grid, shown, strict=True):
+        recorded = np.asarray(run.recording[one.channel].values, np.float64)
+        factor, units = _handy(recorded, str(run.recording[one.channel].attrs.get("units", "")))
+        if one is shown[0]:
+            lacking = recorded - steps[0][1][one.channel]
+            stretch = _stretch(time, found.surroundings.frequency_hz, _left(one, lacking))
+        left.plot(time[stretch], factor * recorded[stretch], color=FAINT_COLOUR, lw=2.6, label="recorded")
+        for label, simulated, colour, line in steps:
+            values = simulated[one.channel]
+            left.plot(time[stretch], factor * values[stretch], color=colour, lw=0.9, ls=line, label=label)
+            right.plot(time, factor * _left(one, recorded - values), color=colour, lw=0.6)
+        left.set_ylabel(f"{plain(one.channel)}\n[{plain(units)}]", fontsize=7)
+        right.axvspan(time[stretch][0], time[stretch][-1], color="#f0ead8", zorder=0)
+    grid[0, 0].set_title("recorded and simulated, a stretch")
+    grid[0, 1].set_title("recorded − simulated")
+    grid[-1, 0].set_xlabel("time [s]")
+    grid[-1, 1].set_xlabel("time [s]")
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    caption = (
+        f"Held-out run {plain(run.name)}, the channels that are missed most; on the left the stretch that is "
+        "shaded on the right. The mean is taken off where it means nothing. Releases and offsets are those of the "
+        "fit, or believed where the run was not fitted."
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def plain_ticks_within_decades(axis: Any) -> None:
+    """Ticks within every decade as plain numbers, as many as there is room for; limits must be set."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=_steps_of_a_decade(*axis.get_view_interval()), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: short_tick(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _steps_of_a_decade(low: float, high: float) -> tuple[float, ...]:
+    """Few enough to stay apart: an axis may cover half a decade or six."""
+    decades = np.log10(high / low)
+    return (1.0, 2.0, 5.0) if decades < 2.2 else (1.0, 3.0) if decades < 3.2 else (1.0,)
+
+
+def short_tick(value: float) -> str:
+    """A tick as a plain number where that is short.
+
+    Examples
+    --------
+    >>> short_tick(0.5), short_tick(20000.0), short_tick(2e5), short_tick(1e6)
+    ('0.5', '20000', '2·10⁵', '10⁶')
+    """
+    if value < 1e5:
+        return power_of_ten(value)
+    exponent = int(np.floor(np.log10(value) + 1e-9))
+    mantissa = round(value / 10.0**exponent)
+    return power_of_ten(10.0**exponent) if mantissa == 1 else f"{mantissa}·{power_of_ten(10.0**exponent)}"
+
+
+def _same(found: list[ChannelMismatch], wanted: ChannelMismatch) -> ChannelMismatch:
+    return next(one for one in found if (one.run, one.channel) == (wanted.run, wanted.channel))
+
+
+def _highest(channel_mismatch: ChannelMismatch) -> int:
+    """The band below which nearly all of the misfit lies that is no noise."""
+    inner = channel_mismatch.excess[1:-1] if channel_mismatch.excess.shape[0] > 4 else channel_mismatch.excess
+    beyond = np.maximum(inner.mean(axis=0) - _EXCESS_OF_NOISE, 0.0)
+    cumulative = np.cumsum(beyond)
+    if cumulative[-1] <= 0:
+        return int(channel_mismatch.excess.shape[1]) - 1
+    index = int(np.searchsorted(cumulative, 0.98 * cumulative[-1]))
+    return int(min(max(2 * index, 12), channel_mismatch.excess.shape[1] - 1))
+
+
+def _left(observation: Observation, values: FloatArray) -> FloatArray:
+    return values if observation.keeps_mean else values - float(np.nanmean(values))
+
+
+def named_channels(diagnosis: Diagnosis) -> list[str]:
+    """Channels on which the named effects act."""
+    best = diagnosis.verdict.best
+    return (
+        [candidate.channel.partition("<")[0] for candidate in best.fit.candidates if candidate.channel]
+        if best
+        else []
+    )
+
+
+def extended_label(diagnosis: Diagnosis) -> str:
+    """Words for the best explanation."""
+    return "nearest known effect" if diagnosis.verdict.kind == "unknown" else "with what was left out"
+
+
+def words(explanation: Explanation, between: str = " + ") -> str:
+    """Effects of an explanation and where they act."""
+    return between.join(plain(form_and_place(candidate), 64) for candidate in explanation.fit.candidates)
+
+
+def _handy(values: FloatArray, units: str) -> tuple[float, str]:
+    """Factor and unit in which values are handy, units as people write them."""
+    if units == "m" and float(np.nanmax(np.abs(values))) < 0.1:
+        return 1e3, "mm"
+    return 1.0, {"m s-2": "m/s²", "m s-1": "m/s"}.get(units, units)
+
+
+def _stretch(time: FloatArray, frequency_hz: float, lacking: FloatArray) -> slice:
+    """The cycles that are missed most."""
+    step = time[1] - time[0]
+    n = max(10, min(int(_SHOWN_CYCLES / max(frequency_hz, 1e-6) / step), time.size))
+    power = np.concatenate([[0.0], np.cumsum(np.nan_to_num(lacking) ** 2)])
+    first = int(np.argmax(power[n:] - power[:-n]))
+    return slice(first, first + n)

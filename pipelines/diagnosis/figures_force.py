@@ -1,0 +1,105 @@
+"""Figures on the force that the baseline lacks: over the motion, over the level, in time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.results import Diagnosis
+from pipelines.report.figure import NothingToDrawError, ReportFigure
+from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, new_figure, plain, png_bytes
+from sloshlab.diagnosis.force_character import ForceCharacter
+from sloshlab.diagnosis.latent_force import LatentForce
+
+FloatArray = NDArray[np.float64]
+_CYCLES = 10
+_MOST_POINTS = 6000
+
+
+def missing_force(name: str, diagnosis: Diagnosis) -> ReportFigure:
+    """The latent force in time, over the velocity, over the displacement, and its work over the level."""
+    place = worst_place(diagnosis)
+    cut = diagnosis.examination.cut
+    assert cut is not None
+    character = diagnosis.examination.characters[place]
+    forces = cut.forces(place)
+    largest = max(forces, key=lambda force: float(np.mean(force.force_n**2)))
+    figure = new_figure(4.4)
+    panels = figure.subplots(2, 2)
+    _in_time(panels[0, 0], largest)
+    _over(panels[0, 1], largest, 1, "velocity [m/s]")
+    over_a = place == "tank"
+    _over(panels[1, 0], largest, 2 if over_a else 0, "acceleration [m/s²]" if over_a else "displacement [mm]")
+    _work(panels[1, 1], character)
+    caption = (
+        f"The force that the retuned baseline lacks at the {place}, from {plain(largest.run.name)} (work: all "
+        f"fitted runs): {character.size_n:.3g} N RMS beyond the block's own parameters, "
+        f"{character.noise_n:.2g} N of it noise. Positive is upward; positive work is taken from the motion, "
+        "after the damping that retuning may have added is given back."
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def worst_place(diagnosis: Diagnosis) -> str:
+    """Where the largest force is missing."""
+    cut = diagnosis.examination.cut
+    there = {
+        place: character for place, character in diagnosis.examination.characters.items() if character.is_there
+    }
+    if cut is None:
+        raise NothingToDrawError("this twin has no measured interfaces")
+    if not there:
+        raise NothingToDrawError("no block lacks a force beyond noise")
+    shares = {one.block: one.share for one in cut.blocks if np.isfinite(one.share)}
+    return max(there, key=lambda place: (shares.get(place, 0.0), there[place].size_n / there[place].noise_n))
+
+
+def _in_time(axes, latent_force: LatentForce) -> None:  # type: ignore[no-untyped-def]
+    spread = latent_force.motion[:, 2].std() / max(latent_force.motion[:, 1].std(), 1e-300)
+    n = min(
+        latent_force.time_s.size, int(_CYCLES * 2 * np.pi / spread * latent_force.run.attributes.sampling_rate_hz)
+    )
+    power = np.convolve(latent_force.force_n**2, np.ones(n), "valid")
+    start = int(power.argmax()) if not latent_force.run.is_free else 0
+    part = slice(start, start + n)
+    velocity = latent_force.motion[part, 1]
+    scale = np.abs(latent_force.force_n[part]).max() / max(np.abs(velocity).max(), 1e-300)
+    axes.plot(latent_force.time_s[part], scale * velocity, color="#b8c4d0", lw=1.0, label="velocity (scaled)")
+    axes.plot(
+        latent_force.time_s[part],
+        latent_force.force_n[part],
+        color=REFERENCE_COLOUR,
+        lw=1.0,
+        label="missing force",
+    )
+    axes.set(xlabel="time [s]", ylabel="force [N]")
+    axes.set_ylim(top=1.45 * np.abs(latent_force.force_n[part]).max())
+    axes.legend(loc="upper right", fontsize=7, ncols=2)
+
+
+def _over(axes, latent_force: LatentForce, order: int, label: str) -> None:  # type: ignore[no-untyped-def]
+    step = max(1, latent_force.force_n.size // _MOST_POINTS)
+    values = latent_force.motion[::step, order] * (1e3 if order == 0 else 1.0)
+    axes.plot(values, latent_force.force_n[::step], ".", color=NEUTRAL_COLOUR, ms=1.5, alpha=0.5, rasterized=True)
+    edges = np.quantile(values, np.linspace(0.005, 0.995, 31))
+    middle, mean = [], []
+    for low, high in pairwise(edges):
+        inside = (values >= low) & (values <= high)
+        if inside.sum() > 3:
+            middle.append(float(values[inside].mean()))
+            mean.append(float(latent_force.force_n[::step][inside].mean()))
+    axes.plot(middle, mean, color=REFERENCE_COLOUR, lw=1.5, label="mean")
+    axes.set(xlabel=label, ylabel="missing force [N]")
+    axes.legend(loc="upper right", fontsize=7)
+
+
+def _work(axes, character: ForceCharacter) -> None:  # type: ignore[no-untyped-def]
+    found = character.windows
+    axes.errorbar(
+        found.level_g, 1e3 * found.work_j, 1.645e3 * found.work_doubt_j, fmt="o", ms=2.5, lw=0.6,
+        color=NEUTRAL_COLOUR, ecolor="#b8c4d0",
+    )  # fmt: skip
+    axes.axhline(0.0, color="black", lw=0.8)
+    axes.set(xlabel="amplitude of the acceleration [g]", ylabel="work per cycle [mJ]")

@@ -1,0 +1,103 @@
+"""The report on a diagnosis: which figures and tables, in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from pipelines.diagnosis import figures, figures_force, figures_where, tables
+from pipelines.diagnosis.results import Diagnosis
+from pipelines.report.citations import Citation
+from pipelines.report.figure import ReportFigure
+from pipelines.report.page import Page
+from pipelines.report.sections import FigurePlan, SectionPlan
+from pipelines.report.tables import Table, provenance_table
+from sloshlab import __version__
+
+_TRANSFORM = Citation(
+    "short-time spectra",
+    "J. P. Princen, A. B. Bradley: Analysis/synthesis filter bank design based on time domain "
+    "aliasing cancellation. "
+    "IEEE Transactions on Acoustics, Speech, and Signal Processing 34, 1153–1161 (1986).",
+    "10.1109/TASSP.1986.1164954",
+)
+_ROBUST = Citation(
+    "large residuals",
+    "P. J. Huber: Robust estimation of a location parameter. Annals of Mathematical Statistics 35, 73–101 (1964).",
+    "10.1214/aoms/1177703732",
+)
+
+Draw = Callable[..., ReportFigure]
+
+
+def page_of(diagnosis: Diagnosis) -> Page:
+    """The page of the report."""
+    places = [place for place, character in diagnosis.examination.characters.items()]
+    where_tables = (
+        tables.cut_table(diagnosis),
+        tables.sensor_table(diagnosis),
+        tables.sensor_error_table(diagnosis),
+    )
+    drawn: dict[str, tuple[dict[str, Draw], tuple[Table | None, ...]]] = {
+        "Where": (
+            {
+                "block_shares": figures_where.block_shares,
+                "where": figures.where,
+                "time_histories": figures.time_histories,
+                "residual_profiles": figures_where.residual_profiles,
+            },
+            where_tables,
+        ),
+        "What kind of force": (
+            {"missing_force": figures_force.missing_force},
+            tuple(tables.answers_table(diagnosis, place) for place in places),
+        ),
+        "For and against": (
+            {"evidence": figures.evidence},
+            (
+                tables.evidence_table(diagnosis),
+                tables.explanation_table(diagnosis),
+                tables.left_out_table(diagnosis),
+            ),
+        ),
+        "Does it help": (
+            {"held_out_errors": figures.held_out_errors},
+            (tables.effect_parameter_table(diagnosis), tables.baseline_table(diagnosis)),
+        ),
+        "What remains": ({}, (tables.remains_table(diagnosis), tables.limits_table(diagnosis))),
+    }
+    plans = tuple(
+        SectionPlan(
+            title,
+            tuple(FigurePlan(name, partial(draw, diagnosis=diagnosis)) for name, draw in them.items()),
+            tuple(table for table in shown if table is not None),
+        )
+        for title, (them, shown) in drawn.items()
+    )
+    return Page(
+        title="What was left out",
+        subtitle=f"{diagnosis.findings.case.name} · sloshlab {__version__}",
+        flags=diagnosis.findings.split.limits,
+        lead=diagnosis.verdict.statement,
+        summary=_sentences(diagnosis),
+        plans=(*plans, SectionPlan("Provenance", (), (provenance_table(diagnosis.provenance),))),
+        papers=(_TRANSFORM, _ROBUST),
+    )
+
+
+def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
+    verdict, found = diagnosis.verdict, diagnosis.findings
+    lines = []
+    if verdict.separating_experiment:
+        lines.append(f"To tell them apart: {verdict.separating_experiment}.")
+    names = sorted(verdict.probabilities.items(), key=lambda item: -item[1])[:4]
+    lines.append(
+        "Probabilities: " + ", ".join(f"{name.replace('_', ' ')} {100 * p:.0f} %" for name, p in names) + "."
+    )
+    lines.append(
+        f"{len(found.case.runs)} runs, {len(found.split.fitting)} fitted and "
+        f"{len(found.split.held_out)} held out; "
+        f"{len(diagnosis.explanations)} explanations fitted, {len(found.screened)} candidates set aside early, "
+        f"{len(found.failed)} failed."
+    )
+    return tuple(lines)

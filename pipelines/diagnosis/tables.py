@@ -1,0 +1,343 @@
+"""Tables of the report on a diagnosis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from typing import Final
+
+import numpy as np
+
+from pipelines.diagnosis.figures import extended_label
+from pipelines.diagnosis.results import Diagnosis
+from pipelines.report.numbers import MISSING, signed, text
+from pipelines.report.tables import Table
+from sloshlab.diagnosis.baseline_parameter import BaselineParameter
+from sloshlab.diagnosis.evidence import ALONE, CANNOT_TELL
+from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.units import named_and_units
+from sloshlab.diagnosis.verdict.interval import interval
+from sloshlab.diagnosis.verdict.wording import form_and_place, named_and_placed
+
+_MOST_EXPLANATIONS: Final = 14
+_MOST_LEFT_OUT: Final = 12
+_OF_THE_CHANNEL: Final = ("limit", "amplitude")
+
+
+def effect_parameter_table(diagnosis: Diagnosis) -> Table | None:
+    """Numbers of the effects with their intervals."""
+    best = diagnosis.verdict.best
+    if best is None:
+        return None
+    rows: list[tuple[str, ...]] = []
+    for candidate in best.fit.candidates:
+        for parameter in candidate.effect.parameters:
+            estimate, low, high = interval(best, candidate, parameter.name)
+            words, units = named_and_units(parameter.name)
+            unit = units or ("of the channel" if parameter.name in _OF_THE_CHANNEL else "1")
+            bounds = f"{text(low, 4)} … {text(high, 4)}"
+            rows.append((named_and_placed(candidate), words, text(estimate, 4), bounds, unit))
+    is_named = diagnosis.verdict.kind != "unknown"
+    return Table(
+        "Numbers of what was left out" if is_named else "Numbers of the nearest known effect",
+        ("effect", "parameter", "estimate", "90 % interval", "unit"),
+        tuple(rows),
+        "Fitted in free-running simulation over all fitting runs, with the baseline's parameters free.",
+    )
+
+
+def baseline_table(diagnosis: Diagnosis) -> Table:
+    """What retuning did to the baseline, with and without the effect."""
+    found, best = diagnosis.findings, diagnosis.verdict.best
+    rows = []
+    for parameter in found.model.parameters:
+        if parameter.name.startswith(("release", "offset")):
+            continue
+        retuned = found.retuned.fit.values.get(parameter.name, parameter.believed)
+        row = [parameter.name, text(parameter.believed, 4), text(parameter.tolerance, 2), text(retuned, 4)]
+        row.append(_moved(parameter, retuned))
+        if best is not None:
+            row.append(_moved(parameter, best.fit.values.get(parameter.name, parameter.believed)))
+        rows.append(tuple(row))
+    header: tuple[str, ...] = ("parameter", "believed", "tolerance", "retuned", "moved, in tolerances")
+    header += () if best is None else ("moved with the effect, in tolerances",)
+    caption = (
+        "A number that wants to move by more than its tolerance asks for a second look at the rig file; at 1.25 "
+        "tolerances, dampings at four, it is held. One of a mode that no run excites means nothing."
+    )
+    return Table("The baseline's own parameters", header, tuple(rows), caption)
+
+
+def _moved(parameter: BaselineParameter, value: float) -> str:
+    """How far a number is from what is believed, and whether it is held there."""
+    tolerances = (value - parameter.believed) / parameter.tolerance
+    held = " (held)" if abs(tolerances) > parameter.most_tolerances - 1e-3 else ""
+    return signed(tolerances if abs(tolerances) >= 0.005 else 0.0, 2) + held
+
+
+def explanation_table(diagnosis: Diagnosis) -> Table:
+    """All explanations, the best on held-out runs first."""
+    found = diagnosis.findings
+    everything: list[tuple[str, Explanation]] = [
+        ("baseline as believed", found.believed),
+        ("baseline retuned", found.retuned),
+        *[(f"{_named(ceiling)} (ceiling)", ceiling) for ceiling in found.ceilings],
+        *[(_named(explanation), explanation) for explanation in diagnosis.explanations],
+    ]
+    rows = [
+        (label, text(one.fit.cost, 4), text(one.held_out, 4), text(one.held_out_rms, 3))
+        for label, one in sorted(everything, key=lambda pair: pair[1].held_out)
+    ]
+    header = ("explanation", "cost on fitted runs", "held-out sum of squares", "held-out error / noise floor")
+    caption = (
+        f"Sums over {found.n_fitting} coefficients of the fitted and {found.n_held_out} of the held-out runs; "
+        "residuals beyond four standard deviations count linearly."
+    )
+    return Table("Explanations", header, tuple(rows), caption)
+
+
+def left_out_table(diagnosis: Diagnosis) -> Table:
+    """Candidates that were not fitted to the end, and why."""
+    found = diagnosis.findings
+    fitted = {explanation.keys[0] for explanation in found.explanations if len(explanation.keys) == 1}
+    gains = sorted(found.screened.items(), key=lambda item: -item[1])
+    rows = [(_beside(name, fitted), f"failed: {why}") for name, why in sorted(found.failed.items())]
+    rows += [(_beside(name, fitted), text(gain, 3)) for name, gain in gains[:_MOST_LEFT_OUT]]
+    if rest := gains[_MOST_LEFT_OUT:]:
+        rows.append((_grouped([name for name, _ in rest]), f"{text(rest[0][1], 3)} or less"))
+    return Table(
+        "Candidates that were not fitted to the end",
+        ("candidate", "promised decrease of the sum of squares"),
+        tuple(rows) or ((MISSING, MISSING),),
+        "Each was simulated from every one of its starts, and set aside by what a first step promised or by what "
+        "the first stages of a fit had gained, beside better ones.",
+    )
+
+
+def _grouped(keys: Sequence[str]) -> str:
+    """Effects with the number of places where each was tried."""
+    effects = [".".join(key.split(".")[:2]) for key in keys]
+    counts = {effect: effects.count(effect) for effect in dict.fromkeys(effects)}
+    return ", ".join(effect if n == 1 else f"{effect} ({n} places)" for effect, n in counts.items())
+
+
+def _beside(key: str, fitted: Collection[str]) -> str:
+    """A candidate, and that it was tried beside another where it has a fit of its own."""
+    return f"{key} (as a second effect)" if key in fitted else key
+
+
+def cut_table(diagnosis: Diagnosis) -> Table:
+    """Each block on its measured input."""
+    cut = diagnosis.examination.cut
+    header = ("block", "fed with", "compared", "share of the mismatch", "lacks (RMS)", "noise (RMS)", "remark")
+    if cut is None:
+        caption = "A twin of the user's own has no blocks that can be fed one by one."
+        return Table("Cut at the measured interfaces", header, ((MISSING,) * 7,), caption)
+    rows = []
+    for one in cut.blocks:
+        share = f"{100 * one.share:.0f} % ({100 * one.low:.0f} … {100 * one.high:.0f})"
+        unit = " σ" if one.block == "sensor" else " N"
+        rows.append(
+            (
+                one.block,
+                one.input,
+                one.output,
+                share if math.isfinite(one.share) else "cannot tell",
+                text(one.size, 3) + (unit if math.isfinite(one.size) else ""),
+                text(one.noise, 2) + (unit if math.isfinite(one.noise) else ""),
+                one.remark or (MISSING if math.isfinite(one.share) else "within noise"),
+            )
+        )
+    caption = (
+        "Shares with 90 % intervals. A block lacks the force that would make its output follow the recording; "
+        "of sensors, what they contradict each other by in standard deviations. "
+    )
+    return Table("Cut at the measured interfaces", header, tuple(rows), caption + _sentence(cut.remark))
+
+
+def sensor_table(diagnosis: Diagnosis) -> Table | None:
+    """Channels beside what the others of the same motion say."""
+    cut = diagnosis.examination.cut
+    if cut is None or not cut.sensors:
+        return None
+    rows = [
+        (
+            sensor.channel,
+            text(sensor.ratio, 3),
+            text(sensor.disagreement_without, 3),
+            text(sensor.demand_without_n2**0.5, 3),
+        )
+        for sensor in sorted(cut.sensors, key=lambda sensor: -sensor.ratio)
+    ]
+    header = ("channel", "difference from the others / noise", "others among themselves without it / noise",
+              "force that blocks then lack [N]")  # fmt: skip
+    return Table(
+        "Sensors beside each other",
+        header,
+        tuple(rows),
+        "Every motion channel is compared with the motion that all of them agree on, force cells with each other. "
+        "A channel is doubted when the others agree without it.",
+    )
+
+
+def sensor_error_table(diagnosis: Diagnosis) -> Table | None:
+    """What the error of a doubted channel is a function of."""
+    cut, answers = diagnosis.examination.cut, diagnosis.examination.sensor
+    if cut is None or not answers:
+        return None
+    rows = [
+        (
+            answer.term,
+            f"{_share(answer.share)} ({_share(answer.low)} … {_share(answer.high)})",
+            _holds(answer.holds),
+        )
+        for answer in answers
+        if answer.term != ALONE
+    ]
+    caption = "Share of the variance of its error that each form explains alone, with 90 % intervals."
+    return Table(f"What {cut.doubted} reads wrong", ("form", "share", "holds"), tuple(rows), caption)
+
+
+def answers_table(diagnosis: Diagnosis, place: str) -> Table:
+    """Answers to the physical questions on the force at one place."""
+    character = diagnosis.examination.characters[place]
+    rows = []
+    for answer in character.answers:
+        shown = _share if answer.quantity.startswith("share") else text
+        low_high = f"{shown(answer.low)} … {shown(answer.high)}" if math.isfinite(answer.low) else MISSING
+        quantity = answer.quantity + (f" [{answer.units}]" if answer.units != "1" else "")
+        rows.append(
+            (answer.question, answer.finding, quantity, shown(answer.value), low_high, answer.remark or MISSING)
+        )
+    caption = (
+        f"The force is {text(character.size_n, 3)} N RMS beyond the block's own parameters, its noise "
+        f"{text(character.noise_n, 2)} N."
+    )
+    if len(rows) > 1:
+        caption += (
+            " Intervals are by drawing stretches of the runs; what the block's own damping may be off is in that "
+            f"of the energy. “The first” is the {'acceleration' if place == 'tank' else 'displacement'}."
+        )
+    title = f"Physical questions to the force missing at the {place}"
+    return Table(title, ("question", "finding", "by", "value", "90 % interval", "remark"), tuple(rows), caption)
+
+
+def _share(value: float) -> str:
+    """A share to a thousandth; what is less is nothing."""
+    return MISSING if not math.isfinite(value) else "0" if abs(value) < 5e-4 else f"{value:.3f}".replace("-", "−")
+
+
+def evidence_table(diagnosis: Diagnosis) -> Table | None:
+    """For and against each explanation, the best on held-out runs first."""
+    found, examination = diagnosis.findings, diagnosis.examination
+    if not found.explanations:
+        return None
+    chosen = diagnosis.explanations[:_MOST_EXPLANATIONS]
+    alternatives = {alternative.keys for alternative in diagnosis.verdict.alternatives}
+    rows = []
+    for one in chosen:
+        for_: list[str] = []
+        against: list[str] = []
+        open_: list[str] = []
+        for candidate in one.fit.candidates:
+            on = examination.evidence_on(candidate.effect)
+            for_ += on.speaks_for
+            against += on.speaks_against
+            open_ += on.still_open
+            doubted = examination.cut.doubted if examination.cut else ""
+            if candidate.effect.block == "sensor" and doubted:
+                own = candidate.channel.partition("<")[0]
+                (for_ if own == doubted else against).append(f"{doubted} contradicts the others")
+        gain = found.retuned.held_out - one.held_out
+        rows.append(
+            (
+                _named(one),
+                _standing(diagnosis, one, alternatives),
+                text(gain, 3),
+                "; ".join(dict.fromkeys(for_)) or MISSING,
+                "; ".join(dict.fromkeys(against)) or MISSING,
+                "; ".join(dict.fromkeys(open_)) or MISSING,
+            )
+        )
+    return Table(
+        "Evidence for and against",
+        (
+            "explanation",
+            "standing",
+            "gain on held-out runs",
+            "speaks for it",
+            "speaks against it",
+            "cannot be told",
+        ),
+        tuple(rows),
+        "The tests on the missing force and on the sensors know of no candidate. Fits decide; a test that "
+        "contradicts the named effect is a reason to doubt it.",
+    )
+
+
+def remains_table(diagnosis: Diagnosis) -> Table:
+    """What is left of every channel on held-out runs."""
+    found = diagnosis.findings
+    steps = [("believed", found.believed), ("retuned", found.retuned)]
+    if diagnosis.verdict.best is not None:
+        steps.append((extended_label(diagnosis), diagnosis.verdict.best))
+    readings = [found.readings(step) for _, step in steps]
+    names = dict.fromkeys(one.channel for run in found.held_out for one in run)
+    rows = []
+    for name in names:
+        shown = []
+        for reading in readings:
+            squares = [
+                observed.residual(reading[observed.run.name][name])[observed.informative] ** 2
+                for run in found.held_out
+                for observed in run
+                if observed.channel == name
+            ]
+            joined = np.concatenate(squares)
+            shown.append(text(float(np.sqrt(joined.mean())), 3) if joined.size else MISSING)
+        rows.append((name, *shown))
+    return Table(
+        "What remains per channel",
+        ("channel", *[label for label, _ in steps]),
+        tuple(rows),
+        "RMS of the weighted residual on held-out runs where the recording stands out of the noise; one is the "
+        "noise floor.",
+    )
+
+
+def limits_table(diagnosis: Diagnosis) -> Table:
+    """What this case cannot decide."""
+    limits = list(diagnosis.findings.split.limits)
+    cut = diagnosis.examination.cut
+    if cut is not None:
+        limits += [f"{one.block}: {one.remark}" for one in cut.blocks if one.remark]
+        limits += [cut.remark] if cut.remark else []
+    for place, character in diagnosis.examination.characters.items():
+        undecided = [answer.question for answer in character.answers if answer.finding == CANNOT_TELL]
+        if undecided:
+            limits.append(f"force at the {place}: no answer on {', '.join(undecided)}")
+    rows = tuple((limit,) for limit in dict.fromkeys(limits)) or ((MISSING,),)
+    return Table("Limits", ("what these recordings cannot tell",), rows)
+
+
+def _named(explanation: Explanation) -> str:
+    """Effects of an explanation and where they act."""
+    return " + ".join(form_and_place(candidate) for candidate in explanation.fit.candidates)
+
+
+def _standing(diagnosis: Diagnosis, explanation: Explanation, alternatives: Collection[tuple[str, ...]]) -> str:
+    verdict = diagnosis.verdict
+    if verdict.best is not None and explanation.keys == verdict.best.keys:
+        return verdict.kind if verdict.kind != "unknown" else "nearest, not adequate"
+    if explanation.keys in alternatives:
+        return "as good"
+    is_more = verdict.best is not None and set(explanation.keys) > set(verdict.best.keys)
+    return "not worth one more effect" if is_more and verdict.kind != "unknown" else "worse"
+
+
+def _holds(holds: bool | None) -> str:
+    return CANNOT_TELL if holds is None else "yes" if holds else "no"
+
+
+def _sentence(words: str) -> str:
+    return f"{words[0].upper()}{words[1:]}." if words else ""

@@ -1,0 +1,113 @@
+"""The page of a blind trial as markdown: numbers first, then figures, then every failure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from pipelines.diagnosis.trial_figures import CLASS_WORDS
+from sealed_trial.scoring.score import Gain, Score
+from sealed_trial.scoring.statistics import Rate
+
+CAPTIONS: Final = {
+    "classes": "Answers by class; right ones are framed.",
+    "names": "Answers by what was hidden.",
+    "detection": (
+        "What became of every hidden effect against its strength; filled marks were answered right. "
+        "The line is a logistic curve, the dashed one three times the noise floor."
+    ),
+    "gains": "Error on held-out runs before and after, over that of the ceiling, as the verdicts state it.",
+}
+
+
+def page_text(score: Score, figures: Sequence[str]) -> str:
+    """The whole page."""
+    title = "sealed" if score.purpose == "sealed" else "development"
+    parts = [
+        f"# Blind trial ({title} set)",
+        f"{len(score.marks)} cases. Intervals are those of Clopper and Pearson at 95 %.",
+        _rates(score),
+        _numbers(score),
+        "\n\n".join(f"![{CAPTIONS[name]}](figures/{name}.png)\n\n{CAPTIONS[name]}" for name in figures),
+        _rivals(score),
+        _gains(score.gains),
+        _failures(score),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+
+
+def _percent(value: float) -> str:
+    return "–" if math.isnan(value) else f"{100 * value:.0f} %"
+
+
+def _share(rate: Rate) -> list[str]:
+    interval = f"{_percent(rate.low)} … {_percent(rate.high)}" if rate.n else "–"
+    return [f"{rate.successes} of {rate.n}", _percent(rate.value), interval]
+
+
+def _rates(score: Score) -> str:
+    return _table(
+        ["", "cases", "share", "interval"], [[name, *_share(rate)] for name, rate in score.rates.items()]
+    )
+
+
+def _numbers(score: Score) -> str:
+    done = [outcome for outcome in score.outcomes.values() if outcome.status == "done"]
+    rows = [
+        ["logarithmic score of the probabilities, mean", _number(score.log_score)],
+        ["Brier score, mean (0 … 2)", _number(score.brier_score)],
+        ["held-out error after naming over the ceiling, median", _number(score.after_over_ceiling)],
+        ["strength at which half of the effects are detected", _number(score.curve.half) if score.curve else "–"],
+        ["processor time per case, median and largest", _spread([one.processor_s for one in done], "s")],
+        ["wall time per case, median and largest", _spread([one.wall_s for one in done], "s")],
+        ["memory per case, largest", _spread([one.memory_mib for one in done], "MiB")],
+    ]
+    return _table(["", ""], rows)
+
+
+def _number(value: float) -> str:
+    return "–" if math.isnan(value) else f"{value:.3g}"
+
+
+def _spread(values: Sequence[float], unit: str) -> str:
+    return f"{np.median(values):.0f} and {max(values):.0f} {unit}" if values else "–"
+
+
+def _rivals(score: Score) -> str:
+    rows = [[name, *_share(rival)] for name, rival in score.rivals.items()]
+    text = "The class of a case, guessed without its signals, is right for:"
+    return "## Rivals\n\n" + text + "\n\n" + _table(["", "cases", "share", "interval"], rows)
+
+
+def _gains(gains: Sequence[Gain]) -> str:
+    if not gains:
+        return ""
+    rows = [
+        [
+            gain.case,
+            CLASS_WORDS[gain.kind],
+            *(f"{v:.3g}" for v in (gain.floor, gain.retuned, gain.after, gain.ceiling)),
+        ]
+        for gain in gains
+    ]
+    head = ["case", "class", "noise floor", "retuned", "as diagnosed", "ceiling"]
+    return "## Held-out errors, case by case\n\n" + _table(head, rows)
+
+
+def _failures(score: Score) -> str:
+    rows = []
+    for mark in score.failures:
+        outcome = score.outcomes[mark.case]
+        strength = f"{mark.strength:.1f}" if mark.strength else "–"
+        said = mark.answered if outcome.status == "done" else outcome.status.replace("_", " ")
+        rows.append([mark.case, CLASS_WORDS[mark.kind], mark.truth, strength, said, mark.column])
+    text = _table(["case", "class", "hidden", "strength", "answered", "which is"], rows) if rows else "None."
+    return "## Every failure\n\n" + text

@@ -1,0 +1,156 @@
+"""Writing the report of a model: page, figures, training curve, maps and residual tests."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipelines.liquid_model.comparison import validated
+from pipelines.liquid_model.results import Training, ValidatedModel
+from pipelines.liquid_model.sections import page_of
+from pipelines.liquid_model.training_runs import TrainingRuns
+from pipelines.report.outputs import sha256_of, versions, write_dataset
+from pipelines.report.page import write_page
+from pipelines.report.progress import progress
+from sloshlab import atomic_file
+from sloshlab.quantities import described
+from sloshlab.reduced_order_model.model import ReducedOrderModel
+
+_N_FIGURES = 11
+
+
+def write_validation(
+    model: ReducedOrderModel,
+    runs: TrainingRuns,
+    test: Sequence[Path],
+    folder: Path,
+    *,
+    command: str,
+    training: Training | None = None,
+    model_file: Path | None = None,
+) -> dict[str, Any]:
+    """Compare a model with recordings and write the report; return what is to be said.
+
+    Parameters
+    ----------
+    model : ReducedOrderModel
+    runs : TrainingRuns
+    test : sequence of Path
+        Further runs.
+    folder : Path
+        All files appear in it together, complete, or none does.
+    command : str
+        What the user typed, for the report.
+    training : Training, optional
+    model_file : Path, optional
+        Where the model was read from.
+    """
+    files = runs.files
+    n_steps = 3 + len(files.validation) + len(test) + _N_FIGURES
+    with progress("validation", n_steps) as advance:
+        found = validated(model, runs, test, training=training, advance=advance)
+        read = () if model_file is None else (model_file,)
+        inputs = (*read, *files.training, *files.validation, *test, *files.still, files.rig)
+        provenance = {
+            "command": command,
+            "inputs": {path.name: sha256_of(path) for path in inputs},
+            "versions": versions(),
+        }
+        found = dataclasses.replace(found, provenance=provenance)
+        with atomic_file.filled_folder(folder) as complete:
+            for name, dataset in datasets(found).items():
+                write_dataset(dataset, complete / name)
+            write_page(page_of(found), complete, progress=lambda _done, _total, name: advance(name))
+    return _summary(found, folder)
+
+
+def datasets(found: ValidatedModel) -> dict[str, xr.Dataset]:
+    """What is written beside the page, by file name."""
+    written = {}
+    if found.training is not None:
+        written["training_curve.nc"] = _training_curve(found.training)
+    if found.maps is not None:
+        written["maps.nc"] = _maps(found)
+    if found.tests:
+        written["residual.nc"] = _residual(found)
+    stamp = {
+        "title": "Validation of a reduced-order model",
+        "inputs": json.dumps(found.provenance.get("inputs", {}), sort_keys=True),
+        "versions": json.dumps(found.provenance.get("versions", {}), sort_keys=True),
+    }
+    return {name: described(dataset).assign_attrs(stamp) for name, dataset in written.items()}
+
+
+def _training_curve(training: Training) -> xr.Dataset:
+    epochs = training.record.epochs
+    return xr.Dataset(
+        {
+            "start_number": ("epoch_index", np.array([epoch.start for epoch in epochs])),
+            "epoch_number": ("epoch_index", np.array([epoch.number for epoch in epochs])),
+            "training_rms_n": ("epoch_index", np.sqrt([epoch.training_mse for epoch in epochs])),
+            "validation_rms_n": ("epoch_index", np.sqrt([epoch.validation_mse for epoch in epochs])),
+            "is_kept": ("epoch_index", np.array([epoch is training.record.best for epoch in epochs], np.int8)),
+        }
+    )
+
+
+def _maps(found: ValidatedModel) -> xr.Dataset:
+    assert found.maps is not None
+    variables: dict[str, Any] = {}
+    for name in ("w_bar", "beta"):
+        variables[name] = found.maps.measured.maps.dataset[name].variable
+        variables[f"predicted_{name}"] = found.maps.predicted.maps.dataset[name].variable
+        variables[f"{name}_difference"] = found.maps.difference(name).variable
+    coordinates = {name: found.maps.measured.maps.dataset[name].values for name in ("omega_bar", "u_bar")}
+    return xr.Dataset(variables, coords=coordinates)
+
+
+def _residual(found: ValidatedModel) -> xr.Dataset:
+    """Correlations of the first validation run."""
+    tests = next(iter(found.tests.values()))
+    rate = found.model.sampling_rate_hz
+    n = max(test.lags.size for test in tests)
+    values = np.full((2, len(tests), n), np.nan)
+    for row, test in enumerate(tests):
+        values[0, row, -test.lags.size :], values[1, row, -test.lags.size :] = test.correlation, test.band
+    return xr.Dataset(
+        {
+            "residual_correlation": (("residual_test", "lag_s"), values[0]),
+            "residual_band": (("residual_test", "lag_s"), values[1]),
+            "residual_explained": ("residual_test", [test.explained for test in tests]),
+        },
+        coords={
+            "residual_test": np.array([test.against for test in tests], dtype=object),
+            "lag_s": np.arange(n) / rate,
+        },
+    )
+
+
+def _summary(found: ValidatedModel, folder: Path) -> dict[str, Any]:
+    said: dict[str, Any] = {"report": str(folder / "report.html")}
+    lines = []
+    if found.ceiling:
+        pairs = found.ceiling
+        said["ceiling_percent"] = float(np.mean([pair.repeats.fit_of_ideal_model().fit_percent for pair in pairs]))
+        said["repeat_percent"] = float(np.mean([pair.repeats.fit().fit_percent for pair in pairs]))
+        said["model_on_repeats_percent"] = float(np.mean([pair.model.fit_percent for pair in pairs]))
+        lines.append(
+            f"on repeats: fit {said['model_on_repeats_percent']:.1f} %, one repeat for another "
+            f"{said['repeat_percent']:.1f} %, ideal model {said['ceiling_percent']:.1f} %"
+        )
+    if found.maps is not None:
+        for name, error in found.maps.errors.items():
+            said[f"{name}_map_error"] = error.relative_rms
+        lines.append(
+            f"maps: RMS error of W̄ {100 * said['w_bar_map_error']:.1f} %, of β "
+            f"{100 * said['beta_map_error']:.1f} % of "
+            "the largest value"
+        )
+    lines += [f"residual on {run}: {test.verdict}" for run, tests in found.tests.items() for test in tests[:2]]
+    return {"lines": [*lines, f"report: {folder / 'report.html'}"], "flags": list(found.flags), **said}

@@ -1,0 +1,140 @@
+"""The command `study`: many models of one liquid, picked by validation error."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+
+from pipelines.liquid_model.sensitivity_study import (
+    FURTHER_CASES,
+    MODEL_NAME,
+    SOURCE_CASES,
+    CaseResult,
+    picked,
+    sensitivity_study,
+)
+from pipelines.liquid_model.study_page import StudiedModels, page_of
+from pipelines.liquid_model.training_runs import RunFiles, training_runs
+from pipelines.report.outputs import sha256_of, versions, write_dataset
+from pipelines.report.page import write_page
+from pipelines.report.progress import amounts
+from sloshlab import atomic_file
+from sloshlab.errors import InputError
+from sloshlab.quantities import described
+from sloshlab.reduced_order_model.training import TrainingSettings
+
+CASES: Final = {"source": SOURCE_CASES, "all": (*SOURCE_CASES, *FURTHER_CASES)}
+BEST_NAME: Final = "ROM.nc"
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """Choices of a study.
+
+    Attributes
+    ----------
+    cases : {"all", "source"}
+    rate_hz : float, optional
+        By default chosen from the training runs.
+    n_workers : int
+    """
+
+    cases: str = "all"
+    rate_hz: float | None = None
+    n_workers: int = 2
+
+
+def study(
+    files: RunFiles, folder: Path, wanted: StudySettings, settings: TrainingSettings, *, command: str
+) -> dict[str, Any]:
+    """Train all cases, pick one, and write table, figure and the picked model; return what is to be said.
+
+    Parameters
+    ----------
+    files : RunFiles
+    folder : Path
+        Cases that it holds already are not trained again.
+    wanted : StudySettings
+    settings : TrainingSettings
+    command : str
+        What the user typed, for the report.
+
+    Raises
+    ------
+    InputError
+        If a recording, the rig or a setting is bad.
+    """
+    if wanted.cases not in CASES:
+        raise InputError("--cases", got=repr(wanted.cases), allowed=", ".join(CASES))
+    runs = training_runs(files, wanted.rate_hz)
+    with amounts("study") as advance:
+        last = ""
+
+        def told(result: CaseResult, done: int, n: int) -> None:
+            nonlocal last
+            last = f"{done} of {n} cases, {result.case.name}: {math.sqrt(result.validation_mse):.4g} N"
+
+        results = sensitivity_study(
+            [one.run() for one in runs.training],
+            [one.run() for one in runs.validation],
+            runs.rate_hz,
+            folder,
+            settings,
+            cases=CASES[wanted.cases],
+            n_workers=wanted.n_workers,
+            facts=runs.facts(),
+            told=told,
+            watch=lambda share: advance(share, 1.0, last),
+        )
+    pick = picked(results)
+    best = folder / pick.best.case.name / MODEL_NAME
+    inputs = (*files.training, *files.validation, *files.still, files.rig)
+    provenance = {
+        "command": command,
+        "inputs": {path.name: sha256_of(path) for path in inputs},
+        "versions": versions(),
+    }
+    flags = (*runs.flags, *(f"{result.case.name}: {result.ended}" for result in results if not result.is_trained))
+    found = StudiedModels(tuple(results), pick, settings, runs.rate.reason, flags, provenance)
+    with atomic_file.filled_folder(folder) as complete:
+        write_dataset(dataset_of(results), complete / "study.nc")
+        atomic_file.write_bytes(complete / BEST_NAME, best.read_bytes())
+        write_page(page_of(found), complete)
+    return {
+        "lines": [f"picked: {pick.reason}", f"model: {folder / BEST_NAME}", f"report: {folder / 'report.html'}"],
+        "flags": list(flags),
+        "output": str(folder),
+        "picked": pick.best.case.name,
+        "lighter": pick.lighter.case.name,
+        "validation_rms_n": math.sqrt(pick.best.validation_mse),
+        "cases": len(results),
+        "training_s": sum(result.seconds for result in results),
+    }
+
+
+def dataset_of(results: list[CaseResult]) -> xr.Dataset:
+    """One row per case, the best first; errors are infinite where a case could not be trained."""
+    variables: dict[str, list[Any]] = {
+        "study_case": [result.case.name for result in results],
+        "structure": [result.case.structure for result in results],
+        "network": [result.case.network for result in results],
+        "n_input_delays": [result.case.delays for result in results],
+        "n_output_delays": [result.case.output_delays for result in results],
+        "n_neurons": [result.case.neurons for result in results],
+        "n_parameters": [result.n_parameters for result in results],
+        "n_epochs": [result.n_epochs for result in results],
+        "training_s": [result.seconds for result in results],
+        "training_rms_n": [math.sqrt(result.training_mse) for result in results],
+        "validation_rms_n": [math.sqrt(result.validation_mse) for result in results],
+        "ended": [result.ended for result in results],
+    }
+    columns: dict[str, Any] = {}
+    for name, values in variables.items():
+        is_text = isinstance(values[0], str)
+        columns[name] = ("case_number", np.array(values, dtype=object if is_text else None))
+    return described(xr.Dataset(columns)).assign_attrs(title="Sensitivity study of reduced-order models")

@@ -1,0 +1,322 @@
+"""The command `train`: a reduced-order model of the liquid from runs on the shaker."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.liquid_model.extensions import remembering, trained_ensemble
+from pipelines.liquid_model.training_runs import RunFiles, TrainingRuns, require_new_runs, training_runs
+from pipelines.report.outputs import sha256_of
+from pipelines.report.progress import amounts
+from sloshlab.errors import InputError
+from sloshlab.recording import read_attributes
+from sloshlab.reduced_order_model.agitation import Agitation
+from sloshlab.reduced_order_model.ensemble import Ensemble
+from sloshlab.reduced_order_model.ensemble_storage import save_ensemble
+from sloshlab.reduced_order_model.fit_quality import FitQuality, fit_quality
+from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
+from sloshlab.reduced_order_model.model import ReducedOrderModel
+from sloshlab.reduced_order_model.network_list import NETWORKS
+from sloshlab.reduced_order_model.regressors import Delays
+from sloshlab.reduced_order_model.stability import stability
+from sloshlab.reduced_order_model.storage import load_model, save_model
+from sloshlab.reduced_order_model.training import Epoch, TrainingRecord, TrainingSettings, fit
+from sloshlab.reduced_order_model.validity_domain import ValidityDomain
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """What is to be trained.
+
+    Attributes
+    ----------
+    structure : {"nfir", "noe"}
+        Without feedback, or with its own outputs fed back.
+    delays, output_delays : int
+        Length of the delay lines; output delays of NOE only.
+    neurons : int
+    network : str
+        One of `NETWORKS`.
+    rate_hz : float, optional
+        By default chosen from the data.
+    memory_s : float, optional
+        Time constant of a slow state of the speed that the network sees, too.
+    sudden_starts : tuple of Path
+        Recordings from rest, to which a break-up of the liquid is fitted.
+    n_members : int
+        Of an ensemble trained besides; 0 for none.
+    """
+
+    structure: str
+    delays: int
+    output_delays: int
+    neurons: int
+    network: str = "normalised_rbf"
+    rate_hz: float | None = None
+    memory_s: float | None = None
+    sudden_starts: tuple[Path, ...] = ()
+    n_members: int = 0
+
+    def checked(self) -> ModelSettings:
+        """Return self if nothing is impossible.
+
+        Raises
+        ------
+        InputError
+            If something is.
+        """
+        if self.structure not in ("nfir", "noe"):
+            raise InputError("--model", got=repr(self.structure), allowed="nfir, noe")
+        if self.network not in NETWORKS:
+            raise InputError("--network", got=repr(self.network), allowed=", ".join(NETWORKS))
+        if self.structure == "noe" and self.network == "multilayer":
+            raise InputError("--network with feedback", got="multilayer", allowed="normalised_rbf, rbf")
+        if self.structure == "noe" and (self.memory_s is not None or self.sudden_starts):
+            raise InputError("memory of the liquid", got="--model noe", allowed="--model nfir")
+        if self.n_members == 1:
+            raise InputError("--ensemble", got="1", allowed="0, or at least 2")
+        self.delay_lines(), self.agitation()
+        return self
+
+    def agitation(self) -> Agitation | None:
+        """Return the slow state, if there shall be one."""
+        return None if self.memory_s is None else Agitation("speed", (self.memory_s,))
+
+    def delay_lines(self) -> Delays:
+        """Return the delays of the model."""
+        return Delays.tapped(self.delays, self.output_delays if self.structure == "noe" else 0)
+
+    def network_settings(self) -> dict[str, Any]:
+        """Return what the network is made of beside its inputs."""
+        if self.network == "multilayer":
+            return {"layers": str(self.neurons)}
+        return {"n_neurons": self.neurons}
+
+
+@dataclass(frozen=True)
+class TrainedModel:
+    """A model with all that a report of it needs.
+
+    Attributes
+    ----------
+    model : ReducedOrderModel
+    record : TrainingRecord
+    runs : TrainingRuns
+    settings : TrainingSettings
+    quality : FitQuality
+        Of the free run over all validation runs together.
+    ensemble : Ensemble, optional
+    """
+
+    model: ReducedOrderModel
+    record: TrainingRecord
+    runs: TrainingRuns
+    settings: TrainingSettings
+    quality: FitQuality
+    ensemble: Ensemble | None = None
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What a reader must know before using the model."""
+        interrupted = ("training was interrupted; the best model so far is kept",)
+        return self.runs.flags + (interrupted if self.record.interrupted else ())
+
+
+def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSettings) -> TrainedModel:
+    """Train a model on some runs of the shaker and validate it on others.
+
+    Parameters
+    ----------
+    files : RunFiles
+    wanted : ModelSettings
+    settings : TrainingSettings
+
+    Raises
+    ------
+    InputError
+        If a recording, the rig or their combination is bad.
+    """
+    wanted = wanted.checked()
+    runs = training_runs(files, wanted.rate_hz)
+    n_epochs = (settings.n_epochs + 1) * (2 if wanted.structure == "noe" else 1)
+    with amounts("train") as advance:
+
+        def told(epoch: Epoch) -> None:
+            done = epoch.start * n_epochs + epoch.number + 1
+            errors = f"epoch {epoch.number}, error {epoch.training_mse**0.5:.4g} N, validation "
+            advance(done, settings.n_starts * n_epochs, f"{errors}{epoch.validation_mse**0.5:.4g} N")
+
+        model, record = fit(
+            wanted.network,
+            wanted.network_settings(),
+            wanted.delay_lines(),
+            [one.run() for one in runs.training],
+            [one.run() for one in runs.validation],
+            runs.rate_hz,
+            settings,
+            agitation=wanted.agitation(),
+            told=told,
+        )
+    errors = {"training_mse_n2": record.best.training_mse, "validation_mse_n2": record.best.validation_mse}
+    model.facts.update(runs.facts() | errors)
+    ensemble = trained_ensemble(model, wanted.n_members, runs, settings) if wanted.n_members else None
+    if wanted.sudden_starts:
+        model = remembering(model, wanted.sudden_starts, runs)
+    return TrainedModel(model, record, runs, settings, _quality(model, runs.validation), ensemble)
+
+
+def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
+    """Write the model; return what is to be said.
+
+    Parameters
+    ----------
+    trained : TrainedModel
+    output : Path
+    """
+    save_model(trained.model, output)
+    best, quality = trained.record.best, trained.quality
+    forgetting = stability(trained.model, [one.velocity_m_per_s for one in trained.runs.training])
+    lines = [
+        f"model: {output}",
+        f"rate: {trained.runs.rate.reason}",
+        f"training: {len(trained.record.epochs)} epochs, {trained.record.ended}; kept: epoch {best.number} of "
+        f"start {best.start}",
+        f"free run on the validation runs: fit {quality.fit_percent:.1f} % (as printed in the source "
+        f"{quality.fit_percent_as_printed:.1f} %), error {quality.rms_error:.3g} N RMS",
+        forgetting.line("N"),
+        *_extension_lines(trained, output),
+    ]
+    unstable = (
+        [] if forgetting.is_stable else ["the model does not forget its start: small errors grow in a free run"]
+    )
+    return {
+        "lines": lines,
+        "flags": [*trained.flags, *unstable],
+        "output": str(output),
+        "fit_percent": quality.fit_percent,
+        "fit_percent_as_printed": quality.fit_percent_as_printed,
+        "rms_error_n": quality.rms_error,
+        "epochs": len(trained.record.epochs),
+        "sampling_rate_hz": trained.model.sampling_rate_hz,
+    }
+
+
+def train_and_report(
+    files: RunFiles,
+    test: Sequence[Path],
+    wanted: ModelSettings,
+    settings: TrainingSettings,
+    output: Path,
+    command: str | None,
+) -> dict[str, Any]:
+    """Train, write the model, and write the report into a folder of its name beside it.
+
+    Parameters
+    ----------
+    files : RunFiles
+    test : sequence of Path
+        Further runs, for the report.
+    wanted : ModelSettings
+    settings : TrainingSettings
+    output : Path
+        The model; the report goes to the folder of that name without its suffix.
+    command : str, optional
+        What the user typed, for the report; without it there is no report.
+
+    Raises
+    ------
+    InputError
+        If a recording, the rig or their combination is bad, or there is no place for the report.
+    """
+    folder = report_folder(output)
+    require_new_runs(test, files)
+    if command is not None and folder.exists() and not folder.is_dir():
+        raise InputError(
+            f"report folder {folder}",
+            got="a file",
+            allowed="a folder or nothing",
+            remedy="name the model otherwise",
+        )
+    for path in test if command is not None else ():
+        read_attributes(path)  # before hours of training, not after them
+    trained = trained_model(files, wanted, settings)
+    summary = write_model(trained, output)
+    if command is None:
+        return summary
+    from pipelines.liquid_model.outputs import write_validation
+    from pipelines.liquid_model.results import Training
+
+    training = Training(trained.record, settings, trained.runs.rate.reason)
+    said = write_validation(trained.model, trained.runs, test, folder, command=command, training=training)
+    lines, flags = summary["lines"] + said.pop("lines"), dict.fromkeys([*summary["flags"], *said.pop("flags")])
+    return summary | said | {"lines": lines, "flags": list(flags)}
+
+
+def _extension_lines(trained: TrainedModel, output: Path) -> list[str]:
+    """Write the ensemble beside the model; say what there is beyond the model without memory."""
+    lines = []
+    if (break_up := trained.model.break_up) is not None:
+        lines.append(
+            f"break-up: growth {break_up.growth_per_s:.3g}/s, exponent {break_up.exponent:.2g}, "
+            f"calming {break_up.calming_s:.3g} s, {100 * break_up.at_rest:.2g} % broken up at rest"
+        )
+    if trained.ensemble is not None:
+        path = output.with_name(f"{output.stem}_ensemble.nc")
+        save_ensemble(trained.ensemble, path)
+        residual = trained.ensemble.residual
+        lines.append(
+            f"ensemble: {path}, {len(trained.ensemble.members)} members; residual on the validation runs "
+            f"{residual.constant:.3g} N and {residual.slope:.2g} of the force"
+        )
+    return lines
+
+
+def report_folder(model: Path) -> Path:
+    """Return where the report of a model goes.
+
+    Examples
+    --------
+    >>> report_folder(Path("results/ROM.nc")).as_posix(), report_folder(Path("ROM")).as_posix()
+    ('results/ROM', 'ROM_report')
+    """
+    return model.with_suffix("") if model.suffix else model.with_name(f"{model.name}_report")
+
+
+def validate_model(
+    path: Path, files: RunFiles, test: Sequence[Path], folder: Path, command: str
+) -> dict[str, Any]:
+    """Write the report of a model that is there already.
+
+    Raises
+    ------
+    InputError
+        If the model is damaged, was trained on one of the runs, or a run is bad.
+    """
+    from pipelines.liquid_model.outputs import write_validation
+
+    model = load_model(path)
+    try:
+        ValidityDomain.of_facts(model.facts["domain"])
+        known = set(dict(model.facts["training"]).values())
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise InputError(
+            f"model {path}",
+            got="no domain of validity or no training runs",
+            allowed="a model of `sloshlab train` or `sloshlab study`",
+        ) from None
+    for run in (*files.validation, *test):
+        if sha256_of(run) in known:
+            raise InputError(f"run {run}", got="one that the model was trained on", allowed="other runs")
+    require_new_runs(test, files)
+    runs = training_runs(files, model.sampling_rate_hz)
+    return write_validation(model, runs, test, folder, command=command, model_file=path)
+
+
+def _quality(model: ReducedOrderModel, runs: Sequence[LiquidSignals]) -> FitQuality:
+    simulated = [model.simulate(run.velocity_m_per_s, run.dynamic_force_n) for run in runs]
+    return fit_quality(np.concatenate([run.dynamic_force_n for run in runs]), np.concatenate(simulated))

@@ -1,0 +1,223 @@
+"""From recordings of the shaker to what models are trained on: runs of one rig, its dry mass, the rate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from pipelines.report.outputs import sha256_of
+from pipelines.sweep.stages import naming, require_usable
+from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass
+from sloshlab.conditioning.combined_channels import acceleration_channels, force_channels
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.recording import read_recording
+from sloshlab.reduced_order_model.liquid_signals import LiquidSignals, liquid_signals
+from sloshlab.reduced_order_model.model_rate import ModelRate, chosen_rate
+from sloshlab.reduced_order_model.tank_scaling import tank_facts
+from sloshlab.reduced_order_model.validity_domain import ValidityDomain, motion_cycles
+from sloshlab.rig import Rig
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """Files of a training.
+
+    Attributes
+    ----------
+    training, validation : tuple of Path
+        Runs of the moving liquid; none for training where a model is only validated.
+    still : tuple of Path
+        Empty or frozen runs, for the dry mass.
+    rig : Path
+    """
+
+    training: tuple[Path, ...]
+    validation: tuple[Path, ...]
+    still: tuple[Path, ...]
+    rig: Path
+
+    @classmethod
+    def of(cls, runs: Sequence[Path], still: Sequence[Path], rig: Path) -> RunFiles:
+        """Take the last run for validation and the others for training.
+
+        Raises
+        ------
+        InputError
+            If there are not two, or the last one is among the others.
+        """
+        if len(runs) < 2:
+            raise InputError(
+                "runs", got="one", allowed="TRAIN.nc... VALID.nc", remedy="give another run for validation"
+            )
+        files = cls(tuple(runs[:-1]), (runs[-1],), tuple(still), rig)
+        hashes = {sha256_of(path): path for path in files.training}
+        if (same := hashes.get(sha256_of(runs[-1]))) is not None:
+            raise InputError(
+                f"validation run {runs[-1]}",
+                got=f"the training run {same}",
+                allowed="a run that the model is not trained on",
+                remedy="record another run, or split off one of several training runs",
+            )
+        return files
+
+
+@dataclass(frozen=True)
+class TrainingRuns:
+    """Signals of a training at the rate of the model.
+
+    Attributes
+    ----------
+    files : RunFiles
+    rig : Rig
+    dry : DryMass or None
+        Identified, if there were still runs.
+    rate : ModelRate
+        Chosen from the training runs, or from the validation runs where there are no others.
+    rate_hz : float
+        Of the signals; the chosen one unless another was wanted.
+    training, validation : list of LiquidSignals
+    """
+
+    files: RunFiles
+    rig: Rig
+    dry: DryMass | None
+    rate: ModelRate
+    rate_hz: float
+    training: list[LiquidSignals]
+    validation: list[LiquidSignals]
+
+    @cached_property
+    def domain(self) -> ValidityDomain:
+        """Where a model of these runs knows what it says."""
+        return ValidityDomain.of([motion_cycles(one.velocity_m_per_s, self.rate_hz) for one in self.training])
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What a reader must know before using a model of these runs."""
+        if self.dry is not None:
+            return ()
+        return (f"dry mass taken from {self.files.rig.name}, not identified; give --still runs",)
+
+    def facts(self) -> dict[str, Any]:
+        """Return what a model keeps of them."""
+        return {
+            "training": {path.name: sha256_of(path) for path in self.files.training},
+            "validation": {path.name: sha256_of(path) for path in self.files.validation},
+            **tank_facts(self.rig),
+            "dry_mass_kg": self.rig.tank.dry_mass_kg if self.dry is None else self.dry.mass_kg,
+            "domain": self.domain.facts(),
+        }
+
+
+def training_runs(files: RunFiles, rate_hz: float | None = None) -> TrainingRuns:
+    """Read the runs of a training.
+
+    Parameters
+    ----------
+    files : RunFiles
+    rate_hz : float, optional
+        Of the model; by default chosen from the training runs.
+
+    Raises
+    ------
+    InputError
+        If a recording, the rig or their combination is bad.
+    """
+    rig = Rig.from_toml(files.rig)
+    dry = dry_mass(files.still, rig)
+    training, validation = (
+        [signals_of(sloshing_run(path, rig), rig, dry) for path in paths]
+        for paths in (files.training, files.validation)
+    )
+    rate = chosen_rate(training or validation)
+    wanted = rate_hz or rate.sampling_rate_hz
+    return TrainingRuns(
+        files,
+        rig,
+        dry,
+        rate,
+        wanted,
+        [one.at_rate(wanted) for one in training],
+        [one.at_rate(wanted) for one in validation],
+    )
+
+
+def require_new_runs(test: Sequence[Path], files: RunFiles) -> None:
+    """Refuse test runs that the model is trained on or chosen by, and runs given twice.
+
+    Raises
+    ------
+    InputError
+        Naming the run.
+    """
+    known = {sha256_of(path): path for path in (*files.training, *files.validation)}
+    for path in test:
+        digest = sha256_of(path)
+        if digest in known:
+            raise InputError(f"test run {path}", got=f"the same as {known[digest]}", allowed="other runs")
+        known[digest] = path
+
+
+def dry_mass(paths: Sequence[Path], rig: Rig) -> DryMass | None:
+    """Identify the dry mass from empty and frozen runs; None without any.
+
+    Raises
+    ------
+    InputError
+        If a run is unusable, or neither empty nor frozen.
+    """
+    if not paths:
+        return None
+    runs: dict[str, list[xr.Dataset]] = {"empty": [], "frozen": []}
+    for path in paths:
+        recording = usable_run(path, rig)
+        configuration = str(recording.attrs.get("configuration"))
+        if configuration not in runs:
+            raise AnalysisError(
+                f"{path}: configuration", got=repr(configuration), allowed="empty or frozen with --still"
+            )
+        runs[configuration].append(recording)
+    first = (runs["empty"] + runs["frozen"])[0]
+    return identify_dry_mass(
+        runs["empty"],
+        runs["frozen"],
+        liquid_mass_kg=rig.liquid_mass_kg,
+        force_names=force_channels(first),
+        acceleration_names=acceleration_channels(first),
+    )
+
+
+def usable_run(path: Path, rig: Rig) -> xr.Dataset:
+    """Read a recording with working sensors and the right signs."""
+    with naming(path):
+        recording = read_recording(path)
+        require_usable(recording, path)
+        check_signs(recording, rig)
+    return recording
+
+
+def sloshing_run(path: Path, rig: Rig) -> xr.Dataset:
+    """Read a usable recording of the moving liquid.
+
+    Raises
+    ------
+    AnalysisError
+        If the liquid was frozen, or there was none.
+    """
+    recording = usable_run(path, rig)
+    configuration = recording.attrs.get("configuration")
+    if configuration != "sloshing":
+        raise AnalysisError(f"{path}: configuration", got=repr(configuration), allowed="sloshing")
+    return recording
+
+
+def signals_of(recording: xr.Dataset, rig: Rig, dry: DryMass | None) -> LiquidSignals:
+    """Return velocity and force of a recording, with the identified dry mass if there is one."""
+    if dry is None:
+        return liquid_signals(recording, rig)
+    return liquid_signals(recording, rig, dry_mass_kg=dry.mass_kg, gain_ratio=dry.gain_ratio)

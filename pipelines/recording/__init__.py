@@ -1,0 +1,1 @@
+"""Getting recordings and looking after them: import, check, record, recover, replay, the virtual laboratory."""

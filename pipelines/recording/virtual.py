@@ -1,0 +1,182 @@
+"""The command `virtual`: runs of the virtual laboratory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import xarray as xr
+
+from acquisition.virtual_laboratory.campaign import make_campaign
+from acquisition.virtual_laboratory.numerical_campaign import (
+    CampaignSettings,
+    FinishedRun,
+    make_numerical_campaign,
+)
+from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
+from acquisition.virtual_laboratory.shaker_run import EXPERIMENTS as SHAKER_EXPERIMENTS
+from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run, write_virtual_run
+from acquisition.virtual_laboratory.structure_run import STRUCTURE_EXPERIMENTS, virtual_structure_run
+from pipelines.report.progress import amounts, progress
+from sloshlab.errors import InputError
+from sloshlab.rig import Rig
+
+LIQUIDS: Final = ("law", "numerical")
+RANDOM_LOWEST_HZ: Final = 8.0
+"""Of random motion of the shaker; lower frequencies would use up the stroke."""
+EXPERIMENTS: Final = (*SHAKER_EXPERIMENTS, *STRUCTURE_EXPERIMENTS)
+
+
+@dataclass(frozen=True)
+class VirtualRun:
+    """What the virtual laboratory is asked to do; of the options it takes those that the experiment has."""
+
+    experiment: str
+    configuration: str
+    seed: int
+    liquid: str
+    layers: int
+    acceleration_g: float
+    direction: str
+    law: str
+    frequency_hz: float
+    duration_s: float | None
+    sampling_rate_hz: float | None
+    initial_displacement_m: float | None
+    rms_g: float
+    second_frequency_hz: float = 14.7
+
+    def settings(self) -> dict[str, Any]:
+        """Arguments of the laboratory's own function."""
+        chosen: dict[str, Any] = {
+            "experiment": self.experiment,
+            "configuration": self.configuration,
+            "seed": self.seed,
+            "duration_s": self.duration_s,
+            "sampling_rate_hz": self.sampling_rate_hz,
+        }
+        if self.experiment in STRUCTURE_EXPERIMENTS:
+            chosen["initial_displacement_m"] = self.initial_displacement_m
+            chosen["rms_g"] = self.rms_g
+        else:
+            chosen |= {"acceleration_g": self.acceleration_g, "direction": self.direction, "law": self.law}
+        if self.experiment in ("sudden_start", "shaker_two_tone"):
+            chosen["start_hz"] = self.frequency_hz
+        if self.experiment == "shaker_random":
+            chosen["start_hz"] = RANDOM_LOWEST_HZ
+        if self.experiment == "shaker_two_tone":
+            chosen["stop_hz"] = self.second_frequency_hz
+        return {name: value for name, value in chosen.items() if value is not None}
+
+
+def make_virtual_run(
+    run: VirtualRun, rig: Path | None, output: Path, checkpoint: Path | None = None
+) -> dict[str, Any]:
+    """Make one run and write it.
+
+    Parameters
+    ----------
+    run : VirtualRun
+    rig : Path, optional
+        Rig description; needed.
+    output : Path
+        The recording.
+    checkpoint : Path, optional
+        Where a computed liquid is saved meanwhile; by default beside the recording. Removed at the end.
+
+    Raises
+    ------
+    InputError
+        If the experiment is unknown, no rig is given, or an argument is out of range.
+    """
+    if run.experiment not in EXPERIMENTS:
+        raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join((*EXPERIMENTS, "campaign")))
+    _check_liquid(run.liquid)
+    if rig is None:
+        raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
+    saved = checkpoint or output.with_suffix(".checkpoint")
+    for option, path in (("--output", output), ("--checkpoint", saved)):
+        if path.is_dir() or not path.parent.is_dir():
+            raise InputError(f"{option} {path}", got="no file", allowed="a file in a folder that exists")
+    with amounts(run.experiment) as advance:
+        numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
+        recording = _recorded(run, rig, numerical)
+    write_virtual_run(recording, output)
+    saved.unlink(missing_ok=True)
+    rate_hz = recording.attrs["sampling_rate_hz"]
+    lines = [f"recording: {output} ({recording.sizes['time']} samples at {rate_hz:g} Hz)"]
+    stopped = recording.attrs.get(STOPPED)
+    return {"lines": lines, "flags": [str(stopped)] if stopped else [], "output": str(output)}
+
+
+def _recorded(run: VirtualRun, rig: Path, numerical: NumericalLiquid) -> xr.Dataset:
+    """The liquid follows its law where there is one and nothing else is asked for."""
+    described = Rig.from_toml(rig)
+    if run.experiment in STRUCTURE_EXPERIMENTS:
+        return virtual_structure_run(described, numerical=numerical, rig_name=rig.name, **run.settings())
+    computed = numerical if run.liquid == "numerical" else None
+    return virtual_shaker_run(described, numerical=computed, rig_name=rig.name, **run.settings())
+
+
+def make_campaign_folder(
+    folder: Path, liquid: str, settings: CampaignSettings, say: Callable[[str], None]
+) -> dict[str, Any]:
+    """Make the campaign whose liquid follows its law, of which only the seed can be chosen, or is computed.
+
+    Parameters
+    ----------
+    folder : Path
+    liquid : {'law', 'numerical'}
+    settings : CampaignSettings
+    say : callable
+        Takes a line for every computed run.
+    """
+    _check_liquid(liquid)
+    if liquid == "numerical":
+        return _make_numerical_campaign_folder(folder, settings, say)
+    with progress("campaign", 40) as advance:
+        manifest = make_campaign(folder, seed=settings.seed, progress=lambda done, of, name: advance(name))
+    return {"lines": [f"manifest: {manifest}"], "flags": [], "output": str(folder)}
+
+
+def _check_liquid(liquid: str) -> None:
+    if liquid not in LIQUIDS:
+        raise InputError("--liquid", got=repr(liquid), allowed=", ".join(LIQUIDS))
+
+
+def _make_numerical_campaign_folder(
+    folder: Path, settings: CampaignSettings, say: Callable[[str], None]
+) -> dict[str, Any]:
+    share, start_s = [0.0], time.monotonic()
+
+    def told(run: FinishedRun) -> None:
+        left_s = (time.monotonic() - start_s) * (1 - share[0]) / max(share[0], 1e-6)
+        ending = f" ({run.flag})" if run.flag else ""
+        say(
+            f"{run.n_done} of {run.n_runs}: {run.name}{ending}, computed for {_duration(run.computing_s)}; "
+            f"{100 * share[0]:.0f} % of the work, {_duration(left_s)} left"
+        )
+
+    with amounts("campaign") as advance:
+
+        def progressed(now: float) -> None:
+            share[0] = now
+            advance(round(10_000 * now), 10_000)
+
+        summary = make_numerical_campaign(folder, settings, progressed=progressed, finished=told)
+    lines = [f"made: {summary.n_made}, kept: {summary.n_kept}", f"manifest: {summary.manifest}"]
+    return {
+        "lines": lines,
+        "flags": list(summary.flags),
+        "output": str(folder),
+        "made": summary.n_made,
+        "kept": summary.n_kept,
+    }
+
+
+def _duration(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    return f"{seconds:.0f} s" if seconds < 100 else f"{minutes // 60} h {minutes % 60:02d} min"

@@ -1,0 +1,143 @@
+"""Drawing all figures and writing the report: everything complete or nothing."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from pipelines.report.citations import Citation
+from pipelines.report.figure import NothingToDrawError, ReportFigure, SkippedFigure
+from pipelines.report.sections import SectionPlan
+from pipelines.report.style import drawing_style, file_stem
+from sloshlab import atomic_file
+from sloshlab.constants import GRAVITY_M_PER_S2
+
+if TYPE_CHECKING:
+    from pipelines.report.tables import Table
+
+Progress = Callable[[int, int, str], None]
+
+GRAVITY_REMARK: Final = f"Accelerations in g are multiples of {GRAVITY_M_PER_S2} m/s²."
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a report says beside its figures; `plans` are drawn in their order.
+
+    Attributes
+    ----------
+    title, subtitle : str
+        Head of the page.
+    flags, summary : tuple of str
+        What must be read first; the result in sentences.
+    plans : tuple of SectionPlan
+        Sections with their figures and tables.
+    papers : tuple of Citation
+        What the methods rest on.
+    lead : str
+        The result in one sentence, before everything else, if one says it.
+    """
+
+    title: str
+    subtitle: str
+    flags: tuple[str, ...]
+    summary: tuple[str, ...]
+    plans: tuple[SectionPlan, ...]
+    papers: tuple[Citation, ...]
+    lead: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section with its figures drawn."""
+
+    title: str
+    figures: tuple[ReportFigure, ...]
+    skipped: tuple[SkippedFigure, ...]
+    tables: tuple[Table, ...]
+
+
+def write_page(page: Page, folder: Path, *, progress: Progress | None = None) -> Path:
+    """Write `figures/*.png` and `report.html`; nothing is written before every figure is drawn."""
+    sections = drawn_sections(page.plans, progress)
+    html = page_html(page, sections).encode("utf-8", errors="replace")
+    for figure in _figures(sections):
+        atomic_file.write_bytes(folder / "figures" / f"{figure.name}.png", figure.png)
+    report = folder / "report.html"
+    atomic_file.write_bytes(report, html)
+    return report
+
+
+def drawn_sections(plans: Sequence[SectionPlan], progress: Progress | None = None) -> tuple[Section, ...]:
+    """Draw the figures of all sections; those without data become a reason."""
+    total, done, sections = sum(len(plan.figures) for plan in plans), 0, []
+    with drawing_style():
+        for plan in plans:
+            figures, skipped = [], []
+            for figure in plan.figures:
+                try:
+                    figures.append(figure.draw(figure.name))
+                except NothingToDrawError as reason:
+                    skipped.append(SkippedFigure(figure.name, str(reason)))
+                done += 1
+                if progress is not None:
+                    progress(done, total, figure.name)
+            sections.append(Section(plan.title, tuple(figures), tuple(skipped), plan.tables))
+    return tuple(sections)
+
+
+def page_html(page: Page, sections: Sequence[Section]) -> str:
+    """The page as text: styles and images inside, nothing fetched from elsewhere."""
+    from jinja2 import Environment, StrictUndefined
+
+    files = resources.files("pipelines.report")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(files.joinpath("page.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        title=page.title,
+        subtitle=page.subtitle,
+        lead=page.lead,
+        css=_safe_css(files.joinpath("page.css").read_text(encoding="utf-8")),
+        flags=page.flags,
+        summary=page.summary,
+        remark=GRAVITY_REMARK,
+        sections=_numbered(sections),
+        papers=page.papers,
+    )
+
+
+def _safe_css(text: str) -> Any:
+    from markupsafe import Markup
+
+    return Markup(text)  # our own file, no input goes into it
+
+
+def _numbered(sections: Sequence[Section]) -> list[dict[str, Any]]:
+    """Sections as the template takes them, figures numbered through the report."""
+    shown, number = [], 0
+    for index, section in enumerate(sections, start=1):
+        figures = []
+        for figure in section.figures:
+            number += 1
+            figures.append(
+                {
+                    "number": number,
+                    "name": figure.name,
+                    "caption": figure.caption,
+                    "counterpart": figure.counterpart,
+                    "data": base64.b64encode(figure.png).decode("ascii"),
+                }
+            )
+        anchor = f"section-{index}-{file_stem(section.title).lower()}"
+        shown.append({"title": section.title, "anchor": anchor, "figures": figures, "skipped": section.skipped,
+                      "tables": section.tables})  # fmt: skip
+    return shown
+
+
+def _figures(sections: Sequence[Section]) -> Iterator[ReportFigure]:
+    for section in sections:
+        yield from section.figures

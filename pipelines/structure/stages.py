@@ -1,0 +1,301 @@
+"""The stages that one run of a beam or a guided tank goes through."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy.signal import butter, resample_poly, sosfiltfilt
+
+from pipelines.report.outputs import sha256_of
+from pipelines.structure.random_runs import random_response
+from pipelines.structure.results import BeamRun, BeamSettings, ModeDecay, RandomResponse, group_of
+from pipelines.sweep.stages import require_usable
+from pipelines.twin.simulated_tank_model import departures_of
+from sloshlab.conditioning.combined_channels import (
+    acceleration_channels,
+    force_channels,
+    mean_acceleration,
+    total_force,
+)
+from sloshlab.conditioning.quality import RunQuality, quality_of
+from sloshlab.errors import AnalysisError
+from sloshlab.modal.free_decay import FreeDecay, analyse_free_decay
+from sloshlab.modal.modal_filter import ModalFilter, ModalResponse, modal_filter
+from sloshlab.modal.rig_modes import (
+    ModeNames,
+    rig_modal_filter,
+    sensor_places_m,
+    stated_modes,
+    structure_of,
+    uniform_beam,
+)
+from sloshlab.recording import RunAttributes, channels, run_attributes
+from sloshlab.rig import Rig
+
+FloatArray = npt.NDArray[np.float64]
+
+FREE, RANDOM = ("beam_free", "sdof_free"), ("beam_random",)
+_FIRST_MODE_RANGE: Final = (0.7, 1.4)
+_HIGHER_MODE_RANGE: Final = (0.88, 1.14)
+"""Where a mode is looked for, over its believed frequency; the liquid takes mass away from the first."""
+_LARGEST_ROOT_SHARE: Final = 0.05
+_LARGEST_RESIDUAL_SHARE: Final = 0.1
+_N_CYCLES_OF_HIGHER_MODES: Final = 8
+_SMALLEST_RATE_OVER_FREQUENCY: Final = 2.5
+_SAMPLES_PER_CYCLE: Final = 16
+"""Higher modes are resampled to so many, so that a parabola over a quarter of a cycle makes sense."""
+_EDGE_IN_CYCLES_OF_THE_BAND: Final = 2.0
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A recording with what is known about it before the analysis."""
+
+    path: Path
+    recording: xr.Dataset
+    attributes: RunAttributes
+    quality: RunQuality
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Signals of the part that is analysed, means removed."""
+
+    time_s: FloatArray
+    tank: FloatArray
+    root: FloatArray | None
+    force: FloatArray | None
+    sensors: dict[str, FloatArray]
+    places_m: dict[str, float]
+    flags: tuple[str, ...]
+
+
+def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
+    """A recording whose experiment suits the structure, with working sensors.
+
+    Raises
+    ------
+    AnalysisError
+        If it is no run of this structure, or unusable.
+    """
+    attributes = run_attributes(recording, name=str(path))
+    allowed = tuple(name for name in (*FREE, *RANDOM) if name.startswith(kind))
+    if attributes.experiment not in allowed:
+        raise AnalysisError(
+            f"{path}: experiment",
+            got=repr(attributes.experiment),
+            allowed=f"{' or '.join(allowed)} with this rig, whose structure is of kind {kind!r}",
+            remedy="use `sloshlab shaker` for sweeps, or give the rig that the run belongs to",
+        )
+    if attributes.experiment in FREE:
+        recording = _without_still_root(recording)
+    # a frozen liquid has no force: constant channels are no dead sensors in a simulation
+    simulated = "simulated_from" in recording.attrs
+    quality = quality_of(recording) if simulated else require_usable(recording, path)
+    return Loaded(path, recording, attributes, quality)
+
+
+def _without_still_root(recording: xr.Dataset) -> xr.Dataset:
+    """A root that does not move at all is what a free run wants; whether its sensor is dead does not matter."""
+    roots = [name for name in channels(recording, "acceleration") if name.startswith("acceleration_root")]
+    return recording.drop_vars([name for name in roots if np.ptp(recording[name].values) == 0])
+
+
+def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
+    """Take one run from its channels to modal accelerations, decays or spectra.
+
+    Raises
+    ------
+    AnalysisError
+        If sensors cannot see a mode, the first mode does not decay, or channels are missing.
+    """
+    is_random = run.attributes.experiment in RANDOM
+    rate_hz = run.attributes.sampling_rate_hz
+    motion = _motion(run, rig, is_random)
+    its_filter, response = _modal_response(motion, rig, settings, rate_hz, is_random)
+    modes = stated_modes(rig, settings.n_modes)
+    flags = [*motion.flags, *_residual_flags(run, its_filter, response, motion.tank), *_domain_flags(run)]
+    return BeamRun(
+        path=run.path,
+        sha256=sha256_of(run.path),
+        attributes=run.attributes,
+        quality=run.quality,
+        time_s=motion.time_s,
+        tank_acceleration=motion.tank,
+        root_acceleration=motion.root,
+        interface_force=motion.force,
+        sensors=motion.sensors,
+        modal_filter=its_filter,
+        response=response,
+        decays=() if is_random else _decays(response, modes, settings, rate_hz),
+        random=_random(motion, response, modes, settings, rate_hz) if is_random else None,
+        flags=tuple(flags),
+    )
+
+
+def _motion(run: Loaded, rig: Rig, is_random: bool) -> _Motion:
+    recording, flags = run.recording, []
+    names = channels(recording, "acceleration")
+    tank_names = acceleration_channels(recording)
+    if not is_random:
+        recording, flags = _longest_part_without_gaps(run, names)
+    signals = {name: _centred(recording[name].values) for name in names}
+    root = next((signals[name] for name in names if name.startswith("acceleration_root")), None)
+    if is_random and root is None:
+        raise AnalysisError(
+            f"{run.path}: random run", got=f"channels {', '.join(names)}", allowed="acceleration_root among them"
+        )
+    tank = _centred(mean_acceleration(recording, tank_names).values)
+    if not is_random and root is not None and _rms(root) > _LARGEST_ROOT_SHARE * _rms(tank):
+        flags.append(
+            f"{run.attributes.run_id}: the root moves by {100 * _rms(root) / _rms(tank):.0f} % of the tank's "
+            "acceleration in a free run; it is no clamped beam"
+        )
+    force = None
+    if "force_interface" in channels(recording, "force"):
+        force = _centred(total_force(recording, force_channels(recording)).values)
+    places = {} if structure_of(rig).kind == "sdof" else _places_m(recording, names, rig)
+    kept = list(places) or tank_names
+    sensors = {name: signals[name] for name in kept}
+    return _Motion(recording["time"].values, tank, root, force, sensors, places, tuple(flags))
+
+
+def _places_m(recording: xr.Dataset, names: list[str], rig: Rig) -> dict[str, float]:
+    """Accelerometers beyond the root and where they are [m]."""
+    stated = {name: recording[name].attrs.get("x_m") for name in names}
+    places = sensor_places_m(stated, uniform_beam(rig).length_m)
+    return {name: place for name, place in places.items() if place > 0}
+
+
+def _centred(values: npt.NDArray[np.floating]) -> FloatArray:
+    numbers = np.asarray(values, dtype=np.float64)
+    return np.asarray(numbers - np.nanmean(numbers))
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
+def _longest_part_without_gaps(run: Loaded, names: list[str]) -> tuple[xr.Dataset, list[str]]:
+    """A decay is read up to a gap or after it, never across."""
+    whole = np.all([np.isfinite(run.recording[name].values) for name in names], axis=0)
+    if whole.all():
+        return run.recording, []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
+    starts, stops = edges[::2], edges[1::2]
+    longest = int(np.argmax(stops - starts))
+    part = run.recording.isel(time=slice(int(starts[longest]), int(stops[longest])))
+    time = part["time"].values
+    return part, [
+        f"{run.attributes.run_id}: {int((~whole).sum())} samples are lost; the decay is read from {time[0]:.3f} s "
+        f"to {time[-1]:.3f} s, the longest part without gaps"
+    ]
+
+
+def _modal_response(
+    motion: _Motion, rig: Rig, settings: BeamSettings, rate_hz: float, is_random: bool
+) -> tuple[ModalFilter | None, ModalResponse]:
+    values = np.stack(list(motion.sensors.values()))
+    if is_random and motion.root is not None:
+        values = values - motion.root
+    if structure_of(rig).kind == "sdof":
+        alike = modal_filter(np.ones((len(values), 1)), sensor_names=list(motion.sensors), mode_names=("guide",))
+        return None, alike.apply(values, rate_hz)
+    its_filter = rig_modal_filter(rig, motion.places_m, n_modes=settings.n_modes)
+    return its_filter, its_filter.apply(values, rate_hz)
+
+
+def _residual_flags(
+    run: Loaded, its_filter: ModalFilter | None, response: ModalResponse, tank: FloatArray
+) -> list[str]:
+    if its_filter is None or its_filter.weights.shape[0] == its_filter.weights.shape[1]:
+        return []
+    loud = [
+        f"{name} {residual:.3g} m/s²"
+        for name, residual in zip(response.sensor_names, response.residual_rms_m_per_s2, strict=True)
+        if residual > _LARGEST_RESIDUAL_SHARE * _rms(tank)
+    ]
+    if not loud:
+        return []
+    return [
+        f"{run.attributes.run_id}: the modes leave {', '.join(loud)} RMS unexplained, more than "
+        f"{100 * _LARGEST_RESIDUAL_SHARE:.0f} % of the tank's acceleration; check gains, places and mode shapes"
+    ]
+
+
+def _domain_flags(run: Loaded) -> list[str]:
+    """Where the tank model of a simulated run was beyond what it was trained on."""
+    name = f"{run.attributes.run_id} ({group_of(run.attributes)})"
+    return [f"{name}: {one}" for one in departures_of(run.attributes.model_extra or {})]
+
+
+def _decays(
+    response: ModalResponse, modes: ModeNames, settings: BeamSettings, rate_hz: float
+) -> tuple[ModeDecay, ...]:
+    """The first mode must decay; higher ones may be too weak to be read."""
+    found = []
+    for mode, believed in enumerate(modes.frequency_hz):
+        signal = response.acceleration_m_per_s2[mode]
+        if mode == 0:
+            decay = analyse_free_decay(
+                signal,
+                rate_hz,
+                frequency_range_hz=_around(believed, _FIRST_MODE_RANGE),
+                n_cycles=settings.n_cycles,
+            )
+            found.append(ModeDecay(0, decay))
+            continue
+        try:
+            found.append(ModeDecay(mode, _higher_decay(signal, modes, mode, rate_hz)))
+        except AnalysisError as error:
+            found.append(ModeDecay(mode, None, str(error)))
+    return tuple(found)
+
+
+def _higher_decay(signal: FloatArray, modes: ModeNames, mode: int, rate_hz: float) -> FreeDecay:
+    """Decay of a mode in its own band, with enough samples per cycle for peaks."""
+    own = modes.frequency_hz[mode]
+    if own * _SMALLEST_RATE_OVER_FREQUENCY > rate_hz:
+        allowed = f"> {_SMALLEST_RATE_OVER_FREQUENCY * own:.4g} Hz for {modes.names[mode]}"
+        raise AnalysisError("sampling rate", got=f"{rate_hz:g} Hz", allowed=allowed, remedy="record faster")
+    low, high = _band(modes, mode, rate_hz)
+    sections = butter(2, [low, high], btype="bandpass", fs=rate_hz, output="sos")
+    narrow = sosfiltfilt(sections, signal)
+    finer = max(1, math.ceil(_SAMPLES_PER_CYCLE * own / rate_hz))
+    return analyse_free_decay(
+        resample_poly(narrow, finer, 1, padtype="line"),
+        finer * rate_hz,
+        frequency_range_hz=_around(own, _HIGHER_MODE_RANGE),
+        n_cycles=_N_CYCLES_OF_HIGHER_MODES,
+        filter_edge_s=_EDGE_IN_CYCLES_OF_THE_BAND / low,
+    )
+
+
+def _band(modes: ModeNames, mode: int, rate_hz: float) -> tuple[float, float]:
+    """Band of a mode [Hz]: what others leak into it through gains and shapes lies outside."""
+    own = modes.frequency_hz[mode]
+    above = modes.frequency_hz[mode + 1] if mode + 1 < len(modes.frequency_hz) else 4 * own
+    return float(np.sqrt(modes.frequency_hz[mode - 1] * own)), min(float(np.sqrt(own * above)), 0.48 * rate_hz)
+
+
+def _around(frequency_hz: float, shares: tuple[float, float]) -> tuple[float, float]:
+    return shares[0] * frequency_hz, shares[1] * frequency_hz
+
+
+def _random(
+    motion: _Motion, response: ModalResponse, modes: ModeNames, settings: BeamSettings, rate_hz: float
+) -> RandomResponse:
+    if motion.root is None or settings.segment_s is None:
+        raise AnalysisError(
+            "random run", got="no acceleration_root", allowed="acceleration_root among the channels"
+        )
+    outputs = {**motion.sensors, **dict(zip(modes.names, response.acceleration_m_per_s2, strict=True))}
+    if motion.force is not None:
+        outputs["force_interface"] = motion.force
+    return random_response(motion.root, motion.tank, outputs, modes, settings.segment_s, rate_hz)

@@ -1,0 +1,73 @@
+"""`windows.nc`, `maps.nc` and the report of a sweep experiment, and the summary of its command."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+from pipelines.report.outputs import sha256_of, versions, write_dataset
+from pipelines.sweep.results import SweepExperiment
+from sloshlab import atomic_file
+
+
+def write_experiment(
+    experiment: SweepExperiment, folder: Path, *, command: str, report: bool = True
+) -> dict[str, Any]:
+    """Write `windows.nc`, `maps.nc` and the report; return the summary of the command.
+
+    Parameters
+    ----------
+    experiment : SweepExperiment
+        What was analysed.
+    folder : Path
+        Made if it is not there. All files appear together, complete, or none does.
+    command : str
+        What the user typed, for the report.
+    report : bool
+        False leaves the report and its figures out.
+
+    Returns
+    -------
+    dict
+        ``lines`` for people, ``flags``, and numbers for machines.
+    """
+    known = {run.path: run.sha256 for run in experiment.runs}
+    provenance = {
+        "command": command,
+        "inputs": {path.name: known.get(path) or sha256_of(path) for path in experiment.inputs},
+        "versions": versions(),
+        "n_unsteady_windows": sum(int(run.windows.attrs["n_unsteady_windows"]) for run in experiment.runs),
+    }
+    with atomic_file.filled_folder(folder) as complete:
+        _write_results(experiment, complete, provenance)
+        if report:
+            from pipelines.sweep.report import write_report
+
+            write_report(dataclasses.replace(experiment, provenance=provenance), complete)
+    n_windows = int(experiment.windows.sizes["window"])
+    n_unsteady = provenance["n_unsteady_windows"]
+    left_out = f"; {n_unsteady} left out, their amplitude changes too quickly" if n_unsteady else ""
+    lines = [f"windows: {folder / 'windows.nc'} ({n_windows} windows{left_out})", f"maps: {folder / 'maps.nc'}"]
+    return {
+        "lines": lines + ([f"report: {folder / 'report.html'}"] if report else []),
+        "flags": list(experiment.flags),
+        "runs": len(experiment.runs),
+        "windows": n_windows,
+        "unsteady_windows": n_unsteady,
+        "output": str(folder),
+    }
+
+
+def _write_results(experiment: SweepExperiment, folder: Path, provenance: dict[str, Any]) -> None:
+    for name, dataset in (("windows.nc", experiment.windows), ("maps.nc", experiment.maps)):
+        stamped = dataset.assign_attrs(
+            title=experiment.title,
+            inputs=json.dumps(provenance["inputs"], sort_keys=True),
+            versions=json.dumps(provenance["versions"], sort_keys=True),
+            half_width_cycles=experiment.settings.half_width_cycles,
+            spacing_cycles=experiment.settings.spacing_cycles,
+            n_unsteady_windows=provenance["n_unsteady_windows"],
+        )
+        write_dataset(stamped, folder / name)

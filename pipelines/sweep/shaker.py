@@ -1,0 +1,307 @@
+"""The shaker experiment: sweeps and VFA runs of a tank to work, effective mass and maps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipelines.report.progress import progress
+from pipelines.sweep.results import RigResult, RunResult, SweepExperiment
+from pipelines.sweep.stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
+from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass
+from sloshlab.conditioning.combined_channels import (
+    acceleration_channels,
+    force_channels,
+    mean_acceleration,
+    total_force,
+)
+from sloshlab.conditioning.quality import RunQuality
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.maps.energy_maps import energy_maps
+from sloshlab.quantities import described
+from sloshlab.recording import RunAttributes, channels, read_attributes, read_recording
+from sloshlab.rig import Rig
+from sloshlab.sweep.windows import WindowSettings
+
+_SHAKER_EXPERIMENTS = ("shaker_sweep", "shaker_vfa")
+_LARGEST_PLAUSIBLE_GAIN_ERROR = 0.05
+_LARGEST_BIAS_OF_W_BAR = 0.02
+
+
+@dataclass(frozen=True)
+class ShakerSettings(SweepOptions):
+    """Choices of the shaker analysis, checked."""
+
+    @classmethod
+    def checked(cls, *, p: int, m: int, boundaries: str, allow_incomplete: bool) -> ShakerSettings:
+        """Settings from the command line.
+
+        Raises
+        ------
+        InputError
+            If `boundaries` is not ``measured`` or ``law``.
+        """
+        if boundaries not in ("measured", "law"):
+            raise InputError("--boundaries", got=repr(boundaries), allowed="measured or law")
+        windows = WindowSettings(half_width_cycles=p, spacing_cycles=m)
+        return cls(windows=windows, boundaries=boundaries, allow_incomplete=allow_incomplete)
+
+
+@dataclass(frozen=True)
+class _Run:
+    path: Path
+    attributes: RunAttributes
+    rig_name: str
+
+
+def analyse_shaker(paths: Sequence[Path], rig_paths: Sequence[Path], settings: ShakerSettings) -> SweepExperiment:
+    """Analyse the runs of one or several rigs that differ in fill level.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Recordings; those of configuration ``empty`` and ``frozen`` identify the dry mass, the others
+        are analysed.
+    rig_paths : sequence of Path
+        Rig descriptions. With more than one, the attribute `rig` of every run must name one of them.
+    settings : ShakerSettings
+        Windows, boundaries, what to do with incomplete sweeps.
+
+    Returns
+    -------
+    SweepExperiment
+
+    Raises
+    ------
+    InputError
+        If a run, a rig or their combination is bad; nothing has been written then.
+    """
+    rigs = _rigs(rig_paths)
+    runs = _assigned(paths, rigs)
+    results: dict[str, list[RunResult]] = {name: [] for name in rigs}
+    dry: dict[str, DryMass | None] = {}
+    with progress("shaker", len(runs)) as advance:
+        for name, rig in rigs.items():
+            own = [run for run in runs if run.rig_name == name]
+            dry[name] = _dry_mass(own, rig)
+            for run in own:
+                if run.attributes.configuration == "sloshing":
+                    with naming(run.path):
+                        results[name].append(_analysed(run, rig, dry[name], settings))
+                advance(run.path.name)
+        inputs = [*(run.path for run in runs), *rig_paths]
+        return _experiment(results, rigs, dry, settings, inputs)
+
+
+def _rigs(paths: Sequence[Path]) -> dict[str, Rig]:
+    rigs: dict[str, Rig] = {}
+    for path in paths:
+        if path.name in rigs:
+            raise InputError("--rig", got=f"{path.name} twice", allowed="rig files with different names")
+        rigs[path.name] = Rig.from_toml(path)
+    first = next(iter(rigs.values()))
+    for name, rig in rigs.items():
+        box = ("height_m", "length_m", "width_m")
+        if any(getattr(rig.tank, side) != getattr(first.tank, side) for side in box):
+            raise InputError(
+                "--rig",
+                got=f"{name} with another tank than {next(iter(rigs))}",
+                allowed="rigs that differ in fill level only",
+                remedy="analyse them apart",
+            )
+    return rigs
+
+
+def _assigned(paths: Sequence[Path], rigs: Mapping[str, Rig]) -> list[_Run]:
+    """Runs with the rig each belongs to; runs of different rigs must not be mixed under one."""
+    described = [(path, read_attributes(path)) for path in paths]
+    for path, attributes in described:
+        if attributes.experiment not in _SHAKER_EXPERIMENTS:
+            raise AnalysisError(
+                f"{path}: experiment",
+                got=repr(attributes.experiment),
+                allowed=" or ".join(_SHAKER_EXPERIMENTS),
+                remedy="use `sloshlab work` for other sweeps",
+            )
+    seen: dict[str, Path] = {}
+    for path, attributes in described:
+        if attributes.run_id in seen:
+            raise AnalysisError(f"{path}: run_id", got=f"{attributes.run_id!r}, as in {seen[attributes.run_id]}",
+                                allowed="one run_id per run", remedy="give every run once")  # fmt: skip
+        seen[attributes.run_id] = path
+    named = sorted({attributes.rig for _, attributes in described})
+    unknown = [name for name in named if name not in rigs]
+    if len(rigs) == 1 and len(named) == 1 and not _another_rig_lies_beside(described, next(iter(rigs.values()))):
+        return [_Run(path, attributes, next(iter(rigs))) for path, attributes in described]
+    if unknown:
+        raise AnalysisError(
+            "runs of different rigs",
+            got=f"runs of {', '.join(named)} with --rig {', '.join(rigs)}",
+            allowed="runs of the rigs given",
+            remedy="analyse them apart, or give every rig with --rig",
+        )
+    return [_Run(path, attributes, attributes.rig) for path, attributes in described]
+
+
+def _another_rig_lies_beside(described: Sequence[tuple[Path, RunAttributes]], rig: Rig) -> bool:
+    """True if the rig that a run names lies beside it and describes another tank or filling.
+
+    A rig file that was only renamed is no reason to refuse its runs.
+    """
+    own = {
+        path.parent / attributes.rig
+        for path, attributes in described
+        if attributes.rig == Path(attributes.rig).name
+    }
+    return any(file.is_file() and Rig.from_toml(file) != rig for file in own)
+
+
+def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
+    dry = {
+        configuration: [_dry_recording(run, rig) for run in runs if run.attributes.configuration == configuration]
+        for configuration in ("empty", "frozen")
+    }
+    recordings = dry["empty"] + dry["frozen"]
+    if not recordings:
+        return None
+    return identify_dry_mass(
+        dry["empty"],
+        dry["frozen"],
+        liquid_mass_kg=rig.liquid_mass_kg,
+        force_names=force_channels(recordings[0]),
+        acceleration_names=acceleration_channels(recordings[0]),
+    )
+
+
+def _dry_recording(run: _Run, rig: Rig) -> xr.Dataset:
+    with naming(run.path):
+        recording = read_recording(run.path)
+        require_usable(recording, run.path)
+        check_signs(recording, rig)
+    return recording
+
+
+def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings) -> RunResult:
+    recording = read_recording(run.path)
+    signals, quality = sweep_signals(recording, run.path, rig, dry)
+    return analyse_sweep(recording, run.path, signals, settings, quality=quality, rig=rig, rig_name=run.rig_name)
+
+
+def sweep_signals(
+    recording: xr.Dataset, path: Path, rig: Rig, dry: DryMass | None
+) -> tuple[SweepSignals, RunQuality]:
+    """Force and motion of a run of a tank on the shaker, ready to be evaluated, and how good they are.
+
+    Raises
+    ------
+    AnalysisError
+        If the recording is unusable or has wrong signs.
+    """
+    quality = require_usable(recording, path)
+    check_signs(_enough_for_signs(recording), rig)
+    forces, accelerations = force_channels(recording), acceleration_channels(recording)
+    gain = 1.0 if dry is None else dry.gain_ratio
+    mass = (dry.mass_kg if dry is not None else rig.tank.dry_mass_kg) + rig.liquid_mass_kg
+    force = total_force(recording).values
+    force /= gain
+    signals = SweepSignals(
+        force_n=force,
+        motion=mean_acceleration(recording).values,
+        not_measured=not_measured(recording, forces + accelerations, quality),
+        inertia_kg=mass,
+        noise_power=_noise_power(recording, forces, accelerations, mass),
+    )
+    return signals, quality
+
+
+def _enough_for_signs(recording: xr.Dataset) -> xr.Dataset:
+    """The middle minute, if it is complete: a sign does not need the whole run."""
+    middle, half = recording.sizes["time"] // 2, round(30 * float(recording.attrs["sampling_rate_hz"]))
+    part = recording.isel(time=slice(max(0, middle - half), middle + half))
+    complete = all(np.isfinite(part[name].values.sum()) for name in channels(part))
+    return part if complete else recording
+
+
+def _noise_power(
+    recording: xr.Dataset, forces: Sequence[str], accelerations: Sequence[str], mass_kg: float
+) -> float:
+    """Mean square of m ü − F that the stated sensor noise alone gives [N²]; 0 if none is stated."""
+    noise = {name: float(recording[name].attrs.get("noise_std", 0.0)) for name in [*forces, *accelerations]}
+    of_mean = sum(noise[name] ** 2 for name in accelerations) / len(accelerations) ** 2
+    return sum(noise[name] ** 2 for name in forces) + mass_kg**2 * of_mean
+
+
+def _windows_of(name: str, results: Sequence[RunResult]) -> xr.Dataset:
+    if not results:
+        raise AnalysisError(f"rig {name}", got="no sloshing run", allowed="at least one", remedy="record one")
+    windows = xr.concat([result.windows for result in results], dim="window", combine_attrs="drop")
+    if windows.sizes["window"] == 0:
+        raise AnalysisError(
+            f"rig {name}", got="no window with enough usable cycles", allowed="a sweep of at least 2P cycles"
+        )
+    return windows
+
+
+def _experiment(
+    results: Mapping[str, Sequence[RunResult]],
+    rigs: Mapping[str, Rig],
+    dry: Mapping[str, DryMass | None],
+    settings: ShakerSettings,
+    inputs: Sequence[Path],
+) -> SweepExperiment:
+    windows = {name: _windows_of(name, results[name]) for name in rigs}
+    everything = xr.concat(list(windows.values()), dim="window", combine_attrs="drop")
+    rig_results = [
+        RigResult(name, rig, dry[name], windows[name], energy_maps(windows[name], rig, extent=everything))
+        for name, rig in rigs.items()
+    ]
+    runs = [result for name in rigs for result in results[name]]
+    return SweepExperiment(
+        title="Tank on the shaker",
+        inputs=tuple(inputs),
+        kind="shaker",
+        runs=tuple(runs),
+        rigs=tuple(rig_results),
+        windows=everything,
+        maps=_joined(rig_results),
+        settings=settings.windows,
+        flags=tuple([flag for run in runs for flag in run.flags] + _calibration_flags(dry, rigs)),
+    )
+
+
+def _calibration_flags(dry: Mapping[str, DryMass | None], rigs: Mapping[str, Rig]) -> list[str]:
+    flags = []
+    for name, mass in dry.items():
+        if mass is None:
+            continue
+        if abs(mass.gain_ratio - 1) > _LARGEST_PLAUSIBLE_GAIN_ERROR:
+            flags.append(
+                f"{name}: the gain of force over acceleration is {mass.gain_ratio:.3f}; check the calibration"
+            )
+        bias = w_bar_bias_of_delay(mass, rigs[name])
+        if abs(mass.delay_s) > 3 * mass.delay_std_s and abs(bias) > _LARGEST_BIAS_OF_W_BAR:
+            flags.append(
+                f"{name}: force lags acceleration by {1e6 * mass.delay_s:.0f} µs, which shifts W̄ at 20 Hz by "
+                f"{bias:+.3f}; compensate it with delay_s in the channel map"
+            )
+    return flags
+
+
+def w_bar_bias_of_delay(dry: DryMass, rig: Rig, *, frequency_hz: float = 20.0) -> float:
+    """W̄ that a delay τ of force behind acceleration feigns: π Ωτ (M_dry + m_l)/m_l, to first order in Ωτ."""
+    total = dry.mass_kg + rig.liquid_mass_kg
+    return math.pi * 2 * math.pi * frequency_hz * dry.delay_s * total / rig.liquid_mass_kg
+
+
+def _joined(rigs: Sequence[RigResult]) -> xr.Dataset:
+    """The maps of one rig as they are; of several along a dimension ``fill_level``."""
+    if len(rigs) == 1:
+        return rigs[0].maps.dataset
+    rigs = sorted(rigs, key=lambda rig: rig.rig.liquid.fill_level)
+    joined = xr.concat([rig.maps.dataset for rig in rigs], dim="fill_level", combine_attrs="drop", join="exact")
+    return described(joined.assign_coords(fill_level=[rig.rig.liquid.fill_level for rig in rigs]))

@@ -1,0 +1,294 @@
+"""The stages that every sweep goes through, whatever was shaken."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from pipelines.report.outputs import sha256_of
+from pipelines.sweep.results import Excerpt, RunResult
+from sloshlab.conditioning.clipping import clipped_samples
+from sloshlab.conditioning.integration import integrated
+from sloshlab.conditioning.quality import RunQuality, quality_of
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.recording import CLIPPED, CRC_REPAIRED, LOST, STUCK, RunAttributes, run_attributes
+from sloshlab.rig import Rig
+from sloshlab.sweep.cycles import Cycles, evaluate_cycles
+from sloshlab.sweep.law import SweepLaw, identify_law, stated_law
+from sloshlab.sweep.motion_phase import MotionPhase, measured_phase
+from sloshlab.sweep.windows import WindowSettings, evaluate_windows
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+EXCERPT_FREQUENCIES_HZ = (9.0, 13.0, 17.0)
+"""Reference points of Table 1.2, where time histories and loops are shown."""
+_EARLY_STOP_SHARE = 0.03
+"""A sweep must move during all but this share of the time it is stated or recorded to last."""
+_SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE = 8
+
+
+@dataclass(frozen=True)
+class SweepSignals:
+    """Force and motion of one run, ready to be evaluated; all arrays of shape (n_samples,).
+
+    Attributes
+    ----------
+    force_n : ndarray
+        On the structure or tank, upward positive, NaN where lost.
+    motion : ndarray
+        Acceleration [m s-2] or velocity [m s-1], NaN where lost.
+    motion_is_velocity : bool
+        Which of the two.
+    phase_motion : ndarray, optional
+        What the phase is taken from, as an acceleration; None means `motion`.
+    not_measured : ndarray of bool, optional
+        True where a sample that enters `force_n` or `motion` is clipped, lost, repaired or stuck.
+    inertia_kg : float
+        Mass removed to get the dynamic force.
+    noise_power : float
+        Mean square of the dynamic force from sensor noise [N²].
+    """
+
+    force_n: FloatArray
+    motion: FloatArray
+    motion_is_velocity: bool = False
+    phase_motion: FloatArray | None = None
+    not_measured: BoolArray | None = None
+    inertia_kg: float = 0.0
+    noise_power: float = 0.0
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """Choices of the analysis: windows, boundaries, what to do with a sweep that stops early."""
+
+    windows: WindowSettings
+    boundaries: str = "measured"
+    allow_incomplete: bool = False
+
+
+@contextlib.contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name the recording in every error that an analysis of it raises."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in error.what:
+            raise
+        raise AnalysisError(
+            f"{path}: {error.what}", got=error.got, allowed=error.allowed, remedy=error.remedy
+        ) from error
+
+
+def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
+    """Quality of a recording; refuse one that no analysis may rest on.
+
+    Raises
+    ------
+    AnalysisError
+        With every reason.
+    """
+    quality = quality_of(recording)
+    if not quality.usable:
+        raise AnalysisError(f"recording {path}", got="; ".join(quality.reasons), allowed="working sensors")
+    return quality
+
+
+def not_measured(recording: xr.Dataset, names: list[str], quality: RunQuality) -> BoolArray | None:
+    """True where a channel is clipped, or the recorder flags a sample as lost, clipped, repaired or stuck."""
+    suffers = {channel.name for channel in quality.channels if channel.clipping.n_clipped}
+    mask: BoolArray | None = None
+    if "quality" in recording:
+        mask = (recording["quality"].values & (LOST | CLIPPED | CRC_REPAIRED | STUCK)) != 0
+    for name in names:
+        if name in suffers:
+            clipped = clipped_samples(recording[name])
+            mask = clipped if mask is None else mask | clipped
+    return mask
+
+
+def analyse_sweep(
+    recording: xr.Dataset,
+    path: Path,
+    signals: SweepSignals,
+    options: SweepOptions,
+    *,
+    quality: RunQuality,
+    rig: Rig | None = None,
+    rig_name: str = "",
+) -> RunResult:
+    """Take one recording from its signals to its windows.
+
+    Raises
+    ------
+    AnalysisError
+        If there is no sweep in it, or the sweep stops early and that is not allowed.
+    """
+    attributes = run_attributes(recording, name=str(path))
+    rate_hz = attributes.sampling_rate_hz
+    start_time_s = float(recording["time"].values[0])
+    phase = _phase(path, signals, rate_hz)
+    stated = _stated(attributes)
+    flags = _early_stop(path, phase, recording.sizes["time"], attributes, options)
+    measured = phase.cycle_boundaries_s()
+    boundaries = _boundaries(path, measured, stated, start_time_s, options)
+    cycles = evaluate_cycles(
+        signals.force_n,
+        signals.motion,
+        boundaries,
+        sampling_rate_hz=rate_hz,
+        inertia_kg=signals.inertia_kg,
+        motion_is_velocity=signals.motion_is_velocity,
+        unusable=signals.not_measured,
+    )
+    n_samples_per_cycle = rate_hz * float(np.quantile(np.diff(measured), 0.01))
+    if n_samples_per_cycle < _SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE:
+        flags.append(
+            f"{attributes.run_id}: only {n_samples_per_cycle:.1f} samples in the shortest cycles; below "
+            f"{_SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE} the quadrature errs by more than 0.1 %"
+        )
+    middle = 0.5 * (measured[1:] + measured[:-1])
+    law = identify_law(middle + start_time_s, 1.0 / np.diff(measured))
+    windows = evaluate_windows(
+        cycles,
+        run_id=attributes.run_id,
+        law=stated or law,
+        start_time_s=start_time_s,
+        rig=rig,
+        settings=options.windows,
+        noise_power=signals.noise_power,
+    )
+    n_lost = int((~cycles.usable[3:-3]).sum())
+    if n_lost:
+        flags.append(f"{attributes.run_id}: lost or clipped samples cost {n_lost} of {cycles.usable.size} cycles")
+    return RunResult(
+        path=path,
+        sha256=sha256_of(path),
+        attributes=attributes,
+        rig_name=rig_name,
+        windows=windows,
+        law=law,
+        stated=stated,
+        boundary_error_s=_boundary_error(measured + start_time_s, stated),
+        quality=quality,
+        n_cycles=cycles.usable.size,
+        n_cycles_lost=n_lost,
+        excerpts=_excerpts(cycles, windows, signals, rig, rate_hz, start_time_s),
+        flags=tuple(flags),
+    )
+
+
+def _phase(path: Path, signals: SweepSignals, rate_hz: float) -> MotionPhase:
+    reference = signals.motion if signals.phase_motion is None else signals.phase_motion
+    lead = np.pi / 2 if signals.motion_is_velocity and signals.phase_motion is None else 0.0
+    with naming(path):
+        return measured_phase(reference, None, rate_hz, lead_rad=lead)
+
+
+def _stated(attributes: RunAttributes) -> SweepLaw | None:
+    linear = (attributes.model_extra or {}).get("sweep_rate_hz_per_s")
+    slope = float(linear) if isinstance(linear, int | float) else None
+    return stated_law(attributes.sweep_start_hz, attributes.sweep_rate_octave_per_s, slope)
+
+
+def _early_stop(
+    path: Path, phase: MotionPhase, n_samples: int, attributes: RunAttributes, options: SweepOptions
+) -> list[str]:
+    """A flag, or an error, if the motion ends before the recording or before the stated end of the sweep."""
+    if attributes.experiment != "shaker_sweep":
+        return []
+    start, stop = phase.moving_interval_s()
+    recorded = n_samples / attributes.sampling_rate_hz
+    stated = (attributes.model_extra or {}).get("sweep_duration_s")
+    expected = max(recorded, float(stated)) if isinstance(stated, int | float) else recorded
+    if expected - stop <= max(_EARLY_STOP_SHARE * expected, 1.0):
+        return []
+    reached = float(phase.phase(stop, 1)) / (2 * np.pi)
+    if options.allow_incomplete:
+        return [f"{attributes.run_id}: the sweep stops at {stop:.1f} s ({reached:.2f} Hz) of {expected:.1f} s"]
+    raise AnalysisError(
+        f"{path}: the sweep stops early",
+        got=f"motion from {start:.1f} s to {stop:.1f} s ({reached:.2f} Hz)",
+        allowed=f"motion until {expected:.1f} s",
+        remedy="repeat the run, or analyse what there is with --allow-incomplete",
+    )
+
+
+def _boundaries(
+    path: Path, measured: FloatArray, stated: SweepLaw | None, start_time_s: float, options: SweepOptions
+) -> FloatArray:
+    if options.boundaries == "measured":
+        return measured
+    if stated is None:
+        raise AnalysisError(
+            f"{path}: --boundaries law",
+            got="no sweep law in the attributes",
+            allowed="sweep_start_hz with sweep_rate_octave_per_s",
+            remedy="use --boundaries measured",
+        )
+    times = stated.cycle_boundaries_s(measured[0] + start_time_s, measured[-1] + start_time_s)
+    return np.asarray(times - start_time_s)
+
+
+def _boundary_error(measured_s: FloatArray, stated: SweepLaw | None) -> float:
+    """Largest deviation of the measured boundaries from those of the law, the mean phase offset removed [s]."""
+    if stated is None:
+        return float("nan")
+    turns = stated.phase_rad(measured_s) / (2 * np.pi)
+    if not np.isfinite(turns).all():
+        return float("nan")
+    deviation = turns - np.arange(turns.size)
+    deviation -= deviation.mean()
+    return float(np.abs(deviation / stated.frequency_hz(measured_s)).max())
+
+
+def _excerpts(
+    cycles: Cycles,
+    windows: xr.Dataset,
+    signals: SweepSignals,
+    rig: Rig | None,
+    rate_hz: float,
+    start_time_s: float,
+) -> tuple[Excerpt, ...]:
+    """Signals at the windows nearest the reference frequencies, or spread over the sweep."""
+    frequency = windows["frequency_hz"].values
+    if frequency.size == 0 or signals.motion_is_velocity:
+        return ()
+    wanted = np.array(EXCERPT_FREQUENCIES_HZ)
+    if rig is None or frequency.min() > wanted[0] or frequency.max() < wanted[-1]:
+        wanted = np.quantile(frequency, [0.25, 0.5, 0.75])
+    nearest = sorted({int(np.abs(frequency - one).argmin()) for one in wanted})
+    return tuple(_excerpt(windows.isel(window=at), signals, rig, rate_hz, start_time_s) for at in nearest)
+
+
+def _excerpt(
+    window: xr.Dataset, signals: SweepSignals, rig: Rig | None, rate_hz: float, start_time_s: float
+) -> Excerpt:
+    frequency = float(window["frequency_hz"])
+    middle = (float(window["time_s"]) - start_time_s) * rate_hz
+    half = 6.0 / frequency * rate_hz
+    shown = slice(max(0, int(middle - half)), min(signals.motion.size, int(middle + half) + 1))
+    padding = int(2.0 * rate_hz)
+    used = slice(max(0, shown.start - padding), min(signals.motion.size, shown.stop + padding))
+    corner = max(0.2 * frequency, 0.5)
+    speed = integrated(np.asarray(signals.motion[used], dtype=np.float64), 1 / rate_hz, corner_hz=corner)
+    shift = integrated(speed, 1 / rate_hz, corner_hz=corner)[shown.start - used.start :][
+        : shown.stop - shown.start
+    ]
+    force, motion = signals.force_n[shown], signals.motion[shown]
+    dry = signals.inertia_kg - rig.liquid_mass_kg if rig is not None else 0.0
+    shown_force = dry * motion - force if rig is not None else force.copy()
+    return Excerpt(
+        frequency_hz=frequency,
+        acceleration_g=float(window["acceleration_g"]),
+        time_s=start_time_s + np.arange(shown.start, shown.stop) / rate_hz,
+        force_n=shown_force - np.nanmean(shown_force),
+        displacement_m=shift - np.nanmean(shift),
+    )

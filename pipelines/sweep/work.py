@@ -1,0 +1,149 @@
+"""Work per cycle of any structure: one force, one motion, no tank."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from pipelines.report.progress import progress
+from pipelines.sweep.results import RunResult, SweepExperiment
+from pipelines.sweep.stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
+from sloshlab.errors import AnalysisError, InputError
+from sloshlab.maps.energy_maps import energy_maps
+from sloshlab.recording import channels, read_recording
+from sloshlab.sweep.windows import WindowSettings
+
+FloatArray = npt.NDArray[np.float64]
+
+_SIGMA_OF_A_WRONG_SIGN = 5.0
+
+
+@dataclass(frozen=True)
+class WorkSettings(SweepOptions):
+    """Which channels are the force and the motion.
+
+    Attributes
+    ----------
+    force, motion : str
+        Channel names.
+    motion_quantity : str
+        ``acceleration``, ``velocity`` or ``displacement``.
+    phase_reference : str
+        Channel whose phase counts the cycles; empty for the motion.
+    """
+
+    force: str = ""
+    motion: str = ""
+    motion_quantity: str = "acceleration"
+    phase_reference: str = ""
+
+    @classmethod
+    def checked(
+        cls, *, p: int, m: int, force: str, motions: Mapping[str, str], phase_reference: str
+    ) -> WorkSettings:
+        """Settings from the command line.
+
+        Raises
+        ------
+        InputError
+            If not exactly one motion is named.
+        """
+        named = {quantity: name for quantity, name in motions.items() if name}
+        if len(named) != 1:
+            raise InputError(
+                "motion channel",
+                got=f"{len(named)} of --acceleration, --velocity, --displacement",
+                allowed="exactly one",
+            )
+        [(quantity, motion)] = named.items()
+        windows = WindowSettings(half_width_cycles=p, spacing_cycles=m)
+        return cls(windows, "measured", True, force, motion, quantity, phase_reference)
+
+
+def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperiment:
+    """Analyse sweeps with one force and one motion channel.
+
+    Raises
+    ------
+    InputError
+        If a run or a channel is bad; nothing has been written then.
+    """
+    results: list[RunResult] = []
+    with progress("work", len(paths)) as advance:
+        for path in paths:
+            with naming(path):
+                results.append(_analysed(path, settings))
+            advance(path.name)
+    windows = xr.concat([result.windows for result in results], dim="window", combine_attrs="drop")
+    _check_energy_sign(windows, settings)
+    maps = energy_maps(windows)
+    return SweepExperiment(
+        title="Work per cycle",
+        inputs=tuple(paths),
+        kind="work",
+        runs=tuple(results),
+        rigs=(),
+        windows=windows,
+        maps=maps.dataset,
+        work_maps=maps,
+        settings=settings.windows,
+        flags=tuple(flag for result in results for flag in result.flags),
+    )
+
+
+def _analysed(path: Path, settings: WorkSettings) -> RunResult:
+    recording = read_recording(path)
+    quality = require_usable(recording, path)
+    force = _channel(recording, path, settings.force, "force")
+    motion = _channel(recording, path, settings.motion, settings.motion_quantity)
+    reference = None
+    if settings.phase_reference:
+        reference = np.asarray(_channel(recording, path, settings.phase_reference, None), dtype=np.float64)
+    if settings.motion_quantity == "displacement":
+        motion = _derivative(np.asarray(motion, dtype=np.float64), float(recording.attrs["sampling_rate_hz"]))
+    signals = SweepSignals(
+        force_n=force,
+        motion=motion,
+        motion_is_velocity=settings.motion_quantity != "acceleration",
+        phase_motion=reference,
+        not_measured=not_measured(recording, [settings.force, settings.motion], quality),
+    )
+    return analyse_sweep(recording, path, signals, settings, quality=quality)
+
+
+def _channel(recording: xr.Dataset, path: Path, name: str, quantity: str | None) -> FloatArray:
+    available = channels(recording, quantity)
+    if name not in available:
+        raise AnalysisError(
+            f"{path}: channel",
+            got=repr(name),
+            allowed=", ".join(available) or f"no {quantity} channel is there",
+            remedy="name one of these",
+        )
+    return np.asarray(recording[name].values)
+
+
+def _derivative(displacement_m: FloatArray, rate_hz: float) -> FloatArray:
+    """Velocity by the central difference over seven samples, amplitude error (ω Δt)⁶/140 and no phase error."""
+    weights = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0 * rate_hz
+    velocity = np.full_like(displacement_m, np.nan)
+    velocity[3:-3] = np.convolve(displacement_m, weights, mode="valid")
+    return velocity
+
+
+def _check_energy_sign(windows: xr.Dataset, settings: WorkSettings) -> None:
+    """A passive structure cannot give energy: a work that is negative throughout means a wrong sign."""
+    used = windows["dissipated_mass_kg"].values
+    error = np.maximum(windows["dissipated_mass_kg_std"].values, np.finfo(float).tiny)
+    if used.size and np.median(used / error) < -_SIGMA_OF_A_WRONG_SIGN and np.mean(used < 0) > 0.9:
+        raise AnalysisError(
+            f"sign of {settings.force} or {settings.motion}",
+            got=f"negative work in {100 * np.mean(used < 0):.0f} % of the windows",
+            allowed="a structure that takes energy",
+            remedy=f"set sign = -1 for {settings.force} in the channel map and import again",
+        )

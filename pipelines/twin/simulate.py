@@ -1,0 +1,232 @@
+"""The command `simulate`: the twin of a rig file driven by a recorded run."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+
+from pipelines.report.outputs import sha256_of, versions
+from pipelines.report.progress import amounts
+from pipelines.twin.simulated_tank_model import departure_attributes, with_tank_model
+from sloshlab.errors import InputError
+from sloshlab.recording import read_recording, run_attributes, write_recording
+from sloshlab.rig import Rig
+from sloshlab.twin.recorded_run import Drive, drive_of
+from sloshlab.twin.reduced_order_model_domain import departures
+from sloshlab.twin.rig_beam import scale_remarks
+from sloshlab.twin.simulated_channels import SimulatedRun, simulated_run
+from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.storage import load_twin, save_twin
+from sloshlab.twin.structure_forces import MASS_ERROR
+from sloshlab.twin.twin import Twin
+
+CONFIGURATIONS: Final = ("sloshing", "frozen", "empty")
+LEAST_RATE_HZ: Final = 20_000.0
+STEPS_PER_PERIOD: Final = 60
+"""Integration steps per second, and per period of the highest mode, at least."""
+
+_MOST_STEPS = 1000
+_LARGEST_ENERGY_ERROR = 1e-3
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """What the command is asked to do.
+
+    Attributes
+    ----------
+    rig, run, output : Path
+    block : str
+        ``all``, ``tank`` or ``structure``.
+    configuration : str
+        Of the liquid, ``sloshing`` being as the rig file describes it.
+    twin : Path, optional
+        A saved twin instead of that of the rig file.
+    save_twin : Path, optional
+        Where the twin that ran is saved.
+    steps : int, optional
+        Integration steps per sample.
+    seed : int
+        Of the noise of the twin's sensors.
+    """
+
+    rig: Path
+    run: Path
+    output: Path
+    block: str = "all"
+    configuration: str = "sloshing"
+    twin: Path | None = None
+    save_twin: Path | None = None
+    steps: int | None = None
+    seed: int = 0
+
+
+def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
+    """Simulate and write the recording.
+
+    Returns
+    -------
+    dict
+        ``lines`` for people, ``flags`` (exit code 3), and numbers for machines.
+
+    Raises
+    ------
+    InputError
+        If the run cannot drive the twin, or the twin leaves what can be simulated; nothing is written then.
+    """
+    _check(settings)
+    rig = Rig.from_toml(settings.rig)
+    twin = _chosen_twin(settings, rig)
+    recording = read_recording(settings.run)
+    drive = drive_of(recording, twin, block=settings.block)  # type: ignore[arg-type]
+    n_steps = settings.steps or steps_per_sample(twin, drive.excitation.sampling_rate_hz)
+    with amounts("simulating") as watch:
+        simulation = drive.twin.simulate(
+            drive.excitation,
+            initial_displacement_m=drive.initial_displacement_m,
+            n_substeps=n_steps,
+            watch=watch,
+        ).require_done()
+    left = departures(simulation)
+    attributes = _attributes(settings, recording, drive, n_steps) | departure_attributes(left)
+    simulated = simulated_run(simulation, recording, rig, attributes=attributes, seed=settings.seed)
+    write_recording(simulated.recording, settings.output, encoding=_encoding(simulated.recording))
+    if settings.save_twin is not None:
+        save_twin(twin, settings.save_twin)
+    summary = _summary(settings, rig, recording, drive, simulation, simulated, n_steps)
+    return with_tank_model(summary, simulation, left)
+
+
+def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:
+    """Steps that make 20 kHz at least, and sixty per period of the highest mode.
+
+    Raises
+    ------
+    InputError
+        If more than a thousand are needed.
+    """
+    rate = LEAST_RATE_HZ
+    if twin.structure is not None:
+        rate = max(rate, STEPS_PER_PERIOD * float(twin.structure.frequencies_hz.max()))
+    steps = math.ceil(rate / sampling_rate_hz)
+    if steps > _MOST_STEPS:
+        raise InputError(
+            "sampling rate",
+            got=f"{sampling_rate_hz:g} Hz, so that a sample needs {steps} steps",
+            allowed=f"≤ {_MOST_STEPS} steps",
+            remedy="drive the twin with a run of higher sampling rate",
+        )
+    return steps
+
+
+def _check(settings: SimulationSettings) -> None:
+    if settings.configuration not in CONFIGURATIONS:
+        raise InputError(
+            "--configuration", got=repr(settings.configuration)[:80], allowed=", ".join(CONFIGURATIONS)
+        )
+    for option, path in (("--output", settings.output), ("--save-twin", settings.save_twin)):
+        if path is None:
+            continue
+        if path.is_dir() or not path.absolute().parent.is_dir():
+            raise InputError(f"{option} {path}", got="no file", allowed="a file in a folder that exists")
+        for given in (settings.run, settings.rig, settings.twin):
+            if given is not None and path.exists() and given.exists() and path.samefile(given):
+                raise InputError(f"{option} {path}", got="a file that is read", remedy="choose another name")
+
+
+def _chosen_twin(settings: SimulationSettings, rig: Rig) -> Twin:
+    twin = (
+        Twin.from_rig(rig, folder=settings.rig.absolute().parent)
+        if settings.twin is None
+        else load_twin(settings.twin)
+    )
+    if settings.configuration == "sloshing":
+        return twin
+    frozen = replace(twin, terms=tuple(term for term in twin.terms if term.place == "structure"))
+    if settings.configuration == "frozen":
+        return frozen
+    return frozen.with_term(MASS_ERROR(place="tank", mass_kg=-rig.liquid_mass_kg))
+
+
+def _attributes(settings: SimulationSettings, recording: xr.Dataset, drive: Drive, n_steps: int) -> dict[str, Any]:
+    """Global attributes that say what was simulated; no clock, so that the same inputs give the same bytes."""
+    liquid_moves = settings.configuration == "sloshing" and any(t.place == "tank" for t in drive.twin.terms)
+    return {
+        "run_id": f"{run_attributes(recording).run_id}_simulated"[-200:],
+        "configuration": "sloshing" if liquid_moves else settings.configuration.replace("sloshing", "frozen"),
+        "rig": settings.rig.name,
+        "simulated_from": settings.run.name,
+        "simulated_from_sha256": sha256_of(settings.run),
+        "simulated_blocks": settings.block,
+        "simulated_forces": ", ".join(f"{term.name} ({term.place})" for term in drive.twin.terms) or "none",
+        "simulated_with_steps_per_sample": n_steps,
+        "versions": json.dumps(versions(), sort_keys=True),
+    }
+
+
+def _encoding(simulated: xr.Dataset) -> dict[str, dict[str, Any]]:
+    return {str(name): {"_FillValue": None} for name in ("time", "quality") if name in simulated.variables}
+
+
+def _summary(
+    settings: SimulationSettings,
+    rig: Rig,
+    recording: xr.Dataset,
+    drive: Drive,
+    simulation: Simulation,
+    simulated: SimulatedRun,
+    n_steps: int,
+) -> dict[str, Any]:
+    passed = float(np.abs(simulation.works_j).max(initial=0.0)) + float(simulation.mechanical_energy_j.max())
+    error = float(np.abs(simulation.energy_residual_j).max()) / passed if passed else 0.0
+    flags = [*drive.flags, *simulation.remarks]
+    if error > _LARGEST_ENERGY_ERROR:
+        flags.append(f"energy balance closes only to {error:.1e} of the energy passed on: give more --steps")
+    recorded, now = run_attributes(recording).configuration, simulated.recording.attrs["configuration"]
+    lines = [
+        f"simulation: {settings.output} ({simulation.time_s.size} samples, {n_steps} steps each)",
+        f"driven by: {drive.description}",
+        f"forces: {simulated.recording.attrs['simulated_forces']}",
+    ]
+    if simulation.twin.structure is not None:
+        lines.append(f"energy balance: closes to {error:.1e} of the energy passed on")
+    if recorded != now:
+        lines.append(f"the run is recorded {recorded}, the twin is {now}")
+    if simulated.left_out:
+        lines.append(f"not simulated: {', '.join(simulated.left_out)}")
+    if rig.structure is not None and rig.structure.kind == "beam":
+        lines += [f"rig: {remark}" for remark in scale_remarks(rig.structure)]
+    return {
+        "lines": lines,
+        "flags": flags,
+        "output": str(settings.output),
+        "samples": int(simulation.time_s.size),
+        "steps_per_sample": n_steps,
+        "driven_by": list(drive.channels),
+        "initial_displacement_m": drive.initial_displacement_m,
+        "channels": sorted(str(name) for name in simulated.recording.data_vars),
+        "left_out": list(simulated.left_out),
+        "events": simulation.n_events,
+        "relative_energy_error": error,
+        "rms": _rms(recording, simulated.recording),
+    }
+
+
+def _rms(recording: xr.Dataset, simulated: xr.Dataset) -> dict[str, dict[str, float]]:
+    """Root mean squares of what was recorded, what was simulated, and their difference, per channel."""
+    compared = {}
+    for name in simulated.data_vars:
+        if name not in recording.data_vars or name == "quality":
+            continue
+        was, now = recording[name].values.astype(float), simulated[name].values
+        both = np.isfinite(was) & np.isfinite(now)
+        if both.any():
+            values = {"recorded": was[both], "simulated": now[both], "difference": now[both] - was[both]}
+            compared[str(name)] = {key: float(np.sqrt(np.mean(each**2))) for key, each in values.items()}
+    return compared
