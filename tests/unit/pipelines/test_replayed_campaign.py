@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from pipelines.recording import replayed_campaign as campaign
 from pipelines.recording.replayed_campaign import Way, differences, window_differences
-from pipelines.recording.replayed_campaign import replayed_campaign as campaign
 from sloshlab.errors import RecordingError, SourceError
 
 ATTRIBUTES = {"run_id": "r", "rig": "rig.toml", "sampling_rate_hz": 500.0}
