@@ -15,13 +15,15 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
 import xarray as xr
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from sloshlab import atomic_file, interrupt
+from sloshlab.configurations import Configuration
 from sloshlab.errors import RecordingError, UnitsError
+from sloshlab.experiments import EXPERIMENTS, RecordedExperiment
 from sloshlab.file_structure import require_sound_structure
 from sloshlab.netcdf_lock import NETCDF_LOCK
-from sloshlab.units import SI_UNITS, factor_to_si
+from sloshlab.units import SI_UNITS, ChannelQuantity, factor_to_si
 
 FORMAT: Final = "1"
 MAXIMUM_DECODED_BYTES: Final = 6 * 2**30
@@ -72,8 +74,8 @@ class RunAttributes(BaseModel):
 
     sloshlab_format: Literal["1"]
     run_id: Annotated[str, Field(min_length=1, max_length=200)]
-    experiment: Literal["shaker_sweep", "shaker_vfa", "beam_free", "beam_random", "sdof_free", "other"]
-    configuration: Literal["sloshing", "frozen", "empty"]
+    experiment: RecordedExperiment
+    configuration: Configuration
     rig: str
     sampling_rate_hz: PositiveFloat
     start_time_utc: str
@@ -92,6 +94,14 @@ class RunAttributes(BaseModel):
             raise ValueError("must be ISO 8601, for example 2026-01-31T12:00:00Z") from None
         return value
 
+    @model_validator(mode="after")
+    def _complete_for_its_experiment(self) -> RunAttributes:
+        given = self.model_dump(exclude_none=True)
+        for name in EXPERIMENTS[self.experiment].required_attributes:
+            if name not in given:
+                raise ValueError(f"{name} among the attributes of a run of {self.experiment}")
+        return self
+
 
 class ChannelAttributes(BaseModel):
     """Attributes of one channel; unknown ones are kept."""
@@ -99,7 +109,7 @@ class ChannelAttributes(BaseModel):
     model_config = ConfigDict(frozen=True, extra="allow", strict=True)
 
     units: str
-    quantity: Literal["force", "acceleration", "velocity", "displacement", "voltage"]
+    quantity: ChannelQuantity
     block_from: str | None = None
     block_to: str | None = None
     x_m: FiniteFloat | None = None

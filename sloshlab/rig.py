@@ -10,17 +10,31 @@ import os
 import tomllib
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import RigError
+from sloshlab.registry import Registry, one_of
 
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 NonNegativeFloat = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 
 _LARGEST_RIG_FILE_BYTES = 1_000_000
+
+
+TANK_MODELS: Final[Registry[Any]] = Registry("tank model", group="sloshlab.tank_models")
+"""By the names of a rig's [twin] table; `sloshlab.twin.tank_models` says what an entry is and how to add one."""
+for _name, _function in {
+    "frozen": "sloshlab.twin.tank_models:frozen",
+    "viscous": "sloshlab.twin.tank_models:viscous",
+    "bouncing_ball": "sloshlab.twin.tank_models:bouncing_ball",
+    "rom": "sloshlab.twin.reduced_order_model_force:reduced_order_model",
+}.items():
+    TANK_MODELS.declare(_name, _function)
+
+TankModelName = Annotated[str, one_of(lambda: TANK_MODELS.names)]
 
 
 class _Described(BaseModel):
@@ -94,7 +108,7 @@ class Structure(_Described):
 class Twin(_Described):
     """The simulation that recordings of this rig are compared with."""
 
-    tank_model: Literal["frozen", "viscous", "bouncing_ball", "rom"] = "frozen"
+    tank_model: TankModelName = "frozen"
     parameters: dict[str, Any] = Field(default_factory=dict)
 
 

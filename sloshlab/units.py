@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
-from typing import Final
+from typing import Annotated, Final
 
 from sloshlab.errors import UnitsError
+from sloshlab.registry import one_of
 
 SI_UNITS: Final[dict[str, str]] = {
     "force": "N",
@@ -15,6 +16,8 @@ SI_UNITS: Final[dict[str, str]] = {
     "voltage": "V",
 }
 """Quantity of a channel → the units that it has inside the software."""
+
+ChannelQuantity = Annotated[str, one_of(lambda: tuple(SI_UNITS))]
 
 _LONGEST_UNITS = 64
 

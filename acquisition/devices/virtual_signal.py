@@ -15,11 +15,22 @@ from numpy.typing import NDArray
 
 from acquisition.devices.signal import Piece, Signal
 from acquisition.sources.interface import Channel, SourceURL
-from acquisition.sources.simulated_source import EXPERIMENTS, MOST_SAMPLES, channel_of, counts_of, run_settings
+from acquisition.sources.simulated_source import (
+    MOST_SAMPLES,
+    channel_of,
+    counts_of,
+    live_experiments,
+    run_settings,
+)
 from acquisition.sources.urls import URLOptions
 from acquisition.virtual_laboratory.sensors import CHANNELS, FORCE_CELLS, Laboratory, cell_forces
 from acquisition.virtual_laboratory.shaker import SweepPlan
-from acquisition.virtual_laboratory.shaker_run import VirtualShaker, virtual_shaker, virtual_shaker_run
+from acquisition.virtual_laboratory.shaker_run import (
+    LAW_OF_EXPERIMENT,
+    VirtualShaker,
+    virtual_shaker,
+    virtual_shaker_run,
+)
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
 
@@ -45,8 +56,8 @@ def virtual_signal(url: SourceURL, names: Sequence[str] | None = None) -> Virtua
     rig = options.text("rig")
     settings = run_settings(options)
     options.refuse_others()
-    if url.target not in EXPERIMENTS:
-        raise InputError(url.text, got=repr(url.target), allowed=", ".join(EXPERIMENTS))
+    if url.target not in live_experiments():
+        raise InputError(url.text, got=repr(url.target), allowed=", ".join(live_experiments()))
     if rig is None:
         raise InputError(f"{url.text}: rig", got="none", allowed="a rig description", remedy="add rig=RIG.toml")
     n_samples = settings["duration_s"] * settings["sampling_rate_hz"]
@@ -121,7 +132,7 @@ class _Truth:
         first, last = known.values() if settings["direction"] == "up" else reversed(known.values())
         plan = SweepPlan(
             acceleration_g=settings["acceleration_g"],
-            law="vfa" if experiment == "shaker_vfa" else settings["law"],
+            law=LAW_OF_EXPERIMENT.get(experiment, settings["law"]),
             start_hz=first,
             stop_hz=last,
             duration_s=settings["duration_s"],

@@ -14,8 +14,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from acquisition.files.file_format import FormatName
+from sloshlab.configurations import Configuration
 from sloshlab.errors import ChannelMapError
-from sloshlab.units import SI_UNITS
+from sloshlab.experiments import RecordedExperiment
+from sloshlab.units import SI_UNITS, ChannelQuantity
 
 _LARGEST_MAP_BYTES = 1_000_000
 _CHANNEL_NAME = re.compile(rf"({'|'.join(SI_UNITS)})_[A-Za-z0-9_]{{1,100}}")
@@ -51,8 +54,8 @@ class RunSection(_Section):
     """Global attributes of the recording; see the recording format."""
 
     run_id: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    experiment: Literal["shaker_sweep", "shaker_vfa", "beam_free", "beam_random", "sdof_free", "other"]
-    configuration: Literal["sloshing", "frozen", "empty"]
+    experiment: RecordedExperiment
+    configuration: Configuration
     start_time_utc: str | None = None
     rig: str | None = None
     initial_displacement_m: FiniteFloat | None = None
@@ -71,7 +74,7 @@ class RunSection(_Section):
 class SourceSection(_Section):
     """How the files are to be read; `docs/import.md` explains each key."""
 
-    format: Literal["csv", "mat", "uff", "tdms", "lvm", "mf4", "asc", "blf", "trc", "netcdf"] | None = None
+    format: FormatName | None = None
     join: Literal["channels", "time"] | None = None
     time: ColumnReference | None = None
     time_units: Literal["s", "ms", "us", "ns", "min", "h"] = "s"
@@ -114,7 +117,7 @@ class ChannelSection(_Section):
 
     column: ColumnReference
     source: Annotated[int, Field(ge=1)] | None = None
-    quantity: Literal["force", "acceleration", "velocity", "displacement", "voltage"] | None = None
+    quantity: ChannelQuantity | None = None
     units: Annotated[str, Field(max_length=64)] | None = None
     units_override: bool = False
     sign: Literal[1, -1] = 1

@@ -9,41 +9,11 @@ from pathlib import Path
 from typing import Final
 
 from acquisition.files.channel_map import SourceSection
+from acquisition.files.file_format import FILE_FORMATS, format_begun, format_called, format_names
 from acquisition.files.reading_limits import checked_size
 from acquisition.files.table import Table
 from sloshlab.errors import FileFormatError
 
-READERS: Final[dict[str, str]] = {
-    "csv": "delimited_text",
-    "mat": "matlab5",
-    "mat73": "matlab73",
-    "uff": "universal58",
-    "tdms": "labview_tdms",
-    "lvm": "labview_text",
-    "mf4": "measurement_data",
-    "asc": "can_log",
-    "blf": "can_log",
-    "trc": "can_log",
-    "netcdf": "network_common_data",
-}
-"""Format → module with a function ``read(path, settings) -> Table``."""
-
-_BINARY_SUFFIXES: Final[dict[str, str]] = {
-    ".mat": "mat",
-    ".tdms": "tdms",
-    ".mf4": "mf4",
-    ".blf": "blf",
-    ".nc": "netcdf",
-    ".nc4": "netcdf",
-    ".cdf": "netcdf",
-}
-_TEXT_SUFFIXES: Final[dict[str, str]] = {
-    ".uff": "uff",
-    ".unv": "uff",
-    ".lvm": "lvm",
-    ".asc": "asc",
-    ".trc": "trc",
-}
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _REFUSED: Final[dict[bytes, str]] = {
     b"\x93NUMPY": "a NumPy .npy array (it can carry pickled code, states no units and no rate)",
@@ -79,7 +49,7 @@ def read_table(path: Path, settings: SourceSection) -> Table:
     """
     checked_size(path)
     chosen = file_format(path, settings.format)
-    module = importlib.import_module(f"acquisition.files.{READERS[chosen]}")
+    module = importlib.import_module(f"acquisition.files.{FILE_FORMATS[chosen].reader}")
     table: Table = module.read(path, settings.model_copy(update={"format": chosen}))
     columns = tuple(
         column if column.number else replace(column, number=number)
@@ -89,7 +59,7 @@ def read_table(path: Path, settings: SourceSection) -> Table:
 
 
 def file_format(path: Path, stated: str | None = None) -> str:
-    """Name of the format of a file, one of `READERS`.
+    """Name of the format of a file, one of `FILE_FORMATS`.
 
     Raises
     ------
@@ -105,7 +75,7 @@ def file_format(path: Path, stated: str | None = None) -> str:
             raise FileFormatError(
                 f"source {path}",
                 got=description,
-                allowed="csv, mat, uff, tdms, lvm, mf4, asc, blf, trc, netcdf",
+                allowed=", ".join(format_names()),
                 remedy="save the signals as CSV, MAT v5 or netCDF",
             )
     found = _by_magic(path, start, has_hdf5_userblock) or _by_text(start)
@@ -114,7 +84,7 @@ def file_format(path: Path, stated: str | None = None) -> str:
     if found is not None:
         return found
     suffix = path.suffix.lower()
-    expected = _BINARY_SUFFIXES.get(suffix) or _TEXT_SUFFIXES.get(suffix)
+    expected = format_called(suffix)
     if expected is not None:
         raise FileFormatError(
             f"source {path}",
@@ -126,14 +96,12 @@ def file_format(path: Path, stated: str | None = None) -> str:
         raise FileFormatError(
             f"source {path}",
             got="binary content of an unknown format",
-            allowed="csv, mat, uff, tdms, lvm, mf4, asc, blf, trc, netcdf",
+            allowed=", ".join(format_names()),
         )
     return "csv"
 
 
 def _by_magic(path: Path, start: bytes, has_hdf5_userblock: bool) -> str | None:
-    if start.startswith(b"TDSm"):
-        return "tdms"
     if start.startswith(b"MDF     "):
         if start[8:9] != b"4":
             raise FileFormatError(
@@ -143,17 +111,13 @@ def _by_magic(path: Path, start: bytes, has_hdf5_userblock: bool) -> str | None:
                 remedy="convert it to MF4",
             )
         return "mf4"
-    if start.startswith(b"LOGG"):
-        return "blf"
     if has_hdf5_userblock and start.startswith(b"MATLAB 7.3"):
         return "mat73"
     if start.startswith(_HDF5):
         return "mat73" if path.suffix.lower() == ".mat" else "netcdf"
-    if start[:3] == b"CDF" and start[3:4] in (b"\x01", b"\x02", b"\x05"):
-        return "netcdf"
     if start[126:128] in (b"IM", b"MI") and start[124:126] in (b"\x00\x01", b"\x01\x00"):
         return "mat"
-    return None
+    return format_begun(start)
 
 
 def _by_text(start: bytes) -> str | None:

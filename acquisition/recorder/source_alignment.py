@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from acquisition.recorder.placement import SourcePlacement
 from acquisition.recorder.survey import SourceSurvey
 from acquisition.sources.interface import SourceInfo
+from sloshlab.channel_names import ACCELERATION_CONTROL, ACCELERATION_ROOF
 from sloshlab.conditioning.device_clock import ClockStatus
 from sloshlab.conditioning.redundancy import PHASE_ERROR_AT_HZ
 from sloshlab.conditioning.time_alignment import (
@@ -228,7 +229,7 @@ def common_motion_pairs(
 
 def _rigid_accelerometers(placement: SourcePlacement) -> list[str]:
     names = [channel.name for channel in placement.info.channels]
-    return [name for name in names if name.startswith(("acceleration_roof", "acceleration_control"))]
+    return [name for name in names if name.startswith((ACCELERATION_ROOF, ACCELERATION_CONTROL))]
 
 
 def _by_arrival(base: SourcePlacement, other: SourcePlacement) -> tuple[SourceAlignment, float, float]:

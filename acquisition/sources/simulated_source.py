@@ -17,15 +17,19 @@ from acquisition.sources.interface import Channel, CountArray, SourceInfo, Sourc
 from acquisition.sources.playback import PlayedSource
 from acquisition.sources.urls import URLOptions
 from acquisition.virtual_laboratory.sensors import CHANNELS, LOST_COUNT
-from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run
+from acquisition.virtual_laboratory.shaker_run import SWEEP_LAWS, virtual_shaker_run
+from sloshlab.configurations import CONFIGURATIONS, SLOSHING
 from sloshlab.errors import InputError, SourceError
+from sloshlab.experiments import experiment_names
 from sloshlab.rig import Rig
 
 MOST_SAMPLES: Final = 4_000_000
 """Two hours at 512 Hz."""
 
-EXPERIMENTS: Final = ("shaker_sweep", "shaker_vfa")
-"""What the virtual shaker can do."""
+
+def live_experiments() -> tuple[str, ...]:
+    """Experiments that the virtual shaker can run live: those that recordings name."""
+    return experiment_names(lambda experiment: experiment.moves == "shaker" and experiment.is_recorded)
 
 
 class SimulatedSource(PlayedSource):
@@ -45,8 +49,8 @@ class SimulatedSource(PlayedSource):
 
     def __init__(self, url: SourceURL, **clocks: Any) -> None:
         super().__init__(url, device="virtual_shaker", real_time=True, **clocks)
-        if url.target not in EXPERIMENTS:
-            raise SourceError(f"source {url.text}", got=repr(url.target), allowed=", ".join(EXPERIMENTS))
+        if url.target not in live_experiments():
+            raise SourceError(f"source {url.text}", got=repr(url.target), allowed=", ".join(live_experiments()))
         self._rig = self._options.text("rig")
         self._settings = {"experiment": url.target, **self._read_settings()}
         self._options.refuse_others()
@@ -112,8 +116,8 @@ def run_settings(options: URLOptions) -> dict[str, Any]:
         "sampling_rate_hz": options.number("sampling_rate_hz", 512.0, lowest=1, highest=1e6),
         "seed": options.integer("seed", 0, lowest=0, highest=2**31 - 1),
         "direction": options.choice("direction", "up", ("up", "down")),
-        "law": options.choice("law", "octave", ("octave", "linear", "stepped")),
-        "configuration": options.choice("configuration", "sloshing", ("sloshing", "frozen", "empty")),
+        "law": options.choice("law", SWEEP_LAWS[0], SWEEP_LAWS),
+        "configuration": options.choice("configuration", SLOSHING, CONFIGURATIONS),
         "imperfect": options.yes("imperfect", True),
     }
 

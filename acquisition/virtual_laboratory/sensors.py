@@ -15,10 +15,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.channel_names import ACCELERATION_CONTROL, ACCELERATION_ROOF, FORCE_CELL, numbered
+
 FloatArray = NDArray[np.float64]
 
-FORCE_CELLS: Final = ("force_cell_1", "force_cell_2")
-ACCELEROMETERS: Final = ("acceleration_roof_1", "acceleration_roof_2", "acceleration_control")
+FORCE_CELLS: Final = numbered(FORCE_CELL, 2)
+ACCELEROMETERS: Final = (*numbered(ACCELERATION_ROOF, 2), ACCELERATION_CONTROL)
 CHANNELS: Final = FORCE_CELLS + ACCELEROMETERS
 LOST_COUNT: Final = -32768
 """Count that stands for a lost sample."""

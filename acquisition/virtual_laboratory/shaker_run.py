@@ -32,20 +32,17 @@ from acquisition.virtual_laboratory.shaker import (
     shaken,
 )
 from acquisition.virtual_laboratory.tone_motion import Accelerated, TankMotion, random_motion, two_tone_motion
+from sloshlab.configurations import CONFIGURATIONS, EMPTY, FROZEN
 from sloshlab.errors import InputError
+from sloshlab.experiments import EXPERIMENTS, experiment_names
 from sloshlab.recording import CLIPPED, LOST, write_recording
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
-Experiment = Literal["shaker_sweep", "shaker_vfa", "sudden_start", "shaker_random", "shaker_two_tone"]
-Configuration = Literal["sloshing", "frozen", "empty"]
-
-EXPERIMENTS: Final = ("shaker_sweep", "shaker_vfa", "sudden_start", "shaker_random", "shaker_two_tone")
 TONES: Final = {"shaker_random": random_motion, "shaker_two_tone": two_tone_motion}
-CONFIGURATIONS: Final = ("sloshing", "frozen", "empty")
 SWEEP_LAWS: Final = ("octave", "linear", "stepped")
-_LAW_OF_EXPERIMENT: Final[dict[str, Law]] = {"shaker_vfa": "vfa", "sudden_start": "constant"}
-_OTHER_EXPERIMENTS: Final = ("sudden_start", *TONES)
+LAW_OF_EXPERIMENT: Final[dict[str, Law]] = {"shaker_vfa": "vfa", "sudden_start": "constant"}
+"""Experiments whose law cannot be chosen."""
 START_TIME_UTC = "2026-01-12T09:00:00Z"
 _LARGEST_SAMPLES = 50_000_000
 
@@ -82,7 +79,7 @@ def virtual_shaker(
     rig: Rig,
     plan: SweepPlan,
     *,
-    configuration: Configuration = "sloshing",
+    configuration: str = "sloshing",
     seed: int = 0,
     imperfect: bool = True,
     laboratory: Laboratory | None = None,
@@ -92,16 +89,16 @@ def virtual_shaker(
     generator = np.random.default_rng([seed, 1])
     motion = shaken(plan, Imperfections.drawn(generator) if imperfect else None)
     liquid = None
-    if configuration != "empty":
-        liquid = LiquidForce(motion, rig, seed=int(generator.integers(2**31)), frozen=configuration == "frozen")
+    if configuration != EMPTY:
+        liquid = LiquidForce(motion, rig, seed=int(generator.integers(2**31)), frozen=configuration == FROZEN)
     return VirtualShaker(motion, liquid, rig.tank.dry_mass_kg * truth.dry_mass_factor)
 
 
 def virtual_shaker_run(
     rig: Rig,
     *,
-    experiment: Experiment = "shaker_sweep",
-    configuration: Configuration = "sloshing",
+    experiment: str = "shaker_sweep",
+    configuration: str = "sloshing",
     acceleration_g: float = 3.0,
     direction: Literal["up", "down"] = "up",
     law: Law = "octave",
@@ -181,7 +178,7 @@ def virtual_shaker_run(
     >>> run.sizes["time"], run.attrs["experiment"]
     (2560, 'shaker_sweep')
     """
-    _check_choice("experiment", experiment, EXPERIMENTS)
+    _check_choice("experiment", experiment, experiment_names(lambda known: known.moves == "shaker"))
     _check_choice("configuration", configuration, CONFIGURATIONS)
     _check_choice("direction", direction, ("up", "down"))
     _check_choice("law", law, SWEEP_LAWS)
@@ -196,7 +193,7 @@ def virtual_shaker_run(
     first, last = (start_hz, stop_hz) if direction == "up" else (stop_hz, start_hz)
     plan = SweepPlan(
         acceleration_g=acceleration_g,
-        law=_LAW_OF_EXPERIMENT.get(experiment, law),
+        law=LAW_OF_EXPERIMENT.get(experiment, law),
         start_hz=first,
         stop_hz=last,
         duration_s=duration_s,
@@ -229,7 +226,7 @@ def virtual_shaker_run(
     attributes = {
         "sloshlab_format": "1",
         "run_id": run_id or f"virtual_{experiment}_{configuration}_{acceleration_g:.2f}g_seed{seed}",
-        "experiment": "other" if experiment in _OTHER_EXPERIMENTS else experiment,
+        "experiment": EXPERIMENTS[experiment].recorded_as,
         "configuration": configuration,
         "rig": rig_name,
         "sampling_rate_hz": float(sampling_rate_hz),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from acquisition.virtual_laboratory.sensors import Reading, reading
 from acquisition.virtual_laboratory.structure_computation import ComputedStructure
 from acquisition.virtual_laboratory.structure_rig import StructureLaboratory, StructureRig
+from sloshlab.channel_names import ACCELERATION_ROOT, ACCELERATION_TIP, DISPLACEMENT_TANK, FORCE_INTERFACE
 
 FloatArray = NDArray[np.float64]
 
@@ -40,12 +41,12 @@ def true_values(
     modal, shape = computed.modal_acceleration_m_per_s2, rig.structure.shape_at_tank
     tip = base_m_per_s2 + modal @ shape
     truths = {
-        "force_interface": rig.dry_mass_kg * tip - computed.liquid_force_n,
-        "acceleration_tip": tip,
-        "displacement_tank": base_m + computed.modal_displacement_m @ shape,
+        FORCE_INTERFACE: rig.dry_mass_kg * tip - computed.liquid_force_n,
+        ACCELERATION_TIP: tip,
+        DISPLACEMENT_TANK: base_m + computed.modal_displacement_m @ shape,
     }
     if rig.is_beam:
-        truths["acceleration_root"] = base_m_per_s2
+        truths[ACCELERATION_ROOT] = base_m_per_s2
         for k, its_shape in enumerate(rig.shapes, start=1):
             truths[f"acceleration_beam_{k}"] = base_m_per_s2 + modal @ its_shape
     return truths
@@ -126,7 +127,7 @@ def _channel_attributes(name: str, its_reading: Reading, rig: StructureRig) -> d
 
 def _place_m(name: str, rig: StructureRig) -> float:
     """Where an accelerometer of the beam is, from the root."""
-    if name == "acceleration_root":
+    if name == ACCELERATION_ROOT:
         return 0.0
     places = (*rig.places_m, rig.length_m)
-    return places[-1] if name == "acceleration_tip" else places[int(name.rpartition("_")[2]) - 1]
+    return places[-1] if name == ACCELERATION_TIP else places[int(name.rpartition("_")[2]) - 1]

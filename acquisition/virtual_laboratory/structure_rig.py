@@ -16,6 +16,14 @@ from numpy.typing import NDArray
 from acquisition.numerical_tank.structures import Mode, Structure
 from acquisition.virtual_laboratory.cantilever import Cantilever, fitted_to
 from acquisition.virtual_laboratory.sensors import Laboratory
+from sloshlab.channel_names import (
+    ACCELERATION_BEAM,
+    ACCELERATION_ROOT,
+    ACCELERATION_TIP,
+    DISPLACEMENT_TANK,
+    FORCE_INTERFACE,
+    numbered,
+)
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
 from sloshlab.rig import Structure as DescribedStructure
@@ -25,13 +33,13 @@ FloatArray = NDArray[np.float64]
 N_BEAM_ACCELEROMETERS: Final = 3
 """Between root and tip, at equal distances."""
 BEAM_CHANNELS: Final = (
-    "force_interface",
-    "acceleration_root",
-    *(f"acceleration_beam_{k + 1}" for k in range(N_BEAM_ACCELEROMETERS)),
-    "acceleration_tip",
-    "displacement_tank",
+    FORCE_INTERFACE,
+    ACCELERATION_ROOT,
+    *numbered(ACCELERATION_BEAM, N_BEAM_ACCELEROMETERS),
+    ACCELERATION_TIP,
+    DISPLACEMENT_TANK,
 )
-SDOF_CHANNELS: Final = ("force_interface", "acceleration_tip", "displacement_tank")
+SDOF_CHANNELS: Final = (FORCE_INTERFACE, ACCELERATION_TIP, DISPLACEMENT_TANK)
 _MASSES_AGREE: Final = 0.01
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 import xarray as xr
@@ -25,7 +25,7 @@ from acquisition.virtual_laboratory.numerical_liquid import (
     method_attributes,
     numerical_setup,
 )
-from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC, Configuration
+from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC
 from acquisition.virtual_laboratory.structure_channels import readings_of, recording_of, true_values
 from acquisition.virtual_laboratory.structure_computation import (
     StructureTask,
@@ -39,21 +39,16 @@ from acquisition.virtual_laboratory.structure_rig import (
     described_structure,
     structure_rig,
 )
+from sloshlab.configurations import CONFIGURATIONS, SLOSHING
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError
+from sloshlab.experiments import EXPERIMENTS, experiment_names
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
-StructureExperiment = Literal["beam_free", "beam_random", "sdof_free"]
-
-STRUCTURE_EXPERIMENTS: Final = ("beam_free", "beam_random", "sdof_free")
-DEFAULT_DURATION_S: Final = {"beam_free": 8.0, "beam_random": 90.0, "sdof_free": 6.0}
-DEFAULT_DISPLACEMENT_M: Final = {"beam_free": -0.0146, "beam_random": 0.0, "sdof_free": 0.064}
-"""A weight of 7 kg pulls the beam down by 14.6 mm; the guided tank is held 64 mm above its rest."""
 SPECTRUM_WIDTH_HZ: Final = 10.0
 """σ of (2.30), which the source does not tell."""
 
-_KIND: Final = {"beam_free": "beam", "beam_random": "beam", "sdof_free": "sdof"}
 _SOUND_OVER_SPEED: Final = 10.0
 _COLUMN_OVER_STRUCTURE: Final = 2.0
 """Quarter-wave resonance c₀/4h of the liquid column over the highest natural frequency of the structure."""
@@ -81,8 +76,8 @@ class _Plan:
 def virtual_structure_run(
     rig: Rig,
     *,
-    experiment: StructureExperiment,
-    configuration: Configuration = "sloshing",
+    experiment: str,
+    configuration: str = "sloshing",
     numerical: NumericalLiquid | None = None,
     duration_s: float | None = None,
     initial_displacement_m: float | None = None,
@@ -167,7 +162,7 @@ def virtual_structure_run(
     ['acceleration_tip', 'displacement_tank', 'force_interface']
     """
     _check(experiment, configuration, seed, rig)
-    duration_s = DEFAULT_DURATION_S[experiment] if duration_s is None else duration_s
+    duration_s = EXPERIMENTS[experiment].virtual_defaults["duration_s"] if duration_s is None else duration_s
     numerical = numerical or NumericalLiquid()
     truth = laboratory or (StructureLaboratory.drawn(0, rig) if imperfect else StructureLaboratory.perfect(rig))
     n_samples = _n_samples(duration_s, sampling_rate_hz)
@@ -198,7 +193,8 @@ def virtual_structure_run(
     base = [sampled_from_release(values, setup, n_samples)[:n_valid] for values in (base_m_per_s2, base_m)]
     truths = true_values(plan.rig, computed, base[0], base[1])
     readings = readings_of(truths, truth, seed=seed, noisy=imperfect)
-    amplitude = f"{rms_g:.2f}g" if experiment == "beam_random" else f"{1000 * plan.initial_displacement_m:.1f}mm"
+    is_free = EXPERIMENTS[experiment].moves == "release"
+    amplitude = f"{1000 * plan.initial_displacement_m:.1f}mm" if is_free else f"{rms_g:.2f}g"
     attributes: dict[str, Any] = {
         "sloshlab_format": "1",
         "run_id": run_id or f"virtual_{experiment}_{configuration}_{amplitude}_seed{seed}",
@@ -209,7 +205,7 @@ def virtual_structure_run(
         "start_time_utc": start_time_utc,
         "repeat": int(repeat),
         **_experiment_attributes(plan, rms_g),
-        **(method_attributes(setup) if configuration == "sloshing" else {"liquid": configuration, "seed": seed}),
+        **(method_attributes(setup) if configuration == SLOSHING else {"liquid": configuration, "seed": seed}),
         **({STOPPED: computed.stopped} if computed.stopped else {}),
     }
     return recording_of(readings, plan.rig, sampling_rate_hz, attributes)
@@ -217,14 +213,14 @@ def virtual_structure_run(
 
 def _check(experiment: str, configuration: str, seed: int, rig: Rig) -> None:
     for what, got, allowed in (
-        ("experiment", experiment, STRUCTURE_EXPERIMENTS),
-        ("configuration", configuration, ("sloshing", "frozen", "empty")),
+        ("experiment", experiment, experiment_names(lambda known: bool(known.structure))),
+        ("configuration", configuration, CONFIGURATIONS),
     ):
         if got not in allowed:
             raise InputError(what, got=repr(got), allowed=", ".join(allowed))
-    kind = described_structure(rig).kind
-    if kind != _KIND[experiment]:
-        raise InputError("rig: structure.kind", got=repr(kind), allowed=f"{_KIND[experiment]!r} for {experiment}")
+    kind, wanted = described_structure(rig).kind, EXPERIMENTS[experiment].structure
+    if kind != wanted:
+        raise InputError("rig: structure.kind", got=repr(kind), allowed=f"{wanted!r} for {experiment}")
     if seed < 0:
         raise InputError("seed", got=str(seed), allowed="≥ 0")
 
@@ -252,7 +248,7 @@ def _plan(
     seed: int,
 ) -> _Plan:
     true_rig = structure_rig(rig, truth)
-    if experiment == "beam_random":
+    if EXPERIMENTS[experiment].moves == "root":
         if initial_displacement_m:
             raise InputError(
                 "initial_displacement_m", got=f"{initial_displacement_m:g}", allowed="0 in a random run"
@@ -261,7 +257,8 @@ def _plan(
         return _Plan(
             true_rig, 0.0, RandomBaseMotion(period_s, rms_g * GRAVITY_M_PER_S2, centre_hz, width_hz, seed)
         )
-    wanted = DEFAULT_DISPLACEMENT_M[experiment] if initial_displacement_m is None else initial_displacement_m
+    default_m = EXPERIMENTS[experiment].virtual_defaults["initial_displacement_m"]
+    wanted = default_m if initial_displacement_m is None else initial_displacement_m
     if not (math.isfinite(wanted) and wanted != 0):
         raise InputError("initial_displacement_m", got=f"{wanted}", allowed="a finite number other than 0")
     return _Plan(true_rig, float(wanted), None)

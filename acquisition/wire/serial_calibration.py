@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from acquisition.sources.interface import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
 from acquisition.wire.serial_frames import LONGEST_TEXT
 from sloshlab.errors import InputError, SourceError, UnitsError
-from sloshlab.units import SI_UNITS, factor_to_si
+from sloshlab.units import SI_UNITS, ChannelQuantity, factor_to_si
 
 _CHANNEL_NAME: Final = re.compile(rf"({'|'.join(SI_UNITS)})_[A-Za-z0-9_]{{1,100}}")
 _REMEDY: Final = "check the device's firmware against docs/serial_protocol.md"
@@ -72,7 +72,7 @@ class _ChannelText(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
 
     name: str
-    quantity: Literal["force", "acceleration", "velocity", "displacement", "voltage"]
+    quantity: ChannelQuantity
     units: str
     bits: Literal[16, 24, 32] = 16
     scale_factor: FiniteFloat = 1.0

@@ -22,6 +22,14 @@ from pipelines.commands.application import (
 
 
 @app.command()
+def analyse(runs: Recordings, rig: RigOption, output: OutputFolder, as_json: Json = False) -> None:
+    """Recordings by the pipeline of their experiment, with its usual settings."""
+    from pipelines.recording.analysing import analyse_runs
+
+    finish(analyse_runs(runs, rig, output, command_as_given()), as_json)
+
+
+@app.command()
 def shaker(
     runs: Recordings,
     rig: RigOption,

@@ -14,6 +14,8 @@ from pipelines.commands.application import (
     app,
     finish,
 )
+from sloshlab.configurations import CONFIGURATIONS, SLOSHING
+from sloshlab.experiments import experiment_names
 
 
 @app.command()
@@ -21,13 +23,13 @@ def virtual(
     experiment: Annotated[
         str,
         typer.Argument(
-            help="shaker_sweep, shaker_vfa, sudden_start, shaker_random, shaker_two_tone, beam_free, "
-            "beam_random, sdof_free, or campaign for a whole folder of raw_data."
+            help=", ".join(experiment_names(lambda experiment: bool(experiment.virtual_run)))
+            + ", or campaign for a whole folder of raw_data."
         ),
     ],
     output: OutputFile,
     rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig of the experiment.")] = None,
-    configuration: Annotated[str, typer.Option(help="sloshing, frozen or empty.")] = "sloshing",
+    configuration: Annotated[str, typer.Option(help=f"One of {', '.join(CONFIGURATIONS)}.")] = SLOSHING,
     acceleration_g: Annotated[float, typer.Option(help="Level of the sweep in g.")] = 3.0,
     direction: Annotated[str, typer.Option(help="up or down.")] = "up",
     law: Annotated[str, typer.Option(help="octave, linear or stepped.")] = "octave",

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pipelines.commands.application import Json, OutputFile, OutputFolder, app, command_as_given, finish
+from sloshlab.configurations import SLOSHING
 
 Runs = Annotated[
     list[Path],
@@ -142,9 +143,7 @@ def simulate(
     block: Annotated[
         str, typer.Option(help="'all' together, or 'tank' or 'structure' alone on its measured input.")
     ] = "all",
-    configuration: Annotated[
-        str, typer.Option(help="Liquid: sloshing (as described), frozen, empty.")
-    ] = "sloshing",
+    configuration: Annotated[str, typer.Option(help="Liquid: sloshing (as described), frozen, empty.")] = SLOSHING,
     twin: Annotated[
         Path | None,
         typer.Option(metavar="TWIN.toml", help="A saved twin instead of that of the rig.", show_default=False),

@@ -12,6 +12,7 @@ from sloshlab.conditioning.calibration import check_signs
 from sloshlab.conditioning.quality import ChannelQuality, RunQuality, quality_of
 from sloshlab.conditioning.redundancy import PairAgreement
 from sloshlab.errors import InputError, RecordingError
+from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import read_recording
 
 
@@ -61,7 +62,7 @@ def _usable_quality(path: Path) -> RunQuality:
             allowed="a run that an analysis may rest on",
             remedy="record again, or mend it with `sloshlab import`",
         )
-    if recording.attrs["experiment"] in ("shaker_sweep", "shaker_vfa"):
+    if "signs" in EXPERIMENTS[recording.attrs["experiment"]].stages:
         with naming(path):
             check_signs(recording)
     return quality

@@ -17,17 +17,21 @@ from acquisition.virtual_laboratory.numerical_campaign import (
     make_numerical_campaign,
 )
 from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
-from acquisition.virtual_laboratory.shaker_run import EXPERIMENTS as SHAKER_EXPERIMENTS
-from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run, write_virtual_run
-from acquisition.virtual_laboratory.structure_run import STRUCTURE_EXPERIMENTS, virtual_structure_run
+from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from pipelines.report.progress import amounts, progress
 from sloshlab.errors import InputError
+from sloshlab.experiments import EXPERIMENTS, experiment_names
+from sloshlab.registry import loaded
 from sloshlab.rig import Rig
 
 LIQUIDS: Final = ("law", "numerical")
-RANDOM_LOWEST_HZ: Final = 8.0
-"""Of random motion of the shaker; lower frequencies would use up the stroke."""
-EXPERIMENTS: Final = (*SHAKER_EXPERIMENTS, *STRUCTURE_EXPERIMENTS)
+CAMPAIGN: Final = "campaign"
+"""In place of an experiment: a whole folder of raw_data."""
+
+
+def virtual_experiments() -> tuple[str, ...]:
+    """Experiments that the virtual laboratory can run."""
+    return experiment_names(lambda experiment: bool(experiment.virtual_run))
 
 
 @dataclass(frozen=True)
@@ -58,17 +62,8 @@ class VirtualRun:
             "duration_s": self.duration_s,
             "sampling_rate_hz": self.sampling_rate_hz,
         }
-        if self.experiment in STRUCTURE_EXPERIMENTS:
-            chosen["initial_displacement_m"] = self.initial_displacement_m
-            chosen["rms_g"] = self.rms_g
-        else:
-            chosen |= {"acceleration_g": self.acceleration_g, "direction": self.direction, "law": self.law}
-        if self.experiment in ("sudden_start", "shaker_two_tone"):
-            chosen["start_hz"] = self.frequency_hz
-        if self.experiment == "shaker_random":
-            chosen["start_hz"] = RANDOM_LOWEST_HZ
-        if self.experiment == "shaker_two_tone":
-            chosen["stop_hz"] = self.second_frequency_hz
+        for argument, source in EXPERIMENTS[self.experiment].virtual_options.items():
+            chosen[argument] = getattr(self, source) if isinstance(source, str) else source
         return {name: value for name, value in chosen.items() if value is not None}
 
 
@@ -92,8 +87,9 @@ def make_virtual_run(
     InputError
         If the experiment is unknown, no rig is given, or an argument is out of range.
     """
-    if run.experiment not in EXPERIMENTS:
-        raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join((*EXPERIMENTS, "campaign")))
+    if run.experiment not in virtual_experiments():
+        allowed = (*virtual_experiments(), CAMPAIGN)
+        raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join(allowed))
     _check_liquid(run.liquid)
     if rig is None:
         raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
@@ -114,11 +110,11 @@ def make_virtual_run(
 
 def _recorded(run: VirtualRun, rig: Path, numerical: NumericalLiquid) -> xr.Dataset:
     """The liquid follows its law where there is one and nothing else is asked for."""
-    described = Rig.from_toml(rig)
-    if run.experiment in STRUCTURE_EXPERIMENTS:
-        return virtual_structure_run(described, numerical=numerical, rig_name=rig.name, **run.settings())
-    computed = numerical if run.liquid == "numerical" else None
-    return virtual_shaker_run(described, numerical=computed, rig_name=rig.name, **run.settings())
+    described, experiment = Rig.from_toml(rig), EXPERIMENTS[run.experiment]
+    # no law is known for the liquid in a tank that moves with a structure
+    computed = numerical if run.liquid == "numerical" or experiment.structure else None
+    make: Callable[..., xr.Dataset] = loaded(experiment.virtual_run)
+    return make(described, numerical=computed, rig_name=rig.name, **run.settings())
 
 
 def make_campaign_folder(

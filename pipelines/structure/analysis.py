@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.report.progress import progress
 from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, FrozenMode, group_of
-from pipelines.structure.stages import RANDOM, Loaded, analysed, loaded
+from pipelines.structure.stages import Loaded, analysed, has_spectra, loaded
 from pipelines.sweep.stages import naming
 from sloshlab.conditioning.calibration import ApparentMass, apparent_mass
 from sloshlab.errors import AnalysisError, InputError
@@ -106,7 +106,7 @@ def _loaded(paths: Sequence[Path], kind: str) -> list[Loaded]:
             raise AnalysisError(f"{path}: run_id", got=f"{own[0]!r}, as in {same.path}",
                                 allowed="one run_id per run", remedy="give every run once")  # fmt: skip
         runs.append(run)
-    rates = {run.attributes.sampling_rate_hz for run in runs if run.attributes.experiment in RANDOM}
+    rates = {run.attributes.sampling_rate_hz for run in runs if has_spectra(run.attributes)}
     if len(rates) > 1:
         raise AnalysisError(
             "random runs",
@@ -122,7 +122,7 @@ def _segment_s(runs: Sequence[Loaded]) -> float:
     durations = [
         run.recording.sizes["time"] / run.attributes.sampling_rate_hz
         for run in runs
-        if run.attributes.experiment in RANDOM
+        if has_spectra(run.attributes)
     ]
     return max(math.floor(min(durations, default=0.0) / _SEGMENTS_PER_RUN), _SMALLEST_SEGMENT_S)
 

@@ -12,8 +12,10 @@ import numpy as np
 import xarray as xr
 
 from pipelines.report.outputs import sha256_of, versions, write_dataset
-from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, ModeDecay
+from pipelines.structure.analysis import analyse_beam
+from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, ModeDecay
 from sloshlab import atomic_file
+from sloshlab.errors import InputError
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping
 from sloshlab.quantities import described
 
@@ -279,3 +281,13 @@ def _summary(experiment: BeamExperiment, folder: Path, report: bool) -> dict[str
         },
         "output": str(folder),
     }
+
+
+def analyse_and_write(
+    recordings: Sequence[Path], rigs: Sequence[Path], output: Path, command: str
+) -> dict[str, Any]:
+    """The pipeline of a tank on a structure with its usual settings."""
+    if len(rigs) != 1:
+        raise InputError("--rig", got=f"{len(rigs)} rigs", allowed="the one rig that the runs belong to")
+    experiment = analyse_beam(recordings, rigs[0], BeamSettings())
+    return write_beam(experiment, output, command=command)

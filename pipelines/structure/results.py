@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from sloshlab.conditioning.calibration import ApparentMass
 from sloshlab.conditioning.quality import RunQuality
+from sloshlab.configurations import EMPTY, FROZEN, SLOSHING
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.modal.free_decay import FreeDecay
 from sloshlab.modal.modal_filter import ModalFilter, ModalResponse
@@ -25,7 +26,8 @@ from sloshlab.rig import Rig
 
 FloatArray = npt.NDArray[np.float64]
 
-CONFIGURATIONS: Final = ("frozen", "empty", "sloshing")
+CONFIGURATIONS: Final = (FROZEN, EMPTY, SLOSHING)
+"""In the order in which the report shows them: the structure alone first."""
 _SHORT: Final = {"reduced order model": "ROM"}
 METHODS: Final = ("log decrement", "envelope", "local sine fit")
 """Of reading a decay, in the order of `FreeDecay.readings`."""

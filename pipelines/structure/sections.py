@@ -22,6 +22,7 @@ from pipelines.structure import (
 from pipelines.structure.results import BeamExperiment
 from pipelines.structure.summary import sentences
 from sloshlab import __version__
+from sloshlab.experiments import EXPERIMENTS
 
 _THESIS: Final = Citation(
     "beam, guided tank, modal filter and damping (2.13, 2.25, 2.31; Tables 2.1, 2.4, 2.5)",
@@ -68,11 +69,9 @@ def write_beam_report(experiment: BeamExperiment, folder: Path) -> Path:
 
 def planned_sections(experiment: BeamExperiment) -> tuple[SectionPlan, ...]:
     """The sections of the report; what has no data is left out or says so."""
-    sections = []
-    if experiment.free_runs:
-        sections.append(_decay_section(experiment))
-    if experiment.random_runs:
-        sections.append(_random_section(experiment))
+    analysed = [run for run in experiment.runs if run.decays or run.random is not None]
+    filled = {name for run in analysed for name in EXPERIMENTS[run.attributes.experiment].report_sections}
+    sections = [section(experiment) for name, section in _SECTIONS.items() if name in filled]
     if any(run.is_simulated for run in experiment.runs):
         sections.append(_twin_section(experiment))
     quality = _present(
@@ -132,6 +131,10 @@ def _random_section(experiment: BeamExperiment) -> SectionPlan:
     }
     drawn = tuple(FigurePlan(name, partial(draw, experiment=experiment)) for name, draw in plans.items())
     return SectionPlan("Random motion", drawn, _present(tables.random_table(experiment)))
+
+
+_SECTIONS: Final = {"decays": _decay_section, "spectra": _random_section}
+"""By the names that the registry of experiments has for them, in their order."""
 
 
 def _present(*shown: Table | None) -> tuple[Table, ...]:

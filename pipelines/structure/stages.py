@@ -17,6 +17,7 @@ from pipelines.structure.random_runs import random_response
 from pipelines.structure.results import BeamRun, BeamSettings, ModeDecay, RandomResponse, group_of
 from pipelines.sweep.stages import require_usable
 from pipelines.twin.simulated_tank_model import departures_of
+from sloshlab.channel_names import ACCELERATION_ROOT, FORCE_INTERFACE
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
     force_channels,
@@ -25,6 +26,7 @@ from sloshlab.conditioning.combined_channels import (
 )
 from sloshlab.conditioning.quality import RunQuality, quality_of
 from sloshlab.errors import AnalysisError
+from sloshlab.experiments import EXPERIMENTS, experiment_names
 from sloshlab.modal.free_decay import FreeDecay, analyse_free_decay
 from sloshlab.modal.modal_filter import ModalFilter, ModalResponse, modal_filter
 from sloshlab.modal.rig_modes import (
@@ -40,7 +42,6 @@ from sloshlab.rig import Rig
 
 FloatArray = npt.NDArray[np.float64]
 
-FREE, RANDOM = ("beam_free", "sdof_free"), ("beam_random",)
 _FIRST_MODE_RANGE: Final = (0.7, 1.4)
 _HIGHER_MODE_RANGE: Final = (0.88, 1.14)
 """Where a mode is looked for, over its believed frequency; the liquid takes mass away from the first."""
@@ -76,6 +77,11 @@ class _Motion:
     flags: tuple[str, ...]
 
 
+def has_spectra(attributes: RunAttributes) -> bool:
+    """Whether the runs of this experiment are evaluated by spectra, not by decays."""
+    return "spectra" in EXPERIMENTS[attributes.experiment].stages
+
+
 def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
     """A recording whose experiment suits the structure, with working sensors.
 
@@ -85,7 +91,7 @@ def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
         If it is no run of this structure, or unusable.
     """
     attributes = run_attributes(recording, name=str(path))
-    allowed = tuple(name for name in (*FREE, *RANDOM) if name.startswith(kind))
+    allowed = experiment_names(lambda experiment: experiment.structure == kind)
     if attributes.experiment not in allowed:
         raise AnalysisError(
             f"{path}: experiment",
@@ -93,7 +99,7 @@ def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
             allowed=f"{' or '.join(allowed)} with this rig, whose structure is of kind {kind!r}",
             remedy="use `sloshlab shaker` for sweeps, or give the rig that the run belongs to",
         )
-    if attributes.experiment in FREE:
+    if EXPERIMENTS[attributes.experiment].moves == "release":
         recording = _without_still_root(recording)
     # a frozen liquid has no force: constant channels are no dead sensors in a simulation
     simulated = "simulated_from" in recording.attrs
@@ -103,7 +109,7 @@ def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
 
 def _without_still_root(recording: xr.Dataset) -> xr.Dataset:
     """A root that does not move at all is what a free run wants; whether its sensor is dead does not matter."""
-    roots = [name for name in channels(recording, "acceleration") if name.startswith("acceleration_root")]
+    roots = [name for name in channels(recording, "acceleration") if name.startswith(ACCELERATION_ROOT)]
     return recording.drop_vars([name for name in roots if np.ptp(recording[name].values) == 0])
 
 
@@ -115,7 +121,7 @@ def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
     AnalysisError
         If sensors cannot see a mode, the first mode does not decay, or channels are missing.
     """
-    is_random = run.attributes.experiment in RANDOM
+    is_random = has_spectra(run.attributes)
     rate_hz = run.attributes.sampling_rate_hz
     motion = _motion(run, rig, is_random)
     its_filter, response = _modal_response(motion, rig, settings, rate_hz, is_random)
@@ -146,7 +152,7 @@ def _motion(run: Loaded, rig: Rig, is_random: bool) -> _Motion:
     if not is_random:
         recording, flags = _longest_part_without_gaps(run, names)
     signals = {name: _centred(recording[name].values) for name in names}
-    root = next((signals[name] for name in names if name.startswith("acceleration_root")), None)
+    root = next((signals[name] for name in names if name.startswith(ACCELERATION_ROOT)), None)
     if is_random and root is None:
         raise AnalysisError(
             f"{run.path}: random run", got=f"channels {', '.join(names)}", allowed="acceleration_root among them"
@@ -158,7 +164,7 @@ def _motion(run: Loaded, rig: Rig, is_random: bool) -> _Motion:
             "acceleration in a free run; it is no clamped beam"
         )
     force = None
-    if "force_interface" in channels(recording, "force"):
+    if FORCE_INTERFACE in channels(recording, "force"):
         force = _centred(total_force(recording, force_channels(recording)).values)
     places = {} if structure_of(rig).kind == "sdof" else _places_m(recording, names, rig)
     kept = list(places) or tank_names
@@ -297,5 +303,5 @@ def _random(
         )
     outputs = {**motion.sensors, **dict(zip(modes.names, response.acceleration_m_per_s2, strict=True))}
     if motion.force is not None:
-        outputs["force_interface"] = motion.force
+        outputs[FORCE_INTERFACE] = motion.force
     return random_response(motion.root, motion.tank, outputs, modes, settings.segment_s, rate_hz)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pipelines.report.outputs import sha256_of, versions, write_dataset
 from pipelines.sweep.results import SweepExperiment
+from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 from sloshlab import atomic_file
+from sloshlab.sweep.windows import WindowSettings
 
 
 def write_experiment(
@@ -71,3 +74,11 @@ def _write_results(experiment: SweepExperiment, folder: Path, provenance: dict[s
             n_unsteady_windows=provenance["n_unsteady_windows"],
         )
         write_dataset(stamped, folder / name)
+
+
+def analyse_and_write(
+    recordings: Sequence[Path], rigs: Sequence[Path], output: Path, command: str
+) -> dict[str, Any]:
+    """The pipeline of sweeps on the shaker with its usual settings."""
+    experiment = analyse_shaker(recordings, rigs, ShakerSettings(WindowSettings()))
+    return write_experiment(experiment, output, command=command)

@@ -13,6 +13,7 @@ import xarray as xr
 
 from pipelines.report.figure import NothingToDrawError
 from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.experiments import EXPERIMENTS
 from sloshlab.sweep.law import LawKind
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def level_text(run: RunResult) -> str:
 
 def is_sweep(run: RunResult) -> bool:
     """True for a run that holds one level; amplitude-modulated runs are not shown as a level."""
-    return run.attributes.experiment != "shaker_vfa"
+    return not EXPERIMENTS[run.attributes.experiment].is_modulated
 
 
 def goes_up(run: RunResult) -> bool:

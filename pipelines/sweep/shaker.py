@@ -21,14 +21,15 @@ from sloshlab.conditioning.combined_channels import (
     total_force,
 )
 from sloshlab.conditioning.quality import RunQuality
+from sloshlab.configurations import SLOSHING, STILL_CONFIGURATIONS
 from sloshlab.errors import AnalysisError, InputError
+from sloshlab.experiments import experiment_names
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.quantities import described
 from sloshlab.recording import RunAttributes, channels, read_attributes, read_recording
 from sloshlab.rig import Rig
 from sloshlab.sweep.windows import WindowSettings
 
-_SHAKER_EXPERIMENTS = ("shaker_sweep", "shaker_vfa")
 _LARGEST_PLAUSIBLE_GAIN_ERROR = 0.05
 _LARGEST_BIAS_OF_W_BAR = 0.02
 
@@ -90,7 +91,7 @@ def analyse_shaker(paths: Sequence[Path], rig_paths: Sequence[Path], settings: S
             own = [run for run in runs if run.rig_name == name]
             dry[name] = _dry_mass(own, rig)
             for run in own:
-                if run.attributes.configuration == "sloshing":
+                if run.attributes.configuration == SLOSHING:
                     with naming(run.path):
                         results[name].append(_analysed(run, rig, dry[name], settings))
                 advance(run.path.name)
@@ -120,12 +121,13 @@ def _rigs(paths: Sequence[Path]) -> dict[str, Rig]:
 def _assigned(paths: Sequence[Path], rigs: Mapping[str, Rig]) -> list[_Run]:
     """Runs with the rig each belongs to; runs of different rigs must not be mixed under one."""
     described = [(path, read_attributes(path)) for path in paths]
+    swept = experiment_names(lambda experiment: experiment.moves == "shaker" and experiment.is_recorded)
     for path, attributes in described:
-        if attributes.experiment not in _SHAKER_EXPERIMENTS:
+        if attributes.experiment not in swept:
             raise AnalysisError(
                 f"{path}: experiment",
                 got=repr(attributes.experiment),
-                allowed=" or ".join(_SHAKER_EXPERIMENTS),
+                allowed=" or ".join(swept),
                 remedy="use `sloshlab work` for other sweeps",
             )
     seen: dict[str, Path] = {}
@@ -164,7 +166,7 @@ def _another_rig_lies_beside(described: Sequence[tuple[Path, RunAttributes]], ri
 def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
     dry = {
         configuration: [_dry_recording(run, rig) for run in runs if run.attributes.configuration == configuration]
-        for configuration in ("empty", "frozen")
+        for configuration in STILL_CONFIGURATIONS
     }
     recordings = dry["empty"] + dry["frozen"]
     if not recordings:

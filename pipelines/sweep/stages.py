@@ -17,6 +17,7 @@ from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import integrated
 from sloshlab.conditioning.quality import RunQuality, quality_of
 from sloshlab.errors import AnalysisError, InputError
+from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import CLIPPED, CRC_REPAIRED, LOST, STUCK, RunAttributes, run_attributes
 from sloshlab.rig import Rig
 from sloshlab.sweep.cycles import Cycles, evaluate_cycles
@@ -202,7 +203,7 @@ def _early_stop(
     path: Path, phase: MotionPhase, n_samples: int, attributes: RunAttributes, options: SweepOptions
 ) -> list[str]:
     """A flag, or an error, if the motion ends before the recording or before the stated end of the sweep."""
-    if attributes.experiment != "shaker_sweep":
+    if "end_of_sweep" not in EXPERIMENTS[attributes.experiment].stages:
         return []
     start, stop = phase.moving_interval_s()
     recorded = n_samples / attributes.sampling_rate_hz

@@ -14,6 +14,7 @@ import xarray as xr
 from pipelines.report.outputs import sha256_of, versions
 from pipelines.report.progress import amounts
 from pipelines.twin.simulated_tank_model import departure_attributes, with_tank_model
+from sloshlab.configurations import CONFIGURATIONS
 from sloshlab.errors import InputError
 from sloshlab.recording import read_recording, run_attributes, write_recording
 from sloshlab.rig import Rig
@@ -26,7 +27,6 @@ from sloshlab.twin.storage import load_twin, save_twin
 from sloshlab.twin.structure_forces import MASS_ERROR
 from sloshlab.twin.twin import Twin
 
-CONFIGURATIONS: Final = ("sloshing", "frozen", "empty")
 LEAST_RATE_HZ: Final = 20_000.0
 STEPS_PER_PERIOD: Final = 60
 """Integration steps per second, and per period of the highest mode, at least."""

@@ -9,6 +9,13 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from sloshlab.channel_names import (
+    ACCELERATION_CONTROL,
+    ACCELERATION_ROOF,
+    ACCELERATION_TIP,
+    FORCE_CELL,
+    FORCE_INTERFACE,
+)
 from sloshlab.conditioning.gaps import require_channels
 from sloshlab.errors import AnalysisError
 from sloshlab.recording import channels
@@ -24,8 +31,8 @@ def force_channels(recording: xr.Dataset) -> list[str]:
         If there is neither a ``force_cell_*`` nor a ``force_interface``.
     """
     forces = channels(recording, "force")
-    cells = [name for name in forces if name.startswith("force_cell")]
-    chosen = cells or [name for name in forces if name == "force_interface"]
+    cells = [name for name in forces if name.startswith(FORCE_CELL)]
+    chosen = cells or [name for name in forces if name == FORCE_INTERFACE]
     if not chosen:
         raise AnalysisError(
             "force on the tank",
@@ -48,7 +55,7 @@ def acceleration_channels(recording: xr.Dataset) -> list[str]:
         If none of these is there, or several unknown ones are.
     """
     accelerations = channels(recording, "acceleration")
-    for prefix in ("acceleration_roof", "acceleration_tip", "acceleration_control"):
+    for prefix in (ACCELERATION_ROOF, ACCELERATION_TIP, ACCELERATION_CONTROL):
         chosen = [name for name in accelerations if name.startswith(prefix)]
         if chosen:
             return chosen

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 from numba import njit
 
+from sloshlab.channel_names import ACCELERATION_CONTROL, ACCELERATION_ROOF
 from sloshlab.conditioning.block_spectra import block_spectra, delay_s
 from sloshlab.conditioning.gaps import require_channels
 from sloshlab.errors import AnalysisError
@@ -96,7 +97,7 @@ class SensorAgreement:
 def redundant_accelerometers(recording: xr.Dataset) -> list[str]:
     """Accelerometers of a rigid tank that must read the same: on the roof, and the control."""
     accelerations = channels(recording, "acceleration")
-    return [name for name in accelerations if name.startswith(("acceleration_roof", "acceleration_control"))]
+    return [name for name in accelerations if name.startswith((ACCELERATION_ROOF, ACCELERATION_CONTROL))]
 
 
 def agreement(recording: xr.Dataset, names: Sequence[str], reference: str | None = None) -> SensorAgreement:

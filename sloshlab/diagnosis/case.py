@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from sloshlab.errors import InputError
+from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import RunAttributes, read_recording, run_attributes
 from sloshlab.rig import Rig
 
@@ -49,7 +50,7 @@ class CaseRun:
     @property
     def is_free(self) -> bool:
         """Whether it starts from a release and nothing drives it."""
-        return self.attributes.experiment in ("beam_free", "sdof_free")
+        return EXPERIMENTS[self.attributes.experiment].moves == "release"
 
     @property
     def duration_s(self) -> float:

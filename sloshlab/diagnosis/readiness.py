@@ -16,6 +16,7 @@ from sloshlab.diagnosis.case import Case, CaseRun
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.errors import AnalysisError, InputError
+from sloshlab.experiments import EXPERIMENTS
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
@@ -49,8 +50,8 @@ def require_one_rig(case: Case) -> None:
     _require_one_moving_mass(case, case.rig)
     kind = None if case.rig.structure is None else case.rig.structure.kind
     for run in case.runs:
-        expected = {"beam_free": "beam", "beam_random": "beam", "sdof_free": "sdof"}.get(run.attributes.experiment)
-        if expected is not None and expected != kind:
+        expected = EXPERIMENTS[run.attributes.experiment].structure
+        if expected and expected != kind:
             raise InputError(
                 f"recording {run.name}: experiment",
                 got=f"{run.attributes.experiment} on a rig whose structure is {kind or 'absent'}",

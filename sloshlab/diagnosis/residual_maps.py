@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, hilbert, sosfiltfilt
 
+from sloshlab.channel_names import ACCELERATION_CONTROL, ACCELERATION_ROOF, ACCELERATION_TIP
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.rig import Rig
@@ -130,7 +131,7 @@ def residual_maps(
 
 def _motion_per_block(observed: Sequence[Observation]) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Amplitude [m/s²], frequency [Hz] and purity (0 … 1) of the tank's acceleration per block."""
-    names = ("acceleration_roof", "acceleration_tip", "acceleration_control", "acceleration")
+    names = (ACCELERATION_ROOF, ACCELERATION_TIP, ACCELERATION_CONTROL, "acceleration")
     for name in names:
         chosen = [one for one in observed if one.channel.startswith(name)]
         if chosen:
@@ -164,7 +165,7 @@ def _sorted_by(
 
 def _phase(observed: Sequence[Observation]) -> FloatArray | None:
     """Phase of the tank's acceleration at every sample, NaN at the ends; None where it has no single frequency."""
-    chosen = [one for one in observed if one.channel.startswith(("acceleration_roof", "acceleration_tip"))]
+    chosen = [one for one in observed if one.channel.startswith((ACCELERATION_ROOF, ACCELERATION_TIP))]
     if not chosen:
         return None
     run = chosen[0].run

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import hilbert
 
+from sloshlab.channel_names import ACCELERATION_ROOT
 from sloshlab.diagnosis.candidate import Surroundings
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
@@ -17,7 +18,7 @@ from sloshlab.recording import channels
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
-_BASE: Final = "acceleration_root"
+_BASE: Final = ACCELERATION_ROOT
 _SHARE_OF_ONE_NUMBER: Final = 0.9
 """Of the mean square of a channel that may be another one's, with a gain and a delay, before they are alike."""
 _MOST_PEAKS: Final = 3

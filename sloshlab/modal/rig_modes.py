@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from sloshlab.channel_names import ACCELERATION_ROOF, ACCELERATION_ROOT, ACCELERATION_TIP
 from sloshlab.errors import AnalysisError, RigError
 from sloshlab.modal.cantilever import Cantilever, cantilever_modes
 from sloshlab.modal.modal_filter import ModalFilter, modal_filter
@@ -21,7 +22,7 @@ from sloshlab.twin.rig_beam import beam_of_rig
 
 FloatArray = npt.NDArray[np.float64]
 
-_AT_THE_TIP: Final = ("acceleration_tip", "acceleration_roof")
+_AT_THE_TIP: Final = (ACCELERATION_TIP, ACCELERATION_ROOF)
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,7 @@ def sensor_places_m(places_m: Mapping[str, float | None], length_m: float) -> di
         place = stated
         if place is None and name.startswith(_AT_THE_TIP):
             place = length_m
-        if place is None and name.startswith("acceleration_root"):
+        if place is None and name.startswith(ACCELERATION_ROOT):
             place = 0.0
         if place is None or not 0 <= place <= length_m * (1 + 1e-6):
             raise AnalysisError(

@@ -15,6 +15,7 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.interpolate import CubicSpline
 
+from sloshlab.channel_names import ACCELERATION_ROOT, DISPLACEMENT_TANK
 from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
@@ -26,6 +27,7 @@ from sloshlab.conditioning.combined_channels import (
 from sloshlab.conditioning.gaps import runs
 from sloshlab.conditioning.integration import integrated
 from sloshlab.errors import AnalysisError, InputError
+from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import run_attributes
 from sloshlab.twin.excitation import Excitation, free, recorded
 from sloshlab.twin.twin import Twin
@@ -34,7 +36,6 @@ FloatArray = npt.NDArray[np.float64]
 Block = Literal["all", "tank", "structure"]
 
 BLOCKS: Final = ("all", "tank", "structure")
-FREE_EXPERIMENTS: Final = ("beam_free", "sdof_free")
 LONGEST_BRIDGE: Final = 5
 """Lost samples in a row that are bridged."""
 
@@ -115,11 +116,11 @@ def _driven_tank(recording: xr.Dataset, twin: Twin, *, by_noise: bool) -> Drive:
     if not _is_free(recording):
         acceleration -= acceleration.mean()
     motion = _integrated_twice(acceleration, rate)
-    if "displacement_tank" in recording.data_vars and _is_free(recording):
+    if DISPLACEMENT_TANK in recording.data_vars and _is_free(recording):
         # integration has to forget the constant, and at the ends more; a free run starts with all of it
-        measured, _, _ = _usable(recording, ["displacement_tank"], recording["displacement_tank"].values)
+        measured, _, _ = _usable(recording, [DISPLACEMENT_TANK], recording[DISPLACEMENT_TANK].values)
         motion = (motion[0], measured[:n_driven])
-        names = [*names, "displacement_tank"]
+        names = [*names, DISPLACEMENT_TANK]
     excitation = recorded(rate, acceleration=acceleration, velocity=motion[0], displacement=motion[1])
     return Drive(twin, excitation, 0.0, tuple(names), f"the tank follows {', '.join(names)}", flags)
 
@@ -131,9 +132,9 @@ def _driven_structure(recording: xr.Dataset, twin: Twin, block: Block) -> Drive:
     driven: dict[str, FloatArray] = {}
     flags: tuple[str, ...] = ()
     parts: list[str] = []
-    if "acceleration_root" in recording.data_vars and not _is_free(recording):
-        names.append("acceleration_root")
-        acceleration, n, flags = _usable(recording, names, recording["acceleration_root"].values)
+    if ACCELERATION_ROOT in recording.data_vars and not _is_free(recording):
+        names.append(ACCELERATION_ROOT)
+        acceleration, n, flags = _usable(recording, names, recording[ACCELERATION_ROOT].values)
         acceleration -= acceleration.mean()
         velocity, displacement = _integrated_twice(acceleration, rate)
         driven = {"acceleration": acceleration, "velocity": velocity, "displacement": displacement}
@@ -167,23 +168,23 @@ def _driven_structure(recording: xr.Dataset, twin: Twin, block: Block) -> Drive:
 
 
 def _is_free(recording: xr.Dataset) -> bool:
-    return run_attributes(recording).experiment in FREE_EXPERIMENTS
+    return EXPERIMENTS[run_attributes(recording).experiment].moves == "release"
 
 
 def _initial_displacement_m(recording: xr.Dataset) -> float:
     """Nominal deflection of the tank at the first sample; measured where a free run states none."""
     stated = run_attributes(recording).initial_displacement_m
-    if stated is not None or not _is_free(recording) or "displacement_tank" not in recording.data_vars:
+    if stated is not None or not _is_free(recording) or DISPLACEMENT_TANK not in recording.data_vars:
         return float(stated or 0.0)
-    first = float(recording["displacement_tank"].values[0])
+    first = float(recording[DISPLACEMENT_TANK].values[0])
     return first if np.isfinite(first) else 0.0
 
 
 def _start_remarks(recording: xr.Dataset, stated_m: float) -> tuple[str, ...]:
     """A nominal deflection that the measured one contradicts, for example by its sign."""
-    if "displacement_tank" not in recording.data_vars:
+    if DISPLACEMENT_TANK not in recording.data_vars:
         return ()
-    measured = float(recording["displacement_tank"].values[0])
+    measured = float(recording[DISPLACEMENT_TANK].values[0])
     if not np.isfinite(measured) or abs(measured - stated_m) <= _DEFLECTIONS_AGREE * abs(stated_m):
         return ()
     stated = f"released from the stated {1000 * stated_m:g} mm"

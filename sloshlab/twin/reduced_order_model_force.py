@@ -39,7 +39,6 @@ from sloshlab.twin.reduced_order_model_law import (
     step_of_model,
     workspace_size,
 )
-from sloshlab.twin.tank_models import tank_model
 from sloshlab.twin.terms import ForceKind, Parameter, Term, register
 
 FloatArray = npt.NDArray[np.float64]
@@ -121,8 +120,8 @@ REDUCED_ORDER_MODEL = register(
 assert len(REDUCED_ORDER_MODEL.parameters) == N_VALUES
 
 
-@tank_model("rom")
-def _rom(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+def reduced_order_model(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+    """The trained model of a file as tank model ``rom``."""
     unknown = sorted(set(parameters) - {"rom"})
     if unknown or not isinstance(parameters.get("rom"), str):
         raise InputError("rom", got=", ".join(unknown) or "no file", allowed='rom = "file.nc", a trained model')

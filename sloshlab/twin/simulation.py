@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from sloshlab.channel_names import ACCELERATION_ROOT, ACCELERATION_TIP, DISPLACEMENT_TANK, FORCE_INTERFACE
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.twin.status import Ending, Status
 from sloshlab.twin.terms import PLACES
@@ -162,10 +163,10 @@ class Simulation:
     def to_dataset(self, *, seed: int | None = None) -> xr.Dataset:
         """Channels under the names of recordings, as the sensors read them; channels without a sensor are true."""
         channels = {
-            "acceleration_tip": (self.acceleration_m_per_s2, "m s-2"),
-            "acceleration_root": (self.base_acceleration_m_per_s2, "m s-2"),
-            "displacement_tank": (self.displacement_m, "m"),
-            "force_interface": (self.interface_force_n, "N"),
+            ACCELERATION_TIP: (self.acceleration_m_per_s2, "m s-2"),
+            ACCELERATION_ROOT: (self.base_acceleration_m_per_s2, "m s-2"),
+            DISPLACEMENT_TANK: (self.displacement_m, "m"),
+            FORCE_INTERFACE: (self.interface_force_n, "N"),
         }
         generator = None if seed is None else np.random.default_rng(seed)
         for sensor in self.twin.sensors:

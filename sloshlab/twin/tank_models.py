@@ -6,7 +6,8 @@ Another model is one function and one line::
     def half_a_ball(rig, parameters, folder):
         return (BOUNCING_BALL(liquid_mass_kg=0.5 * rig.liquid_mass_kg, height_m=rig.tank.height_m, **parameters),)
 
-The data-driven model ``rom`` is registered by `sloshlab.twin.reduced_order_model_force`.
+An installed package declares its model as an entry point of the group ``sloshlab.tank_models`` instead; then every
+command knows it. The names stand in `sloshlab.rig`, which checks them when a rig file is read.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from sloshlab.errors import InputError, RigError
-from sloshlab.rig import Rig
+from sloshlab.rig import TANK_MODELS, Rig
 from sloshlab.twin.measured_maps import terms_from_maps
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING
 from sloshlab.twin.tank_forces import BOUNCING_BALL
@@ -24,17 +25,10 @@ from sloshlab.twin.terms import Term
 
 TankModel = Callable[[Rig, Mapping[str, Any], Path], tuple[Term, ...]]
 
-_MODELS: dict[str, TankModel] = {}
-
 
 def tank_model(name: str) -> Callable[[TankModel], TankModel]:
     """Make a tank model known by its name; it gets the rig, its parameters, and the folder of the rig file."""
-
-    def register(model: TankModel) -> TankModel:
-        _MODELS[name] = model
-        return model
-
-    return register
+    return TANK_MODELS.register(name)
 
 
 def tank_terms(rig: Rig, folder: Path | None = None) -> tuple[Term, ...]:
@@ -47,31 +41,24 @@ def tank_terms(rig: Rig, folder: Path | None = None) -> tuple[Term, ...]:
     """
     if rig.twin is None:
         return ()
-    name = rig.twin.tank_model
-    if name not in _MODELS:
-        raise RigError(
-            "rig: twin.tank_model",
-            got=name,
-            allowed=", ".join(sorted(_MODELS)),
-            remedy="import the module that registers this model, or choose another one",
-        )
+    model: TankModel = TANK_MODELS[rig.twin.tank_model]
     try:
-        return _MODELS[name](rig, rig.twin.parameters, folder or Path())
+        return model(rig, rig.twin.parameters, folder or Path())
     except (InputError, TypeError) as error:
         if isinstance(error, RigError):
             raise
         raise RigError(f"rig: twin.parameters: {error}") from error
 
 
-@tank_model("frozen")
-def _frozen(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+def frozen(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+    """Liquid that moves with the tank: no force beside its inertia."""
     if parameters:
         raise InputError("frozen", got=", ".join(sorted(parameters)), allowed="no parameters")
     return ()
 
 
-@tank_model("viscous")
-def _viscous(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+def viscous(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+    """A damper between tank and liquid, of one coefficient or as maps say."""
     if "maps" in parameters:
         return terms_from_maps(rig, parameters, folder)
     unknown = sorted(set(parameters) - {"damping_kg_per_s"})
@@ -81,7 +68,7 @@ def _viscous(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Ter
     return (VISCOUS_DAMPING(place="tank", damping_n_s_per_m=parameters["damping_kg_per_s"]),)
 
 
-@tank_model("bouncing_ball")
-def _bouncing_ball(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+def bouncing_ball(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+    """The bouncing ball of (2.1); height and mass are those of the rig unless stated."""
     fixed = {"liquid_mass_kg": rig.liquid_mass_kg, "height_m": rig.tank.height_m}
     return (BOUNCING_BALL(**{**fixed, **parameters}),)

@@ -18,7 +18,6 @@ from pathlib import Path
 
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
-from sloshlab.twin import reduced_order_model_force  # noqa: F401  it registers its tank model
 from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.preparation import Watch, run
 from sloshlab.twin.sensors import Sensor

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import math
 import re
-from collections.abc import Mapping
+import sys
+import types
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +16,13 @@ import pytest
 import xarray as xr
 
 from sloshlab.errors import RigError
-from sloshlab.rig import Rig
-from sloshlab.twin import rate_independent_forces, tank_models
+from sloshlab.rig import TANK_MODELS, Rig
+from sloshlab.twin import rate_independent_forces, reduced_order_model_force
 from sloshlab.twin.excitation import free, harmonic, stepped_sine
 from sloshlab.twin.law import VELOCITY, law
 from sloshlab.twin.structure import single_degree_of_freedom
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING
-from sloshlab.twin.tank_forces import VISCOUS_MAP, table_of
+from sloshlab.twin.tank_forces import BOUNCING_BALL, VISCOUS_MAP, table_of
 from sloshlab.twin.tank_models import tank_model, tank_terms
 from sloshlab.twin.terms import _KINDS, ForceKind, Parameter, Term, register
 from sloshlab.twin.twin import Twin
@@ -44,13 +47,18 @@ tank_model = "{model}"
 [twin.parameters]
 {parameters}
 """
-assert rate_independent_forces.HYSTERESIS.name == "hysteresis"  # registers the last of the built-in forces
+assert rate_independent_forces.HYSTERESIS.name == "hysteresis"  # these two modules register the last of
+assert reduced_order_model_force.NAME == "reduced_order_model"  # the built-in forces
 LIQUID_KG, HEIGHT_M = 0.12433, 0.0272
 SCALE = math.sqrt(9.81 / HEIGHT_M)
 
 
+def rig_text(model: str, parameters: str = "") -> str:
+    return RIG.format(model=model, parameters=parameters)
+
+
 def rig_of(model: str, parameters: str = "") -> Rig:
-    return Rig.from_toml_text(RIG.format(model=model, parameters=parameters))
+    return Rig.from_toml_text(rig_text(model, parameters))
 
 
 @pytest.fixture
@@ -235,19 +243,65 @@ HELD = register(
 )  # fmt: skip
 
 
-def test_a_model_in_discrete_time_fills_the_slot_of_the_data_driven_one(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.fixture
+def registered() -> Iterator[None]:
+    """What a test registers is forgotten at its end."""
+    before = TANK_MODELS.names
+    yield
+    for name in set(TANK_MODELS.names) - set(before):
+        TANK_MODELS.withdraw(name)
+
+
+def test_the_documented_tank_model_can_be_named_in_a_rig_file(folder: Path, registered: None) -> None:
+    """Half the liquid as a ball: a rig names it, and its simulation is that of a ball of half the mass."""
+
+    @tank_model("half_a_ball")
+    def half_a_ball(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+        return (BOUNCING_BALL(liquid_mass_kg=0.5 * rig.liquid_mass_kg, height_m=rig.tank.height_m, **parameters),)
+
+    numbers = "radius_m = 0.009\nstiffness_n_per_m = 3000.0\ndamping_kg_per_s = 2.0\n"
+    numbers += "hardening_per_m = 300.0\nbeta = 0.002"
+    path = folder / "rig_half.toml"
+    path.write_text(rig_text("half_a_ball", numbers), encoding="utf-8")
+    half = Twin.from_rig(Rig.from_toml(path), folder=folder)
+    mass_kg = 0.5 * Rig.from_toml(path).liquid_mass_kg
+    ball = Twin.from_rig(rig_of("bouncing_ball", f"{numbers}\nliquid_mass_kg = {mass_kg!r}"), folder=folder)
+    release = free(0.5, 5000.0)
+    results = [twin.simulate(release, initial_displacement_m=0.005).require_done() for twin in (half, ball)]
+    np.testing.assert_array_equal(results[0].displacement_m, results[1].displacement_m)
+    whole = Twin.from_rig(rig_of("bouncing_ball", numbers), folder=folder)
+    other = whole.simulate(release, initial_displacement_m=0.005).require_done()
+    assert np.abs(other.displacement_m - results[0].displacement_m).max() > 1e-4
+
+
+def test_a_tank_model_that_nobody_registered_is_refused_with_all_names(registered: None) -> None:
+    tank_model("half_a_ball")(lambda rig, parameters, folder: ())
+    with pytest.raises(RigError, match=r"got 'third_of_a_ball'.*'frozen', 'viscous', .*'half_a_ball'"):
+        rig_of("third_of_a_ball", "")
+
+
+def test_a_tank_model_of_another_package_is_known_by_its_entry_point(
+    monkeypatch: pytest.MonkeyPatch, registered: None
 ) -> None:
+    point = importlib.metadata.EntryPoint("of_a_package", "tests_of_a_package:model", "sloshlab.tank_models")
+    module = types.ModuleType("tests_of_a_package")
+    module.model = lambda rig, parameters, folder: (HELD(damping_n_s_per_m=parameters["c"]),)
+    monkeypatch.setitem(sys.modules, "tests_of_a_package", module)
+    monkeypatch.setitem(TANK_MODELS._declared, "of_a_package", point)
+    [term] = tank_terms(rig_of("of_a_package", "c = 2.5"))
+    assert term.values["damping_n_s_per_m"] == 2.5
+
+
+def test_a_model_in_discrete_time_is_a_tank_model(folder: Path, registered: None) -> None:
     """Held for one sample, a damper acts half a sample late: at 20 kHz its decay is that of the damper."""
-    monkeypatch.setattr(tank_models, "_MODELS", dict(tank_models._MODELS))
     seen: list[Path] = []
 
-    @tank_model("rom")
-    def rom(rig: Rig, parameters: Mapping[str, Any], where: Path) -> tuple[Term, ...]:
-        seen.append(where / parameters["rom"])
+    @tank_model("held")
+    def held(rig: Rig, parameters: Mapping[str, Any], where: Path) -> tuple[Term, ...]:
+        seen.append(where / parameters["file"])
         return (HELD(damping_n_s_per_m=3.4),)
 
-    closed = Twin.from_rig(rig_of("rom", 'rom = "model.nc"'), folder=folder)
+    closed = Twin.from_rig(rig_of("held", 'file = "model.nc"'), folder=folder)
     assert seen == [folder / "model.nc"]
     result = closed.simulate(free(1.0, 20000.0), initial_displacement_m=0.01).require_done()
     damper = Twin.from_rig(rig_of("viscous", "damping_kg_per_s = 3.4"), folder=folder)

@@ -22,7 +22,7 @@ from import_scenarios import (
 )
 
 from acquisition.files import describe_source, import_recording
-from acquisition.files.formats import READERS
+from acquisition.files.file_format import FILE_FORMATS
 from sloshlab.errors import ChannelMapError, FileFormatError, InputError
 
 
@@ -273,5 +273,5 @@ def test_npy_is_refused_with_its_reason(tmp_path: Path) -> None:
 def test_every_format_has_a_reader_module() -> None:
     import importlib
 
-    for module in set(READERS.values()):
+    for module in {known.reader for known in FILE_FORMATS}:
         assert callable(importlib.import_module(f"acquisition.files.{module}").read)
