@@ -93,6 +93,7 @@ def test_the_virtual_laboratory_the_check_and_the_analysis_know_it(folder: Path)
     assert run(arguments) == 0
     found = json.loads((folder / "out" / "swing.json").read_text())
     assert found["rigs"] == ["rig.toml"]
+    # of 50 samples per period the nearest to the peak is half a sample away
     assert found["largest"]["swing.nc"] == pytest.approx(
         0.1 * np.cos(np.pi / 50), rel=1e-9
     )  # 50 samples per period
