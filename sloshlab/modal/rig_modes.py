@@ -16,8 +16,8 @@ import numpy.typing as npt
 from sloshlab.errors import AnalysisError, RigError
 from sloshlab.modal.cantilever import Cantilever, cantilever_modes
 from sloshlab.modal.modal_filter import ModalFilter, modal_filter
+from sloshlab.modal.rig_beam import beam_of_rig
 from sloshlab.rig import Rig, Structure
-from sloshlab.twin.rig_beam import beam_of_rig
 
 FloatArray = npt.NDArray[np.float64]
 

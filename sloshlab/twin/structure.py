@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sloshlab.errors import RigError
+from sloshlab.modal.rig_beam import base_participation_kg
 from sloshlab.rig import Rig
-from sloshlab.twin.rig_beam import base_participation_kg
 
 FloatArray = npt.NDArray[np.float64]
 _LONGEST_STEP: Final = 1.5
