@@ -117,7 +117,10 @@ def test_a_copy_in_another_process_would_be_the_same_twin() -> None:
     copied = copy.deepcopy(twin)
     assert copied.terms[0].kind is BOUNCING_BALL
     run = free(0.2, 2000.0)
-    runs = [one.simulate(run, initial_displacement_m=-0.06).displacement_m.tobytes() for one in (twin, copied)]
+    runs = [
+        each_twin.simulate(run, initial_displacement_m=-0.06).displacement_m.tobytes()
+        for each_twin in (twin, copied)
+    ]
     assert runs[0] == runs[1]
 
 
