@@ -16,11 +16,11 @@ from pipelines.report.progress import amounts
 from pipelines.twin.simulated_tank_model import departure_attributes, with_tank_model
 from sloshlab.configurations import CONFIGURATIONS
 from sloshlab.errors import InputError
+from sloshlab.modal.rig_beam import scale_remarks
 from sloshlab.recording import read_recording, run_attributes, write_recording
 from sloshlab.rig import Rig
 from sloshlab.twin.recorded_run import Drive, drive_of
 from sloshlab.twin.reduced_order_model_domain import departures
-from sloshlab.twin.rig_beam import scale_remarks
 from sloshlab.twin.simulated_channels import SimulatedRun, simulated_run
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import load_twin, save_twin

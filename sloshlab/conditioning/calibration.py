@@ -189,7 +189,7 @@ def identify_dry_mass(
         delay_std_s=delay_std,
         gain_ratio=gain,
         gain_ratio_std=gain_std,
-        source_runs=tuple(one.run_id for one in everything),
+        source_runs=tuple(identification.run_id for identification in everything),
     )
 
 

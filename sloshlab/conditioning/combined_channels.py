@@ -131,7 +131,7 @@ def weights_by_noise(recording: xr.Dataset, names: Sequence[str]) -> list[float]
     stated = [float(recording[name].attrs.get("noise_std", 0.0)) for name in names]
     known = all(np.isfinite(std) and std > 0 for std in stated)
     inverse = [(min(stated) / std) ** 2 if known else 1.0 for std in stated]
-    return [one / sum(inverse) for one in inverse]
+    return [weight / sum(inverse) for weight in inverse]
 
 
 def mean_acceleration(

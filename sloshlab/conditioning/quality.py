@@ -130,18 +130,18 @@ def quality_of(recording: xr.Dataset) -> RunQuality:
         If it has fewer than two samples.
     """
     step_s = sampling_step_s(recording)
-    each = tuple(channel_quality(recording[name]) for name in channels(recording))
+    qualities = tuple(channel_quality(recording[name]) for name in channels(recording))
     lost = gaps(recording)
     flags = _flag_counts(recording)
-    agreed, failure = _accelerometer_agreement(recording, each)
-    reasons = [*_channel_reasons(each), *_sign_reasons(agreed)]
-    remarks = [*_channel_remarks(each), *_gap_remarks(lost, flags), *_gain_remarks(agreed), *failure]
+    agreed, failure = _accelerometer_agreement(recording, qualities)
+    reasons = [*_channel_reasons(qualities), *_sign_reasons(agreed)]
+    remarks = [*_channel_remarks(qualities), *_gap_remarks(lost, flags), *_gain_remarks(agreed), *failure]
     return RunQuality(
         run_id=str(recording.attrs.get("run_id", "unnamed")),
         sampling_rate_hz=1.0 / step_s,
         duration_s=step_s * (recording.sizes["time"] - 1),
         n_samples=int(recording.sizes["time"]),
-        channels=each,
+        channels=qualities,
         gaps=lost,
         n_flagged_clipped=flags[CLIPPED],
         n_crc_repaired=flags[CRC_REPAIRED],
@@ -181,10 +181,12 @@ def _flag_counts(recording: xr.Dataset) -> dict[int, int]:
 
 
 def _accelerometer_agreement(
-    recording: xr.Dataset, each: tuple[ChannelQuality, ...]
+    recording: xr.Dataset, qualities: tuple[ChannelQuality, ...]
 ) -> tuple[SensorAgreement | None, list[str]]:
     """The agreement, or None with the reason why it could not be had."""
-    alive = {one.name for one in each if one.n_lost < one.n_samples and not one.is_constant}
+    alive = {
+        channel.name for channel in qualities if channel.n_lost < channel.n_samples and not channel.is_constant
+    }
     names = [name for name in redundant_accelerometers(recording) if name in alive]
     if len(names) < 2:
         return None, []
@@ -194,33 +196,33 @@ def _accelerometer_agreement(
         return None, [f"redundant accelerometers were not compared: {error}"]
 
 
-def _channel_reasons(each: tuple[ChannelQuality, ...]) -> list[str]:
+def _channel_reasons(qualities: tuple[ChannelQuality, ...]) -> list[str]:
     reasons = []
-    for one in each:
-        lost, clipped = one.n_lost / one.n_samples, one.clipping.n_clipped / one.n_samples
-        if one.is_constant:
-            reasons.append(f"{one.name}: constant at {one.minimum:.6g} {one.units}")
+    for channel in qualities:
+        lost, clipped = channel.n_lost / channel.n_samples, channel.clipping.n_clipped / channel.n_samples
+        if channel.is_constant:
+            reasons.append(f"{channel.name}: constant at {channel.minimum:.6g} {channel.units}")
         elif lost > LARGEST_LOST_FRACTION:
-            reasons.append(f"{one.name}: {100 * lost:.3g} % of the samples are lost")
+            reasons.append(f"{channel.name}: {100 * lost:.3g} % of the samples are lost")
         elif clipped > LARGEST_CLIPPED_FRACTION:
-            reasons.append(f"{one.name}: {100 * clipped:.3g} % of the samples are clipped")
+            reasons.append(f"{channel.name}: {100 * clipped:.3g} % of the samples are clipped")
     return reasons
 
 
-def _channel_remarks(each: tuple[ChannelQuality, ...]) -> list[str]:
+def _channel_remarks(qualities: tuple[ChannelQuality, ...]) -> list[str]:
     remarks = []
-    for one in each:
-        if one.clipping.n_clipped:
+    for channel in qualities:
+        if channel.clipping.n_clipped:
             remarks.append(
-                f"{one.name}: {one.clipping.n_clipped} clipped samples in {one.clipping.n_runs} runs, "
-                f"the first at {one.clipping.first_s:.6g} s"
+                f"{channel.name}: {channel.clipping.n_clipped} clipped samples in {channel.clipping.n_runs} runs, "
+                f"the first at {channel.clipping.first_s:.6g} s"
             )
-        if one.clipping.is_suspected:
+        if channel.clipping.is_suspected:
             remarks.append(
-                f"{one.name}: {one.clipping.n_suspected} samples look cut off at the channel's own extreme"
+                f"{channel.name}: {channel.clipping.n_suspected} samples look cut off at the channel's own extreme"
             )
-        if one.n_lost:
-            remarks.append(f"{one.name}: {one.n_lost} lost samples")
+        if channel.n_lost:
+            remarks.append(f"{channel.name}: {channel.n_lost} lost samples")
     return remarks
 
 

@@ -230,9 +230,9 @@ def _nothing_in_common(reference: SampledSignal) -> ClockDelay:
 
 
 def _require_common_time(reference: SampledSignal, other: SampledSignal) -> None:
-    ends = [one.start_s + one.step_s * one.values.size for one in (reference, other)]
+    ends = [signal.start_s + signal.step_s * signal.values.size for signal in (reference, other)]
     common_s = min(ends) - max(reference.start_s, other.start_s)
-    shortest_s = min(one.step_s * one.values.size for one in (reference, other))
+    shortest_s = min(signal.step_s * signal.values.size for signal in (reference, other))
     if min(shortest_s, max(common_s, 0.5 * shortest_s)) < 2.0:
         raise AnalysisError(
             "signals to align", got=f"{common_s:.3g} s in common", allowed="≥ 2 s", remedy="record longer"
@@ -265,7 +265,9 @@ def _candidates(
         correlation = np.fft.irfft(x_spectrum * np.fft.rfft(y, n_padded), n_padded)
         near = np.concatenate([correlation[n_padded - n_lags :], correlation[: n_lags + 1]])
         found += [(height, _Line(centre_s, (lag - n_lags) * step_s, slope)) for height, lag in _maxima(near)]
-    return _best_apart([one for one in found if one[0] > 0], 0.25 / _highest_frequency_hz(reference))
+    return _best_apart(
+        [(height, line) for height, line in found if height > 0], 0.25 / _highest_frequency_hz(reference)
+    )
 
 
 def _drifts(largest_ppm: float, duration_s: float, frequency_hz: float) -> FloatArray:
@@ -301,7 +303,7 @@ def _maxima(values: FloatArray) -> list[tuple[float, float]]:
 def _best_apart(found: list[tuple[float, _Line]], distance_s: float) -> list[_Line]:
     """The highest ones that are not the same maximum seen with another drift."""
     chosen: list[_Line] = []
-    for _, line in sorted(found, key=lambda one: -one[0]):
+    for _, line in sorted(found, key=lambda candidate: -candidate[0]):
         if all(abs(line.middle_s - other.middle_s) > distance_s for other in chosen):
             chosen.append(line)
         if len(chosen) == _N_CANDIDATES:

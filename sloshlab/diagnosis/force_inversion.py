@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from sloshlab.modal.rig_beam import shapes_at
 from sloshlab.rig import Rig
-from sloshlab.twin.rig_beam import shapes_at
 from sloshlab.twin.structure import Structure
 
 FloatArray = NDArray[np.float64]

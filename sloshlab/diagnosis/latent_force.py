@@ -31,6 +31,7 @@ from sloshlab.diagnosis.force_inversion import (
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.rig import Rig
+from sloshlab.twin.blocks import Blocks
 from sloshlab.twin.excitation import recorded
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.structure import Structure
@@ -396,7 +397,7 @@ def _unequal_cells(
     return {name: missed[name] - mean for name in cells}
 
 
-def _changed(simulation: Simulation, twin: Twin, place: str, motion: FloatArray, rate_hz: float) -> FloatArray:
+def _changed(simulation: Simulation, twin: Blocks, place: str, motion: FloatArray, rate_hz: float) -> FloatArray:
     """Baseline forces of a place on the motion that was measured, less those of the simulation."""
     chosen = [i for i, term in enumerate(twin.terms) if term.place == place]
     if not chosen:

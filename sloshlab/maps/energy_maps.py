@@ -100,8 +100,8 @@ def energy_maps(
         w_bar = dataclasses.replace(
             work, values=work.values / rig.liquid_mass_kg, std=work.std / rig.liquid_mass_kg
         )
-        for name, one in (("w_bar", w_bar), ("beta", beta)):
-            variables |= _liquid_maps(name, _on_grids(plane, grids[1:], mask[1:], one, chosen[name]))
+        for name, scattered in (("w_bar", w_bar), ("beta", beta)):
+            variables |= _liquid_maps(name, _on_grids(plane, grids[1:], mask[1:], scattered, chosen[name]))
         variables["measured"] = (("omega_bar", "u_bar"), mask[1].astype(np.int8))
         variables["measured_over_v_bar"] = (("omega_bar", "v_bar"), mask[2].astype(np.int8))
     for name in ("w_bar", "beta") if rig is not None else ("work_j",):
@@ -168,11 +168,11 @@ def _grids(frequency_hz: FloatArray, amplitude_m: FloatArray, rig: Rig | None, n
         axis = np.linspace(0.0, largest, n_grid + 1)[1:]
         return _Grid(frequencies, axis, np.outer(metres_per_unit, axis))
 
-    one = np.ones(n_grid)
-    grids = [grid(float(amplitude_m.max()), one)]
+    displacement_scale = np.ones(n_grid)
+    grids = [grid(float(amplitude_m.max()), displacement_scale)]
     if rig is not None:
         height, speed = rig.tank.height_m, rig.velocity_scale_m_per_s
-        grids.append(grid(float(amplitude_m.max()) / height, height * one))
+        grids.append(grid(float(amplitude_m.max()) / height, height * displacement_scale))
         grids.append(grid(float((2 * np.pi * frequency_hz * amplitude_m).max()) / speed, speed * per_speed))
     return grids
 
@@ -202,7 +202,7 @@ def _on_grids(
         interpolated(field, plane.at(frequency, amplitude), chosen) if frequency.size else (frequency, amplitude)
     )
     results = []
-    for mask, *parts in zip(masks, *(np.split(one, edges) for one in both), strict=True):
+    for mask, *parts in zip(masks, *(np.split(values, edges) for values in both), strict=True):
         filled = [np.full(mask.shape, np.nan) for _ in parts]
         for whole, part in zip(filled, parts, strict=True):
             whole[mask] = part

@@ -152,8 +152,8 @@ def modal_filter(
 
     Examples
     --------
-    >>> one = modal_filter(np.array([[1.0, 1.0], [0.5, -0.7]]), sensor_names=("tip", "middle"))
-    >>> one.apply(np.array([[3.0], [-0.6]]), 1000.0).acceleration_m_per_s2.round(12).tolist()
+    >>> tip_and_middle = modal_filter(np.array([[1.0, 1.0], [0.5, -0.7]]), sensor_names=("tip", "middle"))
+    >>> tip_and_middle.apply(np.array([[3.0], [-0.6]]), 1000.0).acceleration_m_per_s2.round(12).tolist()
     [[1.25], [1.75]]
     """
     shapes = np.atleast_2d(np.asarray(mode_shapes, dtype=np.float64))

@@ -230,7 +230,7 @@ def _least_squares(
         change = np.asarray(np.linalg.lstsq(blocks, _stacked(weights * error), rcond=None)[0], dtype=np.float64)
         moved = _moved(found, change)
         moved_blocks, moved_error = _linearised(s, shares, h, weights, *moved)
-        before, after = (float((np.abs(weights * one) ** 2).sum()) for one in (error, moved_error))
+        before, after = (float((np.abs(weights * residual) ** 2).sum()) for residual in (error, moved_error))
         if after > before * (1 - 1e-12):
             break
         found, blocks, error = moved, moved_blocks, moved_error
@@ -288,8 +288,8 @@ def _linearised(
     pair = (poles.imag != 0).astype(float)
     # s holds the points of the line shape of each line, shape (n_lines, n_points)
     single, partner = 1 / (s[:, :, None] - poles), pair / (s[:, :, None] - poles.conj())
-    plus, minus = (np.einsum("lkp,k->lp", one, shares) for one in (single, partner))
-    plus_squared, minus_squared = (np.einsum("lkp,k->lp", one**2, shares) for one in (single, partner))
+    plus, minus = (np.einsum("lkp,k->lp", fraction, shares) for fraction in (single, partner))
+    plus_squared, minus_squared = (np.einsum("lkp,k->lp", fraction**2, shares) for fraction in (single, partner))
     rows, errors = [], []
     for output in range(n_outputs):
         r = residues[output]

@@ -17,8 +17,8 @@ from sloshlab.channel_names import ACCELERATION_ROOF, ACCELERATION_ROOT, ACCELER
 from sloshlab.errors import AnalysisError, RigError
 from sloshlab.modal.cantilever import Cantilever, cantilever_modes
 from sloshlab.modal.modal_filter import ModalFilter, modal_filter
+from sloshlab.modal.rig_beam import beam_of_rig
 from sloshlab.rig import Rig, Structure
-from sloshlab.twin.rig_beam import beam_of_rig
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -188,9 +188,9 @@ def _relocated(
     numerator = np.column_stack([own, *polynomial])
     denominator = np.column_stack([own, np.ones_like(s)])
     rows, right = [], []
-    for one, weight in zip(h, w, strict=True):
-        scaled = weight / max(float(np.linalg.norm(weight * one)), 1e-300)
-        system = scaled[:, None] * np.hstack([numerator, -one[:, None] * denominator])
+    for response, weight in zip(h, w, strict=True):
+        scaled = weight / max(float(np.linalg.norm(weight * response)), 1e-300)
+        system = scaled[:, None] * np.hstack([numerator, -response[:, None] * denominator])
         triangle = np.asarray(np.linalg.qr(_real(system), mode="r"))
         n_first = numerator.shape[1]
         rows.append(triangle[n_first : n_first + denominator.shape[1], n_first:])
@@ -249,8 +249,8 @@ def _residues(
     basis = np.column_stack([own, *polynomial])
     residues = np.zeros((h.shape[0], poles.size), dtype=np.complex128)
     constant, slope = np.zeros(h.shape[0]), np.zeros(h.shape[0])
-    for output, (one, weight) in enumerate(zip(h, w, strict=True)):
-        right = np.concatenate([(weight * one).real, (weight * one).imag])
+    for output, (response, weight) in enumerate(zip(h, w, strict=True)):
+        right = np.concatenate([(weight * response).real, (weight * response).imag])
         solution = _scaled_least_squares(_real(weight[:, None] * basis), right)
         column = 0
         for index, pole in enumerate(poles):

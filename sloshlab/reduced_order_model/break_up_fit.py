@@ -54,7 +54,7 @@ def with_break_up(model: ReducedOrderModel, runs: Sequence[Run]) -> ReducedOrder
     steady = replace(model, break_up=None)
     forces = [steady.simulate(run.x) for run in runs]
     known = [np.isfinite(force) & np.isfinite(run.y) for force, run in zip(forces, runs, strict=True)]
-    if not any(one.any() for one in known):
+    if not any(samples.any() for samples in known):
         raise AnalysisError("break-up", got="no sample that the model can predict", remedy="longer runs")
     floor = _SLOWEST_SHARE * np.sqrt(np.mean([np.nanmean(run.x**2) for run in runs]))
     size = max(1, round(BLOCK_S * model.sampling_rate_hz))
@@ -69,10 +69,10 @@ def with_break_up(model: ReducedOrderModel, runs: Sequence[Run]) -> ReducedOrder
 
     low, high = np.log(np.array(list(_BOUNDS.values())).T)
     tried = qmc.scale(qmc.Halton(low.size, seed=0).random(_N_TRIED), low, high)
-    costs = [float(np.sum(errors(one) ** 2)) for one in tried]
+    costs = [float(np.sum(errors(logarithms) ** 2)) for logarithms in tried]
     starts = tried[np.argsort(costs)[:_N_REFINED]]
     found = [least_squares(errors, start, bounds=(low, high), diff_step=1e-3) for start in starts]
-    best = min(found, key=lambda one: float(one.cost))
+    best = min(found, key=lambda solution: float(solution.cost))
     values = dict(zip((field_.name for field_ in fields(BreakUp)), np.exp(best.x).tolist(), strict=True))
     return replace(model, break_up=BreakUp(**values))
 

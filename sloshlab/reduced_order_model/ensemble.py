@@ -252,7 +252,7 @@ def drawn_blocks(runs: Sequence[Run], size: int, rng: np.random.Generator) -> li
     Examples
     --------
     >>> run = Run.of(np.zeros(6), np.arange(6.0))
-    >>> [one.y.tolist() for one in drawn_blocks([run], 2, np.random.default_rng(2))]
+    >>> [block_run.y.tolist() for block_run in drawn_blocks([run], 2, np.random.default_rng(2))]
     [[0.0, 1.0, nan, nan, 4.0, 5.0], [0.0, 1.0, nan, nan, nan, nan]]
     """
     n_blocks = [math.ceil(run.x.size / size) for run in runs]

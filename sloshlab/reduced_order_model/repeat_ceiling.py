@@ -66,12 +66,12 @@ class MatchedRepeats:
         return np.sqrt(np.where(counts > 0, squares / np.maximum(counts, 1), np.nan))
 
 
-def matched_repeats(one: LiquidSignals, other: LiquidSignals, sampling_rate_hz: float) -> MatchedRepeats:
+def matched_repeats(reference: LiquidSignals, other: LiquidSignals, sampling_rate_hz: float) -> MatchedRepeats:
     """Bring the force of a repeat to the cycles of another run.
 
     Parameters
     ----------
-    one, other : LiquidSignals
+    reference, other : LiquidSignals
         As recorded, with the same motion.
     sampling_rate_hz : float
         Rate, and so the band, in which forces are compared; not above those of the runs.
@@ -87,15 +87,15 @@ def matched_repeats(one: LiquidSignals, other: LiquidSignals, sampling_rate_hz: 
     that is nearest in time; within a cycle, places correspond by their share of its duration. The other force is
     interpolated there in the band of the wanted rate.
     """
-    edges, others = _boundaries_s(one), _boundaries_s(other)
+    edges, others = _boundaries_s(reference), _boundaries_s(other)
     shift = _shift(edges, others)
     n = np.arange(max(0, -shift), min(edges.size, others.size - shift))
     if n.size < 2:
-        raise _not_repeats(one, other, "no cycles at the same times")
-    alike = _alike(one, other, edges[n], others[n + shift])
+        raise _not_repeats(reference, other, "no cycles at the same times")
+    alike = _alike(reference, other, edges[n], others[n + shift])
     if not alike.mean() > _SMALLEST_MATCHED_SHARE:
-        raise _not_repeats(one, other, f"{100 * alike.mean():.0f} % of the cycles have the same motion")
-    own = one.at_rate(sampling_rate_hz)
+        raise _not_repeats(reference, other, f"{100 * alike.mean():.0f} % of the cycles have the same motion")
+    own = reference.at_rate(sampling_rate_hz)
     time_s = np.arange(own.dynamic_force_n.size) / sampling_rate_hz
     cycle = np.searchsorted(edges[n], time_s, side="right") - 1
     cycle[(cycle < 0) | (cycle >= n.size - 1)] = -1
@@ -109,7 +109,7 @@ def matched_repeats(one: LiquidSignals, other: LiquidSignals, sampling_rate_hz: 
         np.where(known, force, np.nan),
         np.where(known, cycle, -1),
         1 / np.diff(edges[n]),
-        (one.name, other.name),
+        (reference.name, other.name),
     )
 
 
@@ -123,10 +123,12 @@ def _shift(edges: FloatArray, others: FloatArray) -> int:
     return int(np.abs(others - edges[middle]).argmin()) - middle
 
 
-def _alike(one: LiquidSignals, other: LiquidSignals, edges: FloatArray, others: FloatArray) -> NDArray[np.bool_]:
+def _alike(
+    reference: LiquidSignals, other: LiquidSignals, edges: FloatArray, others: FloatArray
+) -> NDArray[np.bool_]:
     """Whether cycles have the same frequency and the same speed, half the difference of its extremes."""
     frequency = np.abs(np.diff(edges) / np.diff(others) - 1) < FREQUENCY_TOLERANCE
-    speed, of_other = _speeds(one, edges), _speeds(other, others)
+    speed, of_other = _speeds(reference, edges), _speeds(other, others)
     return np.asarray(frequency & (np.abs(of_other / np.maximum(speed, 1e-12) - 1) < SPEED_TOLERANCE))
 
 
@@ -137,7 +139,10 @@ def _speeds(run: LiquidSignals, edges: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (highest - lowest))
 
 
-def _not_repeats(one: LiquidSignals, other: LiquidSignals, got: str) -> AnalysisError:
+def _not_repeats(reference: LiquidSignals, other: LiquidSignals, got: str) -> AnalysisError:
     return AnalysisError(
-        f"{one.name} and {other.name}", got=got, allowed="repeats of one motion", remedy="compare runs of one law"
+        f"{reference.name} and {other.name}",
+        got=got,
+        allowed="repeats of one motion",
+        remedy="compare runs of one law",
     )

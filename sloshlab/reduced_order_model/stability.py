@@ -111,7 +111,7 @@ def stability(
 
 
 def _random_like(inputs: Sequence[ArrayLike], n: int, seed: int) -> FloatArray:
-    known = [values[np.isfinite(values)] for values in (np.asarray(one, np.float64) for one in inputs)]
+    known = [values[np.isfinite(values)] for values in (np.asarray(given, np.float64) for given in inputs)]
     longest = max(known, key=lambda values: values.size, default=np.zeros(0))
     if longest.size < 2 or not np.ptp(longest) > 0:
         raise AnalysisError("stability", got="no input that moves", allowed="inputs such as those of the training")

@@ -133,8 +133,8 @@ class ValidityDomain:
         inside = [speed[bins == k] for k in range(first, last + 1)]
         return cls(
             first,
-            tuple(float(one.min()) if one.size else math.nan for one in inside),
-            tuple(float(one.max()) if one.size else math.nan for one in inside),
+            tuple(float(speeds.min()) if speeds.size else math.nan for speeds in inside),
+            tuple(float(speeds.max()) if speeds.size else math.nan for speeds in inside),
         )
 
     def facts(self) -> dict[str, Any]:

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from scipy.linalg import eigh
 
 from sloshlab.errors import RigError
+from sloshlab.modal.rig_beam import Rotation, rotation_of_beam
 from sloshlab.rig import Structure as DescribedStructure
-from sloshlab.twin.rig_beam import Rotation, rotation_of_beam
 from sloshlab.twin.structure import RockedModes, Structure
 
 FloatArray = npt.NDArray[np.float64]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from sloshlab.errors import InputError
 from sloshlab.twin import engine
+from sloshlab.twin.blocks import Blocks
 from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.model import (
     DRY_FRICTION,
@@ -28,9 +29,6 @@ from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.status import Ending, Status
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import PLACES, Term
-
-if TYPE_CHECKING:
-    from sloshlab.twin.twin import Twin
 
 FloatArray = npt.NDArray[np.float64]
 Watch = Callable[[int, int], None]
@@ -153,7 +151,7 @@ def _friction_frame(terms: Sequence[Term], excitation: Excitation) -> int:
 
 
 def start_state(
-    twin: Twin, ready: Prepared, first_inputs: FloatArray, displacement_m: float, velocity_m_per_s: float
+    twin: Blocks, ready: Prepared, first_inputs: FloatArray, displacement_m: float, velocity_m_per_s: float
 ) -> FloatArray:
     """Modes under a static force at the tank, and memories that move with it."""
     for value, name in (
@@ -175,7 +173,7 @@ def start_state(
 
 
 def run(
-    twin: Twin, excitation: Excitation, start: tuple[float, float], n_substeps: int, watch: Watch | None
+    twin: Blocks, excitation: Excitation, start: tuple[float, float], n_substeps: int, watch: Watch | None
 ) -> Simulation:
     """Integrate stretch by stretch; `watch` is told samples done and samples in all after each."""
     ready = prepared(twin.terms, twin.structure, excitation)
@@ -252,7 +250,7 @@ def _n_event_functions(terms: Sequence[Term]) -> int:
     return max((term.kind.n_switches + len(term.kind.limits) for term in terms), default=0)
 
 
-def _place_of(twin: Twin, model: Model, status: int, where: int) -> str:
+def _place_of(twin: Blocks, model: Model, status: int, where: int) -> str:
     """Name of what ended the simulation."""
     if status == Status.FAULT:
         kind = twin.terms[where].kind
@@ -267,7 +265,7 @@ def _place_of(twin: Twin, model: Model, status: int, where: int) -> str:
 
 
 def _simulation(
-    twin: Twin,
+    twin: Blocks,
     excitation: Excitation,
     ending: Ending,
     out: Outputs,

@@ -129,7 +129,7 @@ def _departure(reason: str, excursions: list[Excursion], term: Term, simulation:
     root, height_m = math.sqrt(term.values["height_ratio"]), term.values["height_m"]
     # of stretches outside for one reason, the farthest is the fastest, or the slowest where all are too weak
     pick = min if reason == "too weak" else max
-    worst = pick(excursions, key=lambda one: one.speed_m_per_s)
+    worst = pick(excursions, key=lambda excursion: excursion.speed_m_per_s)
     omega, speed = 2 * math.pi * worst.frequency_hz / root, worst.speed_m_per_s * root
     return Departure(
         reason,

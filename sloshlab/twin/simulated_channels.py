@@ -15,9 +15,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from sloshlab.errors import InputError
+from sloshlab.modal.rig_beam import shapes_at
 from sloshlab.recording import LOST, channels, quality_attributes
 from sloshlab.rig import Rig
-from sloshlab.twin.rig_beam import shapes_at
 from sloshlab.twin.simulation import Simulation
 from sloshlab.units import SI_UNITS
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,11 +11,9 @@ import xarray as xr
 
 from sloshlab.channel_names import ACCELERATION_ROOT, ACCELERATION_TIP, DISPLACEMENT_TANK, FORCE_INTERFACE
 from sloshlab.errors import AnalysisError, InputError
+from sloshlab.twin.blocks import Blocks
 from sloshlab.twin.status import Ending, Status
 from sloshlab.twin.terms import PLACES
-
-if TYPE_CHECKING:
-    from sloshlab.twin.twin import Twin
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,7 +24,8 @@ class Simulation:
 
     Attributes
     ----------
-    twin : Twin
+    twin : Blocks
+        Of the twin that was simulated.
     sampling_rate_hz : float
     ending : Ending
     modes : ndarray, shape (n, 3, n_modes)
@@ -49,7 +47,7 @@ class Simulation:
         All of them; `events` holds the first ones.
     """
 
-    twin: Twin
+    twin: Blocks
     sampling_rate_hz: float
     ending: Ending
     modes: FloatArray

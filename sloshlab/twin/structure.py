@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sloshlab.errors import RigError
+from sloshlab.modal.rig_beam import base_participation_kg
 from sloshlab.rig import Rig
-from sloshlab.twin.rig_beam import base_participation_kg
 
 FloatArray = npt.NDArray[np.float64]
 _LONGEST_STEP: Final = 1.5
@@ -129,8 +129,8 @@ def single_degree_of_freedom(mass_kg: float, stiffness_n_per_m: float, damping_k
     >>> round(float(single_degree_of_freedom(2.241, 3808.8).frequencies_hz[0]), 2)
     6.56
     """
-    mass, one = np.array([mass_kg]), np.ones(1)
-    return Structure(mass, np.array([stiffness_n_per_m]), np.array([damping_kg_per_s]), one, mass.copy())
+    mass, tip_value = np.array([mass_kg]), np.ones(1)
+    return Structure(mass, np.array([stiffness_n_per_m]), np.array([damping_kg_per_s]), tip_value, mass.copy())
 
 
 def modal_structure(

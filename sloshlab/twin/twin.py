@@ -18,11 +18,12 @@ from pathlib import Path
 
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
+from sloshlab.twin.blocks import Blocks
 from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.preparation import Watch, run
 from sloshlab.twin.sensors import Sensor
 from sloshlab.twin.simulation import Simulation
-from sloshlab.twin.structure import Structure, guide_friction_n, structure_of_rig
+from sloshlab.twin.structure import guide_friction_n, structure_of_rig
 from sloshlab.twin.structure_forces import COULOMB_FRICTION
 from sloshlab.twin.tank_models import tank_terms
 from sloshlab.twin.terms import Term
@@ -31,24 +32,8 @@ __all__ = ["Simulation", "Twin"]
 
 
 @dataclass(frozen=True, eq=False)
-class Twin:
-    """Structure, forces and sensors.
-
-    Attributes
-    ----------
-    structure : Structure or None
-        None: the tank's motion is prescribed.
-    terms : tuple of Term
-        Forces of structure and tank. A frozen liquid has none.
-    sensors : tuple of Sensor
-    carried_mass_kg : float
-        Tank with frozen liquid, all that the interface force moves.
-    """
-
-    structure: Structure | None
-    terms: tuple[Term, ...] = ()
-    sensors: tuple[Sensor, ...] = ()
-    carried_mass_kg: float = 0.0
+class Twin(Blocks):
+    """Structure, forces and sensors, put together from a rig or block by block, and simulated."""
 
     @classmethod
     def from_rig(cls, rig: Rig, *, folder: Path | None = None) -> Twin:

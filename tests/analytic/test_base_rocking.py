@@ -11,10 +11,10 @@ from scipy.signal import lsim
 
 from sloshlab.errors import InputError, RigError
 from sloshlab.modal.cantilever import Cantilever, cantilever_modes
+from sloshlab.modal.rig_beam import base_participation_kg, rotation_of_beam, shapes_at
 from sloshlab.rig import Structure as DescribedStructure
 from sloshlab.twin.base_rocking import BaseRocking
 from sloshlab.twin.excitation import free, recorded
-from sloshlab.twin.rig_beam import base_participation_kg, rotation_of_beam, shapes_at
 from sloshlab.twin.storage import load_twin, save_twin
 from sloshlab.twin.structure import Structure, modal_structure
 from sloshlab.twin.twin import Twin

@@ -98,12 +98,12 @@ def test_update_intervals_hold_in_nine_of_ten_repeats(errors_known: bool) -> Non
     held = []
     for _ in range(100):
         noisy = true * (1 + generator.normal(0, 0.002, 3))
-        one = update_beam(BEAM, noisy, measured_std_hz=0.002 * true if errors_known else None, n_elements=6)
-        k = one.coverage_factor
+        update = update_beam(BEAM, noisy, measured_std_hz=0.002 * true if errors_known else None, n_elements=6)
+        k = update.coverage_factor
         held.append(
             (
-                abs(one.beam.tip_mass_kg - 0.44) <= k * one.tip_mass_kg_std,
-                abs(one.beam.youngs_modulus_pa - 70e9) <= k * one.youngs_modulus_pa_std,
+                abs(update.beam.tip_mass_kg - 0.44) <= k * update.tip_mass_kg_std,
+                abs(update.beam.youngs_modulus_pa - 70e9) <= k * update.youngs_modulus_pa_std,
             )
         )
     # 100 repeats: 90 % within twice the standard deviation of 3 %
@@ -118,8 +118,8 @@ def test_claimed_errors_of_the_update_are_the_scatter_over_repeats() -> None:
         for _ in range(100)
     ]
     for name in ("tip_mass_kg", "youngs_modulus_pa"):
-        scatter = np.std([getattr(one.beam, name) for one in found])
-        claimed = np.sqrt(np.mean([getattr(one, f"{name}_std") ** 2 for one in found]))
+        scatter = np.std([getattr(update.beam, name) for update in found])
+        claimed = np.sqrt(np.mean([getattr(update, f"{name}_std") ** 2 for update in found]))
         # 100 repeats give a standard deviation within 7 %; three of those
         assert claimed == pytest.approx(scatter, rel=0.21)
 

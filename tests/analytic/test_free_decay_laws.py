@@ -32,12 +32,12 @@ def linear_decay(damping_ratio: float, duration_s: float, phase: float = 0.0) ->
 def test_linear_decay_without_noise(damping_ratio: float, reading: int) -> None:
     # the strongest damping is followed over 3 nepers only: 8 cycles, of which the envelope's edges take most
     signal = linear_decay(damping_ratio, 4 / (damping_ratio * OMEGA) if damping_ratio < 0.05 else 1.2)
-    one = analyse_free_decay(signal, RATE_HZ).readings[reading]
-    assert one.used.sum() >= 2
+    curve = analyse_free_decay(signal, RATE_HZ).readings[reading]
+    assert curve.used.sum() >= 2
     # 0.5 % is what is asked for; the methods are exact but for the parabola and the edges
-    assert one.damping_ratio[one.used] == pytest.approx(damping_ratio, rel=0.5e-2)
+    assert curve.damping_ratio[curve.used] == pytest.approx(damping_ratio, rel=0.5e-2)
     # parabolas are centred on whole samples, which moves the vertices of a strongly damped decay a little
-    assert one.frequency_hz[one.used] == pytest.approx(FREQUENCY_HZ, rel=1e-3)
+    assert curve.frequency_hz[curve.used] == pytest.approx(FREQUENCY_HZ, rel=1e-3)
 
 
 def test_amplitudes_are_those_of_the_envelope() -> None:
@@ -54,7 +54,7 @@ def repeats() -> list[FreeDecay]:
     """200 decays with the same ζ = 1 %, other noise and other phases."""
     generator = np.random.default_rng(5)
     clean = [linear_decay(0.01, 2.4, phase) for phase in generator.uniform(0, 2 * np.pi, 200)]
-    return [analyse_free_decay(one + generator.normal(0, 1.0, one.size), RATE_HZ) for one in clean]
+    return [analyse_free_decay(decay + generator.normal(0, 1.0, decay.size), RATE_HZ) for decay in clean]
 
 
 @pytest.mark.parametrize("reading", [0, 1, 2])
@@ -65,9 +65,9 @@ def test_intervals_hold_the_true_value_in_nine_of_ten_repeats(
     truth = 0.01 if quantity == "damping_ratio" else FREQUENCY_HZ
     share = []
     for decay in repeats:
-        one = decay.readings[reading]
-        low, high = one.damping_ratio_interval if quantity == "damping_ratio" else one.frequency_interval_hz
-        share.append(((low <= truth) & (truth <= high))[one.used].mean())
+        curve = decay.readings[reading]
+        low, high = curve.damping_ratio_interval if quantity == "damping_ratio" else curve.frequency_interval_hz
+        share.append(((low <= truth) & (truth <= high))[curve.used].mean())
     assert len(share) == 200
     assert 0.85 <= np.mean(share) <= 0.95
 
@@ -77,10 +77,10 @@ def test_standard_errors_are_the_scatter_over_the_repeats(repeats: list[FreeDeca
     """RMS of claimed over RMS of true errors in the first 1.4 s, where every repeat is clear of noise."""
     error, claimed = [], []
     for decay in repeats:
-        one = decay.readings[reading]
-        early = one.used & (one.time_s < 1.4)
-        error.append(one.damping_ratio[early] - 0.01)
-        claimed.append(one.damping_ratio_std[early])
+        curve = decay.readings[reading]
+        early = curve.used & (curve.time_s < 1.4)
+        error.append(curve.damping_ratio[early] - 0.01)
+        claimed.append(curve.damping_ratio_std[early])
     ratio = np.sqrt((np.concatenate(claimed) ** 2).mean() / (np.concatenate(error) ** 2).mean())
     # some 500 values that are independent of each other give the ratio within 3.2 %; two of those
     assert ratio == pytest.approx(1.0, abs=0.07)
@@ -113,13 +113,13 @@ def test_coulomb_damping_grows_as_the_amplitude_falls(reading: int) -> None:
     offset = 0.004
     signal = coulomb_displacement(offset, 4.0)
     decay = analyse_free_decay(signal[np.isfinite(signal)], 500.0, motion="displacement")
-    one = decay.readings[reading]
-    amplitude = one.acceleration_amplitude_m_per_s2 / OMEGA**2
+    curve = decay.readings[reading]
+    amplitude = curve.acceleration_amplitude_m_per_s2 / OMEGA**2
     expected = 2 * offset / (np.pi * amplitude)
-    wide = one.used & (amplitude > 0.2)
+    wide = curve.used & (amplitude > 0.2)
     assert wide.sum() >= 4
     # the formula is first order in x_f/X, 2 % at the smallest amplitude kept
-    assert one.damping_ratio[wide] == pytest.approx(expected[wide], rel=0.03)
+    assert curve.damping_ratio[wide] == pytest.approx(expected[wide], rel=0.03)
 
 
 @pytest.mark.parametrize("reading", [0, 1, 2])
@@ -137,10 +137,10 @@ def test_quadratic_and_cubic_damping_fall_with_the_amplitude(
 ) -> None:
     coefficient = 0.1 if power == 2 else 1.5e-3
     signal = integrated(lambda _x, v: coefficient * v * abs(v) ** (power - 1), 4.0)
-    one = analyse_free_decay(signal, 500.0, motion="displacement", n_cycles=3).readings[reading]
-    amplitude = one.acceleration_amplitude_m_per_s2 / OMEGA**2
-    later = one.used & (one.time_s > 0.2)
+    curve = analyse_free_decay(signal, 500.0, motion="displacement", n_cycles=3).readings[reading]
+    amplitude = curve.acceleration_amplitude_m_per_s2 / OMEGA**2
+    later = curve.used & (curve.time_s > 0.2)
     assert later.sum() >= 4
     assert np.ptp(amplitude[later]) > 0.2
     # first order in ζ ≤ 4 %, and ζ changes by up to a fifth within the stretches of the envelope and the fit
-    assert one.damping_ratio[later] == pytest.approx(law(coefficient, amplitude[later]), rel=0.03)
+    assert curve.damping_ratio[later] == pytest.approx(law(coefficient, amplitude[later]), rel=0.03)

@@ -104,14 +104,14 @@ def test_linear_structural_damping_has_one_loss_factor_over_a_decade(middle_hz: 
 def test_forces_of_two_frequencies_add_up_in_the_linear_law_alone(term: Term, superposes: bool) -> None:
     rate, duration = 2000.0, 3.0
     parts = [harmonic_force(force, frequency, duration, rate) for force, frequency in ((10.0, 4.1), (6.0, 9.7))]
-    one, other, both = (
+    slow, fast, both = (
         damped(term).simulate(excitation).displacement_m
         for excitation in (
             *parts,
             Excitation(rate, parts[0].n_samples, lambda t: parts[0].inputs(t) + parts[1].inputs(t)),
         )
     )
-    error = np.abs(both - one - other).max() / np.abs(both).max()
+    error = np.abs(both - slow - fast).max() / np.abs(both).max()
     assert error < 1e-10 if superposes else error > 1e-3
 
 

@@ -100,11 +100,11 @@ def test_coulomb_decay_falls_by_the_same_amount_each_half_cycle_and_stays_where_
 
 def test_friction_of_guide_and_tank_adds_up_where_nothing_moves_the_base() -> None:
     run = free(3.0, 2000.0)
-    one = rig().with_term(COULOMB_FRICTION(force_n=0.37)).simulate(run, initial_displacement_m=0.002)
+    alone = rig().with_term(COULOMB_FRICTION(force_n=0.37)).simulate(run, initial_displacement_m=0.002)
     two = rig().with_term(COULOMB_FRICTION(force_n=0.2)).with_term(COULOMB_FRICTION(place="tank", force_n=0.17))
     result = two.simulate(run, initial_displacement_m=0.002)
-    np.testing.assert_allclose(result.displacement_m, one.displacement_m, atol=1e-14)
-    np.testing.assert_allclose(result.forces_n.sum(axis=1), one.forces_n[:, 0], atol=1e-9)
+    np.testing.assert_allclose(result.displacement_m, alone.displacement_m, atol=1e-14)
+    np.testing.assert_allclose(result.forces_n.sum(axis=1), alone.forces_n[:, 0], atol=1e-9)
     assert result.forces_n[-1, 0] * 0.17 == pytest.approx(result.forces_n[-1, 1] * 0.2)
     assert result.forces_n[-1].sum() == pytest.approx(K * result.displacement_m[-1], rel=1e-9)  # at rest it holds
 

@@ -30,10 +30,10 @@ def decays(external_data: Path) -> list[FreeDecay]:
 
 def between(decay: FreeDecay, reading: int, first_s: float, last_s: float) -> tuple[float, float]:
     """Means of frequency [Hz] and damping ratio over a part of the record."""
-    one = decay.readings[reading]
-    part = one.used & (one.time_s >= first_s) & (one.time_s < last_s)
+    curve = decay.readings[reading]
+    part = curve.used & (curve.time_s >= first_s) & (curve.time_s < last_s)
     assert part.any()
-    return float(one.frequency_hz[part].mean()), float(one.damping_ratio[part].mean())
+    return float(curve.frequency_hz[part].mean()), float(curve.damping_ratio[part].mean())
 
 
 @pytest.mark.parametrize("reading", [0, 1, 2])

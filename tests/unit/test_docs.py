@@ -121,7 +121,7 @@ def test_the_navigation_lists_every_page() -> None:
         if isinstance(entry, str):
             return [entry]
         nested = entry.values() if isinstance(entry, dict) else entry
-        return [page for one in nested for page in pages(one)]
+        return [page for nested_entry in nested for page in pages(nested_entry)]
 
     settings = yaml.safe_load((REPOSITORY / "mkdocs.yml").read_text(encoding="utf-8"))
     assert sorted(pages(settings["nav"])) == [str(page.relative_to(DOCS)) for page in PAGES]

@@ -96,12 +96,14 @@ def test_map_has_the_work_of_its_points() -> None:
     run = HarmonicRun(10, 4, 60)
     maps = response_map(ball, rig, np.array([0.01, 0.02]), np.array([5.0, 6.0, 7.0]), run)
     assert maps["loss_factor"].shape == (3, 2)
-    one = loss_factor(ball, rig, 0.02, 6.0, run)
-    assert float(maps["loss_factor"][1, 1]) == pytest.approx(one, rel=1e-12)
-    assert float(maps["work_j"][1, 1]) == pytest.approx(one * np.pi * 0.18 * (0.02 * 12 * np.pi) ** 2, rel=1e-9)
+    at_point = loss_factor(ball, rig, 0.02, 6.0, run)
+    assert float(maps["loss_factor"][1, 1]) == pytest.approx(at_point, rel=1e-12)
+    assert float(maps["work_j"][1, 1]) == pytest.approx(
+        at_point * np.pi * 0.18 * (0.02 * 12 * np.pi) ** 2, rel=1e-9
+    )
     scale = np.sqrt(G / 0.06)
     w_bar = w_bar_at(ball, rig, np.array([12 * np.pi / scale]), np.array([0.02 / 0.06]), run)
-    assert w_bar[0] == pytest.approx(np.pi * one, rel=1e-9)
+    assert w_bar[0] == pytest.approx(np.pi * at_point, rel=1e-9)
 
 
 def test_decay_with_the_ball_is_read_as_a_recording_is() -> None:

@@ -59,15 +59,15 @@ def test_ends_of_a_curved_interval_are_where_the_sum_of_squares_has_grown() -> N
         off = SPACE.point(ball) - answer
         return np.concatenate([[a * np.expm1(3 * off[0])], 2 * off[1:], np.full(40, e)])
 
-    one = identified(residuals, SPACE, SETTINGS).intervals[0]
+    interval = identified(residuals, SPACE, SETTINGS).intervals[0]
     growth = student_t.ppf(0.95, 40) * e / a
-    for end, sign in ((one.low, -1), (one.high, 1)):
+    for end, sign in ((interval.low, -1), (interval.high, 1)):
         moved = answer.copy()
         moved[0] += np.log1p(sign * growth) / 3
         # the root of the growth is met within 5 %
-        assert end - one.value == pytest.approx(SPACE.parameter(0, moved) - one.value, rel=0.07)
-    assert one.value - one.low > 1.2 * (one.high - one.value)
-    assert one.profile_ratio == pytest.approx(1.0, abs=0.1)
+        assert end - interval.value == pytest.approx(SPACE.parameter(0, moved) - interval.value, rel=0.07)
+    assert interval.value - interval.low > 1.2 * (interval.high - interval.value)
+    assert interval.profile_ratio == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_parameter_that_the_data_do_not_hold_has_no_ends() -> None:
@@ -104,8 +104,8 @@ def test_balls_that_cannot_be_simulated_do_not_stop_the_search() -> None:
 
 
 def test_same_seed_same_ball() -> None:
-    one, two = (linear_problem(np.full(5, 0.5), 0.1)[2].ball for _ in range(2))
-    assert one == two
+    first, second = (linear_problem(np.full(5, 0.5), 0.1)[2].ball for _ in range(2))
+    assert first == second
 
 
 def test_as_many_values_as_parameters_are_not_enough() -> None:

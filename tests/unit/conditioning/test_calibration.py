@@ -84,9 +84,11 @@ def test_stated_deviations_are_those_of_repeated_identifications():
         empty = [swept_tank(seed=seed, **settings)]
         frozen = [swept_tank(seed=seed + 100, masses_kg=FROZEN, configuration="frozen", **settings)]
         found.append(identify_dry_mass(empty, frozen, liquid_mass_kg=M_LIQUID))
-    gains, masses = (np.array([getattr(one, name) for one in found]) for name in ("gain_ratio", "mass_kg"))
-    assert np.mean([one.gain_ratio_std for one in found]) == pytest.approx(gains.std(ddof=1), rel=0.6)
-    assert np.mean([one.mass_std_kg for one in found]) == pytest.approx(masses.std(ddof=1), rel=0.6)
+    gains, masses = (
+        np.array([getattr(dry_mass, name) for dry_mass in found]) for name in ("gain_ratio", "mass_kg")
+    )
+    assert np.mean([dry_mass.gain_ratio_std for dry_mass in found]) == pytest.approx(gains.std(ddof=1), rel=0.6)
+    assert np.mean([dry_mass.mass_std_kg for dry_mass in found]) == pytest.approx(masses.std(ddof=1), rel=0.6)
     assert abs(gains.mean() - 1) < 4 * gains.std(ddof=1) / math.sqrt(12)
 
 

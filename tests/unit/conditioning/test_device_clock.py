@@ -76,7 +76,7 @@ def test_spikes_do_not_move_the_line() -> None:
     late = generator.random(1000) < 0.6
     late[[0, -1]] = False
     with_spikes = arrivals + late * generator.integers(0, 10**9, 1000)
-    clean, spiked = (fitted_device_clock(counter, one, RATE_HZ) for one in (arrivals, with_spikes))
+    clean, spiked = (fitted_device_clock(counter, host_times, RATE_HZ) for host_times in (arrivals, with_spikes))
     assert spiked.drift_ppm == pytest.approx(clean.drift_ppm, abs=1e-4)
     assert spiked.latency_max_s > 0.9
     assert clean.latency_max_s < 1e-8

@@ -27,11 +27,11 @@ def test_numbers_of_one_channel():
     run["force_cell_1"] += 1000.0
     run["force_cell_1"][[3, 4]] = np.nan
     values = run["force_cell_1"].values
-    one = by_name(quality_of(run), "force_cell_1")
-    assert (one.minimum, one.maximum) == (np.nanmin(values), np.nanmax(values))
-    assert one.mean == pytest.approx(np.nanmean(values), rel=1e-12)
-    assert one.rms == pytest.approx(np.nanstd(values), rel=1e-9)
-    assert (one.n_samples, one.n_lost, one.units) == (60000, 2, "N")
+    quality = by_name(quality_of(run), "force_cell_1")
+    assert (quality.minimum, quality.maximum) == (np.nanmin(values), np.nanmax(values))
+    assert quality.mean == pytest.approx(np.nanmean(values), rel=1e-12)
+    assert quality.rms == pytest.approx(np.nanstd(values), rel=1e-9)
+    assert (quality.n_samples, quality.n_lost, quality.units) == (60000, 2, "N")
 
 
 def test_gaps_and_flags_are_remarks():
@@ -104,8 +104,8 @@ def test_numbers_whose_squares_cannot_be_held_are_told_not_raised():
     run = swept_tank(noise=0.01)
     run["force_cell_1"] = run["force_cell_1"].astype(np.float64)
     run["force_cell_1"][100] = 1e200
-    one = by_name(quality_of(run), "force_cell_1")
-    assert (one.maximum, one.rms) == (1e200, math.inf)
+    quality = by_name(quality_of(run), "force_cell_1")
+    assert (quality.maximum, quality.rms) == (1e200, math.inf)
 
 
 def test_a_short_run_is_not_compared_and_says_so():

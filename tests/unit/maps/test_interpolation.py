@@ -87,8 +87,8 @@ def test_noise_is_smoothed_and_exact_data_are_not():
     smooth = cross_validation(field_of(0.1))
     assert smooth.smoothing >= 1e-3
     error = [
-        np.sqrt(np.mean((interpolated(field_of(0.1), {"plane": INSIDE}, one)[0] - truth(INSIDE)) ** 2))
-        for one in (smooth, chosen())
+        np.sqrt(np.mean((interpolated(field_of(0.1), {"plane": INSIDE}, validation)[0] - truth(INSIDE)) ** 2))
+        for validation in (smooth, chosen())
     ]
     assert error[0] < 0.7 * error[1]
 

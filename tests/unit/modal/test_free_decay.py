@@ -131,10 +131,10 @@ def test_where_the_phase_asks_for_an_extremum_that_is_not_there_the_decrement_is
     """At the end of a decay over six decades the edge of the record moves the phase by half a cycle."""
     time = np.arange(4680) / 1024.0
     motion = 65.0 * np.exp(-0.0415 * 2 * np.pi * 10.86 * time) * np.cos(2 * np.pi * 10.86 * time)
-    one = analyse_free_decay(motion, 1024.0).log_decrement
-    assert one.damping_ratio[one.used] == pytest.approx(0.0415 / np.hypot(1, 0.0415), rel=0.01)
-    assert Trust.NO_EXTREMUM in one.trust
-    assert (one.time_s[one.trust == Trust.NO_EXTREMUM] > 4.3).all()
+    reading = analyse_free_decay(motion, 1024.0).log_decrement
+    assert reading.damping_ratio[reading.used] == pytest.approx(0.0415 / np.hypot(1, 0.0415), rel=0.01)
+    assert Trust.NO_EXTREMUM in reading.trust
+    assert (reading.time_s[reading.trust == Trust.NO_EXTREMUM] > 4.3).all()
 
 
 def test_a_sensor_that_is_silent_for_a_while_is_no_division_by_zero() -> None:

@@ -33,15 +33,15 @@ def test_what_the_modes_do_not_explain_is_reported_per_sensor() -> None:
 
 
 def test_visibility_is_the_inverse_of_the_gain_of_noise() -> None:
-    one = modal_filter(SHAPES, sensor_names=NAMES)
+    sensors = modal_filter(SHAPES, sensor_names=NAMES)
     noise = GENERATOR.normal(size=(4, 200_000))
-    scatter = one.apply(noise, 500.0).acceleration_m_per_s2.std(axis=1)
-    assert 1 / one.visibility == pytest.approx(scatter, rel=0.01)
+    scatter = sensors.apply(noise, 500.0).acceleration_m_per_s2.std(axis=1)
+    assert 1 / sensors.visibility == pytest.approx(scatter, rel=0.01)
 
 
 def test_visibility_is_over_the_largest_deflection() -> None:
-    one = modal_filter(np.diag([0.5, 0.5]), sensor_names=("a", "b"), largest_deflection=np.array([0.5, -2.0]))
-    assert one.visibility == pytest.approx([1.0, 0.25])
+    sensors = modal_filter(np.diag([0.5, 0.5]), sensor_names=("a", "b"), largest_deflection=np.array([0.5, -2.0]))
+    assert sensors.visibility == pytest.approx([1.0, 0.25])
     with pytest.raises(AnalysisError, match=r"cannot see mode 2: got visibility 0\.01;"):
         modal_filter(np.eye(2), sensor_names=("a", "b"), largest_deflection=np.array([1.0, 100.0]))
 

@@ -94,11 +94,11 @@ def test_the_width_is_that_of_a_normal_distribution():
 
 def test_members_that_disagree_widen_the_interval():
     """±1 and ±2 without residual: standard deviation 1/√2 about 1.5; with a residual the variances add."""
-    other = ReducedOrderModel(NETWORK, np.array([-1.0, 1.0, 2.0, 2.0]), Delays((1,)), Scaling(), RATE_HZ)
-    one = ReducedOrderModel(NETWORK, np.array([-1.0, 1.0, 1.0, 1.0]), Delays((1,)), Scaling(), RATE_HZ)
+    stronger = ReducedOrderModel(NETWORK, np.array([-1.0, 1.0, 2.0, 2.0]), Delays((1,)), Scaling(), RATE_HZ)
+    weaker = ReducedOrderModel(NETWORK, np.array([-1.0, 1.0, 1.0, 1.0]), Delays((1,)), Scaling(), RATE_HZ)
     for constant in (0.0, 0.8):
         residual = ResidualSpread(constant, 0.0, (2.0,) * len(PROBABILITIES))
-        found = Ensemble((one, other), residual).predicted_range(np.zeros(10))
+        found = Ensemble((weaker, stronger), residual).predicted_range(np.zeros(10))
         half = 2.0 * np.sqrt(0.5 + constant**2)
         assert found.upper[1:] == pytest.approx(1.5 + half)
         assert found.lower[1:] == pytest.approx(1.5 - half)
@@ -107,14 +107,14 @@ def test_members_that_disagree_widen_the_interval():
 def test_blocks_are_drawn_as_often_as_there_are_blocks():
     runs = [Run(np.arange(95.0), np.ones(95)), Run(np.arange(40.0), np.ones(40))]
     drawn = drawn_blocks(runs, 10, np.random.default_rng(1))
-    weights = [np.sum([np.isfinite(one.y) for one in drawn if one.x.size == n], axis=0) for n in (95, 40)]
+    weights = [np.sum([np.isfinite(run.y) for run in drawn if run.x.size == n], axis=0) for n in (95, 40)]
     starts = np.concatenate([weight[::10] for weight in weights])
     assert starts.sum() == 14
     assert starts.max() > 1
     assert starts.min() == 0
     for weight in weights:
         assert np.array_equal(weight, np.repeat(weight[::10], 10)[: weight.size])
-    assert all(np.array_equal(one.x, np.arange(float(one.x.size))) for one in drawn)
+    assert all(np.array_equal(run.x, np.arange(float(run.x.size))) for run in drawn)
 
 
 def test_an_interrupt_keeps_the_members_so_far():

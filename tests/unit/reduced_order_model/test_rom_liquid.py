@@ -100,12 +100,12 @@ def test_a_scaled_model_dissipates_the_same_share():
     scaled = scaled_to(model, TankScaling.between(rig(), other))
     assert scaled.sampling_rate_hz == pytest.approx(100)
     found = []
-    for one, tank in ((model, rig()), (scaled, other)):
-        time = np.arange(2000) / one.sampling_rate_hz
+    for tank_model, tank in ((model, rig()), (scaled, other)):
+        time = np.arange(2000) / tank_model.sampling_rate_hz
         omega = 4.0 * tank.frequency_scale_rad_per_s
         speed = 0.6 * tank.velocity_scale_m_per_s
         velocity = speed * np.sin(omega * time)
-        force = one.simulate(velocity)
+        force = tank_model.simulate(velocity)
         known = np.isfinite(force)
         power = -np.mean(force[known] * velocity[known])
         found.append(power * 2 * math.pi / omega / (tank.liquid_mass_kg * speed**2))

@@ -108,13 +108,13 @@ def test_sums_over_a_delay_line_are_those_of_the_jacobian(network):
     theta = 0.3 * rng.normal(size=network.n_parameters)
     plain = SumsOfJacobian(xp, network, theta)
     found = [network.normal_sums(backend.xp, backend.asarray(theta), is_delay_line=True) for backend in BACKENDS]
-    assert all(isinstance(one, DelayLineSums) for one in found)
+    assert all(isinstance(delay_line_sums, DelayLineSums) for delay_line_sums in found)
     for phi, target in blocks([run], Delays.tapped(30), 613):
         plain.add(phi, target)
-        for one, backend in zip(found, BACKENDS, strict=True):
-            one.add(backend.asarray(phi), backend.asarray(target))
-    for one in found:
-        sums = one.sums()
+        for delay_line_sums, backend in zip(found, BACKENDS, strict=True):
+            delay_line_sums.add(backend.asarray(phi), backend.asarray(target))
+    for delay_line_sums in found:
+        sums = delay_line_sums.sums()
         assert max(scaled_differences(plain.sums(), sums)) < 1e-12
         assert sums.squares == pytest.approx(plain.sums().squares)
 

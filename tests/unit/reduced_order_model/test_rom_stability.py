@@ -46,8 +46,8 @@ def test_two_runs_come_together_at_the_rate_of_the_exponent():
     found = stability(model, [x], n_samples=20_000)
     gains = []
     for stretch in x.reshape(-1, 40)[:300]:
-        one, other = (model.simulate(stretch, np.full(40, start)) for start in (0.2, 0.2 + 1e-3))
-        sizes = np.hypot(np.abs(other - one)[:-1], np.abs(other - one)[1:])
+        undisturbed, disturbed = (model.simulate(stretch, np.full(40, start)) for start in (0.2, 0.2 + 1e-3))
+        sizes = np.hypot(np.abs(disturbed - undisturbed)[:-1], np.abs(disturbed - undisturbed)[1:])
         gains.append(np.log(sizes[35] / sizes[15]) / (20 / RATE_HZ))
     assert found.is_stable
     # the standard error of the mean of 300 stretches

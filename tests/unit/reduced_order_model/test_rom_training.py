@@ -75,10 +75,16 @@ def test_a_training_gives_the_same_model_whatever_the_library(delays, library):
     other = array_backend("torch") if library == "torch" else ArrayBackend(array_api_strict)
     runs = [feedback_run(200, 1)], [feedback_run(100, 2)]
     models = [
-        fit("normalised_rbf", {"n_neurons": 4}, delays, *runs, RATE_HZ, TrainingSettings(n_epochs=4), backend=one)[
-            0
-        ]
-        for one in (array_backend(), other)
+        fit(
+            "normalised_rbf",
+            {"n_neurons": 4},
+            delays,
+            *runs,
+            RATE_HZ,
+            TrainingSettings(n_epochs=4),
+            backend=backend,
+        )[0]
+        for backend in (array_backend(), other)
     ]
     unseen = feedback_run(100, 3)
     first, second = (model.simulate(unseen.x, unseen.y) for model in models)

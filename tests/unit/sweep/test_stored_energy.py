@@ -12,7 +12,7 @@ MASS, SPRING = 0.7, 900.0
 
 def changes_of(elastic, kinetic=0.0, chirp=0.0):
     return Changes(
-        *(np.broadcast_to(np.asarray(one, float), np.shape(elastic)) for one in (elastic, kinetic, chirp))
+        *(np.broadcast_to(np.asarray(energy, float), np.shape(elastic)) for energy in (elastic, kinetic, chirp))
     )
 
 

@@ -52,20 +52,20 @@ def cycles_of(frequency_hz, *, usable=None, work_j=None, speed=1.0) -> Cycles:
 def test_windows_of_2p_cycles_whose_centres_are_m_apart(n_cycles, p, m, expected):
     """Four cycles at both ends are left out: the phase is smoothed there and the shaker starts and stops."""
     slices = list(window_slices(cycles_of(np.linspace(9, 10, n_cycles)), WindowSettings(p, m)))
-    assert [(one.start, one.stop) for one in slices] == expected
+    assert [(window.start, window.stop) for window in slices] == expected
 
 
 def test_no_window_crosses_a_step():
     cycles = cycles_of(np.repeat([5.0, 8.0, 11.0], 40))
     slices = list(window_slices(cycles, WindowSettings(6, 12)))
     assert slices
-    for one in slices:
+    for window in slices:
         # no cycle of another step, and none within four cycles of a step
-        step = one.start // 40
-        assert (one.stop - 1) // 40 == step
-        assert one.start - 40 * step >= 4
-        assert 40 * (step + 1) - one.stop >= 4
-    assert {one.start // 40 for one in slices} == {0, 1, 2}
+        step = window.start // 40
+        assert (window.stop - 1) // 40 == step
+        assert window.start - 40 * step >= 4
+        assert 40 * (step + 1) - window.stop >= 4
+    assert {window.start // 40 for window in slices} == {0, 1, 2}
 
 
 def test_means_and_scatter_are_those_of_the_cycles():

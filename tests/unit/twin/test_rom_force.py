@@ -175,8 +175,8 @@ def test_a_saved_twin_needs_no_model_file_and_gives_the_same_bytes(tmp_path: Pat
             suffix
         ).read_bytes()
     once, twice, again = (
-        one.simulate(free(0.5, 1000.0), initial_displacement_m=0.01).require_done().places.tobytes()
-        for one in (twin, loaded, loaded)
+        each_twin.simulate(free(0.5, 1000.0), initial_displacement_m=0.01).require_done().places.tobytes()
+        for each_twin in (twin, loaded, loaded)
     )
     assert once == twice == again
 

@@ -11,14 +11,11 @@ import xarray as xr
 
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import AnalysisError, InputError, RigError
-from sloshlab.modal.cantilever import cantilever_modes
 from sloshlab.rig import Rig
-from sloshlab.rig import Structure as RigStructure
 from sloshlab.twin import preparation
 from sloshlab.twin.excitation import Excitation, free, harmonic, harmonic_force, recorded, stepped_sine
 from sloshlab.twin.law import VELOCITY, law
 from sloshlab.twin.liquid_effects import LIQUID_DAMPING
-from sloshlab.twin.rig_beam import base_participation_kg, beam_of_rig, scale_remarks, shapes_at
 from sloshlab.twin.sensors import Sensor
 from sloshlab.twin.status import Status
 from sloshlab.twin.storage import load_twin, save_twin
@@ -115,60 +112,15 @@ def test_a_beam_with_a_viscous_tank_decays_as_appendix_e_says() -> None:
     assert decrement == pytest.approx(0.0032 + 3.4 / (2 * 0.8956 * omega), rel=0.01)
 
 
-def rig_structure(**changes: object) -> RigStructure:
-    return Rig.from_toml_text(BEAM_RIG).structure.model_copy(update=changes)  # type: ignore[union-attr]
-
-
-def test_participation_of_the_beam_adds_up_to_its_mass() -> None:
-    """Σ Γ²/m over all modes is the moving mass, here that of an aluminium beam and its tip mass."""
-    many = dict(frequencies_hz=(10.87,) * 10, modal_masses_kg=(0.9,) * 10, tip_mode_shape=(1.0,) * 10)
-    beam = beam_of_rig(rig_structure(**many))
-    gamma = base_participation_kg(rig_structure(**many))
-    assert beam is not None
-    assert gamma is not None
-    masses = cantilever_modes(beam, n_modes=10).modal_mass_kg
-    effective = np.cumsum(gamma**2 / masses)
-    total = 2700 * 0.74 * 0.001 + beam.tip_mass_kg
-    assert (np.diff(effective) > 0).all()
-    assert 0.96 * total < effective[-1] < total
-
-
-def test_the_tip_mass_of_the_beam_is_that_of_its_first_frequency() -> None:
-    """ "About 0.44 kg" meets the first mode of Table 2.4; without such a mass the first modal mass decides."""
-    beam = beam_of_rig(rig_structure())
-    assert beam is not None
-    assert cantilever_modes(beam, n_modes=1).frequency_hz[0] == pytest.approx(10.87, rel=1e-9)
-    assert beam.tip_mass_kg == pytest.approx(0.44, rel=0.03)
-    stiffer = beam_of_rig(rig_structure(frequencies_hz=(60.0, 78.31, 226.5)))
-    assert stiffer is not None
-    assert cantilever_modes(stiffer, n_modes=1).modal_mass_kg[0] == pytest.approx(0.8956, rel=1e-9)
-    with pytest.raises(RigError, match="aluminium beam of these dimensions"):
-        beam_of_rig(rig_structure(frequencies_hz=(60.0, 78.31, 226.5), modal_masses_kg=(0.1, 1.0, 1.0)))
-
-
-def test_masses_that_a_beam_with_these_tip_values_does_not_have_are_remarked() -> None:
-    """Table 2.4 is scaled to the largest deflection; with the tip values of that scale there is no remark."""
-    assert [remark[:6] for remark in scale_remarks(rig_structure())] == ["mode 2", "mode 3"]
-    assert scale_remarks(rig_structure(tip_mode_shape=(1.0, -0.63, 0.46))) == []
-
-
-def test_shapes_along_the_beam_are_scaled_to_the_tip_values() -> None:
-    shapes = shapes_at(rig_structure(tip_mode_shape=(1.0, -0.5, 2.0)), [0.0, 0.37, 0.74])
-    np.testing.assert_allclose(shapes[0], 0.0, atol=1e-12)
-    np.testing.assert_allclose(shapes[2], [1.0, -0.5, 2.0], rtol=1e-12)
-    assert (np.sign(shapes[1]) == [1.0, 1.0, 1.0]).all()
-    with pytest.raises(RigError, match="position along the beam"):
-        shapes_at(rig_structure(), [0.8])
-    with pytest.raises(RigError, match="length_m"):
-        shapes_at(rig_structure(length_m=None), [0.1])
-
-
 def test_a_copy_in_another_process_would_be_the_same_twin() -> None:
     twin = sdof().with_term(BOUNCING_BALL(**BALL))
     copied = copy.deepcopy(twin)
     assert copied.terms[0].kind is BOUNCING_BALL
     run = free(0.2, 2000.0)
-    runs = [one.simulate(run, initial_displacement_m=-0.06).displacement_m.tobytes() for one in (twin, copied)]
+    runs = [
+        each_twin.simulate(run, initial_displacement_m=-0.06).displacement_m.tobytes()
+        for each_twin in (twin, copied)
+    ]
     assert runs[0] == runs[1]
 
 

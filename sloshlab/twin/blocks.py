@@ -1,0 +1,30 @@
+"""What a twin consists of, as data that the engine's preparation and the simulation both read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sloshlab.twin.sensors import Sensor
+from sloshlab.twin.structure import Structure
+from sloshlab.twin.terms import Term
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Structure, forces and sensors.
+
+    Attributes
+    ----------
+    structure : Structure or None
+        None: the tank's motion is prescribed.
+    terms : tuple of Term
+        Forces of structure and tank. A frozen liquid has none.
+    sensors : tuple of Sensor
+    carried_mass_kg : float
+        Tank with frozen liquid, all that the interface force moves.
+    """
+
+    structure: Structure | None
+    terms: tuple[Term, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    carried_mass_kg: float = 0.0
