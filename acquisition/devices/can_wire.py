@@ -8,7 +8,8 @@ import numpy as np
 
 from acquisition.devices.device_clock import DeviceClock
 from acquisition.devices.frames import FrameArray, FrameKind, can_frame
-from acquisition.sources.interface import Channel, CountArray
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import CountArray
 from acquisition.wire.can_frames import ENDED, LOST_DATA, RUNNING, checksums, control_frame, encode_samples
 from acquisition.wire.can_layout import STATUS, STATUS_ID, CanLayout, SampleMessage
 from sloshlab.errors import InputError

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 from sloshlab.errors import FaultsError
 
 _LARGEST_FILE_BYTES: Final = 1 << 20

@@ -19,7 +19,8 @@ from acquisition.devices.sender import STEP_S, HostGoneError, Sender, StoppedErr
 from acquisition.devices.sensor_faults import SensorFaults
 from acquisition.devices.signal import Piece, Signal
 from acquisition.devices.truth import Truth
-from acquisition.sources.interface import Channel, CountArray
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import CountArray
 
 LINGER_S: Final = 10.0
 """So long the device waits at its end for the hosts to read everything and to go."""

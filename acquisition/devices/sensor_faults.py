@@ -13,7 +13,8 @@ from acquisition.devices.device_clock import DeviceClock
 from acquisition.devices.faults import ClippedFault, Faults, StuckFault, SwappedFault
 from acquisition.devices.signal import Piece
 from acquisition.devices.truth import Truth
-from acquisition.sources.interface import Channel, CountArray
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import CountArray
 
 
 class SensorFaults:

@@ -19,7 +19,8 @@ from acquisition.devices.serial_wire import SerialWire
 from acquisition.devices.signal import Signal
 from acquisition.devices.truth import Truth
 from acquisition.devices.uart import TransmitQueue, Uart
-from acquisition.sources.interface import Channel
+from acquisition.files.can_database import write_dbc
+from acquisition.samples.channel import Channel
 from acquisition.wire.can_layout import device_database
 from sloshlab.errors import InputError
 
@@ -101,7 +102,7 @@ def _wire(
         raise InputError("--samples-per-frame", got=found.url.text, allowed="serial devices")
     layout = device_database(found.device, clock.sampling_rate_hz, CLOCK_HZ, channels, fd=found.fd)
     if found.dbc is not None:
-        layout.write_dbc(found.dbc)
+        write_dbc(layout, found.dbc)
     return CanWire(layout, clock)
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.devices.signal import Piece, Signal
-from acquisition.sources.interface import Channel, SourceURL
+from acquisition.samples.channel import Channel
+from acquisition.sources.interface import SourceURL
 from acquisition.sources.simulated_source import EXPERIMENTS, MOST_SAMPLES, channel_of, counts_of, run_settings
 from acquisition.sources.urls import URLOptions
 from acquisition.virtual_laboratory.sensors import CHANNELS, FORCE_CELLS, Laboratory, cell_forces

@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel
 
 from acquisition.devices.faults import Faults
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 from sloshlab.errors import FaultsError
 
 

@@ -7,7 +7,7 @@ from acquisition.devices.faults import Faults
 from acquisition.devices.sensor_faults import SensorFaults
 from acquisition.devices.signal import Piece
 from acquisition.devices.truth import Truth
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 
 CHANNELS = (
     Channel("force_a", "force", "N", 16, 0.5, missing_count=-32768),
