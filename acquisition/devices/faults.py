@@ -188,8 +188,14 @@ class Faults(_Table):
         except ValidationError as error:
             raise _first_of(error, name) from None
 
-    def require_channels(self, channels: Sequence[Channel], *, transport: str) -> None:
+    def require_channels(self, channels: Sequence[Channel], *, can_announce: bool) -> None:
         """Refuse what a device with these channels cannot do.
+
+        Parameters
+        ----------
+        channels : sequence of Channel
+        can_announce : bool
+            Whether the device can describe its channels anew while it runs.
 
         Raises
         ------
@@ -208,7 +214,7 @@ class Faults(_Table):
                 raise FaultsError(
                     "faults: swapped", got=" and ".join(quantities), allowed="two channels of one quantity"
                 )
-            if fault.announced and transport != "serial":
+            if fault.announced and not can_announce:
                 remedy = "leave `announced` out, or play as a serial device"
                 raise FaultsError(
                     "faults: swapped.announced", got="true", allowed="false for a CAN device", remedy=remedy

@@ -8,6 +8,7 @@ import numpy as np
 
 from acquisition.devices.device_clock import CLOCK_HZ, DeviceClock
 from acquisition.devices.frames import SERIAL_FRAME, FrameArray, FrameKind, serial_frames
+from acquisition.devices.wire import Wire
 from acquisition.samples.channel import Channel
 from acquisition.samples.delivery import CountArray
 from acquisition.wire.serial_calibration import Calibration, calibration_text
@@ -27,7 +28,7 @@ _REPEATS_OF_END = 3
 _FRAME_OVERHEAD_BYTES = 28
 
 
-class SerialWire:
+class SerialWire(Wire):
     """Frames of a device with these channels.
 
     Parameters
