@@ -8,7 +8,9 @@ import numpy as np
 
 from acquisition.devices.device_clock import DeviceClock
 from acquisition.devices.frames import FrameArray, FrameKind, can_frame
-from acquisition.sources.interface import Channel, CountArray
+from acquisition.devices.wire import Wire
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import CountArray
 from acquisition.wire.can_frames import ENDED, LOST_DATA, RUNNING, checksums, control_frame, encode_samples
 from acquisition.wire.can_layout import STATUS, STATUS_ID, CanLayout, SampleMessage
 from sloshlab.errors import InputError
@@ -20,7 +22,7 @@ _REPEATS_OF_END = 3
 _LATCH_SAMPLES = 8
 
 
-class CanWire:
+class CanWire(Wire):
     """Frames of a device with this layout.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.devices.signal import Piece, Signal
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 
 FloatArray = NDArray[np.float64]
 

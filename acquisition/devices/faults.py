@@ -9,14 +9,19 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 from sloshlab.errors import FaultsError
+from sloshlab.recording import CLIPPED, STUCK
+
+SENSOR_FAULTS: Final[Mapping[str, int | None]] = {"swapped": None, "clipped": CLIPPED, "stuck": STUCK}
+"""Tables of sensors' faults in the order in which they act on a reading, and the flag of a recording that has the
+same word. Recordings have no flag for an exchange."""
 
 _LARGEST_FILE_BYTES: Final = 1 << 20
 _LATEST_S = 1e7
@@ -147,9 +152,11 @@ class Faults(_Table):
     @model_validator(mode="after")
     def _disjoint(self) -> Self:
         ordered = sorted(self.disconnect, key=lambda fault: fault.at_s)
-        for one, other in itertools.pairwise(ordered):
-            if one.at_s + one.for_s >= other.at_s:
-                raise ValueError(f"disconnect at {other.at_s:g} s begins before the one at {one.at_s:g} s ends")
+        for earlier, later in itertools.pairwise(ordered):
+            if earlier.at_s + earlier.for_s >= later.at_s:
+                raise ValueError(
+                    f"disconnect at {later.at_s:g} s begins before the one at {earlier.at_s:g} s ends"
+                )
         return self
 
     @classmethod
@@ -188,8 +195,14 @@ class Faults(_Table):
         except ValidationError as error:
             raise _first_of(error, name) from None
 
-    def require_channels(self, channels: Sequence[Channel], *, transport: str) -> None:
+    def require_channels(self, channels: Sequence[Channel], *, can_announce: bool) -> None:
         """Refuse what a device with these channels cannot do.
+
+        Parameters
+        ----------
+        channels : sequence of Channel
+        can_announce : bool
+            Whether the device can describe its channels anew while it runs.
 
         Raises
         ------
@@ -208,7 +221,7 @@ class Faults(_Table):
                 raise FaultsError(
                     "faults: swapped", got=" and ".join(quantities), allowed="two channels of one quantity"
                 )
-            if fault.announced and transport != "serial":
+            if fault.announced and not can_announce:
                 remedy = "leave `announced` out, or play as a serial device"
                 raise FaultsError(
                     "faults: swapped.announced", got="true", allowed="false for a CAN device", remedy=remedy

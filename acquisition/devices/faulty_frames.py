@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.devices.faults import Faults, FrameFault
 from acquisition.devices.frames import FrameArray, FrameKind, place
 from acquisition.devices.truth import Truth
+from acquisition.devices.wire import Wire
 
 Mask = NDArray[np.bool_]
 
 _NAMES = ("drop", "duplicate", "reorder", "corrupt", "garbage")
-
-
-class Spoiler(Protocol):
-    """What a wire must be able to do to its own frames."""
-
-    def garbage(self, n_bytes: int, generator: np.random.Generator) -> FrameArray:
-        """Bytes or frames that belong to nobody."""
-
-    def corrupted(self, frames: FrameArray, chosen: int, n_bits: int, generator: np.random.Generator) -> None:
-        """Flip bits of one frame, in place."""
 
 
 class FrameFaults:
@@ -34,13 +23,13 @@ class FrameFaults:
     Parameters
     ----------
     faults : Faults
-    wire : Spoiler
+    wire : Wire
     seed : int
     truth : Truth
         Where every frame that was struck is noted.
     """
 
-    def __init__(self, faults: Faults, wire: Spoiler, *, seed: int, truth: Truth) -> None:
+    def __init__(self, faults: Faults, wire: Wire, *, seed: int, truth: Truth) -> None:
         self._faults, self._wire, self._truth = faults, wire, truth
         self._chance = {name: np.random.default_rng([seed, 21, k]) for k, name in enumerate(_NAMES)}
         self._damage = np.random.default_rng([seed, 22])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.devices.signal import MOST_SAMPLES, Piece, Signal
-from acquisition.sources.interface import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
+from acquisition.samples.channel import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
 from sloshlab.errors import InputError
 
 _STEP: Final = np.uint64(0x9E3779B97F4A7C15)

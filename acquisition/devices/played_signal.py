@@ -9,7 +9,7 @@ from acquisition.devices.pattern_signal import PatternSignal
 from acquisition.devices.recorded_signal import RecordedSignal
 from acquisition.devices.signal import MOST_SAMPLES, Signal
 from acquisition.devices.virtual_signal import virtual_signal
-from acquisition.sources.interface import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS
+from acquisition.samples.channel import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS
 from acquisition.sources.urls import URLOptions, parse_url
 from sloshlab.errors import InputError
 

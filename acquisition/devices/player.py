@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from acquisition.devices.sender import STEP_S, HostGoneError, Sender, StoppedErr
 from acquisition.devices.sensor_faults import SensorFaults
 from acquisition.devices.signal import Piece, Signal
 from acquisition.devices.truth import Truth
-from acquisition.sources.interface import Channel, CountArray
+from acquisition.devices.wire import Wire
+from acquisition.samples.channel import Channel
 
 LINGER_S: Final = 10.0
 """So long the device waits at its end for the hosts to read everything and to go."""
@@ -29,26 +30,6 @@ _PACED_BLOCK_S, _UNPACED_BLOCK_S = 0.25, 1.0
 _DESCRIBED_EVERY_S = 1.0
 _UNPLUGGED_S = 0.5
 _READ_LINGER_S, _STOPPED_LINGER_S = 2.0, 1.0
-
-
-class Wire(Protocol):
-    """How a device puts samples and words into frames."""
-
-    channels: tuple[Channel, ...]
-    n_groups: int
-    samples_per_frame: int
-
-    def described_as(self, channels: tuple[Channel, ...]) -> None:
-        """Describe the channels differently from now on."""
-
-    def samples(self, stream: int, first_counter: int, counts: CountArray) -> FrameArray:
-        """Frames of consecutive samples."""
-
-    def description(self, stream: int, counter: int) -> FrameArray:
-        """What the device says once per second."""
-
-    def end(self, stream: int, counter: int) -> FrameArray:
-        """What it says at its end."""
 
 
 @dataclass

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.devices.signal import Piece, Signal
-from acquisition.sources.interface import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
+from acquisition.samples.channel import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
 from sloshlab.errors import InputError, RecordingError
 from sloshlab.file_structure import require_sound_structure
 from sloshlab.netcdf_lock import NETCDF_LOCK

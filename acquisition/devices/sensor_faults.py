@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.devices.device_clock import DeviceClock
-from acquisition.devices.faults import ClippedFault, Faults, StuckFault, SwappedFault
+from acquisition.devices.faults import SENSOR_FAULTS, ClippedFault, Faults, StuckFault, SwappedFault
 from acquisition.devices.signal import Piece
 from acquisition.devices.truth import Truth
-from acquisition.sources.interface import Channel, CountArray
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import CountArray
 
 
 class SensorFaults:
@@ -47,9 +48,9 @@ class SensorFaults:
         moments += [(fault.to_s, fault) for _, fault in moments if math.isfinite(fault.to_s)]
         for time_s, fault in sorted(moments, key=lambda moment: moment[0]):
             a, b = (self._numbers[name] for name in fault.channels)
-            one, other = channels[a], channels[b]
-            channels[a] = dataclasses.replace(one, sensor_serial=other.sensor_serial)
-            channels[b] = dataclasses.replace(other, sensor_serial=one.sensor_serial)
+            first, second = channels[a], channels[b]
+            channels[a] = dataclasses.replace(first, sensor_serial=second.sensor_serial)
+            channels[b] = dataclasses.replace(second, sensor_serial=first.sensor_serial)
             told[self._clock.sample_at(time_s)] = tuple(channels)
         return told
 
@@ -65,12 +66,12 @@ class SensorFaults:
     def applied(self, start: int, piece: Piece) -> Piece:
         """Counts as the faulty sensors give them; pieces in order, `start` is the first sample's number."""
         counts, samples = piece.counts.copy(), np.arange(start, start + len(piece.counts))
-        for swapped in self._faults.swapped:
-            self._swap(swapped, counts, samples)
-        for clipped in self._faults.clipped:
-            self._clip(clipped, counts, samples)
-        for stuck in self._faults.stuck:
-            self._stick(stuck, counts, samples)
+        act = {"swapped": self._swap, "clipped": self._clip, "stuck": self._stick}
+        for name in SENSOR_FAULTS:
+            for fault in getattr(self._faults, name):
+                n_changed = act[name](fault, counts, samples)
+                if n_changed:
+                    self._truth.counts[name] += n_changed
         for k, channel in enumerate(self._channels):
             if channel.missing_count is not None:
                 missing = piece.counts[:, k] == channel.missing_count
@@ -83,34 +84,31 @@ class SensorFaults:
         last = self._clock.sample_at(fault.to_s) if math.isfinite(fault.to_s) else np.iinfo(np.int64).max
         return (samples >= self._clock.sample_at(fault.from_s)) & (samples < last)
 
-    def _swap(self, fault: SwappedFault, counts: CountArray, samples: NDArray[np.int64]) -> None:
+    def _swap(self, fault: SwappedFault, counts: CountArray, samples: NDArray[np.int64]) -> int:
         rows = self._during(fault, samples)
         a, b = (self._numbers[name] for name in fault.channels)
         counts[rows, a], counts[rows, b] = (
             _as_if_from(counts[rows, b], self._channels[b], self._channels[a]),
             _as_if_from(counts[rows, a], self._channels[a], self._channels[b]),
         )
-        self._note("swapped", int(rows.sum()))
+        return int(rows.sum())
 
-    def _clip(self, fault: ClippedFault, counts: CountArray, samples: NDArray[np.int64]) -> None:
+    def _clip(self, fault: ClippedFault, counts: CountArray, samples: NDArray[np.int64]) -> int:
         rows, k = self._during(fault, samples), self._numbers[fault.channel]
         channel = self._channels[k]
         ends = sorted((sign * fault.limit - channel.add_offset) / channel.scale_factor for sign in (-1.0, 1.0))
         lowest, highest = math.ceil(ends[0] - 1e-9), math.floor(ends[1] + 1e-9)
         clipped = np.clip(counts[rows, k], lowest, highest)
-        self._note("clipped", int((clipped != counts[rows, k]).sum()))
+        n_changed = int((clipped != counts[rows, k]).sum())
         counts[rows, k] = clipped
+        return n_changed
 
-    def _stick(self, fault: StuckFault, counts: CountArray, samples: NDArray[np.int64]) -> None:
+    def _stick(self, fault: StuckFault, counts: CountArray, samples: NDArray[np.int64]) -> int:
         rows, k = self._during(fault, samples), self._numbers[fault.channel]
         if rows.any():
             held = self._held.setdefault(fault, int(counts[np.argmax(rows), k]))
             counts[rows, k] = held
-            self._note("stuck", int(rows.sum()))
-
-    def _note(self, fault: str, n_samples: int) -> None:
-        if n_samples:
-            self._truth.counts[fault] += n_samples
+        return int(rows.sum())
 
 
 def _as_if_from(counts: CountArray, own: Channel, other: Channel) -> CountArray:

@@ -8,7 +8,9 @@ import numpy as np
 
 from acquisition.devices.device_clock import CLOCK_HZ, DeviceClock
 from acquisition.devices.frames import SERIAL_FRAME, FrameArray, FrameKind, serial_frames
-from acquisition.sources.interface import Channel, CountArray
+from acquisition.devices.wire import Wire
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import CountArray
 from acquisition.wire.serial_calibration import Calibration, calibration_text
 from acquisition.wire.serial_frames import (
     LONGEST_BODY,
@@ -26,7 +28,7 @@ _REPEATS_OF_END = 3
 _FRAME_OVERHEAD_BYTES = 28
 
 
-class SerialWire:
+class SerialWire(Wire):
     """Frames of a device with these channels.
 
     Parameters

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.devices.band_limited import MARGIN, interpolated
-from acquisition.sources.interface import Channel, CountArray
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import CountArray
 from sloshlab.errors import InputError
 
 FloatArray = NDArray[np.float64]

@@ -6,21 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from acquisition.devices.appearance import Appearance, endpoint
-from acquisition.devices.can_wire import CanWire
-from acquisition.devices.device_clock import CLOCK_HZ, ClockedSignal, DeviceClock
+from acquisition.devices.appearance import Appearance
+from acquisition.devices.device_clock import ClockedSignal, DeviceClock
 from acquisition.devices.faults import Faults
 from acquisition.devices.faulty_frames import FrameFaults
 from acquisition.devices.laboratory_time import LaboratoryTime
 from acquisition.devices.player import Player
-from acquisition.devices.sender import LossyLine, Sender
+from acquisition.devices.sender import Sender
 from acquisition.devices.sensor_faults import SensorFaults
-from acquisition.devices.serial_wire import SerialWire
 from acquisition.devices.signal import Signal
 from acquisition.devices.truth import Truth
-from acquisition.devices.uart import TransmitQueue, Uart
-from acquisition.sources.interface import Channel
-from acquisition.wire.can_layout import device_database
 from sloshlab.errors import InputError
 
 
@@ -50,26 +45,30 @@ def simulated_device(
     seed : int
         Of the numbers of its streams and everything else that is drawn.
     samples_per_frame : int, optional
-        Of a serial device.
+        Of a device that takes it.
     n_hosts, runs_freely : int, bool
         When it begins, see `StreamEndpoint`.
     """
     faults = faults or Faults()
-    faults.require_channels(signal.channels, transport=found.transport)
+    faults.require_channels(signal.channels, can_announce=found.can_announce)
     clock = DeviceClock(signal.sampling_rate_hz, **faults.clock.model_dump())
     clocked = ClockedSignal(signal, clock, seed=seed + faults.seed)
     truth = Truth()
     sensor_faults = SensorFaults(faults, signal.channels, clock, truth)
-    wire = _wire(found, sensor_faults.first_description(), clock, samples_per_frame)
+    if samples_per_frame is not None and not found.takes_samples_per_frame:
+        raise InputError("--samples-per-frame", got=found.url.text, allowed="serial devices")
+    wire = found.wire(sensor_faults.first_description(), clock, samples_per_frame)
+    if n_hosts > found.most_hosts:
+        raise InputError("--wait-clients", got=str(n_hosts), allowed=f"{found.most_hosts} for {found.url.text}")
     made: list[Player] = []
-    place = endpoint(
-        found,
+    place = found.endpoint(
         laboratory,
         lambda: bytes(made[0].describe()["bytes"][0]),
         n_hosts=n_hosts,
         runs_freely=runs_freely,
     )
-    sender = Sender(place, laboratory, truth, _line(faults, wire, truth), isinstance(wire, SerialWire))
+    line = None if faults.overrun is None else found.line(faults.overrun, wire, truth)
+    sender = Sender(place, laboratory, truth, line, found.offers_bytes)
     made.append(
         Player(
             clocked,
@@ -84,25 +83,6 @@ def simulated_device(
         )
     )
     return made[0]
-
-
-def _line(faults: Faults, wire: SerialWire | CanWire, truth: Truth) -> LossyLine | None:
-    if faults.overrun is None:
-        return None
-    return (Uart if isinstance(wire, SerialWire) else TransmitQueue)(faults.overrun, wire, truth)
-
-
-def _wire(
-    found: Appearance, channels: tuple[Channel, ...], clock: DeviceClock, samples_per_frame: int | None
-) -> SerialWire | CanWire:
-    if found.transport == "serial":
-        return SerialWire(found.device, clock, channels, samples_per_frame=samples_per_frame)
-    if samples_per_frame is not None:
-        raise InputError("--samples-per-frame", got=found.url.text, allowed="serial devices")
-    layout = device_database(found.device, clock.sampling_rate_hz, CLOCK_HZ, channels, fd=found.fd)
-    if found.dbc is not None:
-        layout.write_dbc(found.dbc)
-    return CanWire(layout, clock)
 
 
 def stream_numbers(seed: int) -> Iterator[int]:

@@ -8,20 +8,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
 from acquisition.devices.faults import OverrunFault, Stall
 from acquisition.devices.frames import FrameArray, FrameKind, place
 from acquisition.devices.truth import Truth
-
-
-class LossTeller(Protocol):
-    """A wire that can say in a frame that data were lost."""
-
-    def saying_data_were_lost(self, frames: FrameArray, chosen: int) -> bool:
-        """Say so in one frame, in place; False if it cannot carry that."""
+from acquisition.devices.wire import Wire
 
 
 class SlowLine:
@@ -68,11 +61,11 @@ class Uart:
     Parameters
     ----------
     fault : OverrunFault
-    wire : LossTeller
+    wire : Wire
     truth : Truth
     """
 
-    def __init__(self, fault: OverrunFault, wire: LossTeller, truth: Truth) -> None:
+    def __init__(self, fault: OverrunFault, wire: Wire, truth: Truth) -> None:
         bytes_per_s = fault.baud_rate / fault.bits_per_byte if fault.baud_rate else None
         self._line = SlowLine(bytes_per_s, fault.stalls)
         self._capacity, self._wire, self._truth = fault.fifo_bytes, wire, truth
@@ -139,7 +132,7 @@ class TransmitQueue:
     Parameters
     ----------
     fault : OverrunFault
-    wire : LossTeller
+    wire : Wire
     truth : Truth
 
     Notes
@@ -148,7 +141,7 @@ class TransmitQueue:
     (34 + 8 n)/10: 8333 full frames per second at 1 Mbit/s. CAN FD frames are taken at the same bit rate.
     """
 
-    def __init__(self, fault: OverrunFault, wire: LossTeller, truth: Truth) -> None:
+    def __init__(self, fault: OverrunFault, wire: Wire, truth: Truth) -> None:
         self._line = SlowLine(fault.bit_rate, fault.stalls)
         self._capacity, self._wire, self._truth = fault.queue_frames, wire, truth
         self._inside: deque[float] = deque()

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.devices.signal import Piece, Signal
-from acquisition.sources.interface import Channel, SourceURL
+from acquisition.samples.channel import Channel
+from acquisition.sources.interface import SourceURL
 from acquisition.sources.simulated_source import (
     MOST_SAMPLES,
     channel_of,

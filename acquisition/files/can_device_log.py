@@ -15,11 +15,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.files.can_database import read_layout
 from acquisition.files.reading_limits import LARGEST_DECODED_BYTES, check_declared
 from acquisition.files.table import Column, RawCounts
-from acquisition.sources.interface import Block, Channel, CountArray, Delivery, Trouble, TroubleKind, attributes_of
+from acquisition.samples.channel import Channel, attributes_of
+from acquisition.samples.delivery import Block, CountArray, Delivery, Trouble, TroubleKind
 from acquisition.wire.can_batch import FrameBatch
-from acquisition.wire.can_database import read_layout
 from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage
 from acquisition.wire.can_receiver import CanReceiver
 from sloshlab.errors import FileFormatError, SourceError

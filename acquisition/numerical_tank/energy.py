@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from acquisition.numerical_tank.simulation import LiquidState
+from acquisition.numerical_tank.liquid_state import LiquidState
 
 TERMS: Final = (
     "tank_work",

@@ -18,6 +18,7 @@ from acquisition.numerical_tank.energy import EnergyAccount
 from acquisition.numerical_tank.initial_state import constants_of, particles_at_rest
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.numerical_tank.kernel import coverage_table, surface_gradient
+from acquisition.numerical_tank.liquid_state import LiquidState
 from acquisition.numerical_tank.neighbours import list_neighbours
 from acquisition.numerical_tank.particles import Constants, Images, Pairs, Particles
 from acquisition.numerical_tank.tank import TankSetup
@@ -52,27 +53,6 @@ class WallForces:
     vertical_n: FloatArray
     floor_n: FloatArray
     roof_n: FloatArray
-
-
-@dataclass(frozen=True)
-class LiquidState:
-    """The liquid at one instant, one row per particle.
-
-    Attributes
-    ----------
-    x_m, z_m : ndarray, shape (n,)
-        Position in the tank.
-    vx_m_per_s, vz_m_per_s : ndarray, shape (n,)
-        Velocity relative to the tank.
-    pressure_pa : ndarray, shape (n,)
-        Pressure above that of the gas.
-    """
-
-    x_m: FloatArray
-    z_m: FloatArray
-    vx_m_per_s: FloatArray
-    vz_m_per_s: FloatArray
-    pressure_pa: FloatArray
 
 
 class NumericalTank:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from acquisition.numerical_tank.forced_motion import HarmonicMotion, moved
-from acquisition.numerical_tank.simulation import LiquidState, NumericalTank
+from acquisition.numerical_tank.liquid_state import LiquidState
+from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import Box, Liquid, LiquidColumn, Numerics, TankSetup, filled_tank
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,7 @@ from acquisition.recorder.journal import Journal
 from acquisition.recorder.placement import Loss, Stream
 from acquisition.recorder.recording_plan import Part
 from acquisition.recorder.source_alignment import AlignmentMethod, described
-from acquisition.sources.interface import TroubleKind
+from acquisition.samples.delivery import TroubleKind
 from sloshlab.conditioning.device_clock import ClockStatus
 
 MOST_LOSSES_NAMED: Final = 1000

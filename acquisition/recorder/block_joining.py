@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, Protocol
 
-from acquisition.sources.interface import Block, Delivery, End, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
 
 LONGEST_WAIT_NS: Final = 250_000_000
 _MOST_BYTES_WAITING: Final = 1 << 20

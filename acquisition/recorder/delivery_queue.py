@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from acquisition.sources.interface import Block, Delivery
+from acquisition.samples.delivery import Block, Delivery
 
 BYTES_PER_SOURCE: Final = 32 << 20
 _BYTES_PER_DELIVERY: Final = 200

@@ -16,7 +16,9 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from acquisition.sources.interface import MOST_CHANNELS, Channel, End, SourceInfo, Trouble, TroubleKind
+from acquisition.samples.channel import MOST_CHANNELS, Channel
+from acquisition.samples.delivery import End, Trouble, TroubleKind
+from acquisition.sources.interface import SourceInfo
 
 VERSION: Final = 1
 FILE_MAGIC: Final = b"SLOSHJNL"

@@ -30,7 +30,9 @@ from acquisition.recorder.journal_format import (
     unpacked_text,
 )
 from acquisition.recorder.journal_scanning import Damage, OpenFile, Scan
-from acquisition.sources.interface import MOST_CHANNELS, CountArray, End, SourceInfo, Trouble
+from acquisition.samples.channel import MOST_CHANNELS
+from acquisition.samples.delivery import CountArray, End, Trouble
+from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
 
 MOST_ENTRIES: Final = 20_000_000

@@ -25,7 +25,8 @@ from acquisition.recorder.journal_format import (
     packed_file_header,
     packed_text,
 )
-from acquisition.sources.interface import Block, CountArray, Delivery, End, SourceInfo, Trouble
+from acquisition.samples.delivery import Block, CountArray, Delivery, End, Trouble
+from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
 
 SYNCHRONISATION_INTERVAL_NS: Final = 500_000_000

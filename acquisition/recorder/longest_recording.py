@@ -32,7 +32,7 @@ def longest_duration_s(infos: Sequence[SourceInfo], align: str) -> float:
     --------
     A little less than 6 GiB of eight channels, time and quality, eight bytes each:
 
-    >>> from acquisition.sources.interface import Channel
+    >>> from acquisition.samples.channel import Channel
     >>> channels = tuple(Channel(f"force_cell_{k}", "force", "N") for k in range(8))
     >>> daq = SourceInfo("daq", "serial:/dev/ttyUSB0", 51_200.0, channels, (tuple(range(8)),))
     >>> round(longest_duration_s([daq], "host"))

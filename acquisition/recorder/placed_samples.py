@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.recorder.journal import Entry, Journal
 from acquisition.recorder.placement import GroupPlacement, SourcePlacement
-from acquisition.sources.interface import CountArray
+from acquisition.samples.delivery import CountArray
 
 MOST_CONFLICTS_NAMED = 20
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from acquisition.recorder.delivery_queue import DeliveryQueue
 from acquisition.recorder.journal_format import is_in_file_range
-from acquisition.sources.interface import Block, Delivery, Source
+from acquisition.samples.delivery import Block, Delivery
+from acquisition.sources.interface import Source
 from sloshlab.errors import SloshlabError, SourceError
 
 READ_TIMEOUT_S: Final = 0.1

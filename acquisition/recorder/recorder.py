@@ -28,7 +28,8 @@ from acquisition.recorder.status import (
     SourceState,
     StopReason,
 )
-from acquisition.sources.interface import Block, Source
+from acquisition.samples.delivery import Block
+from acquisition.sources.interface import Source
 from sloshlab.errors import JournalError, SloshlabError
 
 STATUS_INTERVAL_S: Final = 0.25

@@ -17,7 +17,8 @@ from acquisition.recorder.placement import SourcePlacement
 from acquisition.recorder.recording_file import Variable
 from acquisition.recorder.source_alignment import SourceAlignment
 from acquisition.recorder.survey import ChannelSurvey, SourceSurvey
-from acquisition.sources.interface import Channel, SourceInfo, attributes_of
+from acquisition.samples.channel import Channel, attributes_of
+from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
 from sloshlab.recording import FORMAT, quality_attributes, validate_recording
 

@@ -7,7 +7,8 @@ from typing import Final
 
 from acquisition.recorder.statistics import SourceMeters
 from acquisition.recorder.status import SourceState, SourceStatus
-from acquisition.sources.interface import Block, Delivery, End, SourceInfo, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
+from acquisition.sources.interface import SourceInfo
 
 _TOLD_AT_ONCE: Final = frozenset(
     {

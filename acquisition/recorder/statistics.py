@@ -14,7 +14,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.sources.interface import Block, Channel, CountArray, SourceInfo, Trouble, TroubleKind
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, CountArray, Trouble, TroubleKind
+from acquisition.sources.interface import SourceInfo
 
 LEVEL_WINDOW_NS: Final = 1_000_000_000
 """Levels are those of the last completed window of about this length."""

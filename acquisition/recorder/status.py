@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from acquisition.recorder.statistics import ChannelLevel, Drift
-from acquisition.sources.interface import TroubleKind
+from acquisition.samples.delivery import TroubleKind
 
 
 class SourceState(enum.Enum):

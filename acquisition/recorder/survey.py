@@ -16,7 +16,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from acquisition.recorder.placed_samples import PlacedSamples, Repeats, Stretch
-from acquisition.sources.interface import Channel, SourceInfo
+from acquisition.samples.channel import Channel
+from acquisition.sources.interface import SourceInfo
 
 SHORTEST_STUCK_SAMPLES: Final = 64
 SHORTEST_STUCK_S: Final = 0.25

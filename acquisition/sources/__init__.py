@@ -4,17 +4,9 @@
 ``sloshlab.sources``, so that a plug-in can bring its own.
 """
 
-from acquisition.sources.interface import (
-    Block,
-    Channel,
-    Delivery,
-    End,
-    Source,
-    SourceInfo,
-    SourceURL,
-    Trouble,
-    TroubleKind,
-)
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
+from acquisition.sources.interface import Source, SourceInfo, SourceURL
 from acquisition.sources.urls import URLOptions, open_source, parse_url
 
 __all__ = [

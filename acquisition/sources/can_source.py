@@ -14,15 +14,16 @@ from typing import Any, Final
 
 import numpy as np
 
+from acquisition.files.can_database import read_layout
+from acquisition.samples.delivery import Delivery, End, Trouble, TroubleKind
 from acquisition.sources.can_links import CanLink, PythonCanLink, Received, open_bus
 from acquisition.sources.can_text_links import SLCAN_BITRATES, open_slcan, open_socketcand
-from acquisition.sources.interface import Delivery, End, Source, SourceInfo, SourceURL, Trouble, TroubleKind
+from acquisition.sources.interface import Source, SourceInfo, SourceURL
 from acquisition.sources.multicast_loopback import DEFAULT_GROUP, open_multicast_bus
 from acquisition.sources.serial_line import LineLostError
 from acquisition.sources.urls import URLOptions
 from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_counter import CounterTracker
-from acquisition.wire.can_database import read_layout
 from acquisition.wire.can_frames import START, STOP, control_frame, decode
 from acquisition.wire.can_layout import CanLayout
 from acquisition.wire.can_receiver import CanReceiver

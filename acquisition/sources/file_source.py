@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from acquisition.sources.interface import CountArray, SourceInfo, SourceURL
+from acquisition.samples.delivery import CountArray
+from acquisition.sources.interface import SourceInfo, SourceURL
 from acquisition.sources.playback import PlayedSource
 from acquisition.sources.stored_counts import StoredCounts
 from sloshlab.errors import RecordingError, SourceError

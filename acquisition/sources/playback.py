@@ -10,7 +10,8 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from acquisition.sources.interface import Block, CountArray, Delivery, End, Source, SourceInfo, SourceURL
+from acquisition.samples.delivery import Block, CountArray, Delivery, End
+from acquisition.sources.interface import Source, SourceInfo, SourceURL
 from acquisition.sources.urls import URLOptions
 from sloshlab.errors import SourceError
 

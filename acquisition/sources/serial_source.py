@@ -10,7 +10,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from acquisition.sources.interface import Delivery, Source, SourceInfo, SourceURL, Trouble, TroubleKind
+from acquisition.samples.delivery import Delivery, Trouble, TroubleKind
+from acquisition.sources.interface import Source, SourceInfo, SourceURL
 from acquisition.sources.serial_line import Line, LineLostError, open_line
 from acquisition.sources.urls import URLOptions
 from acquisition.wire.serial_decoding import HostTime, SerialDecoder

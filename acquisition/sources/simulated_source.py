@@ -13,7 +13,9 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
-from acquisition.sources.interface import Channel, CountArray, SourceInfo, SourceURL
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import CountArray
+from acquisition.sources.interface import SourceInfo, SourceURL
 from acquisition.sources.playback import PlayedSource
 from acquisition.sources.urls import URLOptions
 from acquisition.virtual_laboratory.sensors import CHANNELS, LOST_COUNT

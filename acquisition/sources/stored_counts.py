@@ -20,7 +20,8 @@ from typing import Any, Final, Self
 import numpy as np
 import xarray as xr
 
-from acquisition.sources.interface import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel, CountArray
+from acquisition.samples.channel import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
+from acquisition.samples.delivery import CountArray
 from sloshlab.errors import RecordingError
 from sloshlab.file_structure import require_sound_structure
 from sloshlab.netcdf_lock import NETCDF_LOCK

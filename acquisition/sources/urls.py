@@ -7,7 +7,6 @@ error and not a silent default.
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 import re
 from collections.abc import Callable, Iterable
@@ -15,9 +14,20 @@ from typing import Final
 from urllib.parse import unquote
 
 from acquisition.sources.interface import Source, SourceURL
+from acquisition.sources.plug_ins import PlugIns
 from sloshlab.errors import SourceError
 
-ENTRY_POINT_GROUP: Final = "sloshlab.sources"
+BACKENDS: Final = PlugIns(
+    "sloshlab.sources",
+    "backend",
+    {
+        "can": "acquisition.sources.can_source:CanSource",
+        "file": "acquisition.sources.file_source:FileSource",
+        "serial": "acquisition.sources.serial_source:SerialSource",
+        "sim": "acquisition.sources.simulated_source:SimulatedSource",
+    },
+)
+"""Classes or functions that make a source of a URL."""
 LONGEST_URL: Final = 4096
 """Characters; longer ones are refused."""
 
@@ -86,34 +96,8 @@ def open_source(text: str) -> Source:
         imported or refuses target or options.
     """
     url = parse_url(text)
-    backend = _backend(url, importlib.metadata.entry_points(group=ENTRY_POINT_GROUP))
+    backend: Callable[[SourceURL], Source] = BACKENDS.named(url.scheme, asked_for=f"source {url.text}")
     return backend(url)
-
-
-def _backend(
-    url: SourceURL, entry_points: Iterable[importlib.metadata.EntryPoint]
-) -> Callable[[SourceURL], Source]:
-    """What makes a source of a URL: the class or function that the entry point names."""
-    installed = tuple(entry_points)
-    # an editable and a plain installation side by side name the same backend twice
-    found = {entry.value: entry for entry in installed if entry.name == url.scheme}
-    if len(found) != 1:
-        raise SourceError(
-            f"source {url.text}",
-            got=f"scheme {url.scheme!r}, which is that of {len(found)} backends" if found else repr(url.scheme),
-            allowed=", ".join(sorted({entry.name for entry in installed})) or "none: nothing is installed",
-            remedy="check the word before the colon, or install the package that brings the backend",
-        )
-    (entry,) = found.values()
-    try:
-        backend: Callable[[SourceURL], Source] = entry.load()
-    except (ImportError, AttributeError) as error:
-        raise SourceError(
-            f"source {url.text}",
-            got=f"backend {entry.value} that cannot be imported ({error})",
-            remedy="install what it needs",
-        ) from error
-    return backend
 
 
 def _parsed_options(text: str, query: str) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,7 +36,7 @@ from acquisition.virtual_laboratory.tone_motion import Accelerated, TankMotion, 
 from sloshlab.configurations import CONFIGURATIONS, EMPTY, FROZEN
 from sloshlab.errors import InputError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
-from sloshlab.recording import CLIPPED, LOST, write_recording
+from sloshlab.recording import CLIPPED, LOST, STUCK, quality_attributes, write_recording
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
@@ -371,15 +372,17 @@ def _dataset(
         )
         flags[its_reading.clipped] |= CLIPPED
     if flags.any():
-        variables["quality"] = xr.Variable(
-            ("time",),
-            flags,
-            {
-                "flag_masks": np.array([1, 2, 4, 8], dtype=np.uint8),
-                "flag_meanings": "lost clipped crc_repaired out_of_order",
-            },
-        )
+        variables["quality"] = xr.Variable(("time",), flags, _legend())
     return xr.Dataset(variables, coords={"time": ("time", time_s, {"units": "s"})}, attrs=dict(attributes))
+
+
+def _legend() -> dict[str, Any]:
+    """What the bits of `quality` mean."""
+    legend = quality_attributes()
+    # the recordings in raw_data do not name the flag of stuck sensors; made again, they must be the same bytes
+    is_named = legend["flag_masks"] != STUCK
+    meanings = itertools.compress(legend["flag_meanings"].split(), is_named)
+    return {"flag_masks": legend["flag_masks"][is_named], "flag_meanings": " ".join(meanings)}
 
 
 def _channel_attributes(name: str, its_reading: Reading) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from acquisition.sources.interface import CountArray
+from acquisition.samples.delivery import CountArray
 from acquisition.wire.can_bits import BitField, FrameBytes, IntArray
 from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage, Selected
 from sloshlab.errors import InputError

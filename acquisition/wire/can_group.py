@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.sources.interface import Block, CountArray, Delivery, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, CountArray, Delivery, Trouble, TroubleKind
 from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_bits import IntArray
 from acquisition.wire.can_counter import CounterTracker, Decided

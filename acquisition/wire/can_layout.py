@@ -1,19 +1,18 @@
 """What the frames of a CAN device look like: which bits are counter, clock, checksum and channels.
 
-`device_database` lays out the frames of a device of ours, `read_layout` takes a layout from a DBC file,
-whoever wrote it. ``docs/can_protocol.md`` has the convention.
+`device_database` lays out the frames of a device of ours, `acquisition.files.can_database` writes a layout
+as a DBC file and takes one from any. ``docs/can_protocol.md`` has the convention.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from acquisition.sources.interface import MOST_CHANNELS, Channel
+from acquisition.samples.channel import MOST_CHANNELS, Channel
 from acquisition.wire.can_bits import BitField, IntArray
 from sloshlab.errors import SourceError
 
@@ -173,26 +172,6 @@ class CanLayout:
     def fd(self) -> bool:
         """Whether any message needs CAN FD."""
         return any(message.fd for message in self.messages)
-
-    def to_dbc(self) -> str:
-        """Text of the DBC file.
-
-        Raises
-        ------
-        SourceError
-            If a text of the device cannot stand in a DBC file.
-        """
-        from acquisition.wire.can_database import dbc_text
-
-        return dbc_text(self)
-
-    def write_dbc(self, path: Path) -> None:
-        """Write the DBC file, complete or not at all."""
-        from sloshlab.atomic_file import replaced
-
-        text = self.to_dbc().encode("cp1252")
-        with replaced(path) as temporary:
-            temporary.write_bytes(text)
 
 
 def device_database(

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.sources.interface import Delivery, End, Trouble, TroubleKind
+from acquisition.samples.delivery import Delivery, End, Trouble, TroubleKind
 from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_bits import IntArray
 from acquisition.wire.can_counter import LONGEST_GAP_S

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, NoReturn, Protoco
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from acquisition.sources.interface import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
+from acquisition.samples.channel import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS, Channel
 from acquisition.wire.serial_frames import LONGEST_TEXT
 from sloshlab.errors import InputError, SourceError, UnitsError
 from sloshlab.units import SI_UNITS, ChannelQuantity, factor_to_si

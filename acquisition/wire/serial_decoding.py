@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from acquisition.sources.interface import Block, Delivery, End, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
 from acquisition.wire.serial_calibration import Calibration, channels_from_calibration
 from acquisition.wire.serial_counter import CounterJumpError, StreamCounter
 from acquisition.wire.serial_frames import (

@@ -17,7 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from acquisition.sources.interface import MOST_CHANNELS, CountArray
+from acquisition.samples.channel import MOST_CHANNELS
+from acquisition.samples.delivery import CountArray
 from acquisition.wire import cobs
 from sloshlab.errors import InputError
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final, Self
 
 from acquisition.recorder.statistics import ChannelLevel
 from acquisition.recorder.status import Event, RecorderStatus, SourceState, SourceStatus
-from acquisition.sources.interface import TroubleKind
+from acquisition.samples.delivery import TroubleKind
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType

@@ -162,9 +162,9 @@ def _require_used(settings: ReplaySettings, places: Sequence[Appearance]) -> Non
     if not 1 <= settings.wait_clients <= MOST_CONNECTIONS:
         allowed = f"1 … {MOST_CONNECTIONS}"
         raise InputError("--wait-clients", got=str(settings.wait_clients), allowed=allowed)
-    if settings.wait_clients > 1 and not any(place.interface == "socketcand" for place in places):
+    if settings.wait_clients > 1 and not any(place.most_hosts > 1 for place in places):
         raise InputError("--wait-clients", got="no socketcand device", allowed="--as can:socketcand?…")
-    if settings.samples_per_frame is not None and not any(place.transport == "serial" for place in places):
+    if settings.samples_per_frame is not None and not any(place.takes_samples_per_frame for place in places):
         raise InputError("--samples-per-frame", got="no serial device", allowed="--as serial:…")
 
 
@@ -182,8 +182,8 @@ def _players(settings: ReplaySettings, places: Sequence[Appearance], laboratory:
                 laboratory,
                 faults=_faults(settings, number),
                 seed=settings.seed * 1000 + number,
-                samples_per_frame=settings.samples_per_frame if place.transport == "serial" else None,
-                n_hosts=settings.wait_clients if place.interface == "socketcand" else 1,
+                samples_per_frame=settings.samples_per_frame if place.takes_samples_per_frame else None,
+                n_hosts=settings.wait_clients if place.most_hosts > 1 else 1,
                 runs_freely=settings.free_run,
             )
         )

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from acquisition.numerical_tank.forced_motion import HarmonicMotion
-from acquisition.numerical_tank.simulation import LiquidState, NumericalTank
+from acquisition.numerical_tank.liquid_state import LiquidState
+from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.virtual_laboratory.numerical_liquid import numerical_setup
 from acquisition.virtual_laboratory.shaker import STROKE_LIMIT_M
 from sloshlab.constants import GRAVITY_M_PER_S2

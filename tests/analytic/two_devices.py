@@ -14,7 +14,9 @@ import numpy as np
 import xarray as xr
 
 from acquisition.recorder.journal import JournalWriter
-from acquisition.sources.interface import Block, Channel, End, SourceInfo
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, End
+from acquisition.sources.interface import SourceInfo
 from sloshlab.recording import write_recording
 
 RATE_HZ = 512.0

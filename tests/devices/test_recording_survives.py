@@ -17,7 +17,9 @@ import pytest
 from acquisition.recorder.journal import JournalWriter, read_journal
 from acquisition.recorder.recorder import Recorder
 from acquisition.recorder.status import StopReason
-from acquisition.sources.interface import Block, Channel, Delivery, Source, SourceInfo
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery
+from acquisition.sources.interface import Source, SourceInfo
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs fork and SIGKILL")
 

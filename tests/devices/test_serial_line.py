@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.sources.interface import Block, Delivery, End, SourceURL, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
+from acquisition.sources.interface import SourceURL
 from acquisition.sources.serial_line import DescriptorLine, Line, LineLostError, open_line
 from acquisition.sources.serial_source import SerialSource
 from sloshlab.errors import SourceError

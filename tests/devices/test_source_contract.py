@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import math
-import re
 import socket
-import sys
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from documented_package import installed_from
 from source_contract import SourceContract, WorkingDevice
 
 from acquisition.devices.appearance import appearance
@@ -167,21 +166,8 @@ class TestRamp(SourceContract):
     @pytest.fixture(autouse=True)
     def installed(self, repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         """The package of the page, installed as far as Python looks."""
-        page = (repository / "docs" / "sources.md").read_text(encoding="utf-8")
-        ((group, entry, package, module),) = re.findall(
-            r'^\[project\.entry-points\."(.+)"\]\n(\w+ = "(\w+)\.(\w+):\w+")$', page, re.MULTILINE
-        )
-        (code,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-        (tmp_path / package).mkdir()
-        (tmp_path / package / f"{module}.py").write_text(code, encoding="utf-8")
-        metadata = tmp_path / f"{package}-1.0.dist-info"
-        metadata.mkdir()
-        (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        (metadata / "entry_points.txt").write_text(f"[{group}]\n{entry.replace(chr(34), '')}\n")
-        monkeypatch.syspath_prepend(tmp_path)
-        yield
-        for name in (f"{package}.{module}", package):
-            sys.modules.pop(name, None)
+        with installed_from(repository / "docs" / "sources.md", tmp_path, monkeypatch):
+            yield
 
 
 def free_port() -> int:

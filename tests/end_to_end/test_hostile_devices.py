@@ -20,7 +20,8 @@ import pytest
 from live_commands import Command, running, visible, wait_until
 from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, assert_one_line
 
-from acquisition.sources.interface import Channel
+from acquisition.files.can_database import dbc_text
+from acquisition.samples.channel import Channel
 from acquisition.wire.can_layout import device_database
 from sloshlab.recording import read_recording
 
@@ -198,7 +199,7 @@ def recording_of(case: Case, port: int, folder: Path) -> Iterator[Command]:
     url = f"serial:socket://127.0.0.1:{port}?{case.options}"
     if case.is_can:
         layout = device_database("cells", 512.0, None, [Channel("force_cell_1", "force", "N")], fd=False)
-        (folder.parent / "cells.dbc").write_text(layout.to_dbc(), encoding="utf-8")
+        (folder.parent / "cells.dbc").write_text(dbc_text(layout), encoding="utf-8")
         url = f"can:socketcand?port={port}&dbc={folder.parent / 'cells.dbc'}&{case.options}"
     arguments = ["record", "--source", url, "--rig", folder.parent / "rig.toml", "-o", folder / "new.nc"]
     with running(arguments, folder) as recorder:

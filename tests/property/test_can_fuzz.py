@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.sources.interface import Block, Channel, Delivery, End, Trouble, TroubleKind
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
 from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_counter import CounterTracker
 from acquisition.wire.can_frames import control_frame, encode_samples

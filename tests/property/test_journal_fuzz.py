@@ -12,7 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from acquisition.recorder.journal import Journal, JournalWriter, read_journal
-from acquisition.sources.interface import Block, Channel, End, SourceInfo, Trouble, TroubleKind
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, End, Trouble, TroubleKind
+from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
 
 N_CHANNELS = (2, 1)

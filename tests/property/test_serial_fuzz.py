@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.sources.interface import Block, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, Trouble, TroubleKind
 from acquisition.wire import cobs
 from acquisition.wire.serial_decoding import HostTime, SerialDecoder
 from acquisition.wire.serial_frames import (

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from acquisition.recorder.statistics import ChannelLevel, Drift
 from acquisition.recorder.status import Event, RecorderStatus, SourceState, SourceStatus
-from acquisition.sources.interface import TroubleKind
+from acquisition.samples.delivery import TroubleKind
 from pipelines.recording.live_view import LiveView, rendered
 
 FORCE = ChannelLevel("force_cell_1", "N", 5.0, 10.0, 20.0, 0, 0, False)

@@ -20,7 +20,9 @@ import pytest
 import pipelines.recording.record
 from acquisition.recorder.journal import JournalWriter, read_journal
 from acquisition.recorder.status import NobodyWatching, RecorderStatus
-from acquisition.sources.interface import Block, Channel, Delivery, End, Source, SourceInfo
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery, End
+from acquisition.sources.interface import Source, SourceInfo
 from pipelines.recording.record import RecordSettings, record
 from pipelines.recording.run_attributes import checked_run_attributes
 from sloshlab.errors import (

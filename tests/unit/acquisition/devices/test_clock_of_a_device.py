@@ -7,7 +7,7 @@ from acquisition.devices.band_limited import interpolated
 from acquisition.devices.device_clock import ClockedSignal, DeviceClock
 from acquisition.devices.pattern_signal import PatternSignal
 from acquisition.devices.signal import Piece, Signal
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 
 RATE_HZ, TONE_HZ, AMPLITUDE = 512.0, 20.0, 8.0e6
 

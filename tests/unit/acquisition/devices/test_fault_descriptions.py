@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel
 
 from acquisition.devices.faults import Faults
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 from sloshlab.errors import FaultsError
 
 
@@ -67,21 +67,21 @@ def test_what_makes_no_sense_is_refused_in_one_line(text, what):
 
 
 @pytest.mark.parametrize(
-    ("text", "transport", "what"),
+    ("text", "can_announce", "what"),
     [
-        ("[[stuck]]\nchannel = 'force_b'", "serial", "force_b"),
-        ("[[swapped]]\nchannels = ['force_a', 'voltage_a']", "serial", "one quantity"),
-        ("[[swapped]]\nchannels = ['force_a', 'force_c']\nannounced = true", "can", "announced"),
+        ("[[stuck]]\nchannel = 'force_b'", True, "force_b"),
+        ("[[swapped]]\nchannels = ['force_a', 'voltage_a']", True, "one quantity"),
+        ("[[swapped]]\nchannels = ['force_a', 'force_c']\nannounced = true", False, "announced"),
     ],
 )
-def test_what_the_device_cannot_do_is_refused(text, transport, what):
+def test_what_the_device_cannot_do_is_refused(text, can_announce, what):
     channels = [
         Channel("force_a", "force", "N"),
         Channel("force_c", "force", "N"),
         Channel("voltage_a", "voltage", "V"),
     ]
     with pytest.raises(FaultsError, match=what):
-        Faults.from_toml_text(text).require_channels(channels, transport=transport)
+        Faults.from_toml_text(text).require_channels(channels, can_announce=can_announce)
 
 
 def test_a_file_that_is_not_there_is_one_clear_line(tmp_path):

@@ -3,11 +3,12 @@
 import numpy as np
 
 from acquisition.devices.device_clock import DeviceClock
-from acquisition.devices.faults import Faults
+from acquisition.devices.faults import SENSOR_FAULTS, Faults
 from acquisition.devices.sensor_faults import SensorFaults
 from acquisition.devices.signal import Piece
 from acquisition.devices.truth import Truth
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
+from sloshlab.recording import quality_attributes
 
 CHANNELS = (
     Channel("force_a", "force", "N", 16, 0.5, missing_count=-32768),
@@ -40,3 +41,12 @@ def test_an_exchanged_channel_has_the_value_of_the_other_in_its_own_counts():
     counts, _ = applied("[[swapped]]\nchannels = ['force_a', 'force_b']\nfrom_s = 0.4")
     # b: 16 · 0.25 + 1 = 5 N are 10 counts of a; a: 50 · 0.5 = 25 N are 96 counts of b
     assert counts == [*COUNTS[:4].tolist(), [10, 96], [12, 116]]
+
+
+def test_devices_and_recordings_share_their_words():
+    legend = quality_attributes()
+    flags = dict(zip(legend["flag_meanings"].split(), legend["flag_masks"].tolist(), strict=True))
+    assert {name: bit for name, bit in SENSOR_FAULTS.items() if bit is not None} == {
+        name: flags[name] for name in SENSOR_FAULTS.keys() & flags.keys()
+    }
+    assert SENSOR_FAULTS.keys() <= Faults.model_fields.keys()

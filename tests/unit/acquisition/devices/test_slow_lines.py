@@ -9,7 +9,7 @@ from acquisition.devices.frames import FrameKind
 from acquisition.devices.serial_wire import SerialWire
 from acquisition.devices.truth import Truth
 from acquisition.devices.uart import SlowLine, Uart
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 
 
 @pytest.mark.parametrize(

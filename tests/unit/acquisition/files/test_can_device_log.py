@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from acquisition.files import import_recording
-from acquisition.sources.interface import Channel
+from acquisition.files.can_database import dbc_text
+from acquisition.samples.channel import Channel
 from acquisition.wire.can_layout import device_database
 from sloshlab.errors import FileFormatError
 from sloshlab.recording import CLIPPED, LOST, read_recording, write_recording
@@ -26,7 +27,7 @@ CHANNELS = [
     Channel("acceleration_roof_1", "acceleration", "m s-2", 16, 2.0**-10),
     Channel("force_cell_2", "force", "N", 24, 1e-6),
 ]
-DBC = device_database("daq", 500.0, 1e6, CHANNELS).to_dbc()
+DBC = dbc_text(device_database("daq", 500.0, 1e6, CHANNELS))
 MAP = """
 [run]
 run_id = "a"
@@ -239,7 +240,7 @@ def described_database() -> str:
     first = dataclasses.replace(
         CHANNELS[0], range_min=-200.0, range_max=230.0, noise_std=0.25, x_m=0.5, block_from="a", block_to="b"
     )
-    return device_database("daq", 500.0, 1e6, [first, *CHANNELS[1:]]).to_dbc()
+    return dbc_text(device_database("daq", 500.0, 1e6, [first, *CHANNELS[1:]]))
 
 
 def test_what_the_database_says_about_a_sensor_stands_where_the_map_is_silent(tmp_path: Path) -> None:

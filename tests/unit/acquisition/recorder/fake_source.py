@@ -8,7 +8,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from acquisition.sources.interface import Block, Channel, Delivery, Source, SourceInfo
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery
+from acquisition.sources.interface import Source, SourceInfo
 
 Step = Sequence[Delivery] | BaseException | Callable[[], Sequence[Delivery]]
 

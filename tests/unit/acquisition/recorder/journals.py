@@ -12,7 +12,9 @@ import xarray as xr
 
 from acquisition.recorder.assembly import AssemblyOptions, AssemblySummary, assemble
 from acquisition.recorder.journal import JournalWriter, read_journal
-from acquisition.sources.interface import Block, Channel, Delivery, End, SourceInfo
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery, End
+from acquisition.sources.interface import SourceInfo
 from sloshlab.recording import read_recording
 
 RATE_HZ = 512.0

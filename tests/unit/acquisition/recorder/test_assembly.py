@@ -26,7 +26,9 @@ from journals import (
 
 from acquisition.recorder.assembly import AssemblyOptions, assemble
 from acquisition.recorder.journal import JournalWriter, read_journal
-from acquisition.sources.interface import Block, Channel, Delivery, End, SourceInfo, Trouble, TroubleKind
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
+from acquisition.sources.interface import SourceInfo
 from pipelines.recording.recover import recover
 from sloshlab.errors import InputError, JournalError, RecordingError
 from sloshlab.recording import CLIPPED, LOST, OUT_OF_ORDER, STUCK, read_recording

@@ -3,7 +3,7 @@
 from fake_source import block
 
 from acquisition.recorder.block_joining import BlockJoiner
-from acquisition.sources.interface import Block, End, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, End, Trouble, TroubleKind
 
 
 class Written:

@@ -23,7 +23,9 @@ from journal_by_hand import (
 )
 
 from acquisition.recorder.journal import Journal, JournalWriter, read_journal
-from acquisition.sources.interface import Block, Channel, End, SourceInfo, Trouble, TroubleKind
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, End, Trouble, TroubleKind
+from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
 
 DAQ = SourceInfo(

@@ -10,7 +10,7 @@ from journals import ORIGIN_NS, RATE_HZ, STREAM, UTC_NS, block, blocks, device, 
 
 from acquisition.recorder.journal import read_journal
 from acquisition.recorder.placement import placed_source
-from acquisition.sources.interface import Block, Delivery, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, Delivery, Trouble, TroubleKind
 from sloshlab.errors import JournalError
 from sloshlab.recording import LOST, OUT_OF_ORDER
 

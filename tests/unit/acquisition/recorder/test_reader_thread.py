@@ -6,7 +6,7 @@ from fake_source import FakeSource, block
 
 from acquisition.recorder.delivery_queue import DeliveryQueue, Finished
 from acquisition.recorder.reader_thread import ReaderThread
-from acquisition.sources.interface import Block
+from acquisition.samples.delivery import Block
 
 PATIENCE_S = 60.0
 

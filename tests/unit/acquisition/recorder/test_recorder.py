@@ -17,7 +17,7 @@ from acquisition.recorder import recorder as recorder_module
 from acquisition.recorder.journal import JournalWriter, read_journal
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
 from acquisition.recorder.status import Event, RecorderStatus, SourceState, StopReason
-from acquisition.sources.interface import Block, End, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, End, Trouble, TroubleKind
 from sloshlab.errors import SourceError
 
 PATIENCE_S = 60.0

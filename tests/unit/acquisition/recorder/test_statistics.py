@@ -14,7 +14,9 @@ from acquisition.recorder.statistics import (
     SourceMeters,
     extreme_counts,
 )
-from acquisition.sources.interface import Block, Channel, SourceInfo, Trouble, TroubleKind
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Trouble, TroubleKind
+from acquisition.sources.interface import SourceInfo
 
 SECOND_NS = 1_000_000_000
 

@@ -6,6 +6,7 @@ import socket
 import struct
 import threading
 
+from acquisition.files.can_database import write_dbc
 from acquisition.sources import Channel
 from acquisition.wire.can_layout import device_database
 
@@ -57,7 +58,7 @@ def text(frames):
 
 def database(path, **more):
     """A DBC file of the device ``cells``."""
-    device_database("cells", RATE_HZ, 1e6, CELLS, **more).write_dbc(path)
+    write_dbc(device_database("cells", RATE_HZ, 1e6, CELLS, **more), path)
     return path
 
 

@@ -9,7 +9,8 @@ import zlib
 import pytest
 from scripted_line import Script
 
-from acquisition.sources.interface import Block, Channel, Delivery, End, Trouble, TroubleKind
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
 from acquisition.sources.serial_line import LineLostError
 from acquisition.sources.serial_source import SerialSource
 from acquisition.sources.urls import open_source, parse_url

@@ -64,7 +64,7 @@ def test_an_unknown_scheme_names_those_there_are():
 
 
 def entry_point(name, value):
-    return importlib.metadata.EntryPoint(name, value, urls.ENTRY_POINT_GROUP)
+    return importlib.metadata.EntryPoint(name, value, urls.BACKENDS.group)
 
 
 def test_a_plug_in_brings_its_own_scheme(monkeypatch):

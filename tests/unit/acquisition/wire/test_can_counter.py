@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 from acquisition.wire.can_bits import BitField
 from acquisition.wire.can_counter import CounterTracker
 from acquisition.wire.can_layout import SampleMessage, Selected, device_database

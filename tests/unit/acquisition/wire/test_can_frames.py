@@ -10,9 +10,9 @@ import cantools
 import numpy as np
 import pytest
 
-from acquisition.sources.interface import Channel
+from acquisition.files.can_database import dbc_text, read_layout
+from acquisition.samples.channel import Channel
 from acquisition.wire.can_bits import BitField
-from acquisition.wire.can_database import read_layout
 from acquisition.wire.can_frames import (
     ENDED,
     RUNNING,
@@ -114,7 +114,7 @@ class TestAgainstCantools:
     @pytest.mark.parametrize("fd", [False, True])
     def test_what_is_encoded_cantools_decodes(self, fd: bool) -> None:
         described = layout(fd)
-        database = cantools.database.load_string(described.to_dbc(), "dbc")
+        database = cantools.database.load_string(dbc_text(described), "dbc")
         counts, ticks = drawn_counts(64), 3_000_000_000 + 1000 * np.arange(64)
         for message, frames in zip(
             described.messages, encode_samples(described, 70_000, ticks, counts), strict=True

@@ -7,8 +7,8 @@ from pathlib import Path
 import cantools
 import pytest
 
-from acquisition.sources.interface import Channel
-from acquisition.wire.can_database import LARGEST_DATABASE_BYTES, read_layout
+from acquisition.files.can_database import LARGEST_DATABASE_BYTES, dbc_text, read_layout, write_dbc
+from acquisition.samples.channel import Channel
 from acquisition.wire.can_layout import CanLayout, device_database
 from sloshlab.errors import SourceError
 
@@ -47,13 +47,13 @@ def layout(fd: bool = False, clock_hz: float | None = 1e6 / 3) -> CanLayout:
 @pytest.mark.parametrize("clock_hz", [None, 1e6 / 3])
 def test_every_field_survives_the_text_exactly(tmp_path: Path, fd: bool, clock_hz: float | None) -> None:
     before = layout(fd, clock_hz)
-    before.write_dbc(tmp_path / "daq.dbc")
+    write_dbc(before, tmp_path / "daq.dbc")
     assert read_layout(tmp_path / "daq.dbc") == before
-    assert read_layout(before.to_dbc()) == before
+    assert read_layout(dbc_text(before)) == before
 
 
 def test_cantools_finds_the_documented_fields() -> None:
-    database = cantools.database.load_string(layout().to_dbc(), "dbc", strict=True)
+    database = cantools.database.load_string(dbc_text(layout()), "dbc", strict=True)
     message = database.get_message_by_name("samples_0")
     places = {s.name: (s.start, s.length, s.byte_order, s.is_signed, s.multiplexer_ids) for s in message.signals}
     assert message.frame_id == 0x101
@@ -79,7 +79,7 @@ def test_cantools_finds_the_documented_fields() -> None:
 
 
 def test_fd_frames_are_told_as_such() -> None:
-    database = cantools.database.load_string(layout(fd=True).to_dbc(), "dbc", strict=True)
+    database = cantools.database.load_string(dbc_text(layout(fd=True)), "dbc", strict=True)
     message = database.get_message_by_name("samples_0")
     assert (message.is_fd, message.length, len(message.signals)) == (True, 64, 5 + 4 * 4)
 
@@ -108,7 +108,7 @@ class TestGroups:
 
 
 def replaced(old: str, new: str, fd: bool = False) -> str:
-    text = device_database("daq", 1000.0, 1e6, [cell(1), cell(2)], fd).to_dbc()
+    text = dbc_text(device_database("daq", 1000.0, 1e6, [cell(1), cell(2)], fd))
     assert old in text
     return text.replace(old, new)
 
@@ -189,10 +189,10 @@ def test_too_large_a_file_is_not_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["force_cell__1", "weight_cell", "force"])
 def test_names_that_would_be_misread_are_not_written(name: str) -> None:
     with pytest.raises(SourceError, match="name"):
-        device_database("d", 1000.0, None, [Channel(name, "force", "N")]).to_dbc()
+        dbc_text(device_database("d", 1000.0, None, [Channel(name, "force", "N")]))
 
 
 def test_quotes_cannot_leave_their_text() -> None:
     channel = Channel("force_cell_1", "force", "N", sensor_serial='7";BO_ 1 x: 8 x')
     with pytest.raises(SourceError, match="no quotes"):
-        device_database("d", 1000.0, None, [channel]).to_dbc()
+        dbc_text(device_database("d", 1000.0, None, [channel]))

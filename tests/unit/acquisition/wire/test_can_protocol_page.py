@@ -9,8 +9,8 @@ import cantools
 import numpy as np
 import pytest
 
-from acquisition.sources.interface import Channel
-from acquisition.wire.can_database import read_layout
+from acquisition.files.can_database import dbc_text, read_layout
+from acquisition.samples.channel import Channel
 from acquisition.wire.can_frames import control_frame, decode, encode_samples, read_control_frame
 from acquisition.wire.can_layout import COMMAND, STATUS, device_database
 
@@ -50,7 +50,7 @@ def test_device_sends_the_frames_of_the_page(page: str) -> None:
     ticks = 0xA0000000 + 1000 * np.arange(8)
     (frames,) = encode_samples(layout, 0x12345600, ticks, np.array([[1234, -1]] * 8))
     np.testing.assert_array_equal(frames.data, frames_of(fenced(page, "hex")[0]))
-    written = [line for line in layout.to_dbc().splitlines() if line]
+    written = [line for line in dbc_text(layout).splitlines() if line]
     for line in fenced(page, "dbc")[0].splitlines():
         assert line in written
 

@@ -9,7 +9,8 @@ import struct
 import numpy as np
 import pytest
 
-from acquisition.sources.interface import Block, Channel, Delivery, End, Trouble, TroubleKind
+from acquisition.samples.channel import Channel
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
 from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_bits import BitField
 from acquisition.wire.can_frames import control_frame, encode_samples

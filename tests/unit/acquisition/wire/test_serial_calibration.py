@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from acquisition.sources.interface import Channel
+from acquisition.samples.channel import Channel
 from acquisition.wire.serial_calibration import Calibration, calibration_text, channels_from_calibration
 from sloshlab.errors import InputError, SourceError
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import serial_bytes as by_hand
 
-from acquisition.sources.interface import Block, Delivery, End, Trouble, TroubleKind
+from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
 from acquisition.wire.serial_decoding import HostTime, SerialDecoder
 
 RATE_HZ = 1000.0

@@ -12,10 +12,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from acquisition.sources.interface import MOST_CHANNELS, Channel
+from acquisition.files.reading_limits import ReaderGuard
+from acquisition.samples.channel import MOST_CHANNELS, Channel
 from acquisition.wire.can_bits import BitField
 from acquisition.wire.can_layout import STREAM_BITS, CanLayout, ControlMessage, SampleMessage, Selected
 from acquisition.wire.serial_calibration import channels_from_calibration
+from sloshlab.atomic_file import replaced
 from sloshlab.errors import FileFormatError, SourceError
 from sloshlab.units import SI_UNITS
 
@@ -65,6 +67,19 @@ def dbc_text(layout: CanLayout) -> str:
     parts += ["\n".join(_message_lines(message, layout)) for message in layout.messages]
     parts += [_DEFINITIONS + "\n".join(_attribute_lines(layout, controls))]
     return "\n\n".join(parts) + "\n"
+
+
+def write_dbc(layout: CanLayout, path: Path) -> None:
+    """Write the DBC file, complete or not at all.
+
+    Raises
+    ------
+    SourceError
+        As `dbc_text`.
+    """
+    text = dbc_text(layout).encode("cp1252")
+    with replaced(path) as temporary:
+        temporary.write_bytes(text)
 
 
 def _require_possible(layout: CanLayout) -> tuple[Channel, ...]:
@@ -179,11 +194,9 @@ def read_layout(source: Path | str) -> CanLayout:
     --------
     >>> from acquisition.wire.can_layout import device_database
     >>> layout = device_database("cells", 1000.0, None, [Channel("force_cell_1", "force", "N")])
-    >>> read_layout(layout.to_dbc()) == layout
+    >>> read_layout(dbc_text(layout)) == layout
     True
     """
-    from acquisition.files.reading_limits import ReaderGuard
-
     name = str(source) if isinstance(source, Path) else "DBC"
     text = _text_of(source)
     try:
