@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 import subprocess
+import tarfile
 import tomllib
 from pathlib import Path
 
@@ -19,6 +22,7 @@ from sloshlab.quantities import QUANTITIES
 REPOSITORY = Path(__file__).resolve().parents[2]
 DOCS = REPOSITORY / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+OLD_TRIALS = REPOSITORY / "sealed_trial" / "archive" / "trials_1_to_13.tar.xz"
 COMMANDS = typer.main.get_command(app).commands
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 NAMED_FILE = re.compile(r"^`([\w.]+\.\w+)`:[^`]*?\n\n```\w+\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -121,7 +125,7 @@ def test_the_navigation_lists_every_page() -> None:
         if isinstance(entry, str):
             return [entry]
         nested = entry.values() if isinstance(entry, dict) else entry
-        return [page for one in nested for page in pages(one)]
+        return [page for part in nested for page in pages(part)]
 
     settings = yaml.safe_load((REPOSITORY / "mkdocs.yml").read_text(encoding="utf-8"))
     assert sorted(pages(settings["nav"])) == [str(page.relative_to(DOCS)) for page in PAGES]
@@ -150,6 +154,47 @@ def test_the_first_screen_of_the_readme_has_two_commands_and_a_picture() -> None
 def test_local_links_lead_somewhere(page: Path) -> None:
     targets = LOCAL_LINK.findall(page.read_text(encoding="utf-8"))
     assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def test_the_archive_of_old_trials_has_the_hashes_that_are_published() -> None:
+    text = (OLD_TRIALS.parent / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"^    ([0-9a-f]{64})$", text, flags=re.MULTILINE) == [
+        hashlib.sha256(OLD_TRIALS.read_bytes()).hexdigest()
+    ]
+    published = set(re.findall(r"^\| (\w+) \| `([0-9a-f]{64})` \|$", text, flags=re.MULTILINE))
+    with tarfile.open(OLD_TRIALS) as archive:
+        content = {name: archive.extractfile(name) for name in archive.getnames() if name.endswith(".json")}
+        hashes = {
+            (name.split("/")[1], hashlib.sha256(file.read()).hexdigest())
+            for name, file in content.items()
+            if file is not None and not name.endswith("truths.json")
+        }
+    assert len(hashes) == 26
+    assert published == hashes
+
+
+def test_the_table_of_all_trials_says_what_their_scores_say() -> None:
+    rows = re.findall(r"^\| \d+ \| \d{4} \|.*$", (DOCS / "blind_trial.md").read_text("utf-8"), flags=re.MULTILINE)
+    shown = sorted(tuple(cell.strip() for cell in row.split("|")[4:-2]) for row in rows)
+    with tarfile.open(OLD_TRIALS) as archive:
+        members = [archive.extractfile(name) for name in archive.getnames() if name.endswith("scores.json")]
+        scores = [json.loads(file.read()) for file in members if file is not None]
+    scores.append(json.loads((DOCS / "blind_trials" / "fourteenth" / "scores.json").read_text(encoding="utf-8")))
+
+    def counts(score: dict[str, list[dict[str, object]]]) -> tuple[str, ...]:
+        marks, held = score["marks"], score["held"]
+        right = [mark["kind"] for mark in marks if mark["right"]]
+        return (
+            str(len(right)),
+            str(sum(bool(mark["false_alarm"]) for mark in marks)),
+            *(str(right.count(kind)) for kind in ("single", "pair", "look_alike", "outside", "masked")),
+            str(sum(bool(mark["wrong_name"]) for mark in marks)),
+            str(sum(mark["column"] == "no answer" for mark in marks)),
+            f"{sum(bool(number['inside']) for number in held)} of {len(held)}",
+        )
+
+    assert len(rows) == 14
+    assert shown == sorted(counts(score) for score in scores)
 
 
 def test_make_targets_that_are_named_exist() -> None:
