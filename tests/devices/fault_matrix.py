@@ -13,7 +13,7 @@ import socket
 import sys
 import tempfile
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -185,24 +185,44 @@ PARTS = {
 }
 
 
+COLUMNS = ("fault", "transports", "readings", "right", "flagged", "given up", "silently wrong")
+
+
 def tables(outcomes: Mapping[str, Outcome | None]) -> str:
-    """The matrix in Markdown; None is a case that does not exist."""
+    """The matrix in Markdown; None is a case that does not exist. Transports with the same outcome share a row."""
     text = ""
     for part, faults in PARTS.items():
         notes: list[str] = []
-        text += f"\n## {part}\n\n| fault | {' | '.join(TRANSPORTS)} |\n|---|{'---|' * len(TRANSPORTS)}\n"
+        text += f"\n## {part}\n\n| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|\n"
         for fault in faults:
+            text += f"| **{fault}** {'| ' * (len(COLUMNS) - 1)}|\n" if fault != "none" else ""
             for intensity in FAULTS[fault]:
-                row = [
-                    _cell(outcomes[Case(fault, intensity, transport).name]) for transport in TRANSPORTS.values()
-                ]
-                text += f"| {_title(fault, intensity, notes)} | {' | '.join(row)} |\n"
+                title = _title(fault, intensity, notes)
+                for numbers, names in _alike(fault, intensity, outcomes).items():
+                    text += f"| {title} | {_together(names)} | {numbers} |\n"
+                    title = ""
         text += "".join(f"\n({number}) {note}.\n" for number, note in enumerate(notes, start=1))
     return text + "\n"
 
 
+def _alike(fault: str, intensity: Intensity, outcomes: Mapping[str, Outcome | None]) -> dict[str, list[str]]:
+    """Names of the transports by what became of the readings."""
+    alike: dict[str, list[str]] = {}
+    for transport in TRANSPORTS.values():
+        numbers = _numbers(outcomes[Case(fault, intensity, transport).name])
+        alike.setdefault(numbers, []).append(transport.name)
+    return alike
+
+
+def _together(names: Sequence[str]) -> str:
+    others = TRANSPORTS.keys() - set(names)
+    if len(others) < 2:
+        return "all" + "".join(f" but {name}" for name in others)
+    return ", ".join(name.removesuffix(" over slcan") for name in names)
+
+
 def _title(fault: str, intensity: Intensity, notes: list[str]) -> str:
-    title = f"**{fault}**" + (f"<br>{intensity.label}" if intensity.label != "–" else "")
+    title = intensity.label if intensity.label != "–" else f"**{fault}**"
     why = [f"Cannot be seen: {intensity.unseen}"] if intensity.unseen else []
     why += [f"Not on CAN: {reason}" for reason in dict.fromkeys(intensity.not_on.values())]
     for note in why:
@@ -212,16 +232,13 @@ def _title(fault: str, intensity: Intensity, notes: list[str]) -> str:
     return title
 
 
-def _cell(outcome: Outcome | None) -> str:
+def _numbers(outcome: Outcome | None) -> str:
     if outcome is None:
-        return "–"
+        return " | ".join("–" * (len(COLUMNS) - 2))
     found = outcome.verdict
-    given_up = f"<br>{found.n_given_up}\N{NO-BREAK SPACE}given\N{NO-BREAK SPACE}up" if found.n_given_up else ""
     wrong = f"**{found.n_wrong}**" if found.n_wrong else "0"
-    fates = "\N{NARROW NO-BREAK SPACE}/\N{NARROW NO-BREAK SPACE}".join(
-        (str(found.n_right), str(found.n_lost + found.n_flagged), wrong)
-    )
-    return f"{found.n_readings}<br>{fates}{given_up}"
+    fates = (found.n_readings, found.n_right, found.n_lost + found.n_flagged, found.n_given_up, wrong)
+    return " | ".join(str(number) for number in fates)
 
 
 def main() -> int:

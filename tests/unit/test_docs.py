@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 import subprocess
+import tarfile
 import tomllib
 from pathlib import Path
 
@@ -12,13 +15,15 @@ import pytest
 import typer.main
 import yaml
 
-from pipelines.commands.application import app
+from pipelines.command_line import app
 from sloshlab import __version__
+from sloshlab.experiments import EXPERIMENTS
 from sloshlab.quantities import QUANTITIES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DOCS = REPOSITORY / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+OLD_TRIALS = REPOSITORY / "sealed_trial" / "archive" / "trials_1_to_13.tar.xz"
 COMMANDS = typer.main.get_command(app).commands
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 NAMED_FILE = re.compile(r"^`([\w.]+\.\w+)`:[^`]*?\n\n```\w+\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -121,7 +126,7 @@ def test_the_navigation_lists_every_page() -> None:
         if isinstance(entry, str):
             return [entry]
         nested = entry.values() if isinstance(entry, dict) else entry
-        return [page for nested_entry in nested for page in pages(nested_entry)]
+        return [page for part in nested for page in pages(part)]
 
     settings = yaml.safe_load((REPOSITORY / "mkdocs.yml").read_text(encoding="utf-8"))
     assert sorted(pages(settings["nav"])) == [str(page.relative_to(DOCS)) for page in PAGES]
@@ -152,6 +157,47 @@ def test_local_links_lead_somewhere(page: Path) -> None:
     assert [target for target in targets if not (page.parent / target).exists()] == []
 
 
+def test_the_archive_of_old_trials_has_the_hashes_that_are_published() -> None:
+    text = (OLD_TRIALS.parent / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"^    ([0-9a-f]{64})$", text, flags=re.MULTILINE) == [
+        hashlib.sha256(OLD_TRIALS.read_bytes()).hexdigest()
+    ]
+    published = set(re.findall(r"^\| (\w+) \| `([0-9a-f]{64})` \|$", text, flags=re.MULTILINE))
+    with tarfile.open(OLD_TRIALS) as archive:
+        content = {name: archive.extractfile(name) for name in archive.getnames() if name.endswith(".json")}
+        hashes = {
+            (name.split("/")[1], hashlib.sha256(file.read()).hexdigest())
+            for name, file in content.items()
+            if file is not None and not name.endswith("truths.json")
+        }
+    assert len(hashes) == 26
+    assert published == hashes
+
+
+def test_the_table_of_all_trials_says_what_their_scores_say() -> None:
+    rows = re.findall(r"^\| \d+ \| \d{4} \|.*$", (DOCS / "blind_trial.md").read_text("utf-8"), flags=re.MULTILINE)
+    shown = sorted(tuple(cell.strip() for cell in row.split("|")[4:-2]) for row in rows)
+    with tarfile.open(OLD_TRIALS) as archive:
+        members = [archive.extractfile(name) for name in archive.getnames() if name.endswith("scores.json")]
+        scores = [json.loads(file.read()) for file in members if file is not None]
+    scores.append(json.loads((DOCS / "blind_trials" / "fourteenth" / "scores.json").read_text(encoding="utf-8")))
+
+    def counts(score: dict[str, list[dict[str, object]]]) -> tuple[str, ...]:
+        marks, held = score["marks"], score["held"]
+        right = [mark["kind"] for mark in marks if mark["right"]]
+        return (
+            str(len(right)),
+            str(sum(bool(mark["false_alarm"]) for mark in marks)),
+            *(str(right.count(kind)) for kind in ("single", "pair", "look_alike", "outside", "masked")),
+            str(sum(bool(mark["wrong_name"]) for mark in marks)),
+            str(sum(mark["column"] == "no answer" for mark in marks)),
+            f"{sum(bool(number['inside']) for number in held)} of {len(held)}",
+        )
+
+    assert len(rows) == 14
+    assert shown == sorted(counts(score) for score in scores)
+
+
 def test_make_targets_that_are_named_exist() -> None:
     makefile = (REPOSITORY / "Makefile").read_text(encoding="utf-8")
     targets = set(re.findall(r"^([a-z-]+):", makefile, flags=re.MULTILINE))
@@ -169,3 +215,18 @@ def test_no_path_of_one_machine_is_tracked() -> None:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
         found += [f"{path.name}:{number}" for number, line in enumerate(lines, 1) if pattern.search(line)]
     assert found == []
+
+
+def test_the_page_of_experiments_says_what_the_registry_says() -> None:
+    text = (DOCS / "experiments.md").read_text(encoding="utf-8")
+    moved_by = {"shaker": "the shaker", "release": "a release", "root": "the root", "anything": "anything"}
+    rows = [
+        f"| `{known.name}` | {known.description} | {moved_by[known.moves]} | `{known.recorded_as}` |"
+        for known in EXPERIMENTS
+    ]
+    assert [row for row in text.splitlines() if row.count("|") == 5 and row.startswith("| `")] == rows
+    for known in EXPERIMENTS:
+        if known.pipeline:
+            room = known.pipeline.rpartition(".")[0].replace(".", "/")
+            [row] = [row for row in text.splitlines() if f"`{room}`" in row]
+            assert f"`{known.name}`" in row
