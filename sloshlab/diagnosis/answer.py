@@ -80,7 +80,9 @@ def _is_clear(found: Findings, pair: Explanation, effect: Candidate, scale: Scal
     alone = [
         at_its_best(found, explanation) for explanation in found.explanations if set(explanation.keys) == rest
     ]
-    return bool(alone) and all(has_gained(pair, one, scale) and is_there(one, pair) for one in alone)
+    return bool(alone) and all(
+        has_gained(pair, rest_alone, scale) and is_there(rest_alone, pair) for rest_alone in alone
+    )
 
 
 def _without(found: Findings, pair: Explanation, nothing: Sequence[str]) -> Findings:

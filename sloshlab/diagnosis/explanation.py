@@ -169,12 +169,12 @@ class Findings:
     @property
     def n_fitting(self) -> int:
         """Coefficients of the fitting runs."""
-        return sum(one.spectra.size for run in self.fitting for one in run)
+        return sum(observation.spectra.size for run in self.fitting for observation in run)
 
     @property
     def n_held_out(self) -> int:
         """Coefficients of the held-out runs."""
-        return sum(one.spectra.size for run in self.held_out for one in run)
+        return sum(observation.spectra.size for run in self.held_out for observation in run)
 
 
 def explained_extension(explanation: Explanation) -> Extension:

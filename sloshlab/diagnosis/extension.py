@@ -80,7 +80,7 @@ def _one_after_another(
 ) -> Callable[[_Changed], _Changed] | None:
     if first is None or second is None:
         return first or second
-    return lambda one: second(first(one))
+    return lambda unchanged: second(first(unchanged))
 
 
 NOTHING = Extension()

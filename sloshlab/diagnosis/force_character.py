@@ -192,12 +192,12 @@ class _Regression:
         sizes = Sizes.of(parts)
         rows, self.sums = [], []
         parity = np.zeros(0, np.int64)
-        for one in parts:
-            state, parity = state_features(one, sizes)
-            columns = (one.own * own, state, memory_features(one, sizes), time_features(one, sizes))
+        for part in parts:
+            state, parity = state_features(part, sizes)
+            columns = (part.own * own, state, memory_features(part, sizes), time_features(part, sizes))
             features = np.concatenate(columns, axis=1)
             rows.append(features)
-            self.sums.append(sums(features, one.force_n))
+            self.sums.append(sums(features, part.force_n))
         widths = np.cumsum([0, *[part.shape[1] for part in columns]])
         own_, state_, memory_, time_ = (np.arange(a, b) for a, b in pairwise(widths))
         state_ = state_[parity >= 0]
@@ -231,7 +231,7 @@ class _Regression:
         """Share of the variance of the state's part per parity, shape (4,)."""
         picked = [self.sums[i] for i in chosen]
         numbers = solved(picked, self.prior, self.sets["state"])
-        xx = np.sum([one.xx for one in picked], axis=0)
+        xx = np.sum([part.xx for part in picked], axis=0)
         powers = np.zeros(4)
         for which in range(4):
             part = np.zeros(numbers.size)
@@ -252,7 +252,7 @@ class _Regression:
             for name, columns in self.sets.items():
                 numbers = solved(fitted, self.prior, columns)
                 rest[name][list(judged)] = [left_over([self.sums[i]], numbers) for i in judged]
-        expected = noise_n**2 * np.array([one.n for one in self.sums])
+        expected = noise_n**2 * np.array([part.n for part in self.sums])
         draws = [np.arange(n), *[self.generator.integers(0, n, n) for _ in range(n_draws)]]
         found: dict[str, list[float]] = {name: [] for name in self.sets}
         for drawn in draws:
@@ -365,12 +365,12 @@ def work_exponent_answers(found: Windows, generator: np.random.Generator) -> lis
     """How the work per cycle grows with amplitude and frequency."""
     result = work_exponents(found, generator)
     answers = []
-    for name, one in (("amplitude", result.amplitude), ("frequency", result.frequency)):
+    for name, estimate in (("amplitude", result.amplitude), ("frequency", result.frequency)):
         question = "work over amplitude" if name == "amplitude" else "work over frequency"
-        if one is None:
+        if estimate is None:
             answers.append(_open(question, f"exponent of the {name}", "1", result.why[name]))
             continue
-        value, low, high = one
+        value, low, high = estimate
         says: dict[str, bool] = {}
         if name == "amplitude":
             for term, exponent in ((WORK_1, 1.0), (WORK_2, 2.0), (WORK_3, 3.0)):

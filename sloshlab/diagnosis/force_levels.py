@@ -138,7 +138,7 @@ def work_exponents(found: Windows, generator: np.random.Generator) -> WorkExpone
     if not any(free):
         return WorkExponents(None, None, why)
     columns = np.stack(
-        [np.ones(logs[0].size), *[log for log, one in zip(logs[1:], free, strict=True) if one]], axis=1
+        [np.ones(logs[0].size), *[log for log, is_free in zip(logs[1:], free, strict=True) if is_free]], axis=1
     )
     stretch = found.stretch[sure]
     names = np.unique(stretch)
@@ -153,8 +153,8 @@ def work_exponents(found: Windows, generator: np.random.Generator) -> WorkExpone
     low, high = np.quantile(draws, (0.05, 0.95), axis=0)
     estimates: list[Estimate | None] = []
     at = 0
-    for one in free:
-        if not one:
+    for is_free in free:
+        if not is_free:
             estimates.append(None)
             continue
         estimates.append((float(value[at]), float(min(low[at], value[at])), float(max(high[at], value[at]))))

@@ -108,12 +108,12 @@ class _Place:
         series: list[FloatArray] = []
         motions: list[FloatArray] = []
         n, of_noise = 0, 0.0
-        for one in sorted(forces, key=lambda each: -each.power_n2):
-            if one.power_n2 <= 0.0 or (pieces and n + one.force_n.size > _MOST_SAMPLES):
+        for latent in sorted(forces, key=lambda latent: -latent.power_n2):
+            if latent.power_n2 <= 0.0 or (pieces and n + latent.force_n.size > _MOST_SAMPLES):
                 break
-            kept = slice(0, prev_fast_len(min(one.force_n.size, _MOST_SAMPLES), real=True))
-            force, motion, rate = one.force_n[kept], one.motion[kept], one.run.attributes.sampling_rate_hz
-            own_motion = motion[:, _FOLLOWED[one.place]]
+            kept = slice(0, prev_fast_len(min(latent.force_n.size, _MOST_SAMPLES), real=True))
+            force, motion, rate = latent.force_n[kept], latent.motion[kept], latent.run.attributes.sampling_rate_hz
+            own_motion = motion[:, _FOLLOWED[latent.place]]
             own, *_ = np.linalg.lstsq(own_motion, force)
             middle = int(np.argmax(np.abs(motion[:, 1])))
             about = motion[max(0, middle - _N_PROBED // 2) : middle + _N_PROBED // 2]
@@ -121,7 +121,7 @@ class _Place:
             pieces.append(piece)
             series.append(_band(force, piece.heard))
             motions.append(np.stack([_band(column, piece.heard) for column in own_motion.T], axis=1))
-            n, of_noise = n + force.size, of_noise + force.size * one.standard_error_n**2
+            n, of_noise = n + force.size, of_noise + force.size * latent.standard_error_n**2
         if not pieces:
             return None
         followed, _ = np.linalg.qr(np.concatenate(motions) / np.concatenate(motions).std(axis=0))
@@ -203,13 +203,13 @@ class ForceStarts:
         tuned = next((k for k, parameter in enumerate(parameters) if parameter.name == _TUNED), -1)
         if tuned >= 0:
             starts = [_with(starts[0], tuned, frequency) for frequency in _about(starts, tuned)]
-        begun = sorted((_sized(force, start, place) for start in starts), key=lambda one: one[0])
+        begun = sorted((_sized(force, start, place) for start in starts), key=lambda reached: reached[0])
         first, then = (n * len(names) for n in _N_EVALUATIONS)
         share, numbers = min(
-            (_descended(left, start, first) for _, start in begun[:_MOST_TRIED]), key=lambda one: one[0]
+            (_descended(left, start, first) for _, start in begun[:_MOST_TRIED]), key=lambda reached: reached[0]
         )
         others: list[tuple[float, FloatArray]] = []
-        if sought := [np.array([one[name] for name in names]) for one in candidate.sought_at()]:
+        if sought := [np.array([numbers[name] for name in names]) for numbers in candidate.sought_at()]:
             grown = np.array([parameter.name in candidate.sizes for parameter in parameters])
             others = _sought(force, sought, place, grown, first)
             share, numbers = min([(share, numbers), *others], key=lambda other: other[0])
@@ -218,8 +218,8 @@ class ForceStarts:
         if not share < 1.0 - _LEAST_EXPLAINED:
             return None
         best, *more = (
-            dict(zip(names, np.clip(one, *bounds.T).tolist(), strict=True))
-            for one in (numbers, *(one for _, one in others))
+            dict(zip(names, np.clip(reached, *bounds.T).tolist(), strict=True))
+            for reached in (numbers, *(end for _, end in others))
         )
         return ForceStart(best, share, tuple(more))
 
@@ -237,7 +237,7 @@ class ForceStarts:
             added = [self._added(extension, piece.drive) for piece in place.pieces]
         except SloshlabError:
             return None
-        known = [one for one in added if one is not None and np.isfinite(one).all()]
+        known = [force for force in added if force is not None and np.isfinite(force).all()]
         return place.heard(known) if len(known) == len(added) else None
 
     def _added(self, extension: Extension, drive: Excitation) -> FloatArray | None:
@@ -254,7 +254,10 @@ class ForceStarts:
 def _about(starts: Sequence[FloatArray], place: int) -> list[float]:
     """Values of one number from well below to well above those of all starts."""
     known = [float(start[place]) for start in starts]
-    return [float(one) for one in np.geomspace(min(known) / _BEYOND, max(known) * _BEYOND, _N_FREQUENCIES)]
+    return [
+        float(frequency_hz)
+        for frequency_hz in np.geomspace(min(known) / _BEYOND, max(known) * _BEYOND, _N_FREQUENCIES)
+    ]
 
 
 def _with(start: FloatArray, place: int, value: float) -> FloatArray:
@@ -306,9 +309,9 @@ def _sought(
     if min(share for share, _ in begun) > _PROMISING:
         return []
     begun += [sized(numbers) for numbers in places[_FIRST_SOUGHT:]]
-    best = sorted(begun, key=lambda one: one[0])
+    best = sorted(begun, key=lambda reached: reached[0])
     tried = [numbers for _, numbers in best[:_MOST_SOUGHT]]
-    reached = [_descended(lambda numbers: sized(numbers)[0], one, n_evaluations, _CLOSE) for one in tried]
+    reached = [_descended(lambda numbers: sized(numbers)[0], place, n_evaluations, _CLOSE) for place in tried]
     return [sized(numbers) for _, numbers in reached]
 
 

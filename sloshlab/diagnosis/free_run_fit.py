@@ -185,10 +185,10 @@ def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
         Without the effects that are to be fitted.
     """
     residual, first, largest = problem.residual(problem.theta_of(fit.values)), 0, 0.0
-    for one in (one for run in problem.runs for one in run):
-        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
-        first += one.spectra.size
-        left = float(np.mean(own**2 * one.variance)) / max(float(np.mean(one.spectra**2)), 1e-300)
+    for observation in (observation for run in problem.runs for observation in run):
+        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
+        first += observation.spectra.size
+        left = float(np.mean(own**2 * observation.variance)) / max(float(np.mean(observation.spectra**2)), 1e-300)
         largest = max(largest, float(np.sqrt(left)))
     return tuple(share for share in STAGES if share < _SHOWN * largest) or STAGES[-1:]
 
@@ -316,7 +316,7 @@ def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], sha
     """
     softness = problem.softness(share)
     left = problem.residuals([problem.theta_of(start) for start in starts])
-    return [huber_cost(softness * one) if np.isfinite(one).all() else np.inf for one in left]
+    return [huber_cost(softness * residual) if np.isfinite(residual).all() else np.inf for residual in left]
 
 
 def finished(

@@ -138,30 +138,31 @@ class FreeRunProblem:
         self.n_baseline = len(self._baseline)
         self.expected = np.array(
             [
-                ((expected or {}).get(one.name, one.believed) - one.believed) / one.tolerance
-                for one in self._baseline
+                ((expected or {}).get(parameter.name, parameter.believed) - parameter.believed)
+                / parameter.tolerance
+                for parameter in self._baseline
             ]
             + [0.0] * (len(self.names) - self.n_baseline)
         )
         driving = {name for run in self.runs for name in model.driving(run[0].run)}
-        self._seen_by = [(one.channel,) if one.channel else () for one in self._baseline] + [
+        self._seen_by = [(parameter.channel,) if parameter.channel else () for parameter in self._baseline] + [
             _only_channels(candidate, driving)
             for candidate in self.candidates
             for _ in candidate.effect.parameters
         ]
         bounds = [
             (
-                one.believed - one.most_tolerances * one.tolerance,
-                one.believed + one.most_tolerances * one.tolerance,
+                parameter.believed - parameter.most_tolerances * parameter.tolerance,
+                parameter.believed + parameter.most_tolerances * parameter.tolerance,
             )
-            for one in self._baseline
+            for parameter in self._baseline
         ] + [
             candidate.bounds(parameter)
             for candidate in self.candidates
             for parameter in candidate.effect.parameters
         ]
         self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
-        ends = np.cumsum([0] + [one.spectra.size for run in self.runs for one in run])
+        ends = np.cumsum([0] + [observation.spectra.size for run in self.runs for observation in run])
         self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
         self.n_simulations = 0
 
@@ -178,7 +179,7 @@ class FreeRunProblem:
     def is_down_to_noise(self, fit: FreeRunFit) -> bool:
         """Whether a fit leaves no more than the noise in any channel."""
         residual = self.residual(self.theta_of(fit.values))
-        left = mean_squares([one for run in self.runs for one in run], residual)
+        left = mean_squares([observation for run in self.runs for observation in run], residual)
         return max(left.values(), default=0.0) < DOWN_TO_NOISE
 
     def values(self, theta: FloatArray) -> dict[str, float]:
@@ -229,9 +230,12 @@ class FreeRunProblem:
         """Factors of the residuals as if all channels were known only to a share of their RMS."""
         return np.concatenate(
             [
-                np.sqrt(one.variance / (one.variance + share**2 * float(np.mean(one.spectra**2)))).ravel()
+                np.sqrt(
+                    observation.variance
+                    / (observation.variance + share**2 * float(np.mean(observation.spectra**2)))
+                ).ravel()
                 for run in self.runs
-                for one in run
+                for observation in run
             ]
         )
 
@@ -265,7 +269,9 @@ class FreeRunProblem:
             return found if all(np.isfinite(moved).all() for moved in found.values()) else {}
 
         found = list((map if works_alone() else _POOL.map)(derivative, places, columns))
-        return BlockJacobian.of_blocks(found, [one.spectra.size for run in self.runs for one in run])
+        return BlockJacobian.of_blocks(
+            found, [observation.spectra.size for run in self.runs for observation in run]
+        )
 
     def residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
         """Residuals after one parameter was moved; unchanged in other runs and channels where it has its own."""
@@ -282,14 +288,14 @@ class FreeRunProblem:
         n_before = 0
         for run in self.runs:
             if not owner or run[0].run.name == owner:
-                chosen = [i for i, one in enumerate(run) if not seen_by or one.channel in seen_by]
+                chosen = [i for i, observation in enumerate(run) if not seen_by or observation.channel in seen_by]
                 runs += [[run[i] for i in chosen]] if chosen else []
                 blocks += [n_before + i for i in chosen]
             n_before += len(run)
         if not runs:
             return {}
         moved = self._of_runs(runs, self.values(theta), None if seen_by else beside)
-        ends = np.cumsum([one.spectra.size for run in runs for one in run])
+        ends = np.cumsum([observation.spectra.size for run in runs for observation in run])
         return dict(zip(blocks, np.split(moved, ends[:-1]), strict=True))
 
 
@@ -312,12 +318,12 @@ def residuals_of_runs(
     found: list[FloatArray] = []
     for run in runs:
         try:
-            names = [one.channel for one in run]
+            names = [observation.channel for observation in run]
             readings = model.simulate(run[0].run, values, extension_of(candidates, values), names)
         except SloshlabError:
-            found += [np.full(one.spectra.size, np.inf) for one in run]
+            found += [np.full(observation.spectra.size, np.inf) for observation in run]
         else:
-            found += [one.residual(readings[one.channel]).ravel() for one in run]
+            found += [observation.residual(readings[observation.channel]).ravel() for observation in run]
     return np.concatenate(found)
 
 
@@ -348,7 +354,7 @@ def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[
     residual : ndarray
         Of all of them, one after another.
     """
-    return _means(observed, residual, lambda one: one.channel)
+    return _means(observed, residual, lambda observation: observation.channel)
 
 
 def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) -> float:
@@ -363,15 +369,15 @@ def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) ->
         Of all of them, one after another.
     """
     total, n, first = 0.0, 0, 0
-    for one in observed:
-        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
-        first += one.spectra.size
+    for observation in observed:
+        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
+        first += observation.spectra.size
         times = [
             huber_cost(row[known]) / known.sum()
-            for row, known in zip(own, one.informative, strict=True)
+            for row, known in zip(own, observation.informative, strict=True)
             if known.any()
         ]
-        counts = [int(known.sum()) for known in one.informative if known.any()]
+        counts = [int(known.sum()) for known in observation.informative if known.any()]
         for k in np.argsort(times)[: int(np.ceil(_QUIETER * len(times)))]:
             total, n = total + times[k] * counts[k], n + counts[k]
     return float(np.sqrt(total / n)) if n else 0.0
@@ -401,11 +407,14 @@ def mean_squares_that_repeat(
     """
     parts: dict[tuple[str, str], tuple[FloatArray, NDArray[np.bool_]]] = {}
     first = 0
-    for one in observed:
-        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
-        first += one.spectra.size
-        if not one.is_rough:
-            parts[one.run.name, one.channel] = np.clip(own, -ROBUST, ROBUST), one.informative
+    for observation in observed:
+        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
+        first += observation.spectra.size
+        if not observation.is_rough:
+            parts[observation.run.name, observation.channel] = (
+                np.clip(own, -ROBUST, ROBUST),
+                observation.informative,
+            )
     found = {}
     for test in tests:
         for channel in dict.fromkeys(of for run, of in parts if run in test):
@@ -429,7 +438,9 @@ def mean_squares_of_runs(observed: Sequence[Observation], residual: FloatArray) 
     observed : sequence of Observation
     residual : ndarray
     """
-    return _means(observed, residual, lambda one: (one.run.name, one.channel), least=_FEWEST_IN_A_RUN)
+    return _means(
+        observed, residual, lambda observation: (observation.run.name, observation.channel), least=_FEWEST_IN_A_RUN
+    )
 
 
 def _means(
@@ -437,11 +448,11 @@ def _means(
 ) -> dict[_Label, float]:
     sums: dict[_Label, list[float]] = {}
     first = 0
-    for one in observed:
-        own = residual[first : first + one.spectra.size]
-        first += one.spectra.size
-        chosen = own[one.informative.ravel()]
-        total = sums.setdefault(label(one), [0.0, 0.0])
+    for observation in observed:
+        own = residual[first : first + observation.spectra.size]
+        first += observation.spectra.size
+        chosen = own[observation.informative.ravel()]
+        total = sums.setdefault(label(observation), [0.0, 0.0])
         total[0] += huber_cost(chosen)
         total[1] += chosen.size
     return {name: squares / n for name, (squares, n) in sums.items() if n >= least}

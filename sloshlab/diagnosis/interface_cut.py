@@ -110,7 +110,7 @@ class InterfaceCut:
 
     def forces(self, place: str) -> list[LatentForce]:
         """Latent forces of all runs at a place."""
-        return [one for run in self.runs if (one := run.at(place)) is not None]
+        return [force for run in self.runs if (force := run.at(place)) is not None]
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -136,7 +136,7 @@ def interface_cut(
     usable = [run for run in runs if run]
     together = [_forces(model, run, values) for run in usable]
     kept = [(run, found) for run, found in zip(usable, together, strict=True) if found is not None]
-    usable, found = [run for run, _ in kept], [one for _, one in kept]
+    usable, found = [run for run, _ in kept], [forces for _, forces in kept]
     sensors = _sensor_checks(model, usable, found, values)
     doubted, remark = _doubted(sensors)
     if doubted:
@@ -164,11 +164,11 @@ def _disagreements(
     """RMS over noise per channel of what channels of one motion say beyond each other, where they can be heard."""
     sums: dict[str, list[float]] = {}
     for observed, forces in zip(runs, found, strict=True):
-        for one in observed:
-            if one.channel in forces.left:
-                spectra = _weighted(one, forces.left[one.channel], values)
-                part = spectra[:, : int(0.6 * one.n_bands)]
-                total = sums.setdefault(one.channel, [0.0, 0.0])
+        for observation in observed:
+            if observation.channel in forces.left:
+                spectra = _weighted(observation, forces.left[observation.channel], values)
+                part = spectra[:, : int(0.6 * observation.n_bands)]
+                total = sums.setdefault(observation.channel, [0.0, 0.0])
                 total[0] += float((part**2).sum())
                 total[1] += part.size
     return {name: float(np.sqrt(total / n)) for name, (total, n) in sums.items()}
@@ -191,7 +191,7 @@ def _sensor_checks(
             alone = others.pop(name)
             ratio = max(ratio, alone)
             without = max((others[other] for other in alike if other != name), default=ratio)
-            demand = float(np.mean([_demand_n2(model, one) for one in again]))
+            demand = float(np.mean([_demand_n2(model, forces) for forces in again]))
         checks.append(SensorCheck(name, ratio, without, demand))
     return tuple(checks)
 
@@ -203,19 +203,19 @@ def _doubted(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
         for of_force in (False, True)
     ]
     for group in groups:
-        worst = max((one.ratio for one in group), default=0.0)
+        worst = max((sensor.ratio for sensor in group), default=0.0)
         if worst <= _CONSISTENT:
             continue
         if len(group) == 2:
-            best, second = sorted(group, key=lambda one: one.demand_without_n2)
+            best, second = sorted(group, key=lambda sensor: sensor.demand_without_n2)
             if second.demand_without_n2 > _FEWER_FORCES * best.demand_without_n2:
                 return best.channel, (
                     f"{best.channel} and {second.channel} contradict each other; {best.channel} is doubted, since "
                     "without it the blocks need hardly any missing force"
                 )
-            names = " and ".join(one.channel for one in group)
+            names = " and ".join(sensor.channel for sensor in group)
             return "", f"{names} contradict each other; with two of them alone nothing says which is wrong"
-        best, second = sorted(group, key=lambda one: _beyond(one.disagreement_without))[:2]
+        best, second = sorted(group, key=lambda sensor: _beyond(sensor.disagreement_without))[:2]
         left, next_left = _beyond(best.disagreement_without), _beyond(second.disagreement_without)
         if left < _EXPLAINED * _beyond(worst) and next_left > _RUNNER_UP * left:
             return best.channel, ""
@@ -249,7 +249,7 @@ def _blocks(
     cuts = [_excitation(runs, found)]
     for place in (STRUCTURE, TANK, EITHER):
         if place in places:
-            own = [beyond_own_parameters(model, run, one) for run in found if (one := run.at(place))]
+            own = [beyond_own_parameters(model, run, force) for run in found if (force := run.at(place))]
             cuts.append(_of_place(place, own, shares))
         elif place == STRUCTURE and EITHER not in places and any(run.structure is not None for run in found):
             cuts.append(_untold(place, "no motion of the structure was recorded"))
@@ -271,7 +271,7 @@ def _untold(block: str, remark: str) -> BlockCut:
 
 
 def _excitation(runs: Sequence[Sequence[Observation]], found: Sequence[RunForces]) -> BlockCut:
-    if all(one.run.is_free for run in runs for one in run[:1]):
+    if all(observation.run.is_free for run in runs for observation in run[:1]):
         return _untold("excitation", "free decays: nothing drives")
     if not any(run.structure is not None for run in found):
         return _untold("excitation", "the tank's own motion is measured, whatever made it")
@@ -316,16 +316,18 @@ def _parts(
                     continue
                 series[place] = shown_by(forces, observed, model.rig, own)
         part = {force.place: np.zeros(_N_PARTS) for force in forces.forces}
-        comparable = [one for one in observed if one.channel in forces.left]
+        comparable = [observation for observation in observed if observation.channel in forces.left]
         if len(comparable) > 1:
             part[SENSOR] = np.zeros(_N_PARTS)
-        for one in observed:
-            missed = _weighted(one, forces.missed[one.channel], {})
+        for observation in observed:
+            missed = _weighted(observation, forces.missed[observation.channel], {})
             for place, shown in series.items():
-                if one.channel != doubted:
-                    part[place] += _per_part((missed * _weighted(one, shown[one.channel], {})).sum(axis=1))
-            if SENSOR in part and one in comparable and (not doubted or one.channel == doubted):
-                left = _weighted(one, forces.left[one.channel], {})
+                if observation.channel != doubted:
+                    part[place] += _per_part(
+                        (missed * _weighted(observation, shown[observation.channel], {})).sum(axis=1)
+                    )
+            if SENSOR in part and observation in comparable and (not doubted or observation.channel == doubted):
+                left = _weighted(observation, forces.left[observation.channel], {})
                 power = (left**2).mean(axis=1)
                 beyond = np.where(power.mean() > _CONSISTENT**2, (left**2 - 1.0).sum(axis=1), 0.0)
                 part[SENSOR] += _per_part(beyond)
@@ -355,8 +357,8 @@ def _shares(parts: Sequence[Mapping[str, FloatArray]], seed: int) -> dict[str, t
     draws = [share(np.asarray(generator.integers(0, table.shape[1], table.shape[1]))) for _ in range(_N_DRAWS)]
     low, high = np.nanquantile(np.array(draws), (0.05, 0.95), axis=0) if np.isfinite(best).all() else (best, best)
     return {
-        name: (float(one), min(float(a), float(one)), max(float(b), float(one)))
-        for name, one, a, b in zip(names, best, low, high, strict=True)
+        name: (float(estimate), min(float(a), float(estimate)), max(float(b), float(estimate)))
+        for name, estimate, a, b in zip(names, best, low, high, strict=True)
     }
 
 

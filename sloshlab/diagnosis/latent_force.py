@@ -134,8 +134,11 @@ def run_forces(
     undone = [fault for fault in extension.faults if fault.channel in model.driving(run)]
     simulation = model._simulation(run, values, extension, undone)
     readings = model.simulate(run, values, extension)
-    missed = {one.channel: _missed(one, readings[one.channel], values, run.is_free) for one in observed}
-    believed = [one for one in observed if one.channel not in without]
+    missed = {
+        observation.channel: _missed(observation, readings[observation.channel], values, run.is_free)
+        for observation in observed
+    }
+    believed = [observation for observation in observed if observation.channel not in without]
     if simulation.twin.structure is None:
         forces, left = _on_shaker(simulation, run, observed, believed, missed)
     else:
@@ -165,22 +168,24 @@ def shown_by(
     frequency = frequencies_hz(n, rate)
     spectrum = in_frequency(series)
     structure = forces.structure
-    n_cells = max(1, sum(one.channel.startswith("force_cell") for one in observed))
+    n_cells = max(1, sum(observation.channel.startswith("force_cell") for observation in observed))
     moved = np.zeros(frequency.size, complex)
     if structure is not None:
         moved = forces.carried_mass_kg * response(structure, structure.mode_shape, 2, frequency)
     of_force = moved - (1.0 if force.place == TANK else 0.0)
     shown = {}
-    for one in observed:
-        attributes = run.recording[one.channel].attrs
+    for observation in observed:
+        attributes = run.recording[observation.channel].attrs
         transfer = np.zeros(frequency.size, complex)
-        if one.channel.startswith("force"):
-            transfer = _sign(one) * of_force / (n_cells if one.channel.startswith("force_cell") else 1)
+        if observation.channel.startswith("force"):
+            transfer = (
+                _sign(observation) * of_force / (n_cells if observation.channel.startswith("force_cell") else 1)
+            )
         elif structure is not None:
-            weights = modal_weights(structure, rig, one.channel, attributes.get("x_m"))
+            weights = modal_weights(structure, rig, observation.channel, attributes.get("x_m"))
             if weights is not None:
-                transfer = response(structure, weights, _order(one.channel), frequency)
-        shown[one.channel] = in_time(transfer * spectrum, n)
+                transfer = response(structure, weights, _order(observation.channel), frequency)
+        shown[observation.channel] = in_time(transfer * spectrum, n)
     return shown
 
 
@@ -288,19 +293,21 @@ def _asked_for(
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
     frequency = frequencies_hz(n, rate)
     receptances, released = {}, {}
-    for one in observed:
-        weights = modal_weights(structure, rig, one.channel, run.recording[one.channel].attrs.get("x_m"))
+    for observation in observed:
+        weights = modal_weights(
+            structure, rig, observation.channel, run.recording[observation.channel].attrs.get("x_m")
+        )
         if weights is not None:
-            receptances[one.channel] = response(structure, weights, _order(one.channel), frequency)
+            receptances[observation.channel] = response(structure, weights, _order(observation.channel), frequency)
             if run.is_free:
-                released[one.channel] = in_frequency(
-                    _release(structure, weights, _order(one.channel), n, rate) * _fade(n, True)
+                released[observation.channel] = in_frequency(
+                    _release(structure, weights, _order(observation.channel), n, rate) * _fade(n, True)
                 )
     spectra = {name: in_frequency(missed[name]) for name in receptances}
     seen = {
-        one.channel: (receptances[one.channel], _noise_power(one, frequency))
-        for one in believed
-        if one.channel in receptances
+        observation.channel: (receptances[observation.channel], _noise_power(observation, frequency))
+        for observation in believed
+        if observation.channel in receptances
     }
     asked, at_release = asked_force(seen, spectra, frequency, rate, released or None)
     left = {}
@@ -336,9 +343,9 @@ def _on_shaker(
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
     frequency = frequencies_hz(n, rate)
     sampled = min(n, simulation.places.shape[0])
-    motions = [one for one in observed if _order(one.channel) == 2]
+    motions = [observation for observation in observed if _order(observation.channel) == 2]
     good = [motion for motion in motions if motion in believed] or motions
-    mean = np.mean([missed[one.channel] for one in good], axis=0) if good else np.zeros(n)
+    mean = np.mean([missed[observation.channel] for observation in good], axis=0) if good else np.zeros(n)
     left = {motion.channel: missed[motion.channel] - mean for motion in motions}
     measured = _measured(observed, believed, missed)
     if measured is None:
@@ -346,8 +353,8 @@ def _on_shaker(
     missed_force, force_noise = measured
     carried = simulation.twin.carried_mass_kg
     of_noise = np.interp(frequency, *force_noise)
-    for one in good:
-        of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(one, frequency)
+    for observation in good:
+        of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(observation, frequency)
     wanted = in_frequency(carried * mean - missed_force)
     share = own_share(np.abs(wanted) ** 2, of_noise, frequency, rate)
     force = in_time(share * wanted, n)[:sampled]
@@ -368,16 +375,16 @@ def _measured(
     observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]] | None:
     """What the force of the structure on the tank is missed by, and the power of its noise over frequency."""
-    forces = [one for one in believed if one.channel.startswith("force")]
+    forces = [force for force in believed if force.channel.startswith("force")]
     cells = [force for force in forces if force.channel.startswith("force_cell")]
     chosen = cells or forces[:1]
     if not chosen:
         return None
-    n_cells = sum(one.channel.startswith("force_cell") for one in observed)
+    n_cells = sum(observation.channel.startswith("force_cell") for observation in observed)
     scale = n_cells / len(cells) if cells else 1.0
-    total = scale * np.sum([_sign(one) * missed[one.channel] for one in chosen], axis=0)
+    total = scale * np.sum([_sign(observation) * missed[observation.channel] for observation in chosen], axis=0)
     frequency = chosen[0].frequencies_hz
-    noise = scale**2 * np.sum([_noise_power(one, frequency) for one in chosen], axis=0)
+    noise = scale**2 * np.sum([_noise_power(observation, frequency) for observation in chosen], axis=0)
     return total, (frequency, noise)
 
 
@@ -388,8 +395,8 @@ def _sign(observation: Observation) -> float:
 def _unequal_cells(
     observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    cells = [one.channel for one in observed if one.channel.startswith("force_cell")]
-    good = [one.channel for one in believed if one.channel in cells]
+    cells = [observation.channel for observation in observed if observation.channel.startswith("force_cell")]
+    good = [observation.channel for observation in believed if observation.channel in cells]
     if len(cells) < 2 or not good:
         return {}
     mean = np.mean([missed[name] for name in good], axis=0)

@@ -72,7 +72,7 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     sensors = {name: _with_simulated(observed, raw[name]) for name, observed in plain.items()}
     noise = _noise_of_drives(case, model, sensors, fit)
     plain = {
-        name: [_louder(one, noise, model.driving(one.run)) for one in observed]
+        name: [_louder(observation, noise, model.driving(observation.run)) for observation in observed]
         for name, observed in sensors.items()
     }
     weighted = dict(plain)
@@ -90,7 +90,10 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
         weighted[run.name] = with_typical_scatter(plain[run.name], repeated)
     return {
         name: within_band(
-            [_quieted(one, of_sensor, noise) for one, of_sensor in zip(observed, sensors[name], strict=True)]
+            [
+                _quieted(observation, of_sensor, noise)
+                for observation, of_sensor in zip(observed, sensors[name], strict=True)
+            ]
         )
         for name, observed in weighted.items()
     }
@@ -180,10 +183,10 @@ def _colour(case: Case, name: str) -> _Colour:
     ratios: list[FloatArray] = []
     frequencies: FloatArray = np.zeros(1)
     for test in case.tests():
-        for one, other in itertools.pairwise(run for run in test if name in run.recording and not run.is_free):
-            rate = one.attributes.sampling_rate_hz
-            a, b = (np.asarray(run.recording[name].values, np.float64) for run in (one, other))
-            std = max(noise_of_sensor(one, name), noise_of_sensor(other, name))
+        for first, other in itertools.pairwise(run for run in test if name in run.recording and not run.is_free):
+            rate = first.attributes.sampling_rate_hz
+            a, b = (np.asarray(run.recording[name].values, np.float64) for run in (first, other))
+            std = max(noise_of_sensor(first, name), noise_of_sensor(other, name))
             if a.size != b.size or rate != other.attributes.sampling_rate_hz or not std > 0:
                 continue
             difference = (a - b) / np.sqrt(2)
@@ -221,13 +224,17 @@ def _noise_through(
             noise = colour.of_white(white, run.attributes.sampling_rate_hz)
             louder = run.recording.assign({driving: variable.copy(data=values + noise)})
             loud = _readings(case, replace(run, recording=louder), fit)
-            for one in plain[run.name]:
-                if one.channel in loud and one.channel != driving:
-                    square = (one.of(loud[one.channel]) - one.of(quiet[one.channel])) ** 2
-                    found[run.name, one.channel] = found.get((run.name, one.channel), 0.0) + square / _N_NOISY
-    for one in plain[run.name]:
-        if one.channel not in run.recording.data_vars:
-            found[run.name, one.channel] = np.full(one.spectra.shape, std**2)
+            for observation in plain[run.name]:
+                if observation.channel in loud and observation.channel != driving:
+                    square = (
+                        observation.of(loud[observation.channel]) - observation.of(quiet[observation.channel])
+                    ) ** 2
+                    found[run.name, observation.channel] = (
+                        found.get((run.name, observation.channel), 0.0) + square / _N_NOISY
+                    )
+    for observation in plain[run.name]:
+        if observation.channel not in run.recording.data_vars:
+            found[run.name, observation.channel] = np.full(observation.spectra.shape, std**2)
     return found
 
 
@@ -253,15 +260,18 @@ def _readings(case: Case, run: CaseRun, fit: FreeRunFit) -> dict[str, FloatArray
 def _loosened(observed: Sequence[Observation]) -> list[Observation]:
     """With five per cent of each channel added to its noise: a first fit must not depend on unknown noise."""
     return [
-        replace(one, variance=one.variance + (0.05**2) * float(np.mean(one.spectra**2)))
-        for one in within_band(observed)
+        replace(observation, variance=observation.variance + (0.05**2) * float(np.mean(observation.spectra**2)))
+        for observation in within_band(observed)
     ]
 
 
 def _with_simulated(observed: Sequence[Observation], raw: Mapping[str, FloatArray]) -> list[Observation]:
     """Observations with what is simulated of them, where it is."""
     return [
-        replace(one, simulated=one.spectra - raw[one.channel]) if one.channel in raw else one for one in observed
+        replace(observation, simulated=observation.spectra - raw[observation.channel])
+        if observation.channel in raw
+        else observation
+        for observation in observed
     ]
 
 
@@ -274,4 +284,7 @@ def _raw_residual(
         readings = model.simulate(observed[0].run, fit.values, NOTHING)
     except SloshlabError:
         return {}
-    return {one.channel: one.residual(readings[one.channel]) * np.sqrt(one.variance) for one in observed}
+    return {
+        observation.channel: observation.residual(readings[observation.channel]) * np.sqrt(observation.variance)
+        for observation in observed
+    }

@@ -60,7 +60,7 @@ class SecondProcess:
         self.n_done = 0
         self.ending = weakref.finalize(model, self._end)
         self._is_busy = threading.Lock()
-        n = sum(one.spectra.size for one in self.observed.all)
+        n = sum(observation.spectra.size for observation in self.observed.all)
         self._shared: FloatArray = np.frombuffer(mmap(-1, 8 * max(1, n)), np.float64)
         self._process, self._line = copied(
             _serve, work, model, self.observed.all, self.candidates.all, self._shared
@@ -71,7 +71,7 @@ class SecondProcess:
         if not self._is_busy.acquire(blocking=False):
             return None
         try:
-            of_runs = [[self.observed.number_of(one) for one in run] for run in runs]
+            of_runs = [[self.observed.number_of(observation) for observation in run] for run in runs]
             self._line.send(
                 (of_runs, dict(values), [self.candidates.number_of(candidate) for candidate in candidates])
             )
@@ -112,11 +112,11 @@ def second_process(
     if works_alone() or not (CAN_FORK and model.may_be_copied):
         return None
     present = _PRESENT.get(model)
-    observed = [one for run in runs for one in run]
-    if present is None and sum(one.spectra.size for one in observed) < _LEAST_COEFFICIENTS:
+    observed = [observation for run in runs for observation in run]
+    if present is None and sum(observation.spectra.size for observation in observed) < _LEAST_COEFFICIENTS:
         return None
     if present is not None:
-        unseen = [one for one in observed if one not in present.observed]
+        unseen = [observation for observation in observed if observation not in present.observed]
         unknown = [candidate for candidate in candidates if candidate not in present.candidates]
         if not unseen and not unknown:
             return present
@@ -131,13 +131,13 @@ class _Numbered(Generic[_Thing]):
 
     def __init__(self, things: Iterable[_Thing]) -> None:
         self.all = tuple(things)
-        self._numbers = {id(one): i for i, one in enumerate(self.all)}
+        self._numbers = {id(thing): i for i, thing in enumerate(self.all)}
 
-    def __contains__(self, one: _Thing) -> bool:
-        return id(one) in self._numbers
+    def __contains__(self, thing: _Thing) -> bool:
+        return id(thing) in self._numbers
 
-    def number_of(self, one: _Thing) -> int:
-        return self._numbers[id(one)]
+    def number_of(self, thing: _Thing) -> int:
+        return self._numbers[id(thing)]
 
 
 def _serve(

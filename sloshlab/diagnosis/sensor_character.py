@@ -60,11 +60,11 @@ def sensor_character(
     """
     parts: dict[str, list[tuple[float, float]]] = {}
     for observed, forces in zip(runs, found, strict=True):
-        one = next((each for each in observed if each.channel == channel), None)
-        if one is None or channel not in forces.left:
+        observation = next((each for each in observed if each.channel == channel), None)
+        if observation is None or channel not in forces.left:
             continue
         error = forces.left[channel]
-        for term, columns in _forms(one, error).items():
+        for term, columns in _forms(observation, error).items():
             parts.setdefault(term, []).extend(_explained(error, columns))
     generator = np.random.default_rng(seed)
     shares = {term: _share(table, generator) for term, table in parts.items()}

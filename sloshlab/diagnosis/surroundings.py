@@ -113,16 +113,16 @@ def most_missed_hz(
     tuple of float
         Hz, places of the highest peak first.
     """
-    n_bands = max(one.spectra.shape[1] for run in fitting for one in run)
+    n_bands = max(observation.spectra.shape[1] for run in fitting for observation in run)
     power, count, first = np.zeros(n_bands), np.full(n_bands, 1e-300), 0
     frequencies = np.zeros(n_bands)
-    for one in (one for run in fitting for one in run):
-        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
-        first += one.spectra.size
-        n = one.spectra.shape[1]
+    for observation in (observation for run in fitting for observation in run):
+        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
+        first += observation.spectra.size
+        n = observation.spectra.shape[1]
         power[:n] += (own**2).sum(axis=0)
-        count[:n] += one.spectra.shape[0]
-        frequencies[:n] = one.frequencies_hz
+        count[:n] += observation.spectra.shape[0]
+        frequencies[:n] = observation.frequencies_hz
     mean = power / count
     beside = np.pad(mean, 1)
     peaks = np.flatnonzero((mean >= beside[:-2]) & (mean >= beside[2:]) & (frequencies > 0))
@@ -140,7 +140,7 @@ def _sizes(
     found: dict[str, float] = {}
     for observed in fitting:
         run = observed[0].run
-        for name in (*[one.channel for one in observed], *model.driving(run)):
+        for name in (*[observation.channel for observation in observed], *model.driving(run)):
             if name in channels(run.recording):
                 found[name] = max(found.get(name, 0.0), float(size(run.recording[name].values)))
     return found

@@ -63,8 +63,8 @@ def _sensor_effect(
         read, back = reading(numbers), None if undone is None else undone(numbers)
         return Extension(
             faults=tuple(
-                SensorFault(one, read, back, (f"sensor.{name}.{channel}", one, *sorted(numbers.items())))
-                for one in channels_of(channel)
+                SensorFault(sensor, read, back, (f"sensor.{name}.{channel}", sensor, *sorted(numbers.items())))
+                for sensor in channels_of(channel)
             )
         )
 
@@ -334,9 +334,9 @@ def _pairs(at: Surroundings) -> list[str]:
     return [f"{to}<{source}" for to, source in pairs[:_MOST_PAIRS]]
 
 
-def _are_alike(one: str, other: str) -> bool:
+def _are_alike(first: str, other: str) -> bool:
     """Whether two channels read the same quantity."""
-    return one.partition("_")[0] == other.partition("_")[0]
+    return first.partition("_")[0] == other.partition("_")[0]
 
 
 def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:

@@ -28,7 +28,8 @@ def ceilings(fits: Fits, at: Surroundings, known: Sequence[Explanation], retuned
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
     alone = _with_any_force(fits, at, retuned)
-    helpful = [one.fit.candidates[-1].effect.block for one in sorted(alone, key=lambda one: one.fit.cost)]
+    by_cost = sorted(alone, key=lambda explanation: explanation.fit.cost)
+    helpful = [explanation.fit.candidates[-1].effect.block for explanation in by_cost]
     return [*alone, *_with_any_force(fits, at, best.fit, helpful[:1])]
 
 

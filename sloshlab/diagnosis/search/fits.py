@@ -97,7 +97,7 @@ class Fits:
     @property
     def n_coefficients(self) -> int:
         """Of the fitted runs."""
-        return sum(one.spectra.size for run in self.fitting for one in run)
+        return sum(observation.spectra.size for run in self.fitting for observation in run)
 
     def part_of(self, jacobian: BlockJacobian, fit: FreeRunFit, whole: Fits) -> BlockJacobian:
         """Of a Jacobian of more fitted runs, at a fit to them, what concerns those that are fitted here."""
@@ -105,7 +105,7 @@ class Fits:
             return jacobian
         names, all_names = self.problem_of(fit).names, whole.problem_of(fit).names
         present = {run[0].run.name for run in self.fitting}
-        of_runs = [one.run.name for run in whole.fitting for one in run]
+        of_runs = [observation.run.name for run in whole.fitting for observation in run]
         chosen = [i for i, name in enumerate(of_runs) if name in present]
         return jacobian.part(chosen, [all_names.index(name) for name in names])
 
@@ -138,7 +138,7 @@ class Fits:
             return None if fit.trouble else self.judged(fit)
 
         found = self.side_by_side([partial(judged, piece) for piece in pieces], candidates)
-        return [one for one in found if one is not None]
+        return [explanation for explanation in found if explanation is not None]
 
     def all_judged(self, fits: Sequence[FreeRunFit], candidates: Iterable[Candidate]) -> list[Explanation]:
         """Fits, each judged; without those that did not run."""
@@ -168,13 +168,13 @@ class Fits:
         residual = problem.residual(problem.theta_of({**fit.values, **own}))
         if not np.isfinite(residual).all():
             return Explanation(fit, np.inf, np.inf)
-        observed = [one for run in problem.runs for one in run]
-        informative = np.concatenate([one.informative.ravel() for one in observed])
+        observed = [observation for run in problem.runs for observation in run]
+        informative = np.concatenate([observation.informative.ravel() for observation in observed])
         chosen = residual[informative] if informative.any() else residual
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
         fitted_to = self.problem_of(fit)
         at_fit = fitted_to.residual(fitted_to.theta_of(fit.values))
-        observed_and_fitted = [*observed, *(one for run in fitted_to.runs for one in run)]
+        observed_and_fitted = [*observed, *(observation for run in fitted_to.runs for observation in run)]
         of_all = np.concatenate([residual, at_fit])
         return Explanation(
             fit,
@@ -194,7 +194,7 @@ class Fits:
         start = problem.values(problem.theta_of(fit.values))
         best, _ = fitted(problem, start, n_iterations=3)
         usual = fit.misfit / max(self.n_coefficients, 1)
-        n = max(sum(one.spectra.size for one in run), 1)
+        n = max(sum(observation.spectra.size for observation in run), 1)
         releases = [name for name in problem.names if name == f"{RELEASE}{run[0].run.name}"]
         if not releases or best.trouble or best.misfit / n < _WORSE_THAN_OTHERS * usual:
             return best.values

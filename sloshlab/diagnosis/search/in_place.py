@@ -51,8 +51,8 @@ class InPlace:
         best = cheapest(kept)
         if best is None or base.candidates or base.cost - best.fit.cost < LEAST_TO_BUILD_ON:
             return []
-        before, after = (soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (base, best.fit))
-        special, fitted_already = best.fit.candidates[-1], {one.keys[-1] for one in kept}
+        before, after = (soft_cost(self.fits.problem_of(fit), fit, _SOFT) for fit in (base, best.fit))
+        special, fitted_already = best.fit.candidates[-1], {explanation.keys[-1] for explanation in kept}
         nearest_of: dict[str, tuple[float, FreeRunProblem, dict[str, float]]] = {}
         for candidate in pool:
             if candidate.key in fitted_already or not _look_alike(candidate, special):
@@ -65,7 +65,7 @@ class InPlace:
             name = f"{candidate.effect.block}.{candidate.effect.name}"
             if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
                 nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
-        best_of = sorted(nearest_of.values(), key=lambda one: one[0])[:most]
+        best_of = sorted(nearest_of.values(), key=lambda start: start[0])[:most]
         pieces = [partial(_fitted_unless_behind, problem, start, after) for _, problem, start in best_of]
         return self.fits.all_fitted(pieces, pool)
 
@@ -86,8 +86,8 @@ class InPlace:
             Whose effects are not tried again.
         pool : sequence of Candidate
         """
-        most, reached = (soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (base, pair.fit))
-        tried = {frozenset(one.keys) for one in known}
+        most, reached = (soft_cost(self.fits.problem_of(fit), fit, _SOFT) for fit in (base, pair.fit))
+        tried = {frozenset(explanation.keys) for explanation in known}
         nearest_ones: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
         for replaced in pair.fit.candidates:
             others = tuple(candidate for candidate in pair.fit.candidates if candidate is not replaced)
@@ -104,7 +104,7 @@ class InPlace:
                 cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
                 if cost < most:
                     near.append((cost, problem, start))
-            nearest_ones += sorted(near, key=lambda one: one[0])[:_MOST_LOOK_ALIKES]
+            nearest_ones += sorted(near, key=lambda start: start[0])[:_MOST_LOOK_ALIKES]
         pieces = [partial(_fitted_unless_behind, problem, start, reached) for _, problem, start in nearest_ones]
         return self.fits.all_fitted(pieces, [*pair.fit.candidates, *pool])
 
@@ -122,10 +122,14 @@ class InPlace:
             Without; an effect must lie nearer to `wider` than this before it is fitted.
         pool : sequence of Candidate
         """
-        reached, before = (soft_cost(self.fits.problem_of(one), one, _SOFT) for one in (wider, base))
+        reached, before = (soft_cost(self.fits.problem_of(fit), fit, _SOFT) for fit in (wider, base))
         most = 0.5 * (reached + before)
         near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
-        chosen = [one for one in pool if len(one.effect.parameters) > 1 and one.effect.block != "sensor"]
+        chosen = [
+            candidate
+            for candidate in pool
+            if len(candidate.effect.parameters) > 1 and candidate.effect.block != "sensor"
+        ]
         for i, candidate in enumerate(chosen):
             self.fits.told(f"one effect in place of all: {candidate.key}", i, len(chosen))
             problem = self.fits.problem((candidate,))
@@ -134,7 +138,7 @@ class InPlace:
             cost = huber_cost(problem.softness(_SOFT) * problem.residual(problem.theta_of(start)))
             if cost < most:
                 near.append((cost, problem, start))
-        best_of = sorted(near, key=lambda one: one[0])[:_MOST_FOR_ALL]
+        best_of = sorted(near, key=lambda start: start[0])[:_MOST_FOR_ALL]
         pieces = [partial(_fitted_unless_behind, problem, start, most) for _, problem, start in best_of]
         return self.fits.all_fitted(pieces, pool)
 
@@ -146,12 +150,20 @@ class InPlace:
         if best is None:
             return []
         last = best.fit.candidates[-1]
-        specials = [one for one in kept if one is best or is_special_case(one.fit.candidates[-1], last)]
+        specials = [
+            explanation
+            for explanation in kept
+            if explanation is best or is_special_case(explanation.fit.candidates[-1], last)
+        ]
         found = []
         for special in {
             special.keys[-1]: special for special in sorted(specials, key=lambda special: -special.fit.cost)
         }.values():
-            known = {one.keys[-1] for one in kept if one in specials or one.fit.cost < special.fit.cost + _AS_GOOD}
+            known = {
+                explanation.keys[-1]
+                for explanation in kept
+                if explanation in specials or explanation.fit.cost < special.fit.cost + _AS_GOOD
+            }
             found += self._more_general(base, special, pool, known, what)
         return found
 
@@ -165,7 +177,9 @@ class InPlace:
     ) -> list[Explanation]:
         special, is_done = best.fit.candidates[-1], self.fits.problem_of(best.fit).is_down_to_noise(best.fit)
         pieces: list[Callable[[], FreeRunFit]] = []
-        for candidate in sorted(pool, key=lambda one: -len(one.effect.parameters)):  # what takes longest first
+        for candidate in sorted(
+            pool, key=lambda candidate: -len(candidate.effect.parameters)
+        ):  # what takes longest first
             if not is_special_case(special, candidate):
                 continue
             self.fits.told(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
@@ -173,7 +187,9 @@ class InPlace:
             pieces += self._differing(problem, candidate, special, best.fit)
             if is_done or candidate.key in known:
                 continue
-            starts = [{**best.fit.values, **one} for one in as_its_special_case(candidate, special, best.fit)]
+            starts = [
+                {**best.fit.values, **numbers} for numbers in as_its_special_case(candidate, special, best.fit)
+            ]
             start = nearest(problem, starts, STAGES[-1])
             pieces.append(partial(_fitted_closely, problem, start))
         return self.fits.all_fitted(pieces, [*base.candidates, *pool])
@@ -198,9 +214,9 @@ class InPlace:
     ) -> list[Explanation]:
         """Special cases in place of the effects of an explanation, unless they are known from a better place."""
         tried: dict[frozenset[str], float] = {}
-        for one in known:
-            keys = frozenset(one.keys)
-            tried[keys] = min(one.fit.cost, tried.get(keys, np.inf))
+        for explanation in known:
+            keys = frozenset(explanation.keys)
+            tried[keys] = min(explanation.fit.cost, tried.get(keys, np.inf))
         pieces: list[Callable[[], FreeRunFit]] = []
         for general in wider.fit.candidates:
             others = [candidate for candidate in wider.fit.candidates if candidate is not general]
@@ -246,5 +262,5 @@ def is_special_case(special: Candidate, general: Candidate) -> bool:
     return general.effect.block == special.effect.block and special.effect.known_as in general.effect.includes
 
 
-def _look_alike(one: Candidate, other: Candidate) -> bool:
-    return one.effect.known_as in other.effect.look_alikes or other.effect.known_as in one.effect.look_alikes
+def _look_alike(first: Candidate, other: Candidate) -> bool:
+    return first.effect.known_as in other.effect.look_alikes or other.effect.known_as in first.effect.look_alikes

@@ -76,11 +76,11 @@ class OneMoreEffect:
         def first_stages(i: int, promise: Promise) -> tuple[FreeRunFit, float]:
             self.fits.told(f"{what}: {promise.candidate.key}", i, 2 * len(promising))
             problem = self.few.problem((*base.candidates, promise.candidate))
-            one = begun(problem, promise.starts, shares, near=near)
-            return one.fit, one.cost
+            begun_fit = begun(problem, promise.starts, shares, near=near)
+            return begun_fit.fit, begun_fit.cost
 
         pieces = [partial(first_stages, i, promise) for i, promise in enumerate(promising)]
-        candidates = [*base.candidates, *(one.candidate for one in promising)]
+        candidates = [*base.candidates, *(promise.candidate for promise in promising)]
         found = []
         for promise, (fit, cost) in zip(promising, self.fits.side_by_side(pieces, candidates), strict=True):
             if fit.trouble:
@@ -98,16 +98,18 @@ class OneMoreEffect:
         more: float,
     ) -> list[BegunFit]:
         """Those that gained most, the best first; the others are remembered with what they promised."""
-        lowest = min((one.cost for one, _ in begun_fits), default=0.0)
-        most_alike = min((promise for _, promise in begun_fits), key=lambda one: one.share_left, default=None)
+        lowest = min((begun_fit.cost for begun_fit, _ in begun_fits), default=0.0)
+        most_alike = min(
+            (promise for _, promise in begun_fits), key=lambda promise: promise.share_left, default=None
+        )
         at_base = soft_cost(self.few.problem_of(base), base, shares[min(1, len(shares) - 1)])
         found = []
-        for i, (one, promise) in enumerate(sorted(begun_fits, key=lambda each: each[0].cost)):
-            is_out = i >= _ALWAYS_FINISHED and at_base - one.cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest)
+        for i, (begun_fit, promise) in enumerate(sorted(begun_fits, key=lambda each: each[0].cost)):
+            is_out = i >= _ALWAYS_FINISHED and at_base - begun_fit.cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest)
             if is_out and not (promise is most_alike and promise.is_like_the_force):
-                self.fits.screened[promise.candidate.key] = max(more * (at_base - one.cost), 0.0)
+                self.fits.screened[promise.candidate.key] = max(more * (at_base - begun_fit.cost), 0.0)
             else:
-                found.append(one)
+                found.append(begun_fit)
         return found
 
     def _finished(
@@ -129,8 +131,8 @@ class OneMoreEffect:
                 )
             return finished(begun_fit, shares)
 
-        pieces = [partial(to_the_end, i, one) for i, one in enumerate(going_on)]
-        done = self.fits.side_by_side(pieces, [of for one in going_on for of in one.fit.candidates])
+        pieces = [partial(to_the_end, i, begun_fit) for i, begun_fit in enumerate(going_on)]
+        done = self.fits.side_by_side(pieces, [of for begun_fit in going_on for of in begun_fit.fit.candidates])
         if shares == STAGES:
             done[:_MOST_SCANNED] = [self._scanned(fit, shares) for fit in done[:_MOST_SCANNED]]
         return done

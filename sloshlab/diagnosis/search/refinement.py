@@ -56,7 +56,7 @@ class Refinement:
             With one effect each.
         """
         chosen = takewhile(
-            lambda one: not self.fits.problem_of(one.fit).is_down_to_noise(one.fit),
+            lambda explanation: not self.fits.problem_of(explanation.fit).is_down_to_noise(explanation.fit),
             _with_good_gains(base, known)[:_MOST_ANEW],
         )
         return self._each_from_believed(list(chosen))
@@ -79,12 +79,12 @@ class Refinement:
             return []
         if _is_simple(worth[0]) and self.fits.is_complete(worth[0]):
             return []
-        simple = [one for one in worth if _is_simple(one)][:_MOST_ANEW]
+        simple = [explanation for explanation in worth if _is_simple(explanation)][:_MOST_ANEW]
         found: list[Explanation] = []
-        for i, one in enumerate(simple):
-            self.fits.told(f"fitting {one.keys[-1]} from other sizes", i, len(simple))
-            sizes = self._sized(one, _SIZES_BESIDE_FRICTION)
-            found += self._better_from(one, [{**base.values, **numbers} for numbers in sizes])
+        for i, explanation in enumerate(simple):
+            self.fits.told(f"fitting {explanation.keys[-1]} from other sizes", i, len(simple))
+            sizes = self._sized(explanation, _SIZES_BESIDE_FRICTION)
+            found += self._better_from(explanation, [{**base.values, **numbers} for numbers in sizes])
         return found
 
     def unstrained(self, known: Sequence[Explanation]) -> list[Explanation]:
@@ -111,8 +111,8 @@ class Refinement:
             self.fits.told(f"fitting {explanation.keys[-1]} from what is believed", i, len(chosen))
             return self._from_believed(explanation)
 
-        pieces = [partial(piece, i, one) for i, one in enumerate(chosen)]
-        found = self.fits.side_by_side(pieces, [of for one in chosen for of in one.fit.candidates])
+        pieces = [partial(piece, i, explanation) for i, explanation in enumerate(chosen)]
+        found = self.fits.side_by_side(pieces, [of for explanation in chosen for of in explanation.fit.candidates])
         return [better for of_one in found for better in of_one]
 
     def _from_believed(self, explanation: Explanation) -> list[Explanation]:
@@ -177,7 +177,7 @@ class Refinement:
         """
         found: list[Explanation] = []
         for n in (2, 1):
-            best = cheapest([one for one in (*known, *found) if len(one.keys) == n])
+            best = cheapest([explanation for explanation in (*known, *found) if len(explanation.keys) == n])
             if best is None:
                 continue
             self.fits.told(f"polishing {' and '.join(best.keys)}", 0, 1)
@@ -187,7 +187,7 @@ class Refinement:
                 found.append(best)
             found += self.in_place.specialised(best, [*known, *found], pool)
             if n > 1:
-                single = cheapest([one for one in known if len(one.keys) == 1])
+                single = cheapest([explanation for explanation in known if len(explanation.keys) == 1])
                 if single is None or single.fit.cost - best.fit.cost > LEAST_TO_BUILD_ON:
                     found += self.in_place.exchanged(best, base, [*known, *found], pool)
                 found += self.take_away([best])
@@ -210,7 +210,7 @@ class Refinement:
     def retuned_from(self, known: Sequence[Explanation], retuned: Explanation) -> Explanation:
         """The retuned baseline from where the best explanations have it: what an effect gains must be its own."""
         best = retuned
-        for chosen in (cheapest(known), min(known, key=lambda one: one.held_out, default=None)):
+        for chosen in (cheapest(known), min(known, key=lambda explanation: explanation.held_out, default=None)):
             if chosen is None:
                 continue
             self.fits.told("retuning the baseline from an explanation", 0, 1)
@@ -229,9 +229,9 @@ def _fitted_from(problem: FreeRunProblem, place: Mapping[str, float]) -> FreeRun
 def _with_good_gains(base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
     """The best fit of each effect that gains a good share of what the best effect does, the best first."""
     ranked = _best_by_effect(known)
-    lowest = min((one.fit.cost for one in ranked), default=base.cost)
+    lowest = min((explanation.fit.cost for explanation in ranked), default=base.cost)
     least = max(LEAST_TO_BUILD_ON, _LEAST_SHARE_OF_GAIN * (base.cost - lowest))
-    return [one for one in ranked if base.cost - one.fit.cost >= least]
+    return [explanation for explanation in ranked if base.cost - explanation.fit.cost >= least]
 
 
 def _is_simple(explanation: Explanation) -> bool:
@@ -242,6 +242,6 @@ def _is_simple(explanation: Explanation) -> bool:
 def _best_by_effect(known: Sequence[Explanation]) -> list[Explanation]:
     """The best fit of each effect, the best effect first."""
     by_key: dict[str, Explanation] = {}
-    for one in sorted(known, key=lambda one: one.fit.cost):
-        by_key.setdefault(one.keys[-1], one)
+    for explanation in sorted(known, key=lambda explanation: explanation.fit.cost):
+        by_key.setdefault(explanation.keys[-1], explanation)
     return list(by_key.values())

@@ -67,8 +67,8 @@ def _parts(problem: FreeRunProblem, n: int) -> NDArray[np.intp]:
     """Number of the part of a run that each residual belongs to, shape (n_residuals,)."""
     found = []
     for i, run in enumerate(problem.runs):
-        for one in run:
-            n_times, n_bands = one.spectra.shape
+        for observation in run:
+            n_times, n_bands = observation.spectra.shape
             of_times = i * n + np.arange(n_times) * n // n_times
             found.append(np.repeat(of_times, n_bands))
     return np.concatenate(found)

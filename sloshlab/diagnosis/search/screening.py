@@ -143,7 +143,7 @@ class Screening:
             much_larger = None if is_near or base.candidates else self._much_larger(candidate, residual, shares[0])
             return Promise(candidate, gains_of, looks, by_force, much_larger)
 
-        others = [one for one in pool if one.key not in {known.key for known in base.candidates}]
+        others = [candidate for candidate in pool if candidate.key not in {known.key for known in base.candidates}]
         pieces = [partial(promise_of, i, candidate) for i, candidate in enumerate(others)]
         promises = self.fits.side_by_side(pieces, pool)
         for candidate, promise in zip(others, promises, strict=True):
@@ -151,8 +151,8 @@ class Screening:
                 self.fits.failed[candidate.key] = "does not run from any start"
         promised = [promise for promise in promises if promise is not None]
         return [
-            replace(one, starts=self._starts(base, one, shares[0], is_near=is_near))
-            for one in self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
+            replace(promise, starts=self._starts(base, promise, shares[0], is_near=is_near))
+            for promise in self._best(promised, _MOST_BESIDE if base.candidates else _MOST_FITTED)
         ]
 
     def _much_larger(self, candidate: Candidate, residual: FloatArray, share: float) -> dict[str, float] | None:
@@ -211,17 +211,17 @@ class Screening:
         """The candidates that promise most, in a soft look or in a hard one, or by their force."""
         if not promised:
             return []
-        top = np.maximum(np.max([one.gains for one in promised], axis=0), _LEAST_PREDICTED)
-        by_force = sorted(promised, key=lambda one: one.share_left)[:_MOST_BY_FORCE]
+        top = np.maximum(np.max([promise.gains for promise in promised], axis=0), _LEAST_PREDICTED)
+        by_force = sorted(promised, key=lambda promise: promise.share_left)[:_MOST_BY_FORCE]
         chosen = []
-        for rank, one in enumerate(sorted(promised, key=lambda one: -float(np.max(one.gains / top)))):
-            is_little = one.gains.max() < _LEAST_PREDICTED
-            is_little = is_little or float(np.max(one.gains / top)) < _LEAST_SHARE_OF_PROMISE
-            is_kept = one.much_larger is not None or (one in by_force and one.is_like_the_force)
+        for rank, promise in enumerate(sorted(promised, key=lambda promise: -float(np.max(promise.gains / top)))):
+            is_little = promise.gains.max() < _LEAST_PREDICTED
+            is_little = is_little or float(np.max(promise.gains / top)) < _LEAST_SHARE_OF_PROMISE
+            is_kept = promise.much_larger is not None or (promise in by_force and promise.is_like_the_force)
             if (is_little or rank >= most) and not is_kept:
-                self.fits.screened[one.candidate.key] = float(one.gains.max())
+                self.fits.screened[promise.candidate.key] = float(promise.gains.max())
             else:
-                chosen.append(one)
+                chosen.append(promise)
         return chosen
 
 

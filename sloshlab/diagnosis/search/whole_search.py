@@ -145,7 +145,7 @@ def _second_effects(
     best = cheapest(known)
     if best is None or retuned.fit.cost - best.fit.cost < LEAST_TO_BUILD_ON:
         return []
-    largest = max(largest_strength(retuned.by_run, one.by_run) for one in known)
+    largest = max(largest_strength(retuned.by_run, explanation.by_run) for explanation in known)
     if largest < _NOTHING_TO_SPEAK_OF and fits.shares_little(retuned):
         return []
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
@@ -163,14 +163,14 @@ def _second_effects(
     if pair is not None and best.fit.cost - pair.fit.cost > LEAST_TO_BUILD_ON:
         alone += more.in_place.one_for_all(pair.fit, retuned.fit, pool)
     alone += Refinement(fits).take_away([pair for pair in pairs if pair.keys[:-1] == best.keys])
-    cost = min((one.fit.cost for one in alone), default=best.fit.cost)
+    cost = min((explanation.fit.cost for explanation in alone), default=best.fit.cost)
     if cost < best.fit.cost:
         alone += more.in_place.look_alikes(retuned.fit, alone, pool, "fitting one effect")
         alone += more.in_place.generalised(retuned.fit, alone, pool, "fitting one effect")
     if pair is None or pair.fit.cost > _SHARE_LEFT_BY_A_PAIR * best.fit.cost:
         return [*pairs, *alone]
     if pair.held_out_rms > LARGEST_REMAINDER:
-        second = cheapest([one for one in alone if one.keys == pair.keys[1:]])
+        second = cheapest([explanation for explanation in alone if explanation.keys == pair.keys[1:]])
         if second is not None:
             pairs += more.fitted(second.fit, fits.jacobian(second.fit), pool, "exchanging the first effect")
     return [*pairs, *alone]
@@ -180,7 +180,7 @@ def _special_case_of(best: Explanation, known: Sequence[Explanation], retuned: E
     """The best explanation by a special case of an effect that gains a good share of what that does."""
     least = _SHARE_OF_A_SPECIAL_CASE * (retuned.fit.cost - best.fit.cost)
     general = best.fit.candidates[-1]
-    specials = [one for one in known if is_special_case(one.fit.candidates[-1], general)]
+    specials = [explanation for explanation in known if is_special_case(explanation.fit.candidates[-1], general)]
     return cheapest([special for special in specials if retuned.fit.cost - special.fit.cost > least])
 
 
@@ -189,6 +189,6 @@ def _possible_beside(best: Explanation, at: Surroundings, pool: Sequence[Candida
     forces = extension_of(best.fit.candidates, best.fit.values).terms
     if not forces:
         return []
-    known = {one.key for one in pool}
+    known = {candidate.key for candidate in pool}
     beside = candidates(replace(at, twin=replace(at.twin, terms=(*at.twin.terms, *forces))))
-    return [one for one in beside if one.key not in known]
+    return [candidate for candidate in beside if candidate.key not in known]

@@ -58,7 +58,8 @@ class UserTwinModel:
         self._truths: OrderedDict[tuple[Any, ...], tuple[dict[str, FloatArray], FloatArray]] = OrderedDict()
         self._excitations: OrderedDict[str, Excitation] = OrderedDict()
         self._shown = {
-            channel: one if isinstance(one, Compared) else Compared(one) for channel, one in twin.compared.items()
+            channel: shown if isinstance(shown, Compared) else Compared(shown)
+            for channel, shown in twin.compared.items()
         }
         for run in self.runs:
             self._check_channels(run)

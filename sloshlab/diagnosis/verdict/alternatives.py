@@ -142,8 +142,8 @@ def equals_of(best: Explanation) -> list[tuple[str, ...]]:
         candidate.effect.name for candidate in best.fit.candidates if candidate.effect.block == "structure"
     ]
     found = []
-    for one, two in _EQUALS.items():
-        for this, other in ((one, two), (two, one)):
+    for single, pair in _EQUALS.items():
+        for this, other in ((single, pair), (pair, single)):
             if set(this) <= set(in_structure):
                 others = [name for name in best.names if name not in this]
                 found.append(tuple(sorted((*others, *other))))

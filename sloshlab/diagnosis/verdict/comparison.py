@@ -50,8 +50,8 @@ class Scale:
     def of(cls, found: Findings) -> Scale:
         """The scale of what one search has found."""
         described = [*found.explanations, *found.ceilings, found.retuned]
-        fitting = min(one.fit.misfit for one in described) / max(found.n_fitting, 1)
-        held_out = min(one.held_out for one in described) / max(found.n_held_out, 1)
+        fitting = min(description.fit.misfit for description in described) / max(found.n_fitting, 1)
+        held_out = min(description.held_out for description in described) / max(found.n_held_out, 1)
         n = max(found.n_fitting + found.n_held_out, 2)
         judged = frozenset(run.name for run in found.split.held_out)
         return cls(2.0 * max(1.0, fitting), 2.0 * max(1.0, held_out), 0.5 * float(np.log(n)), judged)

@@ -88,7 +88,7 @@ def verdict_of(found: Findings) -> Verdict:
     gain = scale.held_out_gain(found.retuned, ceiling)
     probabilities = _probabilities(found, scale)
     described = _in_need_of_all(found, scale)
-    is_more = any(shows_more(one, found.retuned, scale) for one in described)
+    is_more = any(shows_more(description, found.retuned, scale) for description in described)
     is_complete = not (leaves_more(found, found.retuned) or _leaves_much(found, found.retuned))
     if is_complete and not is_more:
         certain = _certain(probabilities, "none")
@@ -121,7 +121,7 @@ def leaves_more(found: Findings, explanation: Explanation) -> bool:
     Parameters
     ----------
     found : Findings
-    one : Explanation
+    explanation : Explanation
     """
     shared = explanation.shared_by_repeats
     if any(max(left) > _MOST_IN_A_CHANNEL or float(np.mean(left)) > _MOST_IN_COMMON for left in shared):
@@ -146,10 +146,12 @@ def _in_need_of_all(found: Findings, scale: Scale) -> list[Explanation]:
     described = [*found.explanations, *found.ceilings]
     parts = [(frozenset(explanation.keys), explanation) for explanation in found.explanations]
     return [
-        one
-        for one in described
+        description
+        for description in described
         if all(
-            shows_more(one, at_its_best(found, part), scale) for keys, part in parts if keys < frozenset(one.keys)
+            shows_more(description, at_its_best(found, part), scale)
+            for keys, part in parts
+            if keys < frozenset(description.keys)
         )
     ]
 
@@ -210,13 +212,13 @@ def _best_of(found: Findings, scale: Scale, n: int) -> Explanation | None:
         for explanation in found.explanations
         if np.isfinite(explanation.held_out) and not explanation.rests_on_a_bound
     ]
-    alike = [one for one in known if len(one.keys) == n]
+    alike = [explanation for explanation in known if len(explanation.keys) == n]
     return _without_excess(max(alike, key=scale.evidence), alike, scale) if alike else None
 
 
 def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scale) -> Explanation:
     """A special case of effects in their place, unless the general form is better by a size worth speaking of."""
-    for special in sorted(alike, key=lambda one: -scale.evidence(one)):
+    for special in sorted(alike, key=lambda explanation: -scale.evidence(explanation)):
         is_special = special.n_numbers < best.n_numbers and includes(best, special)
         if is_special and not any(
             is_more(best, special, scale) for is_more in (is_clearly_better, shows_more, has_surely_gained)

@@ -69,4 +69,4 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
 
 
 def _named(candidate: Candidate, parameter: str) -> EffectParameter:
-    return next(one for one in candidate.effect.parameters if one.name == parameter)
+    return next(known for known in candidate.effect.parameters if known.name == parameter)

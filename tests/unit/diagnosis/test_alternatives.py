@@ -72,8 +72,8 @@ def test_what_is_worse_in_one_noise_of_all_channels_is_not(behind: float, kind: 
     other = left(behind, behind, DRAG, squares=1.1)
     assert judged(BASELINE, [left(0.0, 0.0, FRICTION), other], at=DRIVEN).kind == kind
     best, twice = (
-        replace(one, by_run={**one.by_run, ("run_1", "another"): 1.0})
-        for one in (left(0.0, 0.0, FRICTION), left(2 * behind, 2 * behind, DRAG, squares=1.1))
+        replace(explanation, by_run={**explanation.by_run, ("run_1", "another"): 1.0})
+        for explanation in (left(0.0, 0.0, FRICTION), left(2 * behind, 2 * behind, DRAG, squares=1.1))
     )
     assert judged(BASELINE, [best, twice], at=DRIVEN).kind == kind
 

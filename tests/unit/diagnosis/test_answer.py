@@ -161,5 +161,5 @@ def test_nothing_is_drawn_where_nothing_is_named(monkeypatch: pytest.MonkeyPatch
 def test_a_size_is_told_from_nothing_by_its_interval(spread: float, is_told: bool) -> None:
     """90 % are 1.645 standard deviations; two standard errors of 0.01 and one per cent are beside the spread."""
     own = (spread**2 - 0.02**2 - 0.0037**2) ** 0.5 if spread else 0.0
-    one = replace(left(0.0, 0.0, FRICTION), spread={FRICTION_NUMBER: own})
-    assert is_told_from_nothing(one, one.fit.candidates[0]) is is_told
+    explanation = replace(left(0.0, 0.0, FRICTION), spread={FRICTION_NUMBER: own})
+    assert is_told_from_nothing(explanation, explanation.fit.candidates[0]) is is_told

@@ -50,9 +50,9 @@ def test_what_lasts_longer_counts_with_its_size() -> None:
 def test_channels_have_their_own_quiet_times_and_bands_without_information_do_not_count() -> None:
     first, second = observed(8), observed(8)
     second.informative[:, 10:] = False
-    one, other = np.full((8, 30), 2.0), np.full((8, 30), 1.0)
-    one[0], other[5], other[:, 10:] = 9.0, 9.0, 9.0
-    found = rms_without_bursts(cast(Any, [first, second]), np.concatenate([one.ravel(), other.ravel()]))
+    first_residual, other = np.full((8, 30), 2.0), np.full((8, 30), 1.0)
+    first_residual[0], other[5], other[:, 10:] = 9.0, 9.0, 9.0
+    found = rms_without_bursts(cast(Any, [first, second]), np.concatenate([first_residual.ravel(), other.ravel()]))
     assert found == pytest.approx(np.sqrt((6 * 30 * 4.0 + 6 * 10 * 1.0) / (6 * 40)))
 
 
@@ -89,8 +89,8 @@ def test_only_the_same_channel_and_what_is_informative_is_shared() -> None:
 def test_a_channel_that_need_not_be_described_is_not_asked() -> None:
     observed = [of_run("a", (10, 10)), of_run("b", (10, 10))]
     assert mean_squares_that_repeat([["a", "b"]], cast(Any, observed), np.ones(200)) != {}
-    for one in observed:
-        one.is_rough = True
+    for observation in observed:
+        observation.is_rough = True
     assert mean_squares_that_repeat([["a", "b"]], cast(Any, observed), np.ones(200)) == {}
 
 

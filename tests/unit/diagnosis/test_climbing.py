@@ -109,7 +109,7 @@ def test_of_two_effects_the_one_in_jumps_is_thrown(case: Decays, monkeypatch: py
     known = replace(pair, fit=replace(pair.fit, candidates=candidates))
     assert climbing.climbed(case.fits, [known]) == []
     assert len(thrown) == 4 * 48
-    changed = {name for one in thrown for name, value in one.items() if value != pair.fit.values[name]}
+    changed = {name for place in thrown for name, value in place.items() if value != pair.fit.values[name]}
     assert changed == set(names)
 
 

@@ -38,7 +38,9 @@ def friction(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Examination
         fitting=[observations(run, list(run.recording.data_vars)) for run in runs],
         retuned=retuned,
         explanations=[],
-        readings=lambda one: {run.name: model.simulate(run, one.fit.values, NOTHING) for run in runs},
+        readings=lambda explanation: {
+            run.name: model.simulate(run, explanation.fit.values, NOTHING) for run in runs
+        },
     )
     return found, examined(found)
 
@@ -135,9 +137,9 @@ def test_levels_that_hold_most_of_it_in_words(held: tuple[float, float], words: 
 def test_the_facts_are_strict_json(friction: tuple[Any, Examination]) -> None:
     facts = json.loads(json.dumps(examination_facts(friction[1], friction[0]), allow_nan=False))
     assert facts["interface_cut"]["doubted_channel"] == ""
-    structure = next(one for one in facts["interface_cut"]["blocks"] if one["block"] == "structure")
+    structure = next(block for block in facts["interface_cut"]["blocks"] if block["block"] == "structure")
     assert structure["share"]["low"] <= structure["share"]["estimate"] <= structure["share"]["high"]
-    questions = [one["question"] for one in facts["characters"]["structure"]["answers"]]
+    questions = [answer["question"] for answer in facts["characters"]["structure"]["answers"]]
     assert {"energy", "state", "history", "onset"} <= set(questions)
 
 

@@ -70,11 +70,11 @@ def fit_of(model: RigModel, name: str, place: str) -> tuple[FreeRunFit, float]:
     """The fit of a fault, the shares of the cells free as well, and its misfit per sample."""
     at = surroundings(model)
     candidate = Candidate(effect(f"sensor.{name}"), at, place)
-    held = {one: value for one, value in model.believed.items() if not one.startswith("share")}
+    held = {name: value for name, value in model.believed.items() if not name.startswith("share")}
     [run] = model.runs
     problem = FreeRunProblem(model, [observations(run, CELLS)], [candidate], held)
     fit = fitted_from(problem, [{**model.believed, **start} for start in candidate.starts()])
-    return fit, fit.misfit / sum(one.known.sum() for one in problem.runs[0])
+    return fit, fit.misfit / sum(observation.known.sum() for observation in problem.runs[0])
 
 
 def check(fit: FreeRunFit, label: str, truth: float) -> None:

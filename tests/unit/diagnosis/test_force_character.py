@@ -48,7 +48,7 @@ def asked(
 
 
 def answer(character: ForceCharacter, question: str) -> Answer:
-    return next(one for one in character.answers if one.question == question)
+    return next(answer for answer in character.answers if answer.question == question)
 
 
 def coulomb(t: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -96,9 +96,9 @@ def test_work_of_dry_friction_in_joule() -> None:
 
 def test_energy_share_of_dry_friction() -> None:
     """Mean |v| over its RMS: 2√2/π of a sine."""
-    one = answer(asked(coulomb), "energy")
-    assert one.value == pytest.approx(2 * np.sqrt(2) / np.pi, abs=0.01)
-    assert one.low <= one.value <= one.high
+    energy = answer(asked(coulomb), "energy")
+    assert energy.value == pytest.approx(2 * np.sqrt(2) / np.pi, abs=0.01)
+    assert energy.low <= energy.value <= energy.high
 
 
 def test_a_force_along_the_velocity_gives_energy() -> None:
@@ -160,10 +160,10 @@ def test_a_clearance_has_an_onset_where_its_gap_closes() -> None:
         return np.asarray(-400.0 * np.sign(x) * np.maximum(np.abs(x) - gap, 0.0))
 
     character = asked(contact, amplitudes=(0.002, 0.003, 0.004, 0.005, 0.006, 0.008), omegas=(omega,))
-    one = answer(character, "onset")
+    found = answer(character, "onset")
     assert character.says[evidence.ONSET]
-    assert one.low <= omega**2 * gap / G <= one.high
-    assert one.value == pytest.approx(omega**2 * gap / G, rel=0.25)
+    assert found.low <= omega**2 * gap / G <= found.high
+    assert found.value == pytest.approx(omega**2 * gap / G, rel=0.25)
 
 
 def test_dry_friction_is_there_at_the_smallest_level() -> None:
@@ -213,11 +213,11 @@ def test_a_run_in_which_the_place_rests_is_left_out(left: tuple[float, float]) -
 
 def test_a_motion_that_stops_dead_has_levels() -> None:
     """Running sums over squares that end in zeros round below zero."""
-    one = latent(viscous, 0.004, 25.0, 3)
+    force = latent(viscous, 0.004, 25.0, 3)
     for seed in range(20):
-        motion = np.random.default_rng(seed).normal(size=one.motion.shape)
-        motion[one.time_s > 0.4 * DURATION_S] = 0.0
-        for part in stretches([replace(one, motion=motion)]):
+        motion = np.random.default_rng(seed).normal(size=force.motion.shape)
+        motion[force.time_s > 0.4 * DURATION_S] = 0.0
+        for part in stretches([replace(force, motion=motion)]):
             assert np.isfinite(part.level_g).all()
             assert np.isfinite(part.omega).all()
 

@@ -187,7 +187,7 @@ def test_hidden_numbers_come_back_within_their_intervals(tmp_path: Path, key: st
     if "friction" in name:  # as the search polishes its best: where a decay sticks has side valleys
         fit, _ = fitted(problem, fit.values, shares=STAGES[-2:])
     assert fit.trouble == ""
-    assert fit.misfit < 1.25 * sum(one.known.sum() for run in problem.runs for one in run)
+    assert fit.misfit < 1.25 * sum(observation.known.sum() for run in problem.runs for observation in run)
     for parameter, value in truth.items():
         label = f"{key}.{parameter}"
         error, width = fit.values[label] - value, fit.standard_error(label)

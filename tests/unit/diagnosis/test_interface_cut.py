@@ -42,7 +42,7 @@ def cut_of(folder: Path, recorded: list[CaseRun]) -> tuple[InterfaceCut, RigMode
 
 
 def block(cut: InterfaceCut, name: str) -> BlockCut:
-    return next(one for one in cut.blocks if one.block == name)
+    return next(block for block in cut.blocks if block.block == name)
 
 
 @pytest.mark.parametrize(("place", "other"), [(STRUCTURE, TANK), (TANK, STRUCTURE)])
@@ -60,12 +60,12 @@ def test_without_the_force_between_them_nobody_is_named(tmp_path: Path) -> None:
     cut, _, _ = cut_of(tmp_path, runs(STRUCTURE, measured=False))
     assert cut.places == (EITHER,)
     assert "no force was measured" in block(cut, EITHER).remark
-    assert not any(one.block in (STRUCTURE, TANK) for one in cut.blocks)
+    assert not any(block.block in (STRUCTURE, TANK) for block in cut.blocks)
 
 
 def test_nothing_missing_is_shared_by_nobody(tmp_path: Path) -> None:
     cut, _, _ = cut_of(tmp_path, runs(""))
-    assert all(np.isnan(one.share) for one in cut.blocks)
+    assert all(np.isnan(block.share) for block in cut.blocks)
 
 
 def test_a_wrong_gain_is_found_by_the_forces_that_it_would_need(tmp_path: Path) -> None:
@@ -109,6 +109,6 @@ def test_what_own_parameters_explain_counts_for_nobody(tmp_path: Path) -> None:
     run = run_of("decay", {"displacement_tank": x, "acceleration_tip": a, "force_interface": heavier}, NOISE, 1,
                  initial_displacement_m=0.016)  # fmt: skip
     cut, model, _ = cut_of(tmp_path, [run])
-    assert all(np.isnan(one.share) for one in cut.blocks)
+    assert all(np.isnan(block.share) for block in cut.blocks)
     assert own_tolerances(model, cut.runs[0], TANK)[2] == pytest.approx(0.01 * MASS_KG, rel=1e-6)
     assert LIQUID_KG < MASS_KG

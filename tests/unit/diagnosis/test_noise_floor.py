@@ -123,8 +123,8 @@ def test_the_floor_of_two_repeats_knows_the_noise_of_the_base(tmp_path: Path) ->
     runs[1] = CaseRun("again", runs[0].recording.assign_attrs(repeat=1), runs[1].attributes)
     case = case_of(tmp_path, *runs)
     found = weighted_observations(case, RigModel(case.rig, tmp_path, case.runs))  # type: ignore[arg-type]
-    [one] = found["quiet"]
-    least = one.variance[:, np.argmax(one.variance.mean(axis=0))].mean()
+    [observation] = found["quiet"]
+    least = observation.variance[:, np.argmax(observation.variance.mean(axis=0))].mean()
     assert least > 10 * 1e-3**2
 
 
@@ -146,14 +146,14 @@ def test_what_a_drive_moves_counts_where_nothing_is_recorded(tmp_path: Path) -> 
         runs.append(CaseRun(f"run {repeat}", recording.assign_attrs(repeat=repeat), run.attributes))
     case = case_of(tmp_path, *runs)
     found = weighted_observations(case, RigModel(case.rig, tmp_path, case.runs))  # type: ignore[arg-type]
-    for [one] in found.values():
-        hums = np.abs(one.frequencies_hz - hum_hz) < 1.0
-        assert one.informative[2:-2, hums].all()
-        assert one.simulated is not None
+    for [observation] in found.values():
+        hums = np.abs(observation.frequencies_hz - hum_hz) < 1.0
+        assert observation.informative[2:-2, hums].all()
+        assert observation.simulated is not None
         # well above its resonance a mass on a spring moves by 1/(r² − 1) of its base, and a first fit lessens it
         passed = 1 / ((2 * np.pi * hum_hz / OMEGA) ** 2 - 1)
-        of_base = one.of(hum)
-        power = (one.simulated[3:-3, hums] ** 2).sum() / (of_base[3:-3, hums] ** 2).sum()
+        of_base = observation.of(hum)
+        power = (observation.simulated[3:-3, hums] ** 2).sum() / (of_base[3:-3, hums] ** 2).sum()
         assert np.sqrt(power) == pytest.approx(passed, rel=0.3)
 
 
@@ -197,16 +197,16 @@ def test_slow_displacements_are_known_to_a_few_times_the_noise_of_the_base(tmp_p
     channels = {"displacement_tank": still + 1e-3, "acceleration_root": still}
     run = run_of("quiet", channels, {"acceleration_root": 0.1, "displacement_tank": 1e-5}, 1, experiment="other")
     driving = ("acceleration_root",)
-    [one] = observations(run, ["displacement_tank"], driving, knows_noise_of_drive=True)
+    [observation] = observations(run, ["displacement_tank"], driving, knows_noise_of_drive=True)
     [unknown] = observations(run, ["displacement_tank"], driving)
-    slow, middle = one.frequencies_hz < 2.5, (one.times_s > 2.5) & (one.times_s < 17.0)
-    sensor = one.variance[-1, -1]
-    assert (one.variance[np.ix_(middle, slow)] == sensor).all()
-    assert (one.variance[np.ix_(~middle, slow)] > 1e3 * sensor).sum() >= 2 * 4 * slow.sum()
+    slow, middle = observation.frequencies_hz < 2.5, (observation.times_s > 2.5) & (observation.times_s < 17.0)
+    sensor = observation.variance[-1, -1]
+    assert (observation.variance[np.ix_(middle, slow)] == sensor).all()
+    assert (observation.variance[np.ix_(~middle, slow)] > 1e3 * sensor).sum() >= 2 * 4 * slow.sum()
     assert (unknown.variance[:, slow] > 1e3 * sensor).all()
     assert (unknown.variance[:, ~slow] == sensor).all()
-    noise = {("quiet", "displacement_tank"): np.full(one.spectra.shape, 7.0 * sensor)}
-    louder = _louder(one, noise, driving).variance
+    noise = {("quiet", "displacement_tank"): np.full(observation.spectra.shape, 7.0 * sensor)}
+    louder = _louder(observation, noise, driving).variance
     np.testing.assert_allclose(louder[np.ix_(middle, slow)], 9 * 8.0 * sensor)
     np.testing.assert_allclose(louder[:, ~slow], 8.0 * sensor)
-    np.testing.assert_allclose(_louder(one, noise, ()).variance[np.ix_(middle, slow)], 8.0 * sensor)
+    np.testing.assert_allclose(_louder(observation, noise, ()).variance[np.ix_(middle, slow)], 8.0 * sensor)

@@ -51,7 +51,7 @@ def test_a_large_mass_is_begun_where_it_is_nearest(light: Light, monkeypatch: py
     Decays tell a mass to what is believed of the frequency.
     """
     monkeypatch.setattr(screening, "_MOST_FITTED", 0)
-    [promise] = [one for one in light.chosen() if one.candidate.key == MASS]
+    [promise] = [promise for promise in light.chosen() if promise.candidate.key == MASS]
     assert promise.much_larger is not None
     assert promise.much_larger[f"{MASS}.mass_kg"] == pytest.approx(LACKING_KG, rel=0.25)
     done = finished(begun(light.fits.problem((promise.candidate,)), promise.starts))
@@ -62,11 +62,14 @@ def test_a_large_mass_is_begun_where_it_is_nearest(light: Light, monkeypatch: py
 
 
 def test_nothing_large_is_sought_beside_a_baseline_that_is_right(tmp_path: Path) -> None:
-    assert [one.much_larger for one in Light(tmp_path, MASS_KG).chosen() if one.much_larger] == []
+    assert [promise.much_larger for promise in Light(tmp_path, MASS_KG).chosen() if promise.much_larger] == []
 
 
 def test_only_what_does_no_work_is_sought_at_a_hundred_times_its_size(light: Light) -> None:
-    sizes = {one.key: [next(iter(start.values())) for start in of_growing_sizes(one)] for one in light.pool}
+    sizes = {
+        candidate.key: [next(iter(start.values())) for start in of_growing_sizes(candidate)]
+        for candidate in light.pool
+    }
     assert sizes[FRICTION] == []
     first = next(iter(light.pool[0].starts()[0].values()))
     assert min(sizes[MASS], key=abs) == pytest.approx(1.5 * first)

@@ -56,7 +56,7 @@ def coulomb(case: Decays) -> Explanation:
 
 def test_friction_of_one_direction_is_fitted_from_that_of_both(case: Decays, coulomb: Explanation) -> None:
     found = InPlace(case.fits).generalised(case.baseline, [coulomb], list(case.pool.values()), "")
-    best = cheapest([one for one in found if one.keys == (ASYMMETRIC,)])
+    best = cheapest([explanation for explanation in found if explanation.keys == (ASYMMETRIC,)])
     assert best is not None
     assert best.fit.cost <= coulomb.fit.cost
     up, down = (best.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
@@ -67,9 +67,9 @@ def test_it_is_fitted_where_it_clearly_differs_too(case: Decays, coulomb: Explan
     found = InPlace(case.fits).generalised(case.baseline, [coulomb], list(case.pool.values()), "")
     size = coulomb.fit.values[COULOMB_N]
     sides = [
-        sorted(one.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
-        for one in found
-        if one.keys == (ASYMMETRIC,)
+        sorted(explanation.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
+        for explanation in found
+        if explanation.keys == (ASYMMETRIC,)
     ]
     assert sum(less <= 0.66 * size and more >= 1.34 * size for less, more in sides) >= 1
 
@@ -78,14 +78,14 @@ def test_a_general_form_is_left_out_where_it_is_known(case: Decays, coulomb: Exp
     """Only the forms that clearly differ are fitted again."""
     wide = case.fit(ASYMMETRIC)
     found = InPlace(case.fits).generalised(case.baseline, [coulomb, wide], list(case.pool.values()), "")
-    assert len([one for one in found if one.keys == (ASYMMETRIC,)]) <= 2
+    assert len([explanation for explanation in found if explanation.keys == (ASYMMETRIC,)]) <= 2
 
 
 def test_the_special_case_takes_the_place_of_the_general_form_once(case: Decays, coulomb: Explanation) -> None:
     stribeck = case.fit(STRIBECK)
     pool = list(case.pool.values())
     found = InPlace(case.fits).specialised(stribeck, [stribeck], pool)
-    assert [one.keys for one in found] == [(COULOMB,)]
+    assert [explanation.keys for explanation in found] == [(COULOMB,)]
     assert found[0].fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.02)
     assert InPlace(case.fits).specialised(stribeck, [stribeck, coulomb], pool) == []
 
@@ -252,7 +252,7 @@ def test_beside_dry_friction_simple_effects_are_fitted_from_other_sizes(
 
     monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
     monkeypatch.setattr(refinement, "fitted", stays)
-    monkeypatch.setattr(Fits, "is_complete", lambda self, one: is_complete)
+    monkeypatch.setattr(Fits, "is_complete", lambda self, explanation: is_complete)
     terms = (SimpleNamespace(kind=SimpleNamespace(dry_friction=is_dry)),)
     monkeypatch.setattr(case.fits.model, "twin", SimpleNamespace(terms=terms))
     monkeypatch.setattr(case.fits, "judged", lambda fit: Explanation(fit, 0.0, 1.0))
@@ -278,7 +278,7 @@ def test_rivals_beside_a_strained_baseline_are_fitted_from_what_is_believed(
     other = case.fit(STRIBECK)
     near, far = (replace(other, fit=replace(other.fit, cost=best.fit.cost + more)) for more in (23.0, 25.0))
     found = Refinement(case.fits).unstrained([near, best])
-    assert {one.keys for one in found} <= {(COULOMB,), (STRIBECK,)}
+    assert {explanation.keys for explanation in found} <= {(COULOMB,), (STRIBECK,)}
     assert found[0].keys == (COULOMB,)
     assert found[0].fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
     assert not case.fits.is_strained(found[0].fit)
@@ -306,7 +306,7 @@ def test_numbers_spread_as_far_as_what_is_believed_leaves_them(case: Decays, cou
     """Friction is known to the modal mass and the gains, a per cent each, but not to a tenth of that."""
     other = case.fit(CUBIC)
     found = redrawn(findings(case, other, coulomb), coulomb).explanations
-    assert [one.keys for one in found] == [(COULOMB,), (CUBIC,)]
+    assert [explanation.keys for explanation in found] == [(COULOMB,), (CUBIC,)]
     assert found[1].spread == {}
     assert 6e-3 < found[0].spread[COULOMB_N] / coulomb.fit.values[COULOMB_N] < 2.5e-2
 
@@ -337,8 +337,8 @@ def test_derivatives_and_places_are_the_same_on_one_core_and_on_two(
 
     on_two = found()
     monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)
-    for one, other in zip(found(), on_two, strict=True):
-        np.testing.assert_array_equal(one, other)
+    for explanation, other in zip(found(), on_two, strict=True):
+        np.testing.assert_array_equal(explanation, other)
     for residual, place in zip(on_two[0], places, strict=True):
         np.testing.assert_array_equal(residual, problem.residual(place))
 
@@ -355,7 +355,7 @@ def test_polishing_takes_a_fit_to_its_end(case: Decays) -> None:
 def test_each_of_a_pair_is_fitted_alone(case: Decays) -> None:
     pair = case.fit(COULOMB, CUBIC)
     alone = Refinement(case.fits).take_away([pair])
-    assert [one.keys for one in alone] == [(COULOMB,), (CUBIC,)]
+    assert [explanation.keys for explanation in alone] == [(COULOMB,), (CUBIC,)]
     assert alone[0].fit.cost < alone[1].fit.cost
     assert Refinement(case.fits).take_away([]) == []
 
@@ -451,10 +451,10 @@ def test_what_is_begun_on_some_runs_is_finished_on_all(repeated: Repeated) -> No
     candidate = repeated.pool[COULOMB]
     jacobian = fits.jacobian(base)
     start = Start({**base.values, **candidate.starts()[0]}, is_near=True)
-    one = begun(few.problem((candidate,)), [start], near=few.part_of(jacobian, base, fits))
-    whole = on_more_runs(one, fits.problem((candidate,)), base.values, jacobian)
+    begun_fit = begun(few.problem((candidate,)), [start], near=few.part_of(jacobian, base, fits))
+    whole = on_more_runs(begun_fit, fits.problem((candidate,)), base.values, jacobian)
     assert whole.fit.values["release of decay_1"] == base.values["release of decay_1"]
-    assert whole.fit.values[COULOMB_N] == one.fit.values[COULOMB_N]
+    assert whole.fit.values[COULOMB_N] == begun_fit.fit.values[COULOMB_N]
     assert whole.jacobian.n_columns == len(fits.problem((candidate,)).names)
     done = finished(whole)
     assert done.values[COULOMB_N] == pytest.approx(0.5 * (UP_N + DOWN_N), rel=0.15)

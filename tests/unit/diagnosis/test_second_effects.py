@@ -62,10 +62,10 @@ def sought(
 ) -> tuple[Tried, list[Any]]:
     tried = Tried({BEST.keys: [pair], SECOND.keys: [explanation(1000.0, "hum", "missing_mode", left=0.9)]})
     fits = SimpleNamespace(
-        is_complete=lambda one: is_complete,
+        is_complete=lambda explanation: is_complete,
         problem_of=lambda fit: SimpleNamespace(is_down_to_noise=lambda fit: is_noise),
         jacobian=lambda fit: None,
-        shares_little=lambda one: shares_little,
+        shares_little=lambda explanation: shares_little,
         made_known=lambda pool: None,
     )
     monkeypatch.setattr(whole_search, "OneMoreEffect", lambda fits: tried)
@@ -83,7 +83,11 @@ def test_where_the_best_pair_leaves_too_much_its_first_effect_is_exchanged(
 ) -> None:
     tried, found = sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum"))
     assert tried.beside == [("stiffness_change",), ("hum",)]
-    assert [one.keys for one in found] == [("stiffness_change", "hum"), ("hum", "missing_mode"), ("hum",)]
+    assert [explanation.keys for explanation in found] == [
+        ("stiffness_change", "hum"),
+        ("hum", "missing_mode"),
+        ("hum",),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -129,9 +133,9 @@ def test_only_a_pair_that_gains_a_fifth_tells_that_its_first_effect_is_wrong(
 def test_a_burst_in_one_channel_of_a_run_alone_is_no_physics() -> None:
     fits = Fits(cast(Any, None), [], [], lambda what, done, of: None, [["a", "b"], ["c"]])
     places = {("c", "tip"): 0.9, ("c", "force"): 0.9, ("c", "root"): 15.0}
-    one = Explanation(FreeRunFit((), {}, 0.0, 0.0), 0.0, 1.0, by_run=places, repeating={("a", "tip"): 0.1})
-    assert fits.is_complete(one)
-    assert not fits.is_complete(replace(one, by_run={**places, ("c", "force"): 15.0}))
+    explanation = Explanation(FreeRunFit((), {}, 0.0, 0.0), 0.0, 1.0, by_run=places, repeating={("a", "tip"): 0.1})
+    assert fits.is_complete(explanation)
+    assert not fits.is_complete(replace(explanation, by_run={**places, ("c", "force"): 15.0}))
 
 
 def test_nothing_is_sought_beside_what_leaves_noise(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,7 +197,7 @@ def test_what_acts_on_the_damping_of_liquid_is_possible_beside_what_brings_it(
     model = RigModel(rig(tmp_path), tmp_path, decays((0.02,), 1.0))
     at = surroundings(model)
     pool = candidates(at)
-    assert "tank.breakup_delay" not in {one.key for one in pool}
+    assert "tank.breakup_delay" not in {candidate.key for candidate in pool}
     first = Candidate(effect(key), at)
     best = Explanation(FreeRunFit((first,), first.starts()[0], 0.0, 0.0), 0.0, 1.0)
-    assert {one.key for one in whole_search._possible_beside(best, at, pool)} == beside
+    assert {candidate.key for candidate in whole_search._possible_beside(best, at, pool)} == beside

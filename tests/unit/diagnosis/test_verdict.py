@@ -56,7 +56,7 @@ def test_one_run_alone_names_nothing() -> None:
     assert verdict.kind == "unknown"
     assert verdict.statement.startswith("Something is missing that one run alone does not tell, most likely in")
     assert "the nearest known effect is coulomb friction" in verdict.statement
-    assert [one["name"] for one in verdict_facts(alone, verdict)["effects"]] == ["unknown"]
+    assert [effect["name"] for effect in verdict_facts(alone, verdict)["effects"]] == ["unknown"]
 
 
 @pytest.mark.parametrize(("rms", "is_near"), [(1.91, True), (1.93, False)])
