@@ -23,7 +23,7 @@ _LEAST_SPAN: Final = 1.6
 _LEAST_FREQUENCY_SPAN: Final = 1.25
 _SIGNIFICANT: Final = 2.0
 _N_LEVELS: Final = 6
-_NOTHING: Final = 1.35
+_NOISE_ONLY: Final = 1.35
 """RMS over noise up to which there is nothing."""
 _AT_REST: Final = 0.03
 """Share of the largest level below which a place counts as at rest."""
@@ -211,7 +211,7 @@ def onset(
             numbers = np.linalg.solve(squares + lift * np.eye(3), motion[inside].T @ force[inside])
             top = inside[level[inside] > edges[upper - 1]]
             rest = force[top] - motion[top] @ numbers
-            if np.sqrt(np.mean(rest**2)) > _NOTHING * noise_n:
+            if np.sqrt(np.mean(rest**2)) > _NOISE_ONLY * noise_n:
                 return count
             count = upper
         return count

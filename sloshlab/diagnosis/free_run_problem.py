@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate, channels_of
-from sloshlab.diagnosis.copied_process import N_AT_ONCE
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
+from sloshlab.diagnosis.forked_process import N_WORKERS
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.parallel_pieces import is_single_threaded
 from sloshlab.diagnosis.second_process import SecondProcess, second_process
-from sloshlab.diagnosis.side_by_side import works_alone
 from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
@@ -27,13 +27,13 @@ _STEP: Final = 0.005
 """Of a difference, in tolerances; a frequency must not move by much of a cycle."""
 _COARSE_STEP: Final = 0.03
 _TOLERANCES_OF_DAMPING: Final = 3.0
-ROBUST: Final = 4.0
+HUBER_LIMIT: Final = 4.0
 """Standard deviations from which a residual counts with its size, not with its square."""
 _FEWEST_IN_A_RUN: Final = 50
-_QUIETER: Final = 0.75
+_QUIETER_SHARE: Final = 0.75
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel in which nothing more is to be found."""
-_POOL: Final = ThreadPoolExecutor(N_AT_ONCE)
+_POOL: Final = ThreadPoolExecutor(N_WORKERS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,9 @@ class FreeRunProblem:
             + [0.0] * (len(self.names) - self.n_baseline)
         )
         driving = {name for run in self.runs for name in model.driving(run[0].run)}
-        self._seen_by = [(parameter.channel,) if parameter.channel else () for parameter in self._baseline] + [
+        self._channels_changed = [
+            (parameter.channel,) if parameter.channel else () for parameter in self._baseline
+        ] + [
             _only_channels(candidate, driving)
             for candidate in self.candidates
             for _ in candidate.effect.parameters
@@ -172,7 +174,7 @@ class FreeRunProblem:
         return np.array([1.0] * self.n_baseline + [0.0] * (len(self.names) - self.n_baseline))
 
     @property
-    def moves(self) -> NDArray[np.bool_]:
+    def changes_motion(self) -> NDArray[np.bool_]:
         """Which of the baseline's parameters change the motion, not only what a channel reads."""
         return np.array([not parameter.is_reading for parameter in self._baseline])
 
@@ -200,14 +202,14 @@ class FreeRunProblem:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
-        if works_alone() or len(self.runs) == 1:
+        if is_single_threaded() or len(self.runs) == 1:
             return self._of_runs_in_turn(theta)
         values, beside = self.values(theta), self._second_process()
         return np.concatenate(list(_POOL.map(lambda run: self._of_runs([run], values, beside), self.runs)))
 
     def residuals(self, thetas: Sequence[FloatArray]) -> list[FloatArray]:
         """Residuals of several sets of parameters, of as many at a time as there are threads."""
-        if works_alone() or len(thetas) == 1:
+        if is_single_threaded() or len(thetas) == 1:
             return [self.residual(theta) for theta in thetas]
         beside = self._second_process()
         return list(_POOL.map(lambda theta: self._of_runs_in_turn(theta, beside), thetas))
@@ -226,13 +228,13 @@ class FreeRunProblem:
         found = None if beside is None else beside.done(runs, values, self.candidates)
         return residuals_of_runs(self.model, runs, values, self.candidates) if found is None else found
 
-    def softness(self, share: float) -> FloatArray:
+    def inflation_weights(self, inflation: float) -> FloatArray:
         """Factors of the residuals as if all channels were known only to a share of their RMS."""
         return np.concatenate(
             [
                 np.sqrt(
                     observation.variance
-                    / (observation.variance + share**2 * float(np.mean(observation.spectra**2)))
+                    / (observation.variance + inflation**2 * float(np.mean(observation.spectra**2)))
                 ).ravel()
                 for run in self.runs
                 for observation in run
@@ -259,7 +261,7 @@ class FreeRunProblem:
             moved[column] += step if physical <= self.high[column] else -step
             places.append(moved)
 
-        beside = None if works_alone() else self._second_process()
+        beside = None if is_single_threaded() else self._second_process()
 
         def derivative(place: FloatArray, column: int) -> dict[int, FloatArray]:
             found = self._moved(place, column, beside)
@@ -268,7 +270,7 @@ class FreeRunProblem:
                 moved /= place[column] - theta[column]
             return found if all(np.isfinite(moved).all() for moved in found.values()) else {}
 
-        found = list((map if works_alone() else _POOL.map)(derivative, places, columns))
+        found = list((map if is_single_threaded() else _POOL.map)(derivative, places, columns))
         return BlockJacobian.of_blocks(
             found, [observation.spectra.size for run in self.runs for observation in run]
         )
@@ -282,7 +284,7 @@ class FreeRunProblem:
 
     def _moved(self, theta: FloatArray, column: int, beside: SecondProcess | None) -> dict[int, FloatArray]:
         """Residuals of the channels of runs which a parameter changes, by their number, after it was moved."""
-        owner, seen_by = run_of(self.names[column], self.model), self._seen_by[column]
+        owner, seen_by = run_of(self.names[column], self.model), self._channels_changed[column]
         runs: list[list[Observation]] = []
         blocks: list[int] = []
         n_before = 0
@@ -378,12 +380,12 @@ def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) ->
             if known.any()
         ]
         counts = [int(known.sum()) for known in observation.informative if known.any()]
-        for k in np.argsort(times)[: int(np.ceil(_QUIETER * len(times)))]:
+        for k in np.argsort(times)[: int(np.ceil(_QUIETER_SHARE * len(times)))]:
             total, n = total + times[k] * counts[k], n + counts[k]
     return float(np.sqrt(total / n)) if n else 0.0
 
 
-def mean_squares_that_repeat(
+def repeatable_mean_squares(
     tests: Sequence[Sequence[str]], observed: Sequence[Observation], residual: FloatArray
 ) -> dict[tuple[str, str], float]:
     """Mean square of what the informative residuals of repeats of one test have in common.
@@ -412,7 +414,7 @@ def mean_squares_that_repeat(
         first += observation.spectra.size
         if not observation.is_rough:
             parts[observation.run.name, observation.channel] = (
-                np.clip(own, -ROBUST, ROBUST),
+                np.clip(own, -HUBER_LIMIT, HUBER_LIMIT),
                 observation.informative,
             )
     found = {}
@@ -458,13 +460,13 @@ def _means(
     return {name: squares / n for name, (squares, n) in sums.items() if n >= least}
 
 
-def robust_weights(residual: FloatArray, limit: float = ROBUST) -> FloatArray:
+def robust_weights(residual: FloatArray, limit: float = HUBER_LIMIT) -> FloatArray:
     """Square roots of Huber's weights: a burst or a lost block counts with its size, not with its square."""
     size = np.abs(residual)
     return np.asarray(np.where(size > limit, np.sqrt(limit / np.maximum(size, 1e-300)), 1.0))
 
 
-def huber_cost(residual: FloatArray, limit: float = ROBUST) -> float:
+def huber_cost(residual: FloatArray, limit: float = HUBER_LIMIT) -> float:
     """Sum of squares, of which those beyond some standard deviations, four by default, grow only linearly."""
     size = np.abs(residual)
     within = np.minimum(size, limit)

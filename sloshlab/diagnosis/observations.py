@@ -23,9 +23,9 @@ ZERO_IS_KNOWN: Final = "zero_is_known"
 """Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
 _SLOWEST_INTEGRATED_HZ: Final = 5 * DRIFT_CORNER_HZ
-_SETTLES_S: Final = 1.0 / DRIFT_CORNER_HZ
+_FILTER_SETTLING_S: Final = 1.0 / DRIFT_CORNER_HZ
 """What a filter that removes drift makes of beginnings and ends."""
-FOR_NOTHING: Final = 100.0
+IGNORED_VARIANCE: Final = 100.0
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
 _LEAST_SHARE: Final = 1e-4
 """No channel is believed to better than this share of its RMS per coefficient; quantisation and rounding."""
@@ -137,14 +137,14 @@ def observations(
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
         spectra = _spectra(values, known, keeps_mean, n_bands, run)
         least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
-        variance = np.full(spectra.shape, max(_stated(variable), _white_level(spectra), least, 1e-300))
+        variance = np.full(spectra.shape, max(_stated_variance(variable), _white_level(spectra), least, 1e-300))
         is_rough = float(variable.attrs.get("known_to", 0.0)) > 0.0
         observation = Observation(run, name, keeps_mean, known, spectra, variance, is_rough=is_rough)
         lost = slow_displacements(observation, driving)
         if lost.any():
             times = observation.times_s
-            at_ends = (times - times[0] < _SETTLES_S) | (times[-1] - times < _SETTLES_S)
-            everywhere = FOR_NOTHING * (spectra[lost] ** 2).mean()
+            at_ends = (times - times[0] < _FILTER_SETTLING_S) | (times[-1] - times < _FILTER_SETTLING_S)
+            everywhere = IGNORED_VARIANCE * (spectra[lost] ** 2).mean()
             variance[lost & (at_ends[:, None] | (not knows_noise_of_drive))] += everywhere
         found.append(observation)
     return found
@@ -178,14 +178,14 @@ def noise_of_sensor(run: CaseRun, name: str) -> float:
     values, n_bands = np.asarray(variable.values, np.float64), _n_bands(run)
     known = np.isfinite(values)
     white = _white_level(_spectra(values, known, False, n_bands, run)) if known.sum() >= 2 * n_bands else 0.0
-    return float(np.sqrt(max(_stated(variable), white)))
+    return float(np.sqrt(max(_stated_variance(variable), white)))
 
 
 def _n_bands(run: CaseRun) -> int:
     return max(8, 2 * round(0.5 * BLOCK_S * run.attributes.sampling_rate_hz))
 
 
-def _stated(variable: xr.DataArray) -> float:
+def _stated_variance(variable: xr.DataArray) -> float:
     """Variance of the noise and of what no model need describe, as the recording states them; zero where not."""
     return float(variable.attrs.get("noise_std", 0.0)) ** 2 + float(variable.attrs.get("known_to", 0.0)) ** 2
 
@@ -196,7 +196,7 @@ def _is_integrated(run: CaseRun, driving: Sequence[str]) -> bool:
     return any(variable.attrs["quantity"] == "acceleration" for variable in present)
 
 
-def within_band(observed: Sequence[Observation]) -> list[Observation]:
+def within_informative_bands(observed: Sequence[Observation]) -> list[Observation]:
     """The channels of a run without the high bands in which none of them stands out of what does not repeat.
 
     Parameters

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.copied_process import CAN_FORK, copied, ended
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.forked_process import CAN_FORK, forked, terminate
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.side_by_side import works_alone
+from sloshlab.diagnosis.parallel_pieces import is_single_threaded
 
 FloatArray = NDArray[np.float64]
 Runs = Sequence[Sequence[Observation]]
@@ -31,7 +31,7 @@ Work = Callable[[DiagnosedModel, Runs, Values, Sequence[Candidate]], FloatArray]
 """Weighted residuals of runs, one after another."""
 _LEAST_COEFFICIENTS: Final = 20_000
 """Of all runs; a copy and its messages take longer than what is less."""
-_Thing = TypeVar("_Thing")
+_Item = TypeVar("_Item")
 
 
 class SecondProcess:
@@ -62,7 +62,7 @@ class SecondProcess:
         self._is_busy = threading.Lock()
         n = sum(observation.spectra.size for observation in self.observed.all)
         self._shared: FloatArray = np.frombuffer(mmap(-1, 8 * max(1, n)), np.float64)
-        self._process, self._line = copied(
+        self._process, self._line = forked(
             _serve, work, model, self.observed.all, self.candidates.all, self._shared
         )
 
@@ -84,7 +84,7 @@ class SecondProcess:
             self._is_busy.release()
 
     def _end(self) -> None:
-        ended(self._process, self._line)
+        terminate(self._process, self._line)
 
 
 _PRESENT: Final[weakref.WeakKeyDictionary[DiagnosedModel, SecondProcess]] = weakref.WeakKeyDictionary()
@@ -109,7 +109,7 @@ def second_process(
     SecondProcess or None
         None where it would be of no use or of no good: small problems, other systems, code that is not ours.
     """
-    if works_alone() or not (CAN_FORK and model.may_be_copied):
+    if is_single_threaded() or not (CAN_FORK and model.may_be_forked):
         return None
     present = _PRESENT.get(model)
     observed = [observation for run in runs for observation in run]
@@ -126,18 +126,18 @@ def second_process(
     return found
 
 
-class _Numbered(Generic[_Thing]):
+class _Numbered(Generic[_Item]):
     """Things in the order in which they were given, told apart by which they are, not by what they equal."""
 
-    def __init__(self, things: Iterable[_Thing]) -> None:
-        self.all = tuple(things)
-        self._numbers = {id(thing): i for i, thing in enumerate(self.all)}
+    def __init__(self, items: Iterable[_Item]) -> None:
+        self.all = tuple(items)
+        self._numbers = {id(item): i for i, item in enumerate(self.all)}
 
-    def __contains__(self, thing: _Thing) -> bool:
-        return id(thing) in self._numbers
+    def __contains__(self, item: _Item) -> bool:
+        return id(item) in self._numbers
 
-    def number_of(self, thing: _Thing) -> int:
-        return self._numbers[id(thing)]
+    def number_of(self, item: _Item) -> int:
+        return self._numbers[id(item)]
 
 
 def _serve(

@@ -18,7 +18,7 @@ from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
 _BASE: Final = "acceleration_root"
-_SHARE_OF_ONE_NUMBER: Final = 0.9
+_LARGEST_COHERENCE: Final = 0.9
 """Of the mean square of a channel that may be another one's, with a gain and a delay, before they are alike."""
 _MOST_PEAKS: Final = 3
 ACROSS_A_BAND: Final = (0.0, -0.4, 0.4, -0.8, 0.8)
@@ -62,14 +62,14 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
         longest_run_s=max(observed[0].run.duration_s for observed in fitting),
         blocks=model.blocks,
         peaks=_sizes(fitting, model, lambda values: np.nanmax(np.abs(values))),
-        missed_hz=most_missed_hz(fitting, problem.residual(problem.theta_of(fit.values))),
+        missed_hz=residual_peaks_hz(fitting, problem.residual(problem.theta_of(fit.values))),
         n_modes=0 if model.twin.structure is None else model.twin.structure.masses_kg.size,
-        unlike_base=_unlike_base(fitting),
+        incoherent_with_base=_incoherent_with_base(fitting),
         has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
     )
 
 
-def _unlike_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:
+def _incoherent_with_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:
     """Channels whose analytic signal is not that of the accelerometer of the base times one complex number.
 
     Of all driven runs together: steady motion of one frequency has one such number, motion of several has not.
@@ -86,16 +86,14 @@ def _unlike_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:
             part = np.array([np.vdot(base, own), np.vdot(base, base), np.vdot(own, own)])
             products.setdefault(name, []).append(part)
     sums = {name: np.abs(np.sum(parts, axis=0)) for name, parts in products.items()}
-    return frozenset(
-        name for name, (both, base, own) in sums.items() if both**2 < _SHARE_OF_ONE_NUMBER * base * own
-    )
+    return frozenset(name for name, (both, base, own) in sums.items() if both**2 < _LARGEST_COHERENCE * base * own)
 
 
 def _analytic(values: FloatArray) -> NDArray[np.complex128]:
     return np.asarray(hilbert(np.nan_to_num(np.asarray(values, np.float64) - np.nanmean(values))))
 
 
-def most_missed_hz(
+def residual_peaks_hz(
     fitting: Sequence[Sequence[Observation]], residual: FloatArray, places: Sequence[float] = (0.0,)
 ) -> tuple[float, ...]:
     """Frequencies of the highest peaks of weighted residuals, all runs and channels together.

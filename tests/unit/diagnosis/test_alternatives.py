@@ -143,7 +143,7 @@ def test_one_name_in_two_blocks_is_two_explanations() -> None:
     found = findings(BASELINE, [left(0.0, 0.0, damper[0]), left(1.0, 1.0, damper[1])])
     verdict = verdict_of(found)
     assert verdict.kind == "indistinguishable"
-    assert [alternative.named_in_blocks for alternative in verdict.alternatives] == [
+    assert [alternative.names_with_blocks for alternative in verdict.alternatives] == [
         ("structure.viscous_damping",),
         ("tank.viscous_damping",),
     ]

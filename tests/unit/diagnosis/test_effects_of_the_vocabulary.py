@@ -91,7 +91,7 @@ def test_another_form_of_an_effect_answers_with_its_name_block_and_parameters() 
         assert required[original.name] <= {parameter.name for parameter in form.parameters}
 
 
-@pytest.mark.parametrize(("one", "other"), LOOK_ALIKES)
+@pytest.mark.parametrize(("first", "other"), LOOK_ALIKES)
 def test_look_alikes_know_each_other_and_what_separates_them(first: str, other: str) -> None:
     assert any(other in effect.look_alikes for effect in named(first))
     if " + " not in other:

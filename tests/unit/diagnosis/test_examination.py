@@ -11,7 +11,7 @@ import pytest
 from recorded_oscillators import MASS_KG, NOISE, effect, motion, rig, run_of
 
 from sloshlab.diagnosis.candidate import known_effects
-from sloshlab.diagnosis.evidence import FORCE_TERMS, SENSOR_TERMS, TAKES
+from sloshlab.diagnosis.evidence import DISSIPATIVE, FORCE_TERMS, SENSOR_TERMS
 from sloshlab.diagnosis.examination import Examination, examination_facts, examined, owning_block, seen_at
 from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.observations import observations
@@ -53,7 +53,7 @@ def test_friction_is_spoken_for_and_a_spring_is_not(friction: tuple[Any, Examina
     examination = friction[1]
     on_friction = examination.evidence_on(effect("structure.coulomb_friction"))
     on_spring = examination.evidence_on(effect("structure.cubic_stiffness"))
-    assert TAKES in on_friction.speaks_for
+    assert DISSIPATIVE in on_friction.speaks_for
     assert not on_friction.speaks_against
     assert len(on_spring.speaks_against) >= 2
 
@@ -112,7 +112,7 @@ def test_the_part_of_the_cycle_in_which_a_force_is_no_spring_and_no_damper(force
     motion = np.column_stack([np.cos(phase), -np.sin(phase), -np.cos(phase)])
     lacking = SimpleNamespace(motion=motion, force_n=force(motion[:, 0], motion[:, 1]))
     cut: Any = SimpleNamespace(forces=lambda place: [lacking])
-    characters: Any = {"structure": SimpleNamespace(is_there=True)}
+    characters: Any = {"structure": SimpleNamespace(exceeds_noise=True)}
     effect_ = SimpleNamespace(effect=SimpleNamespace(block="structure"))
     best: Any = SimpleNamespace(channels=(), fit=SimpleNamespace(candidates=[effect_]))
     assert seen_at(Examination(cut, characters, (), [], {}), best) == words

@@ -11,7 +11,7 @@ import pytest
 from recorded_oscillators import DRY_KG, LIQUID_KG, RATE_HZ, RIG, effect, run_of
 
 from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, Surroundings, channels_of, together
+from sloshlab.diagnosis.candidate import Candidate, Surroundings, channels_of, joined_channels
 from sloshlab.diagnosis.free_run_fit import fitted_from
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.observations import observations
@@ -115,4 +115,4 @@ def test_what_an_amplifier_or_a_clock_does_is_sought_on_both_cells(tmp_path: Pat
     of_one = replace(of_two, channels={"acceleration_control": 1.0, "force_cell_1": 1.0})
     assert BOTH in effect(f"sensor.{name}").places(of_two)
     assert not any("+" in place for place in effect(f"sensor.{name}").places(of_one))
-    assert channels_of(together(CELLS)) == CELLS
+    assert channels_of(joined_channels(CELLS)) == CELLS

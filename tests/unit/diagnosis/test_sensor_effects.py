@@ -194,7 +194,7 @@ def test_at_one_frequency_the_base_leaks_only_into_what_it_does_not_move_alike(m
     leaks = effect("sensor.cross_talk")
     into_the_base = {"acceleration_root<acceleration_tip", "acceleration_root<displacement_tank"}
     assert set(leaks.places(at)) == into_the_base
-    unlike = replace(at, unlike_base=frozenset({"acceleration_tip"}))
+    unlike = replace(at, incoherent_with_base=frozenset({"acceleration_tip"}))
     assert set(leaks.places(unlike)) == into_the_base | {"acceleration_tip<acceleration_root"}
 
 

@@ -16,7 +16,7 @@ _PARTS_OF_A_RUN: Final = (1, 4)
 _QUANTILE: Final = 0.95
 
 
-def scatter_of_runs(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJacobian) -> dict[str, float]:
+def cluster_robust_errors(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJacobian) -> dict[str, float]:
     """Standard errors of the effects' numbers if what is left belongs to runs, or parts of runs, as a whole.
 
     Residuals of one stretch of a run are not independent: a chaotic liquid damps more for a while than it does on
