@@ -46,7 +46,9 @@ def worst_place(diagnosis: Diagnosis) -> str:
     """Where the largest force is missing."""
     cut = diagnosis.examination.cut
     there = {
-        place: character for place, character in diagnosis.examination.characters.items() if character.is_there
+        place: character
+        for place, character in diagnosis.examination.characters.items()
+        if character.exceeds_noise
     }
     if cut is None:
         raise NothingToDrawError("this twin has no measured interfaces")

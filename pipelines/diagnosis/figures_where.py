@@ -52,11 +52,11 @@ def block_shares(name: str, diagnosis: Diagnosis) -> ReportFigure:
     axes.set(xlim=(0, _TOP), ylim=(len(blocks) - 0.5, -0.5), xlabel="share of the mismatch beyond noise")
     axes.set_xticks(np.linspace(0, 1, 6), [f"{share} %" for share in range(0, 101, 20)])
     axes.grid(axis="y", visible=False)
-    doubted = f" The channel {plain(cut.doubted)} contradicts the others and is left out." if cut.doubted else ""
+    suspect = f" The channel {plain(cut.suspect)} contradicts the others and is left out." if cut.suspect else ""
     caption = (
         "The system cut open at its measured interfaces, each block of the retuned baseline on its measured "
         "input; what a block's own parameters may be off within their tolerances counts for none. Lines are 90 % "
-        f"intervals by drawing stretches of the runs.{doubted}"
+        f"intervals by drawing stretches of the runs.{suspect}"
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
 

@@ -13,7 +13,7 @@ from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.numbers import MISSING, signed, text
 from pipelines.report.tables import Table
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
-from sloshlab.diagnosis.evidence import ALONE, CANNOT_TELL
+from sloshlab.diagnosis.evidence import CANNOT_TELL, SINGLE_CHANNEL
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.units import named_and_units
 from sloshlab.diagnosis.verdict.interval import interval
@@ -165,7 +165,7 @@ def sensor_table(diagnosis: Diagnosis) -> Table | None:
             sensor.channel,
             text(sensor.ratio, 3),
             text(sensor.disagreement_without, 3),
-            text(sensor.demand_without_n2**0.5, 3),
+            text(sensor.missing_force_without_n2**0.5, 3),
         )
         for sensor in sorted(cut.sensors, key=lambda sensor: -sensor.ratio)
     ]
@@ -192,10 +192,10 @@ def sensor_error_table(diagnosis: Diagnosis) -> Table | None:
             _holds(answer.holds),
         )
         for answer in answers
-        if answer.term != ALONE
+        if answer.term != SINGLE_CHANNEL
     ]
     caption = "Share of the variance of its error that each form explains alone, with 90 % intervals."
-    return Table(f"What {cut.doubted} reads wrong", ("form", "share", "holds"), tuple(rows), caption)
+    return Table(f"What {cut.suspect} reads wrong", ("form", "share", "holds"), tuple(rows), caption)
 
 
 def answers_table(diagnosis: Diagnosis, place: str) -> Table:
@@ -244,10 +244,10 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
             for_ += on.speaks_for
             against += on.speaks_against
             open_ += on.still_open
-            doubted = examination.cut.doubted if examination.cut else ""
-            if candidate.effect.block == "sensor" and doubted:
+            suspect = examination.cut.suspect if examination.cut else ""
+            if candidate.effect.block == "sensor" and suspect:
                 own = candidate.channel.partition("<")[0]
-                (for_ if own == doubted else against).append(f"{doubted} contradicts the others")
+                (for_ if own == suspect else against).append(f"{suspect} contradicts the others")
         gain = found.retuned.held_out - one.held_out
         rows.append(
             (

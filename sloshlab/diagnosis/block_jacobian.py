@@ -96,10 +96,10 @@ class BlockJacobian:
         """
         place = {column: i for i, column in enumerate(columns)}
         blocks, first = [], 0
-        for one in (self.blocks[i] for i in chosen):
-            size = one.values.shape[0]
-            own = np.array([place[column] for column in one.columns.tolist()], np.intp)
-            blocks.append(_Block(slice(first, first + size), own, one.values.copy()))
+        for block in (self.blocks[i] for i in chosen):
+            size = block.values.shape[0]
+            own = np.array([place[column] for column in block.columns.tolist()], np.intp)
+            blocks.append(_Block(slice(first, first + size), own, block.values.copy()))
             first += size
         return BlockJacobian(len(columns), tuple(blocks))
 

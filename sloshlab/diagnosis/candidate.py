@@ -49,7 +49,7 @@ class Surroundings:
         Frequencies about which the retuned baseline misses the recordings most: there a mode may be missing.
     n_modes : int
         Of the structure.
-    unlike_base : frozenset of str
+    incoherent_with_base : frozenset of str
         Channels that do not read the base's motion times a gain, with a delay.
     """
 
@@ -70,7 +70,7 @@ class Surroundings:
     has_one_frequency: bool = False
     missed_hz: tuple[float, ...] = ()
     n_modes: int = 1
-    unlike_base: frozenset[str] = frozenset()
+    incoherent_with_base: frozenset[str] = frozenset()
 
     @property
     def reading(self) -> float:
@@ -111,19 +111,19 @@ class EffectParameter:
 
 
 Numbers = Mapping[str, float]
-_TOGETHER: Final = "+"
+_JOINED: Final = "+"
 _FROM: Final = "<"
 
 
-def together(names: Sequence[str]) -> str:
+def joined_channels(names: Sequence[str]) -> str:
     """Name of a place that is several channels of one device.
 
     Examples
     --------
-    >>> together(["force_cell_1", "force_cell_2"])
+    >>> joined_channels(["force_cell_1", "force_cell_2"])
     'force_cell_1+force_cell_2'
     """
-    return _TOGETHER.join(names)
+    return _JOINED.join(names)
 
 
 def channels_of(place: str) -> tuple[str, ...]:
@@ -134,34 +134,34 @@ def channels_of(place: str) -> tuple[str, ...]:
     >>> channels_of("force_cell_1+force_cell_2"), channels_of("acceleration_tip<displacement_tank")
     (('force_cell_1', 'force_cell_2'), ('acceleration_tip',))
     """
-    return tuple(place.partition(_FROM)[0].split(_TOGETHER))
+    return tuple(place.partition(_FROM)[0].split(_JOINED))
 
 
-def _everywhere(surroundings: Surroundings) -> bool:
+def _always_possible(surroundings: Surroundings) -> bool:
     """Acts in any twin."""
     del surroundings
     return True
 
 
-def _on_no_channel(surroundings: Surroundings) -> Sequence[str]:
+def _no_channel(surroundings: Surroundings) -> Sequence[str]:
     """Acts on a block as a whole."""
     del surroundings
     return [""]
 
 
-def _its_own_limits(surroundings: Surroundings) -> Mapping[str, tuple[float, float]]:
+def _no_other_limits(surroundings: Surroundings) -> Mapping[str, tuple[float, float]]:
     """Has the same bounds at every place."""
     del surroundings
     return {}
 
 
-def _at_its_starts(surroundings: Surroundings) -> Sequence[Numbers]:
+def _no_further_starts(surroundings: Surroundings) -> Sequence[Numbers]:
     """Is looked at where it starts alone."""
     del surroundings
     return []
 
 
-def nowhere(size: float) -> Sequence[Mapping[str, tuple[float, float]]]:
+def never_distinct(size: float) -> Sequence[Mapping[str, tuple[float, float]]]:
     """Is worth no look where it differs from its special case."""
     del size
     return []
@@ -213,15 +213,15 @@ class Effect:
     extension: Callable[[Numbers, Surroundings, str], Extension]
     look_alikes: tuple[str, ...] = ()
     separated_by: str = ""
-    needs: Callable[[Surroundings], bool] = _everywhere
-    places: Callable[[Surroundings], Sequence[str]] = _on_no_channel
+    needs: Callable[[Surroundings], bool] = _always_possible
+    places: Callable[[Surroundings], Sequence[str]] = _no_channel
     spoken_for_by: tuple[str, ...] = ()
     includes: tuple[str, ...] = ()
-    limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = _its_own_limits
-    differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = nowhere
+    limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = _no_other_limits
+    differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = never_distinct
     variant_of: str = ""
     size: tuple[str, ...] = ()
-    sought_at: Callable[[Surroundings], Iterable[Numbers]] = _at_its_starts
+    sought_at: Callable[[Surroundings], Iterable[Numbers]] = _no_further_starts
 
     @property
     def known_as(self) -> str:
@@ -259,9 +259,9 @@ class Candidate:
         return self._named(self.effect.sought_at)
 
     @property
-    def comes_in_jumps(self) -> bool:
+    def is_multimodal(self) -> bool:
         """Whether small changes of its numbers make it another one, so that it is sought at many places."""
-        return self.effect.sought_at is not _at_its_starts
+        return self.effect.sought_at is not _no_further_starts
 
     def _named(self, sets: Callable[[Surroundings], Iterable[Numbers]]) -> list[dict[str, float]]:
         return [

@@ -130,14 +130,14 @@ def read_case(folder: str | Path, *, with_rig: bool = True) -> Case:
     return Case(path.resolve().name, path, rig, tuple(runs))
 
 
-def _same_test(one: CaseRun, other: CaseRun) -> bool:
-    if any(getattr(one.attributes, name) != getattr(other.attributes, name) for name in _SAME_TEST):
+def _same_test(first: CaseRun, other: CaseRun) -> bool:
+    if any(getattr(first.attributes, name) != getattr(other.attributes, name) for name in _SAME_TEST):
         return False
-    if _name_of_test(one) != _name_of_test(other):
+    if _name_of_test(first) != _name_of_test(other):
         return False
-    if one.recording.sizes["time"] != other.recording.sizes["time"]:
+    if first.recording.sizes["time"] != other.recording.sizes["time"]:
         return False
-    return bool(abs(np.log(max(level(one), 1e-300) / max(level(other), 1e-300))) < _LEVELS_AGREE)
+    return bool(abs(np.log(max(level(first), 1e-300) / max(level(other), 1e-300))) < _LEVELS_AGREE)
 
 
 def _name_of_test(run: CaseRun) -> str:

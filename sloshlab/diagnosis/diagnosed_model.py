@@ -27,7 +27,7 @@ class DiagnosedModel(Protocol):
         Those whose names end with ``release of RUN`` or ``in RUN`` belong to that run alone.
     blocks : tuple of str
         Of `sloshlab.diagnosis.candidate.BLOCKS`, those in which something may be missing.
-    may_be_copied : bool
+    may_be_forked : bool
         Whether a copy of this process simulates the same and costs little memory; code of others may not bear to
         be copied as it runs.
     """
@@ -35,7 +35,7 @@ class DiagnosedModel(Protocol):
     runs: tuple[CaseRun, ...]
     parameters: tuple[BaselineParameter, ...]
     blocks: tuple[str, ...]
-    may_be_copied: bool
+    may_be_forked: bool
 
     @property
     def twin(self) -> Twin:

@@ -12,29 +12,31 @@ from typing import Final
 
 CANNOT_TELL: Final = "cannot tell"
 
-TAKES, GIVES, NO_WORK = "takes energy", "gives energy", "does no work"
-SPRING, FRICTION = "odd in displacement", "odd in velocity"
-EVEN, SKEW = "even", "odd in both"
-STATE, MEMORY, AGES = "function of the state", "memory", "changes along the run"
-RATE_FREE, RATE = "rate-independent", "grows with rate"
+DISSIPATIVE, ENERGY_INPUT, CONSERVATIVE = "takes energy", "gives energy", "does no work"
+ODD_IN_DISPLACEMENT, ODD_IN_VELOCITY = "odd in displacement", "odd in velocity"
+EVEN, ODD_IN_BOTH = "even", "odd in both"
+STATE_FUNCTION, MEMORY, TIME_VARYING = "function of the state", "memory", "changes along the run"
+RATE_INDEPENDENT, RATE_DEPENDENT = "rate-independent", "grows with rate"
 WORK_1, WORK_2, WORK_3 = "work ∝ amplitude", "work ∝ amplitude²", "work ∝ amplitude³"
 ONSET, NO_ONSET = "onset", "no onset"
 CONSTANT = "constant part"
 HALF_ORDER, SECOND_ORDER, THIRD_ORDER = "half order", "second order", "third order"
 IMPULSIVE = "impulsive"
 FORCE_TERMS: Final = {
-    TAKES: "the force takes energy out of the motion",
-    GIVES: "the force gives energy to the motion",
-    NO_WORK: "the force does no work over a cycle",
-    SPRING: "its largest part is odd in the displacement (acceleration of a tank) and even in the velocity",
-    FRICTION: "its largest part is odd in the velocity and even in the displacement",
+    DISSIPATIVE: "the force takes energy out of the motion",
+    ENERGY_INPUT: "the force gives energy to the motion",
+    CONSERVATIVE: "the force does no work over a cycle",
+    ODD_IN_DISPLACEMENT: (
+        "its largest part is odd in the displacement (acceleration of a tank) and even in the velocity"
+    ),
+    ODD_IN_VELOCITY: "its largest part is odd in the velocity and even in the displacement",
     EVEN: "a part is even in both",
-    SKEW: "a part is odd in both",
-    STATE: "it is a function of the present motion",
+    ODD_IN_BOTH: "a part is odd in both",
+    STATE_FUNCTION: "it is a function of the present motion",
     MEMORY: "it depends on the history of the motion",
-    AGES: "it changes along a run",
-    RATE_FREE: "its work per cycle does not depend on the frequency",
-    RATE: "its work per cycle grows with the frequency",
+    TIME_VARYING: "it changes along a run",
+    RATE_INDEPENDENT: "its work per cycle does not depend on the frequency",
+    RATE_DEPENDENT: "its work per cycle grows with the frequency",
     WORK_1: "its work per cycle grows as the amplitude",
     WORK_2: "its work per cycle grows as the square of the amplitude",
     WORK_3: "its work per cycle grows as the cube of the amplitude",
@@ -47,24 +49,29 @@ FORCE_TERMS: Final = {
     IMPULSIVE: "it comes in blows",
 }
 
-GAIN, LATE, LEAKS, SLOW = "proportional to the reading", "follows its rate", "follows its integral", "slow trend"
-LINE, CLOCK, CLIPS, TALKS = (
+PROPORTIONAL_TO_READING, PROPORTIONAL_TO_RATE, PROPORTIONAL_TO_INTEGRAL, TREND = (
+    "proportional to the reading",
+    "follows its rate",
+    "follows its integral",
+    "slow trend",
+)
+MAINS_LINE, CLOCK_DRIFT, SATURATING, CROSS_TALK = (
     "a line of the mains",
     "rate growing along the run",
     "at the largest readings",
     "another channel",
 )
-ALONE = "one channel alone"
+SINGLE_CHANNEL = "one channel alone"
 SENSOR_TERMS: Final = {
-    ALONE: "one channel contradicts the others, which agree",
-    GAIN: "what it reads wrong is proportional to what it reads",
-    LATE: "what it reads wrong follows the rate of what it reads",
-    LEAKS: "what it reads wrong follows the integral of what it reads",
-    SLOW: "what it reads wrong is a trend along the run",
-    LINE: "what it reads wrong is a line at 50 or 60 Hz",
-    CLOCK: "what it reads wrong follows its rate, ever more along the run",
-    CLIPS: "it reads wrong where it reads most",
-    TALKS: "what it reads wrong is what another channel reads",
+    SINGLE_CHANNEL: "one channel contradicts the others, which agree",
+    PROPORTIONAL_TO_READING: "what it reads wrong is proportional to what it reads",
+    PROPORTIONAL_TO_RATE: "what it reads wrong follows the rate of what it reads",
+    PROPORTIONAL_TO_INTEGRAL: "what it reads wrong follows the integral of what it reads",
+    TREND: "what it reads wrong is a trend along the run",
+    MAINS_LINE: "what it reads wrong is a line at 50 or 60 Hz",
+    CLOCK_DRIFT: "what it reads wrong follows its rate, ever more along the run",
+    SATURATING: "it reads wrong where it reads most",
+    CROSS_TALK: "what it reads wrong is what another channel reads",
 }
 TERMS: Final = {**FORCE_TERMS, **SENSOR_TERMS}
 
@@ -94,7 +101,7 @@ def evidence(terms: tuple[str, ...], says: Mapping[str, bool]) -> Evidence:
 
     Examples
     --------
-    >>> evidence((TAKES, WORK_1, ONSET), {TAKES: True, WORK_1: False})
+    >>> evidence((DISSIPATIVE, WORK_1, ONSET), {DISSIPATIVE: True, WORK_1: False})
     Evidence(speaks_for=('takes energy',), speaks_against=('work ∝ amplitude',), still_open=('onset',))
     """
     return Evidence(

@@ -19,7 +19,7 @@ from sloshlab.diagnosis.latent_force import EITHER, RunForces
 from sloshlab.diagnosis.mismatch import mismatches, summary
 from sloshlab.diagnosis.residual_maps import ResidualMaps, residual_maps
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.sensor_character import SensorAnswer, said, sensor_character
+from sloshlab.diagnosis.sensor_character import SensorAnswer, decided_terms, sensor_character
 
 FloatArray = NDArray[np.float64]
 _CLEARLY = 1.5
@@ -52,7 +52,7 @@ class Examination:
     def says(self, block: str) -> dict[str, bool]:
         """Terms that tests on a block found to hold, and not to hold."""
         if block == "sensor":
-            return said(self.sensor)
+            return decided_terms(self.sensor)
         for place in (block, EITHER) if block != "excitation" else ("structure", EITHER):
             character = self.characters.get(place)
             if character is not None:
@@ -91,9 +91,9 @@ def examined(found: Findings, seed: int = 0) -> Examination:
             seed=seed,
         )
     sensor: tuple[SensorAnswer, ...] = ()
-    if cut.doubted:
+    if cut.suspect:
         usable = [run for run in found.fitting if run]
-        sensor = sensor_character(usable, cut.runs, cut.doubted, seed)
+        sensor = sensor_character(usable, cut.runs, cut.suspect, seed)
     return Examination(cut, characters, sensor, maps, where)
 
 
@@ -116,7 +116,7 @@ def owning_block(examination: Examination) -> str:
     """The block that surely owns most of the mismatch; empty where the cut cannot tell."""
     if examination.cut is None:
         return ""
-    sure = [one.block for one in examination.cut.blocks if one.share > _MOST and one.low > 0.5]
+    sure = [cut.block for cut in examination.cut.blocks if cut.share > _MOST and cut.low > 0.5]
     return sure[0] if len(sure) == 1 and sure[0] != EITHER else ""
 
 
@@ -132,28 +132,30 @@ def seen_at(examination: Examination, best: Explanation | None) -> str:
     faulty = best.channels if best is not None else ()
     worst = (faulty or examination.where.get("channels") or [""])[0]
     if faulty:
-        cycle = [_of_a_channel(one) for one in examination.maps if one.channel == worst]
+        cycle = [
+            _cycle_of_channel(residual_map) for residual_map in examination.maps if residual_map.channel == worst
+        ]
     else:
         block = best.fit.candidates[0].effect.block if best is not None else owning_block(examination)
-        cycle = [_of_a_force(examination, block)]
+        cycle = [_cycle_of_force(examination, block)]
     words = " ".join(part for part in (*cycle, _levels(examination, worst)) if part)
     return f"seen {words}" if words else ""
 
 
-def _of_a_channel(one: ResidualMaps) -> str:
+def _cycle_of_channel(residual_map: ResidualMaps) -> str:
     """Words for the part of the cycle in which a faulty channel reads most of its error."""
-    if one.phase is None or not np.isfinite(one.phase.excess).all():
+    if residual_map.phase is None or not np.isfinite(residual_map.phase.excess).all():
         return ""
-    return _in_the_cycle(one.phase.middles, np.maximum(one.phase.excess, 0.0))
+    return _in_the_cycle(residual_map.phase.middles, np.maximum(residual_map.phase.excess, 0.0))
 
 
-def _of_a_force(examination: Examination, place: str) -> str:
+def _cycle_of_force(examination: Examination, place: str) -> str:
     """The same for the force that a block lacks beyond its own spring, damper and mass.
 
     A motion that lags behind says nothing on what made it lag.
     """
     character = examination.characters.get(place)
-    if examination.cut is None or character is None or not character.is_there:
+    if examination.cut is None or character is None or not character.exceeds_noise:
         return ""
     phases, squares = [], []
     for force in examination.cut.forces(place):
@@ -188,7 +190,9 @@ def _in_the_cycle(phase: FloatArray, excess: FloatArray) -> str:
 def _levels(examination: Examination, worst: str) -> str:
     """Levels that hold most of the mismatch, if they are not all."""
     levels = examination.where.get("acceleration_g")
-    profile = next((one.level for one in examination.maps if one.channel == worst), None)
+    profile = next(
+        (residual_map.level for residual_map in examination.maps if residual_map.channel == worst), None
+    )
     if not levels or profile is None:
         return ""
     low, high = levels
@@ -213,17 +217,17 @@ def examination_facts(examination: Examination, found: Findings) -> dict[str, An
         facts["interface_cut"] = {
             "blocks": [
                 {
-                    "block": one.block,
-                    "input": one.input,
-                    "output": one.output,
-                    "share": _estimate(one.share, one.low, one.high),
-                    "size": _number(one.size),
-                    "noise": _number(one.noise),
-                    "remark": one.remark,
+                    "block": block.block,
+                    "input": block.input,
+                    "output": block.output,
+                    "share": _estimate(block.share, block.low, block.high),
+                    "size": _number(block.size),
+                    "noise": _number(block.noise),
+                    "remark": block.remark,
                 }
-                for one in cut.blocks
+                for block in cut.blocks
             ],
-            "doubted_channel": cut.doubted,
+            "doubted_channel": cut.suspect,
             "remark": cut.remark,
         }
     for place, character in examination.characters.items():
@@ -234,14 +238,18 @@ def examination_facts(examination: Examination, found: Findings) -> dict[str, An
         }
     if examination.sensor:
         facts["characters"]["sensor"] = {
-            "channel": cut.doubted if cut else "",
+            "channel": cut.suspect if cut else "",
             "answers": [
                 {
                     "question": "share of its error",
-                    "finding": one.term if one.holds else CANNOT_TELL if one.holds is None else f"not: {one.term}",
-                    **(_estimate(one.share, one.low, one.high) or {}),
+                    "finding": answer.term
+                    if answer.holds
+                    else CANNOT_TELL
+                    if answer.holds is None
+                    else f"not: {answer.term}",
+                    **(_estimate(answer.share, answer.low, answer.high) or {}),
                 }
-                for one in examination.sensor
+                for answer in examination.sensor
             ],
         }
     return facts
@@ -258,7 +266,7 @@ def _answer(answer: Answer) -> dict[str, Any]:
 
 
 def _estimate(value: float, low: float, high: float) -> dict[str, float] | None:
-    if not all(math.isfinite(one) for one in (value, low, high)):
+    if not all(math.isfinite(bound) for bound in (value, low, high)):
         return None
     return {"estimate": value, "low": low, "high": high, "level": 0.90}
 

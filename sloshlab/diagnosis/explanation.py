@@ -40,7 +40,7 @@ class Explanation:
         The same per run and channel, of fitted and held-out runs.
     rms_without_bursts : float
         As `held_out_rms`, of the quieter three quarters of the times of every channel and run.
-    repeating : dict
+    repeatable : dict
         Mean square of what repeats of a test have in common of their residuals, per name of the test's first run
         and channel.
     spread : dict
@@ -55,15 +55,15 @@ class Explanation:
     by_channel: dict[str, float] = field(default_factory=dict)
     by_run: dict[tuple[str, str], float] = field(default_factory=dict)
     rms_without_bursts: float = 0.0
-    repeating: dict[tuple[str, str], float] = field(default_factory=dict)
+    repeatable: dict[tuple[str, str], float] = field(default_factory=dict)
     spread: dict[str, float] = field(default_factory=dict)
     scatter: dict[str, float] = field(default_factory=dict)
 
     @property
-    def shared_by_repeats(self) -> list[list[float]]:
-        """`repeating` of every test, one number per channel."""
+    def repeatable_by_test(self) -> list[list[float]]:
+        """`repeatable` of every test, one number per channel."""
         by_test: dict[str, list[float]] = {}
-        for (test, _), in_common in self.repeating.items():
+        for (test, _), in_common in self.repeatable.items():
             by_test.setdefault(test, []).append(in_common)
         return list(by_test.values())
 
@@ -78,7 +78,7 @@ class Explanation:
         return tuple(candidate.key for candidate in self.fit.candidates)
 
     @property
-    def named_in_blocks(self) -> tuple[str, ...]:
+    def names_with_blocks(self) -> tuple[str, ...]:
         """Blocks and names of its effects, sorted; several channels may have the same."""
         return tuple(
             sorted(f"{candidate.effect.block}.{candidate.effect.known_as}" for candidate in self.fit.candidates)
@@ -95,7 +95,7 @@ class Explanation:
         )
 
     @property
-    def rests_on_a_bound(self) -> bool:
+    def has_effect_at_bound(self) -> bool:
         """Whether a number is as large or as small as its effect allows: then it is something else."""
         return any(
             bound != 0
@@ -160,7 +160,7 @@ class Findings:
         return any(len(test) > 1 for test in self.case.tests())
 
     @property
-    def judged_tests(self) -> frozenset[str]:
+    def held_out_tests(self) -> frozenset[str]:
         """Names of the first runs of tests of which runs are held out."""
         judged = {run.name for run in self.split.held_out}
         tests = self.case.names_by_test()
@@ -169,12 +169,12 @@ class Findings:
     @property
     def n_fitting(self) -> int:
         """Coefficients of the fitting runs."""
-        return sum(one.spectra.size for run in self.fitting for one in run)
+        return sum(observation.spectra.size for run in self.fitting for observation in run)
 
     @property
     def n_held_out(self) -> int:
         """Coefficients of the held-out runs."""
-        return sum(one.spectra.size for run in self.held_out for one in run)
+        return sum(observation.spectra.size for run in self.held_out for observation in run)
 
 
 def explained_extension(explanation: Explanation) -> Extension:

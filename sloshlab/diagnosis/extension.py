@@ -65,22 +65,22 @@ class Extension:
         """Both together; the other's changes of liquid and structure come after this one's."""
         return Extension(
             self.terms + other.terms,
-            _one_after_another(self.liquid, other.liquid),
+            _composed(self.liquid, other.liquid),
             self.faults + other.faults,
             self.key + other.key,
-            _one_after_another(self.structure, other.structure),
+            _composed(self.structure, other.structure),
         )
 
 
 _Changed = TypeVar("_Changed")
 
 
-def _one_after_another(
+def _composed(
     first: Callable[[_Changed], _Changed] | None, second: Callable[[_Changed], _Changed] | None
 ) -> Callable[[_Changed], _Changed] | None:
     if first is None or second is None:
         return first or second
-    return lambda one: second(first(one))
+    return lambda unchanged: second(first(unchanged))
 
 
 NOTHING = Extension()

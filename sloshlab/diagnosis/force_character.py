@@ -16,26 +16,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.evidence import (
-    AGES,
     CANNOT_TELL,
+    CONSERVATIVE,
     CONSTANT,
+    DISSIPATIVE,
+    ENERGY_INPUT,
     EVEN,
-    FRICTION,
-    GIVES,
     HALF_ORDER,
     IMPULSIVE,
     MEMORY,
     NO_ONSET,
-    NO_WORK,
+    ODD_IN_BOTH,
+    ODD_IN_DISPLACEMENT,
+    ODD_IN_VELOCITY,
     ONSET,
-    RATE,
-    RATE_FREE,
+    RATE_DEPENDENT,
+    RATE_INDEPENDENT,
     SECOND_ORDER,
-    SKEW,
-    SPRING,
-    STATE,
-    TAKES,
+    STATE_FUNCTION,
     THIRD_ORDER,
+    TIME_VARYING,
     WORK_1,
     WORK_2,
     WORK_3,
@@ -43,14 +43,14 @@ from sloshlab.diagnosis.evidence import (
 from sloshlab.diagnosis.force_levels import Windows, constant_part, onset, orders, windows, work_exponents
 from sloshlab.diagnosis.force_regression import (
     PARITIES,
-    Sizes,
+    Scales,
     Stretch,
-    left_over,
     memory_features,
-    solved,
+    normal_sums,
+    residual_sum_of_squares,
+    ridge_regression,
     state_features,
     stretches,
-    sums,
     time_features,
 )
 from sloshlab.diagnosis.latent_force import LatentForce
@@ -61,8 +61,8 @@ _N_DRAWS: Final = 120
 _NORMAL_90: Final = 1.6449
 _RESOLVED: Final = 0.25
 _OF_STATE: Final = 0.6
-_BLOWS: Final = 5.0
-_FEW: Final = 0.08
+_IMPULSIVE_KURTOSIS: Final = 5.0
+_SMALL_SHARE: Final = 0.08
 """Share of the variance below which a part counts for nothing, and twice which makes it count."""
 
 
@@ -116,7 +116,7 @@ class ForceCharacter:
     windows: Windows
 
     @property
-    def is_there(self) -> bool:
+    def exceeds_noise(self) -> bool:
         """Whether the force stands out of its noise."""
         return self.size_n**2 > (1 + _RESOLVED) * self.noise_n**2
 
@@ -167,7 +167,7 @@ def force_character(
         onset_answer(found, parts, own_tolerances, noise, generator),
         *_order_answers(shifted, fit, generator),
         _constant(fit, generator),
-        _blows(fit, noise),
+        _impulsiveness(fit, noise),
     )
     return ForceCharacter(forces[0].place, size, noise, answers, found)
 
@@ -189,15 +189,15 @@ class _Regression:
 
     def __init__(self, parts: Sequence[Stretch], own: FloatArray, generator: np.random.Generator) -> None:
         self.parts, self.generator = parts, generator
-        sizes = Sizes.of(parts)
-        rows, self.sums = [], []
+        scales = Scales.of(parts)
+        rows, self.normal_sums = [], []
         parity = np.zeros(0, np.int64)
-        for one in parts:
-            state, parity = state_features(one, sizes)
-            columns = (one.own * own, state, memory_features(one, sizes), time_features(one, sizes))
+        for part in parts:
+            state, parity = state_features(part, scales)
+            columns = (part.own * own, state, memory_features(part, scales), time_features(part, scales))
             features = np.concatenate(columns, axis=1)
             rows.append(features)
-            self.sums.append(sums(features, one.force_n))
+            self.normal_sums.append(normal_sums(features, part.force_n))
         widths = np.cumsum([0, *[part.shape[1] for part in columns]])
         own_, state_, memory_, time_ = (np.arange(a, b) for a, b in pairwise(widths))
         state_ = state_[parity >= 0]
@@ -214,9 +214,9 @@ class _Regression:
         n = sum(part.force_n.size for part in parts)
         per_sample = np.sqrt(max(4.0, duration * spread) / n)
         self.prior = np.full(widths[-1], 3.0 / per_sample)
-        self.prior[own_] = np.where(own > 0, 1.0 / (sizes.force / per_sample), 1e-9)
+        self.prior[own_] = np.where(own > 0, 1.0 / (scales.force / per_sample), 1e-9)
         self.rows = rows
-        alone = solved(self.sums, self.prior, own_)
+        alone = ridge_regression(self.normal_sums, self.prior, own_)
         self.beyond_own_of_parts = [part.force_n - row @ alone for part, row in zip(parts, rows, strict=True)]
         self.beyond_own = np.concatenate(self.beyond_own_of_parts)
         spring = alone.copy()
@@ -229,9 +229,9 @@ class _Regression:
 
     def parity_shares(self, chosen: Sequence[int]) -> FloatArray:
         """Share of the variance of the state's part per parity, shape (4,)."""
-        picked = [self.sums[i] for i in chosen]
-        numbers = solved(picked, self.prior, self.sets["state"])
-        xx = np.sum([one.xx for one in picked], axis=0)
+        picked = [self.normal_sums[i] for i in chosen]
+        numbers = ridge_regression(picked, self.prior, self.sets["state"])
+        xx = np.sum([part.xx for part in picked], axis=0)
         powers = np.zeros(4)
         for which in range(4):
             part = np.zeros(numbers.size)
@@ -245,14 +245,16 @@ class _Regression:
 
         Shape (1 + n_draws,) per set of features.
         """
-        n = len(self.sums)
+        n = len(self.normal_sums)
         rest = {name: np.zeros(n) for name in self.sets}
         for first in (0, 1):
-            fitted, judged = self.sums[1 - first :: 2], range(first, n, 2)
+            fitted, judged = self.normal_sums[1 - first :: 2], range(first, n, 2)
             for name, columns in self.sets.items():
-                numbers = solved(fitted, self.prior, columns)
-                rest[name][list(judged)] = [left_over([self.sums[i]], numbers) for i in judged]
-        expected = noise_n**2 * np.array([one.n for one in self.sums])
+                numbers = ridge_regression(fitted, self.prior, columns)
+                rest[name][list(judged)] = [
+                    residual_sum_of_squares([self.normal_sums[i]], numbers) for i in judged
+                ]
+        expected = noise_n**2 * np.array([part.n for part in self.normal_sums])
         draws = [np.arange(n), *[self.generator.integers(0, n, n) for _ in range(n_draws)]]
         found: dict[str, list[float]] = {name: [] for name in self.sets}
         for drawn in draws:
@@ -275,7 +277,7 @@ def _energy(found: Windows, own_damping: float, generator: np.random.Generator) 
     doubt = own_damping * found.velocity_m_per_s**2
     keep = scale > 0
     if keep.sum() < 4:
-        return _open("energy", "work over force times path", "1", "too few cycles")
+        return _undecided("energy", "work over force times path", "1", "too few cycles")
 
     def share(index: NDArray[np.int64]) -> float:
         return float(dissipated[keep][index].sum() / scale[keep][index].sum())
@@ -287,11 +289,11 @@ def _energy(found: Windows, own_damping: float, generator: np.random.Generator) 
     low = max(value - float(np.hypot(value - low, margin)), -1.0)
     high = min(value + float(np.hypot(high - value, margin)), 1.0)
     if low > 0.03:
-        finding, says = TAKES, {TAKES: True, GIVES: False, NO_WORK: False}
+        finding, says = DISSIPATIVE, {DISSIPATIVE: True, ENERGY_INPUT: False, CONSERVATIVE: False}
     elif high < -0.03:
-        finding, says = GIVES, {TAKES: False, GIVES: True, NO_WORK: False}
+        finding, says = ENERGY_INPUT, {DISSIPATIVE: False, ENERGY_INPUT: True, CONSERVATIVE: False}
     elif low > -0.15 and high < 0.15:
-        finding, says = NO_WORK, {TAKES: False, GIVES: False, NO_WORK: True}
+        finding, says = CONSERVATIVE, {DISSIPATIVE: False, ENERGY_INPUT: False, CONSERVATIVE: True}
     else:
         return Answer(
             "energy", CANNOT_TELL, "work over force times path", "1", value, low, high, {},
@@ -306,13 +308,13 @@ def _symmetry(fit: _Regression) -> list[Answer]:
     draws = np.array([fit.parity_shares(fit.draw()) for _ in range(_N_DRAWS)])
     low, high = np.quantile(draws, (0.05, 0.95), axis=0)
     answers = []
-    terms = (EVEN, SPRING, FRICTION, SKEW)
+    terms = (EVEN, ODD_IN_DISPLACEMENT, ODD_IN_VELOCITY, ODD_IN_BOTH)
     for which, (parity, term) in enumerate(zip(PARITIES, terms, strict=True)):
         largest = which == int(np.argmax(shares))
         says: dict[str, bool] = {}
-        if high[which] < 2 * _FEW:
+        if high[which] < 2 * _SMALL_SHARE:
             says[term] = False
-        elif low[which] > 2 * _FEW and (which in (0, 3) or largest):
+        elif low[which] > 2 * _SMALL_SHARE and (which in (0, 3) or largest):
             says[term] = True
         finding = term if says.get(term) else f"not {term}" if term in says else CANNOT_TELL
         answers.append(
@@ -334,29 +336,32 @@ def _history(fit: _Regression, noise_n: float) -> list[Answer]:
     shares = fit.explained_shares(noise_n, _N_DRAWS)
     state, memory, time = shares["state"], shares["memory"], shares["time"]
     answers = [
-        _gain("history", "more by its history", memory - state, MEMORY),
-        _gain("along the run", "more by time", time - state, AGES),
+        _added_share("history", "more by its history", memory - state, MEMORY),
+        _added_share("along the run", "more by time", time - state, TIME_VARYING),
     ]
     value, (low, high) = float(state[0]), _quantiles(state)
     says: dict[str, bool] = {}
-    if any(answer.says.get(term) for answer, term in zip(answers, (MEMORY, AGES), strict=True)) or high < 0.4:
-        says[STATE] = False
+    if (
+        any(answer.says.get(term) for answer, term in zip(answers, (MEMORY, TIME_VARYING), strict=True))
+        or high < 0.4
+    ):
+        says[STATE_FUNCTION] = False
     elif low > _OF_STATE:
-        says[STATE] = True
-    finding = STATE if says.get(STATE) else f"not: {STATE}" if says else CANNOT_TELL
+        says[STATE_FUNCTION] = True
+    finding = STATE_FUNCTION if says.get(STATE_FUNCTION) else f"not: {STATE_FUNCTION}" if says else CANNOT_TELL
     quantity = "share of the variance by the present motion"
     return [Answer("state", finding, quantity, "1", value, low, high, says), *answers]
 
 
-def _gain(question: str, quantity: str, draws: FloatArray, term: str) -> Answer:
+def _added_share(question: str, quantity: str, draws: FloatArray, term: str) -> Answer:
     value = float(draws[0])
     low, high = _quantiles(draws)
-    says = {term: True} if low > _FEW else {term: False} if high < _FEW else {}
+    says = {term: True} if low > _SMALL_SHARE else {term: False} if high < _SMALL_SHARE else {}
     finding = term if says.get(term) else f"not: {term}" if term in says else CANNOT_TELL
     return Answer(question, finding, f"share of the variance, {quantity}", "1", value, low, high, says)
 
 
-def _open(question: str, quantity: str, units: str, why: str) -> Answer:
+def _undecided(question: str, quantity: str, units: str, why: str) -> Answer:
     nan = float("nan")
     return Answer(question, CANNOT_TELL, quantity, units, nan, nan, nan, {}, why)
 
@@ -365,12 +370,12 @@ def work_exponent_answers(found: Windows, generator: np.random.Generator) -> lis
     """How the work per cycle grows with amplitude and frequency."""
     result = work_exponents(found, generator)
     answers = []
-    for name, one in (("amplitude", result.amplitude), ("frequency", result.frequency)):
+    for name, estimate in (("amplitude", result.amplitude), ("frequency", result.frequency)):
         question = "work over amplitude" if name == "amplitude" else "work over frequency"
-        if one is None:
-            answers.append(_open(question, f"exponent of the {name}", "1", result.why[name]))
+        if estimate is None:
+            answers.append(_undecided(question, f"exponent of the {name}", "1", result.why[name]))
             continue
-        value, low, high = one
+        value, low, high = estimate
         says: dict[str, bool] = {}
         if name == "amplitude":
             for term, exponent in ((WORK_1, 1.0), (WORK_2, 2.0), (WORK_3, 3.0)):
@@ -381,9 +386,9 @@ def work_exponent_answers(found: Windows, generator: np.random.Generator) -> lis
             if sum(says.values()) > 1:
                 says = {term: holds for term, holds in says.items() if not holds}
         elif low > 0.35:
-            says = {RATE: True, RATE_FREE: False}
+            says = {RATE_DEPENDENT: True, RATE_INDEPENDENT: False}
         elif high < 0.5 and low > -0.5:
-            says = {RATE: False, RATE_FREE: True}
+            says = {RATE_DEPENDENT: False, RATE_INDEPENDENT: True}
         held = [term for term, holds in says.items() if holds]
         answers.append(
             Answer(
@@ -401,7 +406,7 @@ def onset_answer(
     quantity = "acceleration below which it is nothing"
     if result is None:
         levels = f"{found.level_g.min():.2g} to {found.level_g.max():.2g} g"
-        return _open("onset", quantity, "g", f"levels reach from {levels} only")
+        return _undecided("onset", quantity, "g", f"levels reach from {levels} only")
     value, low, high, at_lowest = result
     if at_lowest:
         return Answer("onset", NO_ONSET, quantity, "g", value, low, high, {ONSET: False, NO_ONSET: True})
@@ -418,10 +423,10 @@ def _order_answers(
     for term, order in ((HALF_ORDER, 0.5), (SECOND_ORDER, 2.0), (THIRD_ORDER, 3.0)):
         quantity = f"share of the variance at order {order:g}"
         if result is None:
-            answers.append(_open(f"order {order:g}", quantity, "1", "the motion has no single frequency"))
+            answers.append(_undecided(f"order {order:g}", quantity, "1", "the motion has no single frequency"))
             continue
         value, low, high = result[order]
-        says = {term: True} if low > _FEW else {term: False} if high < _FEW else {}
+        says = {term: True} if low > _SMALL_SHARE else {term: False} if high < _SMALL_SHARE else {}
         finding = term if says.get(term) else f"no {term}" if term in says else CANNOT_TELL
         answers.append(Answer(f"order {order:g}", finding, quantity, "1", value, low, high, says))
     return answers
@@ -438,7 +443,7 @@ def _constant(fit: _Regression, generator: np.random.Generator) -> Answer:
     return Answer("mean", finding, "mean force", "N", value, low, high, says)
 
 
-def _blows(fit: _Regression, noise_n: float) -> Answer:
+def _impulsiveness(fit: _Regression, noise_n: float) -> Answer:
     """Kurtosis within some cycles: 1.5 for a sine; blows are rare and large."""
     found = []
     for force in fit.beyond_own_of_parts:
@@ -446,7 +451,7 @@ def _blows(fit: _Regression, noise_n: float) -> Answer:
         if size > 2 * noise_n and force.size > 8:
             found.append((_kurtosis(force), size))
     if len(found) < 4:
-        return _open("blows", "kurtosis within some cycles", "1", "too few cycles stand out of the noise")
+        return _undecided("blows", "kurtosis within some cycles", "1", "too few cycles stand out of the noise")
     table = np.array(found)
 
     def mean(rows: NDArray[np.int64]) -> float:
@@ -455,7 +460,13 @@ def _blows(fit: _Regression, noise_n: float) -> Answer:
     n = len(found)
     value = mean(np.arange(n))
     low, high = _quantiles([mean(fit.generator.integers(0, n, n)) for _ in range(_N_DRAWS)])
-    says = {IMPULSIVE: True} if low > _BLOWS else {IMPULSIVE: False} if high < _BLOWS else {}
+    says = (
+        {IMPULSIVE: True}
+        if low > _IMPULSIVE_KURTOSIS
+        else {IMPULSIVE: False}
+        if high < _IMPULSIVE_KURTOSIS
+        else {}
+    )
     finding = IMPULSIVE if says.get(IMPULSIVE) else f"not {IMPULSIVE}" if says else CANNOT_TELL
     return Answer("blows", finding, "kurtosis within some cycles", "1", value, low, high, says)
 

@@ -31,7 +31,7 @@ _LARGEST_SHARE_OF_RATE: Final = 0.4
 
 
 @dataclass(frozen=True, eq=False)
-class AskedForce:
+class InvertedForce:
     """The force at the tank's place that motions ask for.
 
     Attributes
@@ -116,7 +116,7 @@ def modal_weights(structure: Structure, rig: Rig, name: str, along_m: float | No
     return structure.mode_shape if place.startswith(_TANK_PLACES) else None
 
 
-def own_share(power: FloatArray, noise: FloatArray, frequency_hz: FloatArray, rate_hz: float) -> FloatArray:
+def wiener_gain(power: FloatArray, noise: FloatArray, frequency_hz: FloatArray, rate_hz: float) -> FloatArray:
     """Share of a spectrum that is no noise, by the power in the neighbourhood of each frequency: 0 … 1.
 
     Parameters
@@ -129,17 +129,17 @@ def own_share(power: FloatArray, noise: FloatArray, frequency_hz: FloatArray, ra
     """
     width = max(3, round(_SMOOTHING_HZ / (frequency_hz[1] - frequency_hz[0])))
     own = np.maximum(uniform_filter1d(power - noise, width, mode="nearest"), 0.0)
-    heard = frequency_hz < _LARGEST_SHARE_OF_RATE * rate_hz
-    return np.asarray(np.where(heard, own / np.maximum(own + noise, 1e-300), 0.0))
+    in_band = frequency_hz < _LARGEST_SHARE_OF_RATE * rate_hz
+    return np.asarray(np.where(in_band, own / np.maximum(own + noise, 1e-300), 0.0))
 
 
-def asked_force(
+def inverted_force(
     seen: Mapping[str, tuple[ComplexArray, FloatArray]],
     missed: Mapping[str, ComplexArray],
     frequency_hz: FloatArray,
     rate_hz: float,
     released: Mapping[str, ComplexArray] | None = None,
-) -> tuple[AskedForce, float]:
+) -> tuple[InvertedForce, float]:
     """The force that channels ask for together.
 
     Parameters
@@ -159,20 +159,20 @@ def asked_force(
         How far the release was off [m]; zero without `released`.
     """
     below = np.zeros(frequency_hz.size)
-    above, blow = np.zeros(frequency_hz.size, complex), np.zeros(frequency_hz.size, complex)
+    above, of_release = np.zeros(frequency_hz.size, complex), np.zeros(frequency_hz.size, complex)
     for name, (receptance, noise) in seen.items():
         weighted = receptance.conj() / noise
         above += weighted * missed[name]
         below += (weighted * receptance).real
         if released is not None:
-            blow += weighted * released[name]
+            of_release += weighted * released[name]
     noise = np.where(below > 0, 1 / np.where(below > 0, below, 1.0), 0.0)
     force, at_release = above * noise, 0.0
     if released is not None:
-        start = blow * noise
-        share = own_share(np.abs(force) ** 2, noise, frequency_hz, rate_hz)
+        start = of_release * noise
+        share = wiener_gain(np.abs(force) ** 2, noise, frequency_hz, rate_hz)
         size = float((share * np.abs(start) ** 2).sum())
         at_release = float((share * (start.conj() * force).real).sum()) / size if size > 0 else 0.0
         force = force - at_release * start
-    share = own_share(np.abs(force) ** 2, noise, frequency_hz, rate_hz)
-    return AskedForce(frequency_hz, np.asarray(share * force, np.complex128), share * noise), at_release
+    share = wiener_gain(np.abs(force) ** 2, noise, frequency_hz, rate_hz)
+    return InvertedForce(frequency_hz, np.asarray(share * force, np.complex128), share * noise), at_release

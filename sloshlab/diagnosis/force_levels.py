@@ -23,7 +23,7 @@ _LEAST_SPAN: Final = 1.6
 _LEAST_FREQUENCY_SPAN: Final = 1.25
 _SIGNIFICANT: Final = 2.0
 _N_LEVELS: Final = 6
-_NOTHING: Final = 1.35
+_NOISE_ONLY: Final = 1.35
 """RMS over noise up to which there is nothing."""
 _AT_REST: Final = 0.03
 """Share of the largest level below which a place counts as at rest."""
@@ -138,7 +138,7 @@ def work_exponents(found: Windows, generator: np.random.Generator) -> WorkExpone
     if not any(free):
         return WorkExponents(None, None, why)
     columns = np.stack(
-        [np.ones(logs[0].size), *[log for log, one in zip(logs[1:], free, strict=True) if one]], axis=1
+        [np.ones(logs[0].size), *[log for log, is_free in zip(logs[1:], free, strict=True) if is_free]], axis=1
     )
     stretch = found.stretch[sure]
     names = np.unique(stretch)
@@ -153,8 +153,8 @@ def work_exponents(found: Windows, generator: np.random.Generator) -> WorkExpone
     low, high = np.quantile(draws, (0.05, 0.95), axis=0)
     estimates: list[Estimate | None] = []
     at = 0
-    for one in free:
-        if not one:
+    for is_free in free:
+        if not is_free:
             estimates.append(None)
             continue
         estimates.append((float(value[at]), float(min(low[at], value[at])), float(max(high[at], value[at]))))
@@ -211,7 +211,7 @@ def onset(
             numbers = np.linalg.solve(squares + lift * np.eye(3), motion[inside].T @ force[inside])
             top = inside[level[inside] > edges[upper - 1]]
             rest = force[top] - motion[top] @ numbers
-            if np.sqrt(np.mean(rest**2)) > _NOTHING * noise_n:
+            if np.sqrt(np.mean(rest**2)) > _NOISE_ONLY * noise_n:
                 return count
             count = upper
         return count

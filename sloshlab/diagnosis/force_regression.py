@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 DEGREE: Final = 5
 _SHARP: Final = (0.05, 0.008)
 _N_STRETCHES: Final = 24
-_PLAYS: Final = (0.1, 0.3)
+_PLAY_RADII: Final = (0.1, 0.3)
 _FORGETTING_CYCLES: Final = 4.0
 
 
@@ -34,9 +34,9 @@ class Stretch:
         What the force is a function of beside the velocity: x of a structure, a of a tank.
     level_g, omega : ndarray, shape (n,)
         Amplitude of the acceleration and frequency [rad/s] over the cycle about each sample.
-    played : ndarray, shape (n, n_plays)
+    play : ndarray, shape (n, n_plays)
         Of x, by play operators: what a force without rate but with memory follows.
-    lately : ndarray, shape (n,)
+    recent_level : ndarray, shape (n,)
         Mean square of the acceleration over the last cycles, over that of now.
     """
 
@@ -49,8 +49,8 @@ class Stretch:
     first: FloatArray
     level_g: FloatArray
     omega: FloatArray
-    played: FloatArray
-    lately: FloatArray
+    play: FloatArray
+    recent_level: FloatArray
 
     @property
     def own(self) -> FloatArray:
@@ -78,16 +78,16 @@ def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
         power_a, power_v = (np.maximum(power, 0.0) for power in running)
         level = np.sqrt(2 * power_a) / GRAVITY_M_PER_S2
         local = np.sqrt(power_a / np.maximum(power_v, 1e-300))
-        played = np.stack([_play(x, share * largest) for share in _PLAYS], axis=1)
-        lately = _lately(power_a, _FORGETTING_CYCLES * cycle)
+        play = np.stack([_play_operator(x, share * largest) for share in _PLAY_RADII], axis=1)
+        recent_level = _recent_level(power_a, _FORGETTING_CYCLES * cycle)
         first = x if force.place == STRUCTURE else a
-        columns = (force.time_s, force.force_n, x, v, a, first, level, local, played, lately)
+        columns = (force.time_s, force.force_n, x, v, a, first, level, local, play, recent_level)
         for part in np.array_split(np.arange(x.size), _N_STRETCHES):
             found.append(Stretch(number, *(column[part] for column in columns)))
     return found
 
 
-def _play(x: FloatArray, radius: float) -> FloatArray:
+def _play_operator(x: FloatArray, radius: float) -> FloatArray:
     """x less what a play of this radius keeps: bounded by the radius, it remembers the last reversal."""
     out, place = np.empty_like(x), x[0]
     low, high = x - radius, x + radius
@@ -97,7 +97,7 @@ def _play(x: FloatArray, radius: float) -> FloatArray:
     return out
 
 
-def _lately(power: FloatArray, samples: float) -> FloatArray:
+def _recent_level(power: FloatArray, samples: float) -> FloatArray:
     from scipy.signal import lfilter
 
     keep = np.exp(-1 / samples)
@@ -106,7 +106,7 @@ def _lately(power: FloatArray, samples: float) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Sizes:
+class Scales:
     """Largest values that make a regression free of units."""
 
     first: float
@@ -115,7 +115,7 @@ class Sizes:
     time_s: float
 
     @classmethod
-    def of(cls, parts: Sequence[Stretch]) -> Sizes:
+    def of(cls, parts: Sequence[Stretch]) -> Scales:
         """Of all stretches."""
         return cls(
             max(float(np.abs(part.first).max()) for part in parts) or 1.0,
@@ -128,12 +128,12 @@ class Sizes:
 PARITIES: Final = ("even in both", "odd in the first", "odd in the velocity", "odd in both")
 
 
-def state_features(stretch: Stretch, sizes: Sizes) -> tuple[FloatArray, NDArray[np.int64]]:
+def state_features(stretch: Stretch, scales: Scales) -> tuple[FloatArray, NDArray[np.int64]]:
     """T_i(p) T_j(q) with i + j ≤ 5, tanh(q/0.05), tanh(q/0.008), and the parity of each: an index into `PARITIES`.
 
     T_1(p) alone is left to the block's own stiffness and mass.
     """
-    p, q = stretch.first / sizes.first, stretch.v / sizes.velocity
+    p, q = stretch.first / scales.first, stretch.v / scales.velocity
     first, second = (_chebyshev(part) for part in (p, q))
     columns = [np.tanh(q / width) for width in _SHARP]
     parity = [2] * len(columns)
@@ -153,24 +153,24 @@ def _chebyshev(values: FloatArray) -> list[FloatArray]:
     return found
 
 
-def memory_features(stretch: Stretch, sizes: Sizes) -> FloatArray:
+def memory_features(stretch: Stretch, scales: Scales) -> FloatArray:
     """Plays of x, and friction and damping that follow how violent the last cycles were."""
-    q = stretch.v / sizes.velocity
+    q = stretch.v / scales.velocity
     sharp = np.tanh(q / _SHARP[0])
-    plays = stretch.played / np.maximum(np.abs(stretch.played).max(axis=0), 1e-300)
-    late = stretch.lately[:, None] * np.stack([q, sharp, stretch.first / sizes.first], axis=1)
+    plays = stretch.play / np.maximum(np.abs(stretch.play).max(axis=0), 1e-300)
+    late = stretch.recent_level[:, None] * np.stack([q, sharp, stretch.first / scales.first], axis=1)
     return np.concatenate([plays, late], axis=1)
 
 
-def time_features(stretch: Stretch, sizes: Sizes) -> FloatArray:
+def time_features(stretch: Stretch, scales: Scales) -> FloatArray:
     """The linear ones, growing along the run."""
-    t = stretch.time_s / sizes.time_s
-    linear = np.stack([stretch.first / sizes.first, stretch.v / sizes.velocity, np.ones_like(t)], axis=1)
+    t = stretch.time_s / scales.time_s
+    linear = np.stack([stretch.first / scales.first, stretch.v / scales.velocity, np.ones_like(t)], axis=1)
     return np.asarray(t[:, None] * linear)
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
+class NormalSums:
     """What a regression needs of a stretch: sums of products."""
 
     xx: FloatArray
@@ -179,13 +179,13 @@ class Sums:
     n: int
 
 
-def sums(features: FloatArray, force: FloatArray) -> Sums:
+def normal_sums(features: FloatArray, force: FloatArray) -> NormalSums:
     """Sums of products of features and force."""
-    return Sums(features.T @ features, features.T @ force, float(force @ force), force.size)
+    return NormalSums(features.T @ features, features.T @ force, float(force @ force), force.size)
 
 
-def solved(
-    parts: Sequence[Sums], prior: FloatArray, columns: NDArray[np.int64] | slice = slice(None)
+def ridge_regression(
+    parts: Sequence[NormalSums], prior: FloatArray, columns: NDArray[np.int64] | slice = slice(None)
 ) -> FloatArray:
     """Coefficients by ridge regression.
 
@@ -206,7 +206,7 @@ def solved(
     return found
 
 
-def left_over(parts: Sequence[Sums], numbers: FloatArray) -> float:
+def residual_sum_of_squares(parts: Sequence[NormalSums], numbers: FloatArray) -> float:
     """Sum of squares that a regression leaves."""
     total = 0.0
     for part in parts:

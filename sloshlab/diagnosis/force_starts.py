@@ -22,7 +22,7 @@ from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.latent_force import EITHER, STRUCTURE, TANK, LatentForce, run_forces
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.rig_model import RigModel, remembered
+from sloshlab.diagnosis.rig_model import RigModel, with_cached_inputs
 from sloshlab.errors import SloshlabError
 from sloshlab.twin.excitation import Excitation, recorded
 from sloshlab.twin.terms import Term
@@ -35,16 +35,16 @@ _FEWEST_NUMBERS: Final = 2
 _MOST_TRIED: Final = 2
 _N_EVALUATIONS: Final = 15, 40
 """Per number: of every start that is tried, and then of the best."""
-_MOST_SOUGHT: Final = 6
-_FIRST_SOUGHT: Final = 100
+_MOST_DESCENTS: Final = 6
+_FIRST_PLACES: Final = 100
 _PROMISING: Final = 0.9
 """Of the missing force, that the best of the first places may leave if the others are to be looked at."""
-_FAR, _CLOSE = 0.7, 0.15
+_LONG_STEP, _SHORT_STEP = 0.7, 0.15
 """First steps of a descent, of the logarithm of a number: where a force comes in jumps its valleys are narrow."""
-_FOLLOWED: Final = {STRUCTURE: [0, 1], EITHER: [0, 1], TANK: [2, 1]}
+_MOTIONS_OF_BASELINE: Final = {STRUCTURE: [0, 1], EITHER: [0, 1], TANK: [2, 1]}
 """Motions of a place whose multiples the baseline follows; with all three any force of a free motion is one."""
 _N_PROBED: Final = 400
-_TUNED: Final = "frequency_hz"
+_RESONANT_NUMBER: Final = "frequency_hz"
 """A number to which a force is so sensitive that it is sought everywhere before."""
 _BEYOND: Final = 2.0
 _N_FREQUENCIES: Final = 40
@@ -75,20 +75,20 @@ class _Place:
     pieces : list of _Piece
     force_n : ndarray, shape (n,)
         All runs one after another.
-    followed : ndarray, shape (n, 2)
+    baseline_motions : ndarray, shape (n, 2)
         Orthonormal: spring and damper of the structure, mass and damper of the tank.
     """
 
     pieces: list[_Piece]
     force_n: FloatArray
-    followed: FloatArray
+    baseline_motions: FloatArray
 
     def heard(self, added: Sequence[FloatArray]) -> FloatArray:
         """Forces of the same runs, one after another, as far as they are heard and not followed."""
         heard = [_band(force, piece.heard) for force, piece in zip(added, self.pieces, strict=True)]
-        return self._beyond(np.concatenate(heard))
+        return self._beyond_baseline(np.concatenate(heard))
 
-    def share_left(self, force: FloatArray) -> float:
+    def unexplained_share(self, force: FloatArray) -> float:
         """Share of the missing force that stays beside another."""
         left = self.force_n - force
         return float(left @ left) / max(float(self.force_n @ self.force_n), 1e-300)
@@ -98,8 +98,8 @@ class _Place:
         size = float(force @ force)
         return max(float(force @ self.force_n) / size, _LEAST_FACTOR) if size else 0.0
 
-    def _beyond(self, force: FloatArray) -> FloatArray:
-        return np.asarray(force - self.followed @ (self.followed.T @ force))
+    def _beyond_baseline(self, force: FloatArray) -> FloatArray:
+        return np.asarray(force - self.baseline_motions @ (self.baseline_motions.T @ force))
 
     @classmethod
     def of(cls, forces: Sequence[LatentForce]) -> _Place | None:
@@ -108,25 +108,27 @@ class _Place:
         series: list[FloatArray] = []
         motions: list[FloatArray] = []
         n, of_noise = 0, 0.0
-        for one in sorted(forces, key=lambda each: -each.power_n2):
-            if one.power_n2 <= 0.0 or (pieces and n + one.force_n.size > _MOST_SAMPLES):
+        for latent in sorted(forces, key=lambda latent: -latent.power_n2):
+            if latent.power_n2 <= 0.0 or (pieces and n + latent.force_n.size > _MOST_SAMPLES):
                 break
-            kept = slice(0, prev_fast_len(min(one.force_n.size, _MOST_SAMPLES), real=True))
-            force, motion, rate = one.force_n[kept], one.motion[kept], one.run.attributes.sampling_rate_hz
-            own_motion = motion[:, _FOLLOWED[one.place]]
+            kept = slice(0, prev_fast_len(min(latent.force_n.size, _MOST_SAMPLES), real=True))
+            force, motion, rate = latent.force_n[kept], latent.motion[kept], latent.run.attributes.sampling_rate_hz
+            own_motion = motion[:, _MOTIONS_OF_BASELINE[latent.place]]
             own, *_ = np.linalg.lstsq(own_motion, force)
             middle = int(np.argmax(np.abs(motion[:, 1])))
             about = motion[max(0, middle - _N_PROBED // 2) : middle + _N_PROBED // 2]
-            piece = _Piece(_driven(rate, motion), _driven(rate, about), _heard(force - own_motion @ own))
+            piece = _Piece(
+                _driven(rate, motion), _driven(rate, about), _band_of_most_power(force - own_motion @ own)
+            )
             pieces.append(piece)
             series.append(_band(force, piece.heard))
             motions.append(np.stack([_band(column, piece.heard) for column in own_motion.T], axis=1))
-            n, of_noise = n + force.size, of_noise + force.size * one.standard_error_n**2
+            n, of_noise = n + force.size, of_noise + force.size * latent.standard_error_n**2
         if not pieces:
             return None
-        followed, _ = np.linalg.qr(np.concatenate(motions) / np.concatenate(motions).std(axis=0))
-        place = cls(pieces, np.concatenate(series), followed)
-        place = replace(place, force_n=place._beyond(place.force_n))
+        baseline_motions, _ = np.linalg.qr(np.concatenate(motions) / np.concatenate(motions).std(axis=0))
+        place = cls(pieces, np.concatenate(series), baseline_motions)
+        place = replace(place, force_n=place._beyond_baseline(place.force_n))
         return place if float(place.force_n @ place.force_n) > _ABOVE_NOISE * of_noise else None
 
 
@@ -138,14 +140,14 @@ class ForceStart:
     ----------
     numbers : dict
         Named as in a fit.
-    share_left : float
+    unexplained_share : float
         Of the mean square of the missing force, beyond what the baseline can follow.
     others : tuple of dict
         Numbers at which other descents ended, of what is sought at many places.
     """
 
     numbers: dict[str, float]
-    share_left: float
+    unexplained_share: float
     others: tuple[dict[str, float], ...] = ()
 
 
@@ -192,7 +194,7 @@ class ForceStarts:
 
         def left(numbers: FloatArray) -> float:
             added = force(numbers)
-            return np.inf if added is None else place.share_left(added)
+            return np.inf if added is None else place.unexplained_share(added)
 
         def force(numbers: FloatArray) -> FloatArray | None:
             inside = np.clip(numbers, *bounds.T).tolist()
@@ -200,26 +202,31 @@ class ForceStarts:
             return self._force(candidate, named, place)
 
         starts = [np.array([start[name] for name in names]) for start in candidate.starts()]
-        tuned = next((k for k, parameter in enumerate(parameters) if parameter.name == _TUNED), -1)
-        if tuned >= 0:
-            starts = [_with(starts[0], tuned, frequency) for frequency in _about(starts, tuned)]
-        begun = sorted((_sized(force, start, place) for start in starts), key=lambda one: one[0])
+        resonant = next((k for k, parameter in enumerate(parameters) if parameter.name == _RESONANT_NUMBER), -1)
+        if resonant >= 0:
+            starts = [
+                _with_number(starts[0], resonant, frequency) for frequency in _frequencies_about(starts, resonant)
+            ]
+        sized_starts = sorted(
+            (_at_best_size(force, start, place) for start in starts), key=lambda reached: reached[0]
+        )
         first, then = (n * len(names) for n in _N_EVALUATIONS)
         share, numbers = min(
-            (_descended(left, start, first) for _, start in begun[:_MOST_TRIED]), key=lambda one: one[0]
+            (_simplex_descent(left, start, first) for _, start in sized_starts[:_MOST_TRIED]),
+            key=lambda reached: reached[0],
         )
         others: list[tuple[float, FloatArray]] = []
-        if sought := [np.array([one[name] for name in names]) for one in candidate.sought_at()]:
-            grown = np.array([parameter.name in candidate.sizes for parameter in parameters])
-            others = _sought(force, sought, place, grown, first)
+        if sought := [np.array([numbers[name] for name in names]) for numbers in candidate.sought_at()]:
+            proportional = np.array([parameter.name in candidate.sizes for parameter in parameters])
+            others = _descended_from_many(force, sought, place, proportional, first)
             share, numbers = min([(share, numbers), *others], key=lambda other: other[0])
         if share < 1.0 - _LEAST_EXPLAINED:
-            share, numbers = _descended(left, numbers, then, _CLOSE if sought else _FAR)
+            share, numbers = _simplex_descent(left, numbers, then, _SHORT_STEP if sought else _LONG_STEP)
         if not share < 1.0 - _LEAST_EXPLAINED:
             return None
         best, *more = (
-            dict(zip(names, np.clip(one, *bounds.T).tolist(), strict=True))
-            for one in (numbers, *(one for _, one in others))
+            dict(zip(names, np.clip(reached, *bounds.T).tolist(), strict=True))
+            for reached in (numbers, *(end for _, end in others))
         )
         return ForceStart(best, share, tuple(more))
 
@@ -237,33 +244,36 @@ class ForceStarts:
             added = [self._added(extension, piece.drive) for piece in place.pieces]
         except SloshlabError:
             return None
-        known = [one for one in added if one is not None and np.isfinite(one).all()]
+        known = [force for force in added if force is not None and np.isfinite(force).all()]
         return place.heard(known) if len(known) == len(added) else None
 
     def _added(self, extension: Extension, drive: Excitation) -> FloatArray | None:
         """What an extension adds to the force along a motion; None where it is no force."""
         if extension.faults or extension.structure is not None:
             return None
-        force = _along(extension.terms, drive)
+        force = _force_along(extension.terms, drive)
         if extension.liquid is not None:
             liquid = tuple(term for term in self._model.twin.terms if term.place == "tank")
-            force = force + _along(extension.liquid(liquid), drive) - _along(liquid, drive)
+            force = force + _force_along(extension.liquid(liquid), drive) - _force_along(liquid, drive)
         return force
 
 
-def _about(starts: Sequence[FloatArray], place: int) -> list[float]:
+def _frequencies_about(starts: Sequence[FloatArray], place: int) -> list[float]:
     """Values of one number from well below to well above those of all starts."""
     known = [float(start[place]) for start in starts]
-    return [float(one) for one in np.geomspace(min(known) / _BEYOND, max(known) * _BEYOND, _N_FREQUENCIES)]
+    return [
+        float(frequency_hz)
+        for frequency_hz in np.geomspace(min(known) / _BEYOND, max(known) * _BEYOND, _N_FREQUENCIES)
+    ]
 
 
-def _with(start: FloatArray, place: int, value: float) -> FloatArray:
+def _with_number(start: FloatArray, place: int, value: float) -> FloatArray:
     changed = start.copy()
     changed[place] = value
     return changed
 
 
-def _sized(
+def _at_best_size(
     force: Callable[[FloatArray], FloatArray | None], start: FloatArray, place: _Place
 ) -> tuple[float, FloatArray]:
     """Share of the missing force that a start leaves at its best size, and the start with that size.
@@ -276,23 +286,23 @@ def _sized(
         return np.inf, start
     size = float(found @ found)
     for k in range(start.size):
-        doubled = force(_with(start, k, 2.0 * start[k]))
+        doubled = force(_with_number(start, k, 2.0 * start[k]))
         if doubled is not None and float(((doubled - 2.0 * found) ** 2).sum()) < _IN_PROPORTION**2 * size:
-            return place.share_left(found * factor), _with(start, k, start[k] * factor)
-    return place.share_left(found), start
+            return place.unexplained_share(found * factor), _with_number(start, k, start[k] * factor)
+    return place.unexplained_share(found), start
 
 
-def _sought(
+def _descended_from_many(
     force: Callable[[FloatArray], FloatArray | None],
     places: Sequence[FloatArray],
     at: _Place,
-    grown: NDArray[np.bool_],
+    proportional: NDArray[np.bool_],
     n_evaluations: int,
 ) -> list[tuple[float, FloatArray]]:
     """Shares left and numbers from the best of many places, at the size that suits the missing force best.
 
-    The force grows in proportion to the numbers that are `grown`. What leaves nearly all at each of the first
-    places is not it; none are returned then.
+    The force grows in proportion to the numbers that are `proportional`. An effect that leaves nearly all of the
+    force at each of the first places is not what is missing; nothing is returned then.
     """
 
     def sized(numbers: FloatArray) -> tuple[float, FloatArray]:
@@ -300,20 +310,22 @@ def _sought(
         factor = 0.0 if found is None else at.factor(found)
         if found is None or factor == 0.0:
             return np.inf, numbers
-        return at.share_left(found * factor), np.where(grown, numbers * factor, numbers)
+        return at.unexplained_share(found * factor), np.where(proportional, numbers * factor, numbers)
 
-    begun = [sized(numbers) for numbers in places[:_FIRST_SOUGHT]]
-    if min(share for share, _ in begun) > _PROMISING:
+    sized_starts = [sized(numbers) for numbers in places[:_FIRST_PLACES]]
+    if min(share for share, _ in sized_starts) > _PROMISING:
         return []
-    begun += [sized(numbers) for numbers in places[_FIRST_SOUGHT:]]
-    best = sorted(begun, key=lambda one: one[0])
-    tried = [numbers for _, numbers in best[:_MOST_SOUGHT]]
-    reached = [_descended(lambda numbers: sized(numbers)[0], one, n_evaluations, _CLOSE) for one in tried]
+    sized_starts += [sized(numbers) for numbers in places[_FIRST_PLACES:]]
+    best = sorted(sized_starts, key=lambda reached: reached[0])
+    tried = [numbers for _, numbers in best[:_MOST_DESCENTS]]
+    reached = [
+        _simplex_descent(lambda numbers: sized(numbers)[0], place, n_evaluations, _SHORT_STEP) for place in tried
+    ]
     return [sized(numbers) for _, numbers in reached]
 
 
-def _descended(
-    left: Callable[[FloatArray], float], start: FloatArray, n_evaluations: int, step: float = _FAR
+def _simplex_descent(
+    left: Callable[[FloatArray], float], start: FloatArray, n_evaluations: int, step: float = _LONG_STEP
 ) -> tuple[float, FloatArray]:
     """Simplex (Nelder and Mead 1965, doi:10.1093/comjnl/7.4.308) in logarithms of numbers of one sign each."""
     scale = np.where(start == 0, 1.0, start)
@@ -334,10 +346,10 @@ def _descended(
 
 def _driven(rate_hz: float, motion: FloatArray) -> Excitation:
     drive = recorded(rate_hz, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])
-    return remembered(drive)
+    return with_cached_inputs(drive)
 
 
-def _along(terms: Sequence[Term], drive: Excitation) -> FloatArray:
+def _force_along(terms: Sequence[Term], drive: Excitation) -> FloatArray:
     if not terms:
         return np.zeros(drive.n_samples)
     alone = Twin(None, tuple(replace(term, place="tank") for term in terms))
@@ -352,7 +364,7 @@ def _is_resolved(terms: Sequence[Term], drive: Excitation) -> bool:
     return bool(alone.simulate(drive).require_done().n_events < drive.n_samples)
 
 
-def _heard(force: FloatArray) -> NDArray[np.bool_]:
+def _band_of_most_power(force: FloatArray) -> NDArray[np.bool_]:
     """Frequencies up to which nearly all of a force lies."""
     power = np.cumsum(np.abs(rfft(force)) ** 2)
     return np.arange(power.size) <= int(np.searchsorted(power, _POWER_KEPT * power[-1]))

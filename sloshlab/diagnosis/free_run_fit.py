@@ -13,34 +13,34 @@ from scipy.optimize import lsq_linear
 from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.free_run_problem import ROBUST, FreeRunFit, FreeRunProblem, huber_cost, robust_weights
+from sloshlab.diagnosis.free_run_problem import HUBER_LIMIT, FreeRunFit, FreeRunProblem, huber_cost, robust_weights
 
 FloatArray = NDArray[np.float64]
 _LARGEST_DAMPING: Final = 1e8
-_LEAST_SHARE_OF_PROMISE: Final = 0.3
-_LAST_STAGE: Final = 0.03
+_LEAST_GAIN_RATIO: Final = 0.3
+_LAST_STAGE_FACTOR: Final = 0.03
 """Of the tolerance: small steps along a valley add up to more than the gates of a verdict."""
-_HOPELESS: Final = 0.1
+_LEAST_PREDICTED_SHARE: Final = 0.1
 """Of the decrease at which a stage ends: what promises less is not simulated."""
 _N_DRAWN: Final = 32
 _N_REFINED: Final = 2
-_LEFT_BEHIND: Final = 1.02
+_ABANDON_COST_RATIO: Final = 1.02
 """Cost after the first stages, over the best one so far, beyond which another start is given up."""
 _SHOWN: Final = 1.5
 """How much softer than the largest relative residual a stage may be to be of use."""
 _LEAST_ROOM: Final = 1e-12
 """Between a lower and an upper bound of a step, in scaled values; bounds that coincide leave none."""
-_CAME_BACK: Final = 0.02
+_SAME_MINIMUM: Final = 0.02
 """Of a number, within which a fit from elsewhere has found the same place."""
-_PATIENCE: Final = 15
+_MOST_ITERATIONS: Final = 15
 """Steps of a stage at most: where an effect and the baseline share a motion, the way leads along a valley."""
-STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
-SCANNED: Final = (0.75, 0.9, 1.1, 1.3)
+INFLATION_STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
+SCANNED_SIZE_FACTORS: Final = (0.75, 0.9, 1.1, 1.3)
 
 
 def _limit(residual: FloatArray) -> float:
     """Far from the optimum residuals are large everywhere and none of them is a burst."""
-    return max(ROBUST, 3.0 * float(np.sqrt(np.mean(residual**2))))
+    return max(HUBER_LIMIT, 3.0 * float(np.sqrt(np.mean(residual**2))))
 
 
 def fitted(
@@ -49,7 +49,7 @@ def fitted(
     *,
     n_iterations: int = 8,
     tolerance: float = 1e-3,
-    shares: Sequence[float] = STAGES,
+    stages: Sequence[float] = INFLATION_STAGES,
     known: BlockJacobian | None = None,
     is_last: bool = True,
 ) -> tuple[FreeRunFit, BlockJacobian]:
@@ -63,7 +63,7 @@ def fitted(
         At most, per stage; twice as many in the last one.
     tolerance : float
         Of the relative decrease of the cost at which a stage ends; a thirtieth of it in the last one.
-    shares : sequence of float
+    stages : sequence of float
         Stages. In each, every channel is believed to this share of its RMS only, so that details which jump with
         the parameters, such as where friction stops a decay, do not hide the way; zero is the last one.
     known : BlockJacobian, optional
@@ -90,13 +90,13 @@ def fitted(
             problem.candidates, problem.values(theta), np.inf, np.inf, trouble="does not run from its start"
         )
         return empty, BlockJacobian(theta.size, ())
-    descent = _Descent(problem, theta, residual, known)
-    for share in shares:
-        descent.stage(share, n_iterations, tolerance, needs_fresh=is_last and share == shares[-1])
+    descent = _LevenbergMarquardt(problem, theta, residual, known)
+    for inflation in stages:
+        descent.stage(inflation, n_iterations, tolerance, needs_fresh=is_last and inflation == stages[-1])
     return descent.fit(), descent.jacobian
 
 
-class _Descent:
+class _LevenbergMarquardt:
     """Where a fit stands."""
 
     def __init__(
@@ -107,32 +107,32 @@ class _Descent:
         self.prior = problem.prior
         self.jacobian, self.hessian = known or BlockJacobian(n, ()), np.eye(n)
 
-    def stage(self, share: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:
+    def stage(self, inflation: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:
         """Descend with every channel believed to a share of its RMS."""
-        softness, damping, is_fresh = self.problem.softness(share), 1e-3, False
+        inflation_weights, damping, is_fresh = self.problem.inflation_weights(inflation), 1e-3, False
         is_wanted = not self.jacobian.blocks
-        for iteration in range(n_iterations if share > 0 else 2 * n_iterations):
+        for iteration in range(n_iterations if inflation > 0 else 2 * n_iterations):
             if is_wanted:
                 self.jacobian = self.problem.jacobian(
-                    self.theta, self.residual, range(self.theta.size), coarse=share > 0
+                    self.theta, self.residual, range(self.theta.size), coarse=inflation > 0
                 )
                 is_fresh = True
-            least = tolerance * (1.0 if share > 0 else _LAST_STAGE)
-            gain, promised, damping = self._step(softness, damping, _HOPELESS * least)
+            least = tolerance * (1.0 if inflation > 0 else _LAST_STAGE_FACTOR)
+            gain, predicted, damping = self._step(inflation_weights, damping, _LEAST_PREDICTED_SHARE * least)
             is_done = gain < least and (iteration > 0 or gain <= 0)
             if is_done and (is_fresh or not needs_fresh):
                 break
-            is_wanted = is_done or gain < _LEAST_SHARE_OF_PROMISE * promised
+            is_wanted = is_done or gain < _LEAST_GAIN_RATIO * predicted
             is_fresh = is_fresh and gain <= 0
 
-    def _step(self, softness: FloatArray, damping: float, least: float) -> tuple[float, float, float]:
+    def _step(self, inflation_weights: FloatArray, damping: float, least: float) -> tuple[float, float, float]:
         """One step; relative decrease of the cost, what the Jacobian promised, and the next damping.
 
         None is made where so small a one that it could succeed promises less than the least decrease.
         """
         theta, residual, prior = self.theta, self.residual, self.prior
-        limit = _limit(softness * residual)
-        weights = softness * robust_weights(softness * residual, limit)
+        limit = _limit(inflation_weights * residual)
+        weights = inflation_weights * robust_weights(inflation_weights * residual, limit)
         normal, pull = self.jacobian.normal_equations(weights, residual)
         self.hessian = normal + np.diag(prior)
         expected = self.problem.expected
@@ -141,22 +141,22 @@ class _Descent:
         def cost(at: FloatArray, r: FloatArray) -> float:
             if not np.isfinite(r).all():
                 return np.inf
-            return huber_cost(softness * r, limit) + float((prior * (at - expected) ** 2).sum())
+            return huber_cost(inflation_weights * r, limit) + float((prior * (at - expected) ** 2).sum())
 
         before = cost(theta, residual)
         while damping < _LARGEST_DAMPING:
             lift = np.diag(damping * np.maximum(np.diag(self.hessian), 1e-12))
             tried = _step_within_bounds(self.problem, theta, self.hessian + lift, gradient)
             step = tried - theta
-            promised = -float(2 * gradient @ step + step @ self.hessian @ step)
-            if not promised > least * before:
+            predicted = -float(2 * gradient @ step + step @ self.hessian @ step)
+            if not predicted > least * before:
                 break
             new = self.problem.residual(tried)
             after = cost(tried, new)
             if after < before:
                 self.jacobian.correct(step, new - residual)
                 self.theta, self.residual = tried, new
-                return (before - after) / before, promised / before, max(damping / 10, 1e-9)
+                return (before - after) / before, predicted / before, max(damping / 10, 1e-9)
             damping *= 8
         return 0.0, 0.0, 1e-3
 
@@ -185,16 +185,18 @@ def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
         Without the effects that are to be fitted.
     """
     residual, first, largest = problem.residual(problem.theta_of(fit.values)), 0, 0.0
-    for one in (one for run in problem.runs for one in run):
-        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
-        first += one.spectra.size
-        left = float(np.mean(own**2 * one.variance)) / max(float(np.mean(one.spectra**2)), 1e-300)
+    for observation in (observation for run in problem.runs for observation in run):
+        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
+        first += observation.spectra.size
+        left = float(np.mean(own**2 * observation.variance)) / max(float(np.mean(observation.spectra**2)), 1e-300)
         largest = max(largest, float(np.sqrt(left)))
-    return tuple(share for share in STAGES if share < _SHOWN * largest) or STAGES[-1:]
+    return (
+        tuple(inflation for inflation in INFLATION_STAGES if inflation < _SHOWN * largest) or INFLATION_STAGES[-1:]
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class BegunFit:
+class CoarseFit:
     """A fit after its first two stages.
 
     Attributes
@@ -228,57 +230,57 @@ class Start:
     is_near: bool = False
 
 
-def begun(
+def coarsely_fitted(
     problem: FreeRunProblem,
     starts: Sequence[Start],
-    shares: Sequence[float] = STAGES,
+    stages: Sequence[float] = INFLATION_STAGES,
     *,
     near: BlockJacobian | None = None,
     n_iterations: int = 6,
-) -> BegunFit:
+) -> CoarseFit:
     """The first two stages of a fit from the best of several starts.
 
     Parameters
     ----------
     problem : FreeRunProblem
     starts : sequence of Start
-    shares : sequence of float
+    stages : sequence of float
         All stages.
     near : BlockJacobian, optional
         Of the parameters without those of the last candidate, where starts that are near have them.
     n_iterations : int
         At most, per stage.
     """
-    first, second = shares[0], shares[min(1, len(shares) - 1)]
-    best: BegunFit | None = None
+    first, second = stages[0], stages[min(1, len(stages) - 1)]
+    best: CoarseFit | None = None
     for start in starts:
-        known = _extended(problem, start.values, near) if near is not None and start.is_near else None
+        known = _extended_jacobian(problem, start.values, near) if near is not None and start.is_near else None
         fit, jacobian = fitted(
-            problem, start.values, n_iterations=n_iterations, shares=(first,), known=known, is_last=False
+            problem, start.values, n_iterations=n_iterations, stages=(first,), known=known, is_last=False
         )
         if not fit.trouble:
-            reached = BegunFit(problem, fit, jacobian, soft_cost(problem, fit, first))
+            reached = CoarseFit(problem, fit, jacobian, inflated_cost(problem, fit, first))
             best = reached if best is None or reached.cost < best.cost else best
     if best is None:
         trouble = "does not run from any of its starts"
         fit = FreeRunFit(problem.candidates, dict(starts[0].values), np.inf, np.inf, trouble=trouble)
-        return BegunFit(problem, fit, BlockJacobian(len(problem.names), ()), np.inf)
+        return CoarseFit(problem, fit, BlockJacobian(len(problem.names), ()), np.inf)
     if second == first:
         return best
     fit, jacobian = fitted(
-        problem, best.fit.values, n_iterations=n_iterations, shares=(second,), known=best.jacobian, is_last=False
+        problem, best.fit.values, n_iterations=n_iterations, stages=(second,), known=best.jacobian, is_last=False
     )
-    return BegunFit(problem, fit, jacobian, soft_cost(problem, fit, second))
+    return CoarseFit(problem, fit, jacobian, inflated_cost(problem, fit, second))
 
 
-def on_more_runs(
-    begun_fit: BegunFit, problem: FreeRunProblem, others: Mapping[str, float], near: BlockJacobian
-) -> BegunFit:
+def extended_to_all_runs(
+    coarse_fit: CoarseFit, problem: FreeRunProblem, others: Mapping[str, float], near: BlockJacobian
+) -> CoarseFit:
     """A fit that was begun on some of the runs, to be finished on all of them.
 
     Parameters
     ----------
-    begun_fit : BegunFit
+    coarse_fit : BegunFit
     problem : FreeRunProblem
         Of all runs.
     others : mapping
@@ -286,46 +288,50 @@ def on_more_runs(
     near : BlockJacobian
         Of all runs, without the last candidate.
     """
-    values = {**others, **begun_fit.fit.values}
-    known = _extended(problem, values, near) or BlockJacobian(len(problem.names), ())
-    return BegunFit(problem, replace(begun_fit.fit, values=values), known, begun_fit.cost)
+    values = {**others, **coarse_fit.fit.values}
+    known = _extended_jacobian(problem, values, near) or BlockJacobian(len(problem.names), ())
+    return CoarseFit(problem, replace(coarse_fit.fit, values=values), known, coarse_fit.cost)
 
 
-def nearest(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], share: float) -> Mapping[str, float]:
+def best_start(
+    problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inflation: float
+) -> Mapping[str, float]:
     """The start with the lowest cost before anything is fitted, channels known only to a share of their RMS.
 
     Parameters
     ----------
     problem : FreeRunProblem
     starts : sequence of mappings
-    share : float
+    inflation : float
     """
     if len(starts) == 1:
         return starts[0]
-    return starts[int(np.argmin(costs_at(problem, starts, share)))]
+    return starts[int(np.argmin(costs_at(problem, starts, inflation)))]
 
 
-def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], share: float) -> list[float]:
+def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inflation: float) -> list[float]:
     """Costs before anything is fitted, channels known only to a share of their RMS; infinite of what does not run.
 
     Parameters
     ----------
     problem : FreeRunProblem
     starts : sequence of mappings
-    share : float
+    inflation : float
     """
-    softness = problem.softness(share)
+    inflation_weights = problem.inflation_weights(inflation)
     left = problem.residuals([problem.theta_of(start) for start in starts])
-    return [huber_cost(softness * one) if np.isfinite(one).all() else np.inf for one in left]
+    return [
+        huber_cost(inflation_weights * residual) if np.isfinite(residual).all() else np.inf for residual in left
+    ]
 
 
-def finished(
-    begun_fit: BegunFit, shares: Sequence[float] = STAGES, *, n_iterations: int = _PATIENCE
+def refined(
+    coarse_fit: CoarseFit, stages: Sequence[float] = INFLATION_STAGES, *, n_iterations: int = _MOST_ITERATIONS
 ) -> FreeRunFit:
     """The remaining stages of a fit that was begun; the last one in any case."""
-    rest = shares[2:] or shares[-1:]
-    values, known = begun_fit.fit.values, begun_fit.jacobian
-    return fitted(begun_fit.problem, values, n_iterations=n_iterations, shares=rest, known=known)[0]
+    rest = stages[2:] or stages[-1:]
+    values, known = coarse_fit.fit.values, coarse_fit.jacobian
+    return fitted(coarse_fit.problem, values, n_iterations=n_iterations, stages=rest, known=known)[0]
 
 
 def fitted_from(
@@ -340,11 +346,13 @@ def fitted_from(
     n_iterations : int
         At most, per stage.
     """
-    start = begun(problem, [Start(start) for start in starts], n_iterations=n_iterations)
-    return start.fit if start.fit.trouble else finished(start, n_iterations=n_iterations)
+    start = coarsely_fitted(problem, [Start(start) for start in starts], n_iterations=n_iterations)
+    return start.fit if start.fit.trouble else refined(start, n_iterations=n_iterations)
 
 
-def _extended(problem: FreeRunProblem, start: Mapping[str, float], near: BlockJacobian) -> BlockJacobian | None:
+def _extended_jacobian(
+    problem: FreeRunProblem, start: Mapping[str, float], near: BlockJacobian
+) -> BlockJacobian | None:
     """A Jacobian from nearby with the columns of the parameters that it has not, made where a fit starts."""
     theta = problem.theta_of(start)
     at = problem.residual(theta)
@@ -353,10 +361,10 @@ def _extended(problem: FreeRunProblem, start: Mapping[str, float], near: BlockJa
     return near.beside(problem.jacobian(theta, at, range(near.n_columns, theta.size)))
 
 
-def soft_cost(problem: FreeRunProblem, fit: FreeRunFit, share: float) -> float:
+def inflated_cost(problem: FreeRunProblem, fit: FreeRunFit, inflation: float) -> float:
     """Cost of a fit if all channels were known only to a share of their RMS."""
     residual = problem.residual(problem.theta_of(fit.values))
-    return huber_cost(problem.softness(share) * residual) + fit.cost - fit.misfit
+    return huber_cost(problem.inflation_weights(inflation) * residual) + fit.cost - fit.misfit
 
 
 def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple[FreeRunFit, BlockJacobian]:
@@ -379,27 +387,29 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
     best = fitted(problem, problem.model.believed, n_iterations=n_iterations)
     if problem.is_down_to_noise(best[0]):
         return best
-    share = STAGES[1]
-    softness, reached = problem.softness(share), soft_cost(problem, best[0], share)
+    inflation = INFLATION_STAGES[1]
+    inflation_weights, reached = problem.inflation_weights(inflation), inflated_cost(problem, best[0], inflation)
     draws = norm.ppf(qmc.Halton(problem.n_baseline, seed=0).random(_N_DRAWN))
-    draws = np.clip(draws, -2.0, 2.0) * problem.moves
-    costs = [huber_cost(softness * r) if np.isfinite(r).all() else np.inf for r in map(problem.residual, draws)]
+    draws = np.clip(draws, -2.0, 2.0) * problem.changes_motion
+    costs = [
+        huber_cost(inflation_weights * r) if np.isfinite(r).all() else np.inf for r in map(problem.residual, draws)
+    ]
     for place in np.argsort(costs)[:_N_REFINED]:
-        other = fitted(problem, problem.values(draws[place]), n_iterations=n_iterations, shares=(share,))
-        if other[0].trouble or soft_cost(problem, other[0], share) > _LEFT_BEHIND * reached:
+        other = fitted(problem, problem.values(draws[place]), n_iterations=n_iterations, stages=(inflation,))
+        if other[0].trouble or inflated_cost(problem, other[0], inflation) > _ABANDON_COST_RATIO * reached:
             continue
-        other = fitted(problem, other[0].values, n_iterations=n_iterations, shares=STAGES[2:])
+        other = fitted(problem, other[0].values, n_iterations=n_iterations, stages=INFLATION_STAGES[2:])
         if not other[0].trouble and other[0].cost < best[0].cost:
             best = other
     return best
 
 
-def from_another_size(
+def fitted_from_scaled(
     problem: FreeRunProblem,
     fit: FreeRunFit,
     name: str,
     factor: float,
-    shares: Sequence[float] = STAGES,
+    stages: Sequence[float] = INFLATION_STAGES,
     *,
     n_iterations: int = 5,
 ) -> FreeRunFit:
@@ -413,7 +423,7 @@ def from_another_size(
         Of the number.
     factor : float
         Over its size.
-    shares : sequence of float
+    stages : sequence of float
         Stages; the first is left out.
     n_iterations : int
         At most, per stage.
@@ -423,15 +433,15 @@ def from_another_size(
     FreeRunFit
         With its trouble where it was given up, as it was left behind or led back.
     """
-    start, share = {**fit.values, name: fit.values[name] * factor}, shares[1]
-    other, _ = fitted(problem, start, n_iterations=n_iterations, shares=(share,))
+    start, inflation = {**fit.values, name: fit.values[name] * factor}, stages[1]
+    other, _ = fitted(problem, start, n_iterations=n_iterations, stages=(inflation,))
     if other.trouble:
         return other
-    if soft_cost(problem, other, share) > _LEFT_BEHIND * soft_cost(problem, fit, share):
+    if inflated_cost(problem, other, inflation) > _ABANDON_COST_RATIO * inflated_cost(problem, fit, inflation):
         return replace(other, trouble="was left behind")
-    if abs(other.values[name] - fit.values[name]) < _CAME_BACK * abs(fit.values[name]):
+    if abs(other.values[name] - fit.values[name]) < _SAME_MINIMUM * abs(fit.values[name]):
         return replace(other, trouble="came back")
-    return fitted(problem, other.values, n_iterations=n_iterations, shares=shares[2:])[0]
+    return fitted(problem, other.values, n_iterations=n_iterations, stages=stages[2:])[0]
 
 
 def _step_within_bounds(

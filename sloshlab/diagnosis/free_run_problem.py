@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate, channels_of
-from sloshlab.diagnosis.copied_process import N_AT_ONCE
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING, Extension
+from sloshlab.diagnosis.forked_process import N_WORKERS
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.parallel_pieces import is_single_threaded
 from sloshlab.diagnosis.second_process import SecondProcess, second_process
-from sloshlab.diagnosis.side_by_side import works_alone
 from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
@@ -27,13 +27,13 @@ _STEP: Final = 0.005
 """Of a difference, in tolerances; a frequency must not move by much of a cycle."""
 _COARSE_STEP: Final = 0.03
 _TOLERANCES_OF_DAMPING: Final = 3.0
-ROBUST: Final = 4.0
+HUBER_LIMIT: Final = 4.0
 """Standard deviations from which a residual counts with its size, not with its square."""
 _FEWEST_IN_A_RUN: Final = 50
-_QUIETER: Final = 0.75
+_QUIETER_SHARE: Final = 0.75
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel in which nothing more is to be found."""
-_POOL: Final = ThreadPoolExecutor(N_AT_ONCE)
+_POOL: Final = ThreadPoolExecutor(N_WORKERS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,30 +138,33 @@ class FreeRunProblem:
         self.n_baseline = len(self._baseline)
         self.expected = np.array(
             [
-                ((expected or {}).get(one.name, one.believed) - one.believed) / one.tolerance
-                for one in self._baseline
+                ((expected or {}).get(parameter.name, parameter.believed) - parameter.believed)
+                / parameter.tolerance
+                for parameter in self._baseline
             ]
             + [0.0] * (len(self.names) - self.n_baseline)
         )
         driving = {name for run in self.runs for name in model.driving(run[0].run)}
-        self._seen_by = [(one.channel,) if one.channel else () for one in self._baseline] + [
+        self._channels_changed = [
+            (parameter.channel,) if parameter.channel else () for parameter in self._baseline
+        ] + [
             _only_channels(candidate, driving)
             for candidate in self.candidates
             for _ in candidate.effect.parameters
         ]
         bounds = [
             (
-                one.believed - one.most_tolerances * one.tolerance,
-                one.believed + one.most_tolerances * one.tolerance,
+                parameter.believed - parameter.most_tolerances * parameter.tolerance,
+                parameter.believed + parameter.most_tolerances * parameter.tolerance,
             )
-            for one in self._baseline
+            for parameter in self._baseline
         ] + [
             candidate.bounds(parameter)
             for candidate in self.candidates
             for parameter in candidate.effect.parameters
         ]
         self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
-        ends = np.cumsum([0] + [one.spectra.size for run in self.runs for one in run])
+        ends = np.cumsum([0] + [observation.spectra.size for run in self.runs for observation in run])
         self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
         self.n_simulations = 0
 
@@ -171,14 +174,14 @@ class FreeRunProblem:
         return np.array([1.0] * self.n_baseline + [0.0] * (len(self.names) - self.n_baseline))
 
     @property
-    def moves(self) -> NDArray[np.bool_]:
+    def changes_motion(self) -> NDArray[np.bool_]:
         """Which of the baseline's parameters change the motion, not only what a channel reads."""
         return np.array([not parameter.is_reading for parameter in self._baseline])
 
     def is_down_to_noise(self, fit: FreeRunFit) -> bool:
         """Whether a fit leaves no more than the noise in any channel."""
         residual = self.residual(self.theta_of(fit.values))
-        left = mean_squares([one for run in self.runs for one in run], residual)
+        left = mean_squares([observation for run in self.runs for observation in run], residual)
         return max(left.values(), default=0.0) < DOWN_TO_NOISE
 
     def values(self, theta: FloatArray) -> dict[str, float]:
@@ -199,14 +202,14 @@ class FreeRunProblem:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
-        if works_alone() or len(self.runs) == 1:
+        if is_single_threaded() or len(self.runs) == 1:
             return self._of_runs_in_turn(theta)
         values, beside = self.values(theta), self._second_process()
         return np.concatenate(list(_POOL.map(lambda run: self._of_runs([run], values, beside), self.runs)))
 
     def residuals(self, thetas: Sequence[FloatArray]) -> list[FloatArray]:
         """Residuals of several sets of parameters, of as many at a time as there are threads."""
-        if works_alone() or len(thetas) == 1:
+        if is_single_threaded() or len(thetas) == 1:
             return [self.residual(theta) for theta in thetas]
         beside = self._second_process()
         return list(_POOL.map(lambda theta: self._of_runs_in_turn(theta, beside), thetas))
@@ -225,13 +228,16 @@ class FreeRunProblem:
         found = None if beside is None else beside.done(runs, values, self.candidates)
         return residuals_of_runs(self.model, runs, values, self.candidates) if found is None else found
 
-    def softness(self, share: float) -> FloatArray:
+    def inflation_weights(self, inflation: float) -> FloatArray:
         """Factors of the residuals as if all channels were known only to a share of their RMS."""
         return np.concatenate(
             [
-                np.sqrt(one.variance / (one.variance + share**2 * float(np.mean(one.spectra**2)))).ravel()
+                np.sqrt(
+                    observation.variance
+                    / (observation.variance + inflation**2 * float(np.mean(observation.spectra**2)))
+                ).ravel()
                 for run in self.runs
-                for one in run
+                for observation in run
             ]
         )
 
@@ -255,7 +261,7 @@ class FreeRunProblem:
             moved[column] += step if physical <= self.high[column] else -step
             places.append(moved)
 
-        beside = None if works_alone() else self._second_process()
+        beside = None if is_single_threaded() else self._second_process()
 
         def derivative(place: FloatArray, column: int) -> dict[int, FloatArray]:
             found = self._moved(place, column, beside)
@@ -264,8 +270,10 @@ class FreeRunProblem:
                 moved /= place[column] - theta[column]
             return found if all(np.isfinite(moved).all() for moved in found.values()) else {}
 
-        found = list((map if works_alone() else _POOL.map)(derivative, places, columns))
-        return BlockJacobian.of_blocks(found, [one.spectra.size for run in self.runs for one in run])
+        found = list((map if is_single_threaded() else _POOL.map)(derivative, places, columns))
+        return BlockJacobian.of_blocks(
+            found, [observation.spectra.size for run in self.runs for observation in run]
+        )
 
     def residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
         """Residuals after one parameter was moved; unchanged in other runs and channels where it has its own."""
@@ -276,20 +284,20 @@ class FreeRunProblem:
 
     def _moved(self, theta: FloatArray, column: int, beside: SecondProcess | None) -> dict[int, FloatArray]:
         """Residuals of the channels of runs which a parameter changes, by their number, after it was moved."""
-        owner, seen_by = run_of(self.names[column], self.model), self._seen_by[column]
+        owner, seen_by = run_of(self.names[column], self.model), self._channels_changed[column]
         runs: list[list[Observation]] = []
         blocks: list[int] = []
         n_before = 0
         for run in self.runs:
             if not owner or run[0].run.name == owner:
-                chosen = [i for i, one in enumerate(run) if not seen_by or one.channel in seen_by]
+                chosen = [i for i, observation in enumerate(run) if not seen_by or observation.channel in seen_by]
                 runs += [[run[i] for i in chosen]] if chosen else []
                 blocks += [n_before + i for i in chosen]
             n_before += len(run)
         if not runs:
             return {}
         moved = self._of_runs(runs, self.values(theta), None if seen_by else beside)
-        ends = np.cumsum([one.spectra.size for run in runs for one in run])
+        ends = np.cumsum([observation.spectra.size for run in runs for observation in run])
         return dict(zip(blocks, np.split(moved, ends[:-1]), strict=True))
 
 
@@ -312,12 +320,12 @@ def residuals_of_runs(
     found: list[FloatArray] = []
     for run in runs:
         try:
-            names = [one.channel for one in run]
+            names = [observation.channel for observation in run]
             readings = model.simulate(run[0].run, values, extension_of(candidates, values), names)
         except SloshlabError:
-            found += [np.full(one.spectra.size, np.inf) for one in run]
+            found += [np.full(observation.spectra.size, np.inf) for observation in run]
         else:
-            found += [one.residual(readings[one.channel]).ravel() for one in run]
+            found += [observation.residual(readings[observation.channel]).ravel() for observation in run]
     return np.concatenate(found)
 
 
@@ -348,7 +356,7 @@ def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[
     residual : ndarray
         Of all of them, one after another.
     """
-    return _means(observed, residual, lambda one: one.channel)
+    return _means(observed, residual, lambda observation: observation.channel)
 
 
 def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) -> float:
@@ -363,21 +371,21 @@ def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) ->
         Of all of them, one after another.
     """
     total, n, first = 0.0, 0, 0
-    for one in observed:
-        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
-        first += one.spectra.size
+    for observation in observed:
+        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
+        first += observation.spectra.size
         times = [
             huber_cost(row[known]) / known.sum()
-            for row, known in zip(own, one.informative, strict=True)
+            for row, known in zip(own, observation.informative, strict=True)
             if known.any()
         ]
-        counts = [int(known.sum()) for known in one.informative if known.any()]
-        for k in np.argsort(times)[: int(np.ceil(_QUIETER * len(times)))]:
+        counts = [int(known.sum()) for known in observation.informative if known.any()]
+        for k in np.argsort(times)[: int(np.ceil(_QUIETER_SHARE * len(times)))]:
             total, n = total + times[k] * counts[k], n + counts[k]
     return float(np.sqrt(total / n)) if n else 0.0
 
 
-def mean_squares_that_repeat(
+def repeatable_mean_squares(
     tests: Sequence[Sequence[str]], observed: Sequence[Observation], residual: FloatArray
 ) -> dict[tuple[str, str], float]:
     """Mean square of what the informative residuals of repeats of one test have in common.
@@ -401,11 +409,14 @@ def mean_squares_that_repeat(
     """
     parts: dict[tuple[str, str], tuple[FloatArray, NDArray[np.bool_]]] = {}
     first = 0
-    for one in observed:
-        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
-        first += one.spectra.size
-        if not one.is_rough:
-            parts[one.run.name, one.channel] = np.clip(own, -ROBUST, ROBUST), one.informative
+    for observation in observed:
+        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
+        first += observation.spectra.size
+        if not observation.is_rough:
+            parts[observation.run.name, observation.channel] = (
+                np.clip(own, -HUBER_LIMIT, HUBER_LIMIT),
+                observation.informative,
+            )
     found = {}
     for test in tests:
         for channel in dict.fromkeys(of for run, of in parts if run in test):
@@ -429,7 +440,9 @@ def mean_squares_of_runs(observed: Sequence[Observation], residual: FloatArray) 
     observed : sequence of Observation
     residual : ndarray
     """
-    return _means(observed, residual, lambda one: (one.run.name, one.channel), least=_FEWEST_IN_A_RUN)
+    return _means(
+        observed, residual, lambda observation: (observation.run.name, observation.channel), least=_FEWEST_IN_A_RUN
+    )
 
 
 def _means(
@@ -437,23 +450,23 @@ def _means(
 ) -> dict[_Label, float]:
     sums: dict[_Label, list[float]] = {}
     first = 0
-    for one in observed:
-        own = residual[first : first + one.spectra.size]
-        first += one.spectra.size
-        chosen = own[one.informative.ravel()]
-        total = sums.setdefault(label(one), [0.0, 0.0])
+    for observation in observed:
+        own = residual[first : first + observation.spectra.size]
+        first += observation.spectra.size
+        chosen = own[observation.informative.ravel()]
+        total = sums.setdefault(label(observation), [0.0, 0.0])
         total[0] += huber_cost(chosen)
         total[1] += chosen.size
     return {name: squares / n for name, (squares, n) in sums.items() if n >= least}
 
 
-def robust_weights(residual: FloatArray, limit: float = ROBUST) -> FloatArray:
+def robust_weights(residual: FloatArray, limit: float = HUBER_LIMIT) -> FloatArray:
     """Square roots of Huber's weights: a burst or a lost block counts with its size, not with its square."""
     size = np.abs(residual)
     return np.asarray(np.where(size > limit, np.sqrt(limit / np.maximum(size, 1e-300)), 1.0))
 
 
-def huber_cost(residual: FloatArray, limit: float = ROBUST) -> float:
+def huber_cost(residual: FloatArray, limit: float = HUBER_LIMIT) -> float:
     """Sum of squares, of which those beyond some standard deviations, four by default, grow only linearly."""
     size = np.abs(residual)
     within = np.minimum(size, limit)

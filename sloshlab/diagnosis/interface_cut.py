@@ -15,7 +15,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.latent_force import EITHER, STRUCTURE, TANK, LatentForce, RunForces, run_forces, shown_by
+from sloshlab.diagnosis.latent_force import (
+    EITHER,
+    STRUCTURE,
+    TANK,
+    LatentForce,
+    RunForces,
+    channel_responses,
+    run_forces,
+)
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.errors import SloshlabError
@@ -75,14 +83,14 @@ class SensorCheck:
         RMS of the difference over noise.
     disagreement_without : float
         RMS over noise of the other channels when this one is not believed.
-    demand_without_n2 : float
+    missing_force_without_n2 : float
         Mean square of the forces that the blocks then lack beyond noise and their own parameters [N²].
     """
 
     channel: str
     ratio: float
     disagreement_without: float
-    demand_without_n2: float = float("nan")
+    missing_force_without_n2: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +102,7 @@ class InterfaceCut:
     blocks : tuple of BlockCut
         In the order of the chain.
     sensors : tuple of SensorCheck
-    doubted : str
+    suspect : str
         The channel that contradicts all others; empty where there is none.
     remark : str
         What of the sensors cannot be told.
@@ -104,13 +112,13 @@ class InterfaceCut:
 
     blocks: tuple[BlockCut, ...]
     sensors: tuple[SensorCheck, ...]
-    doubted: str
+    suspect: str
     remark: str
     runs: tuple[RunForces, ...]
 
     def forces(self, place: str) -> list[LatentForce]:
         """Latent forces of all runs at a place."""
-        return [one for run in self.runs if (one := run.at(place)) is not None]
+        return [force for run in self.runs if (force := run.at(place)) is not None]
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -136,13 +144,13 @@ def interface_cut(
     usable = [run for run in runs if run]
     together = [_forces(model, run, values) for run in usable]
     kept = [(run, found) for run, found in zip(usable, together, strict=True) if found is not None]
-    usable, found = [run for run, _ in kept], [one for _, one in kept]
+    usable, found = [run for run, _ in kept], [forces for _, forces in kept]
     sensors = _sensor_checks(model, usable, found, values)
-    doubted, remark = _doubted(sensors)
-    if doubted:
-        found = [run_forces(model, run, values, {doubted}) for run in usable]
-    blocks = _blocks(model, usable, found, doubted, seed)
-    return InterfaceCut(blocks, sensors, doubted, remark, tuple(found))
+    suspect, remark = _suspect_channel(sensors)
+    if suspect:
+        found = [run_forces(model, run, values, {suspect}) for run in usable]
+    blocks = _blocks(model, usable, found, suspect, seed)
+    return InterfaceCut(blocks, sensors, suspect, remark, tuple(found))
 
 
 def _forces(model: RigModel, run: Sequence[Observation], values: Mapping[str, float]) -> RunForces | None:
@@ -164,11 +172,11 @@ def _disagreements(
     """RMS over noise per channel of what channels of one motion say beyond each other, where they can be heard."""
     sums: dict[str, list[float]] = {}
     for observed, forces in zip(runs, found, strict=True):
-        for one in observed:
-            if one.channel in forces.left:
-                spectra = _weighted(one, forces.left[one.channel], values)
-                part = spectra[:, : int(0.6 * one.n_bands)]
-                total = sums.setdefault(one.channel, [0.0, 0.0])
+        for observation in observed:
+            if observation.channel in forces.left:
+                spectra = _weighted(observation, forces.left[observation.channel], values)
+                part = spectra[:, : int(0.6 * observation.n_bands)]
+                total = sums.setdefault(observation.channel, [0.0, 0.0])
                 total[0] += float((part**2).sum())
                 total[1] += part.size
     return {name: float(np.sqrt(total / n)) for name, (total, n) in sums.items()}
@@ -183,7 +191,7 @@ def _sensor_checks(
     together = _disagreements(runs, found, values)
     checks = []
     for name, ratio in together.items():
-        without, demand = ratio, float("nan")
+        without, missing_force_n2 = ratio, float("nan")
         alike = [other for other in together if other.startswith("force") == name.startswith("force")]
         if max(together.values()) > _CONSISTENT and len(alike) > 1:
             again = [run_forces(model, run, values, {name}) for run in runs]
@@ -191,39 +199,39 @@ def _sensor_checks(
             alone = others.pop(name)
             ratio = max(ratio, alone)
             without = max((others[other] for other in alike if other != name), default=ratio)
-            demand = float(np.mean([_demand_n2(model, one) for one in again]))
-        checks.append(SensorCheck(name, ratio, without, demand))
+            missing_force_n2 = float(np.mean([_missing_force_power_n2(model, forces) for forces in again]))
+        checks.append(SensorCheck(name, ratio, without, missing_force_n2))
     return tuple(checks)
 
 
-def _doubted(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
+def _suspect_channel(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
     """The channel whose absence lets the others agree, or why none can be named."""
     groups = [
         [sensor for sensor in sensors if sensor.channel.startswith("force") is of_force]
         for of_force in (False, True)
     ]
     for group in groups:
-        worst = max((one.ratio for one in group), default=0.0)
+        worst = max((sensor.ratio for sensor in group), default=0.0)
         if worst <= _CONSISTENT:
             continue
         if len(group) == 2:
-            best, second = sorted(group, key=lambda one: one.demand_without_n2)
-            if second.demand_without_n2 > _FEWER_FORCES * best.demand_without_n2:
+            best, second = sorted(group, key=lambda sensor: sensor.missing_force_without_n2)
+            if second.missing_force_without_n2 > _FEWER_FORCES * best.missing_force_without_n2:
                 return best.channel, (
                     f"{best.channel} and {second.channel} contradict each other; {best.channel} is doubted, since "
                     "without it the blocks need hardly any missing force"
                 )
-            names = " and ".join(one.channel for one in group)
+            names = " and ".join(sensor.channel for sensor in group)
             return "", f"{names} contradict each other; with two of them alone nothing says which is wrong"
-        best, second = sorted(group, key=lambda one: _beyond(one.disagreement_without))[:2]
-        left, next_left = _beyond(best.disagreement_without), _beyond(second.disagreement_without)
-        if left < _EXPLAINED * _beyond(worst) and next_left > _RUNNER_UP * left:
+        best, second = sorted(group, key=lambda sensor: _excess(sensor.disagreement_without))[:2]
+        left, next_left = _excess(best.disagreement_without), _excess(second.disagreement_without)
+        if left < _EXPLAINED * _excess(worst) and next_left > _RUNNER_UP * left:
             return best.channel, ""
         return "", "channels of one motion contradict each other, and leaving out one does not make them agree"
     return "", ""
 
 
-def _demand_n2(model: RigModel, forces: RunForces) -> float:
+def _missing_force_power_n2(model: RigModel, forces: RunForces) -> float:
     """Mean square of what the blocks lack beyond noise and their own parameters; never zero."""
     sizes = [
         max(own.power_n2, _RESOLVED * own.standard_error_n**2)
@@ -232,7 +240,7 @@ def _demand_n2(model: RigModel, forces: RunForces) -> float:
     return float(sum(sizes))
 
 
-def _beyond(ratio: float) -> float:
+def _excess(ratio: float) -> float:
     return max(ratio**2 - 1.0, 0.02)
 
 
@@ -240,45 +248,45 @@ def _blocks(
     model: RigModel,
     runs: Sequence[Sequence[Observation]],
     found: Sequence[RunForces],
-    doubted: str,
+    suspect: str,
     seed: int,
 ) -> tuple[BlockCut, ...]:
     places = tuple(dict.fromkeys(force.place for forces in found for force in forces.forces))
-    parts = _parts(model, runs, found, places, doubted)
+    parts = _parts(model, runs, found, places, suspect)
     shares = _shares(parts, seed)
     cuts = [_excitation(runs, found)]
     for place in (STRUCTURE, TANK, EITHER):
         if place in places:
-            own = [beyond_own_parameters(model, run, one) for run in found if (one := run.at(place))]
+            own = [beyond_own_parameters(model, run, force) for run in found if (force := run.at(place))]
             cuts.append(_of_place(place, own, shares))
         elif place == STRUCTURE and EITHER not in places and any(run.structure is not None for run in found):
-            cuts.append(_untold(place, "no motion of the structure was recorded"))
+            cuts.append(_undetermined(place, "no motion of the structure was recorded"))
     if not any(run.structure is not None for run in found):
-        cuts.insert(1, _untold(STRUCTURE, "there is none: the tank follows its measured motion"))
+        cuts.insert(1, _undetermined(STRUCTURE, "there is none: the tank follows its measured motion"))
     if TANK not in places and EITHER not in places:
-        cuts.append(_untold(TANK, "no force on the tank was recorded"))
+        cuts.append(_undetermined(TANK, "no force on the tank was recorded"))
     share, low, high = shares.get(SENSOR, (float("nan"),) * 3)
     remark = "" if SENSOR in shares else "no two sensors saw the same motion"
     size = float(np.sqrt(max((part[SENSOR].max() for part in parts if SENSOR in part), default=0.0)))
-    compared = doubted or "channels of the same motion"
+    compared = suspect or "channels of the same motion"
     cuts.append(BlockCut(SENSOR, "what the other sensors say", compared, share, low, high, size, 1.0, remark))
     return tuple(cuts)
 
 
-def _untold(block: str, remark: str) -> BlockCut:
+def _undetermined(block: str, remark: str) -> BlockCut:
     nan = float("nan")
     return BlockCut(block, "–", "–", nan, nan, nan, nan, nan, remark)
 
 
 def _excitation(runs: Sequence[Sequence[Observation]], found: Sequence[RunForces]) -> BlockCut:
-    if all(one.run.is_free for run in runs for one in run[:1]):
-        return _untold("excitation", "free decays: nothing drives")
+    if all(observation.run.is_free for run in runs for observation in run[:1]):
+        return _undetermined("excitation", "free decays: nothing drives")
     if not any(run.structure is not None for run in found):
-        return _untold("excitation", "the tank's own motion is measured, whatever made it")
-    return _untold("excitation", "one sensor at the base: nothing to compare it with")
+        return _undetermined("excitation", "the tank's own motion is measured, whatever made it")
+    return _undetermined("excitation", "one sensor at the base: nothing to compare it with")
 
 
-_FED: Final = {
+_INPUT_AND_OUTPUT: Final = {
     STRUCTURE: ("measured base motion and measured force between structure and tank", "motion"),
     TANK: ("measured motion of the tank", "force between structure and tank"),
     EITHER: ("measured base motion", "motion"),
@@ -293,8 +301,8 @@ def _of_place(
     remark = "no force was measured between them: the two cannot be told apart by this" if place == EITHER else ""
     nan = float("nan")
     share, low, high = shares.get(place, (nan, nan, nan))
-    fed, compared = _FED[place]
-    return BlockCut(place, fed, compared, share, low, high, size, noise, remark)
+    fed_with, compared = _INPUT_AND_OUTPUT[place]
+    return BlockCut(place, fed_with, compared, share, low, high, size, noise, remark)
 
 
 def _parts(
@@ -302,7 +310,7 @@ def _parts(
     runs: Sequence[Sequence[Observation]],
     found: Sequence[RunForces],
     places: Sequence[str],
-    doubted: str,
+    suspect: str,
 ) -> list[dict[str, FloatArray]]:
     """Per run, what each block explains of the weighted mismatch in each of some stretches of time."""
     parts = []
@@ -314,18 +322,20 @@ def _parts(
                 own = beyond_own_parameters(model, forces, force)
                 if own.power_n2 < _RESOLVED * own.standard_error_n**2:
                     continue
-                series[place] = shown_by(forces, observed, model.rig, own)
+                series[place] = channel_responses(forces, observed, model.rig, own)
         part = {force.place: np.zeros(_N_PARTS) for force in forces.forces}
-        comparable = [one for one in observed if one.channel in forces.left]
+        comparable = [observation for observation in observed if observation.channel in forces.left]
         if len(comparable) > 1:
             part[SENSOR] = np.zeros(_N_PARTS)
-        for one in observed:
-            missed = _weighted(one, forces.missed[one.channel], {})
+        for observation in observed:
+            missed = _weighted(observation, forces.missed[observation.channel], {})
             for place, shown in series.items():
-                if one.channel != doubted:
-                    part[place] += _per_part((missed * _weighted(one, shown[one.channel], {})).sum(axis=1))
-            if SENSOR in part and one in comparable and (not doubted or one.channel == doubted):
-                left = _weighted(one, forces.left[one.channel], {})
+                if observation.channel != suspect:
+                    part[place] += _per_part(
+                        (missed * _weighted(observation, shown[observation.channel], {})).sum(axis=1)
+                    )
+            if SENSOR in part and observation in comparable and (not suspect or observation.channel == suspect):
+                left = _weighted(observation, forces.left[observation.channel], {})
                 power = (left**2).mean(axis=1)
                 beyond = np.where(power.mean() > _CONSISTENT**2, (left**2 - 1.0).sum(axis=1), 0.0)
                 part[SENSOR] += _per_part(beyond)
@@ -355,8 +365,8 @@ def _shares(parts: Sequence[Mapping[str, FloatArray]], seed: int) -> dict[str, t
     draws = [share(np.asarray(generator.integers(0, table.shape[1], table.shape[1]))) for _ in range(_N_DRAWS)]
     low, high = np.nanquantile(np.array(draws), (0.05, 0.95), axis=0) if np.isfinite(best).all() else (best, best)
     return {
-        name: (float(one), min(float(a), float(one)), max(float(b), float(one)))
-        for name, one, a, b in zip(names, best, low, high, strict=True)
+        name: (float(estimate), min(float(a), float(estimate)), max(float(b), float(estimate)))
+        for name, estimate, a, b in zip(names, best, low, high, strict=True)
     }
 
 

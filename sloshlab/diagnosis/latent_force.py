@@ -18,15 +18,15 @@ from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.force_inversion import (
     ORDERS,
-    AskedForce,
-    asked_force,
+    InvertedForce,
     frequencies_hz,
     in_frequency,
     in_time,
+    inverted_force,
     modal_weights,
-    own_share,
     response,
     sample_variance,
+    wiener_gain,
 )
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RigModel
@@ -135,17 +135,20 @@ def run_forces(
     undone = [fault for fault in extension.faults if fault.channel in model.driving(run)]
     simulation = model._simulation(run, values, extension, undone)
     readings = model.simulate(run, values, extension)
-    missed = {one.channel: _missed(one, readings[one.channel], values, run.is_free) for one in observed}
-    believed = [one for one in observed if one.channel not in without]
+    missed = {
+        observation.channel: _missed(observation, readings[observation.channel], values, run.is_free)
+        for observation in observed
+    }
+    believed = [observation for observation in observed if observation.channel not in without]
     if simulation.twin.structure is None:
         forces, left = _on_shaker(simulation, run, observed, believed, missed)
     else:
         forces, left = _on_structure(simulation, model.rig, observed, believed, missed)
-    left |= _unequal_cells(observed, believed, missed)
+    left |= _cell_disagreements(observed, believed, missed)
     return RunForces(forces, missed, left, simulation.twin.structure, simulation.twin.carried_mass_kg)
 
 
-def shown_by(
+def channel_responses(
     forces: RunForces, observed: Sequence[Observation], rig: Rig, force: LatentForce
 ) -> dict[str, FloatArray]:
     """What a force at its place adds to every channel of the run, in true units, shape (n,) each.
@@ -166,22 +169,24 @@ def shown_by(
     frequency = frequencies_hz(n, rate)
     spectrum = in_frequency(series)
     structure = forces.structure
-    n_cells = max(1, sum(one.channel.startswith("force_cell") for one in observed))
+    n_cells = max(1, sum(observation.channel.startswith("force_cell") for observation in observed))
     moved = np.zeros(frequency.size, complex)
     if structure is not None:
         moved = forces.carried_mass_kg * response(structure, structure.mode_shape, 2, frequency)
     of_force = moved - (1.0 if force.place == TANK else 0.0)
     shown = {}
-    for one in observed:
-        attributes = run.recording[one.channel].attrs
+    for observation in observed:
+        attributes = run.recording[observation.channel].attrs
         transfer = np.zeros(frequency.size, complex)
-        if one.channel.startswith("force"):
-            transfer = _sign(one) * of_force / (n_cells if one.channel.startswith("force_cell") else 1)
+        if observation.channel.startswith("force"):
+            transfer = (
+                _sign(observation) * of_force / (n_cells if observation.channel.startswith("force_cell") else 1)
+            )
         elif structure is not None:
-            weights = modal_weights(structure, rig, one.channel, attributes.get("x_m"))
+            weights = modal_weights(structure, rig, observation.channel, attributes.get("x_m"))
             if weights is not None:
-                transfer = response(structure, weights, _order(one.channel), frequency)
-        shown[one.channel] = in_time(transfer * spectrum, n)
+                transfer = response(structure, weights, _order(observation.channel), frequency)
+        shown[observation.channel] = in_time(transfer * spectrum, n)
     return shown
 
 
@@ -198,10 +203,10 @@ def _missed(
         difference[:n][known] -= difference[:n][known].mean()
     if is_free:
         difference[0] = 2 * difference[1] - difference[2]  # the first sample may still be held
-    return difference * _fade(recorded_.size, is_free) / values.get(f"gain of {observation.channel}", 1.0)
+    return difference * _taper(recorded_.size, is_free) / values.get(f"gain of {observation.channel}", 1.0)
 
 
-def _fade(n: int, is_free: bool) -> FloatArray:
+def _taper(n: int, is_free: bool) -> FloatArray:
     """Ones with a smooth way to zero at the end, and at the start of a run that was not released."""
     m = max(2, int(_END_SHARE * n))
     ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(m) + 0.5) / m)
@@ -212,7 +217,7 @@ def _fade(n: int, is_free: bool) -> FloatArray:
     return window
 
 
-def _kept(n: int, is_free: bool) -> slice:
+def _untapered(n: int, is_free: bool) -> slice:
     m = max(2, int(_END_SHARE * n))
     return slice(m // 4 if is_free else m, n - m)
 
@@ -235,21 +240,21 @@ def _on_structure(
     believed: Sequence[Observation],
     missed: Mapping[str, FloatArray],
 ) -> Found:
-    asked, at_release, left = _asked_for(simulation, rig, observed, believed, missed)
+    inverted, at_release, left = _inverted_force_at_tank(simulation, rig, observed, believed, missed)
     run, structure = observed[0].run, simulation.twin.structure
     assert structure is not None
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
-    frequency = asked.frequency_hz
+    frequency = inverted.frequency_hz
     sampled = min(n, simulation.places.shape[0])
     orders = [response(structure, structure.mode_shape, order, frequency) for order in range(3)]
-    moved = np.stack([in_time(transfer * asked.spectrum, n) for transfer in orders], axis=-1)[:sampled]
+    moved = np.stack([in_time(transfer * inverted.spectrum, n) for transfer in orders], axis=-1)[:sampled]
     started = np.stack([_release(structure, structure.mode_shape, order, n, rate) for order in range(3)], axis=-1)
     moved = moved + at_release * started[:sampled]
     relative, absolute = simulation.places[:sampled, 0] + moved, simulation.places[:sampled, 1] + moved
-    force = in_time(asked.spectrum, n)[:sampled]
-    on_structure = _changed(simulation, simulation.twin, STRUCTURE, relative, rate)
-    in_tank = _changed(simulation, simulation.twin, TANK, absolute, rate)
-    kept = _kept(n, run.is_free)
+    force = in_time(inverted.spectrum, n)[:sampled]
+    on_structure = _change_of_baseline_force(simulation, simulation.twin, STRUCTURE, relative, rate)
+    in_tank = _change_of_baseline_force(simulation, simulation.twin, TANK, absolute, rate)
+    kept = _untapered(n, run.is_free)
     kept = slice(kept.start, min(kept.stop, sampled))
     time = np.asarray(run.recording["time"].values, np.float64)
 
@@ -259,28 +264,30 @@ def _on_structure(
 
     measured = _measured(observed, believed, missed)
     if measured is None:
-        return (latent(EITHER, force - on_structure - in_tank, asked.noise, relative),), left
+        return (latent(EITHER, force - on_structure - in_tank, inverted.noise, relative),), left
     missed_force, force_noise = measured
     inertia = simulation.twin.carried_mass_kg * orders[2]
-    of_release = at_release * simulation.twin.carried_mass_kg * started[:, 2] * _fade(n, run.is_free)
-    liquid = inertia * asked.spectrum - in_frequency(missed_force - of_release) - in_frequency(_padded(in_tank, n))
-    noise = np.abs(inertia) ** 2 * asked.noise + np.interp(frequency, *force_noise)
-    kept_share = own_share(np.abs(liquid) ** 2, noise, frequency, rate)
+    of_release = at_release * simulation.twin.carried_mass_kg * started[:, 2] * _taper(n, run.is_free)
+    liquid = (
+        inertia * inverted.spectrum - in_frequency(missed_force - of_release) - in_frequency(_padded(in_tank, n))
+    )
+    noise = np.abs(inertia) ** 2 * inverted.noise + np.interp(frequency, *force_noise)
+    kept_share = wiener_gain(np.abs(liquid) ** 2, noise, frequency, rate)
     in_liquid = in_time(kept_share * liquid, n)[:sampled]
     of_structure = force - in_tank - in_liquid - on_structure
     return (
-        latent(STRUCTURE, of_structure, asked.noise + kept_share * noise, relative),
+        latent(STRUCTURE, of_structure, inverted.noise + kept_share * noise, relative),
         latent(TANK, in_liquid, kept_share * noise, absolute),
     ), left
 
 
-def _asked_for(
+def _inverted_force_at_tank(
     simulation: Simulation,
     rig: Rig,
     observed: Sequence[Observation],
     believed: Sequence[Observation],
     missed: Mapping[str, FloatArray],
-) -> tuple[AskedForce, float, dict[str, FloatArray]]:
+) -> tuple[InvertedForce, float, dict[str, FloatArray]]:
     """The force at the tank's place that believed motion channels ask for, how far the release was off, and what
     every channel has left.
     """
@@ -289,26 +296,28 @@ def _asked_for(
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
     frequency = frequencies_hz(n, rate)
     receptances, released = {}, {}
-    for one in observed:
-        weights = modal_weights(structure, rig, one.channel, run.recording[one.channel].attrs.get("x_m"))
+    for observation in observed:
+        weights = modal_weights(
+            structure, rig, observation.channel, run.recording[observation.channel].attrs.get("x_m")
+        )
         if weights is not None:
-            receptances[one.channel] = response(structure, weights, _order(one.channel), frequency)
+            receptances[observation.channel] = response(structure, weights, _order(observation.channel), frequency)
             if run.is_free:
-                released[one.channel] = in_frequency(
-                    _release(structure, weights, _order(one.channel), n, rate) * _fade(n, True)
+                released[observation.channel] = in_frequency(
+                    _release(structure, weights, _order(observation.channel), n, rate) * _taper(n, True)
                 )
     spectra = {name: in_frequency(missed[name]) for name in receptances}
     seen = {
-        one.channel: (receptances[one.channel], _noise_power(one, frequency))
-        for one in believed
-        if one.channel in receptances
+        observation.channel: (receptances[observation.channel], _noise_power(observation, frequency))
+        for observation in believed
+        if observation.channel in receptances
     }
-    asked, at_release = asked_force(seen, spectra, frequency, rate, released or None)
+    inverted, at_release = inverted_force(seen, spectra, frequency, rate, released or None)
     left = {}
     for name, spectrum in spectra.items():
         start = at_release * released[name] if released else 0.0
-        left[name] = in_time(spectrum - receptances[name] * asked.spectrum - start, n)
-    return asked, at_release, left
+        left[name] = in_time(spectrum - receptances[name] * inverted.spectrum - start, n)
+    return inverted, at_release, left
 
 
 def _release(structure: Structure, weights: FloatArray, order: int, n: int, rate_hz: float) -> FloatArray:
@@ -337,9 +346,9 @@ def _on_shaker(
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
     frequency = frequencies_hz(n, rate)
     sampled = min(n, simulation.places.shape[0])
-    motions = [one for one in observed if _order(one.channel) == 2]
+    motions = [observation for observation in observed if _order(observation.channel) == 2]
     good = [motion for motion in motions if motion in believed] or motions
-    mean = np.mean([missed[one.channel] for one in good], axis=0) if good else np.zeros(n)
+    mean = np.mean([missed[observation.channel] for observation in good], axis=0) if good else np.zeros(n)
     left = {motion.channel: missed[motion.channel] - mean for motion in motions}
     measured = _measured(observed, believed, missed)
     if measured is None:
@@ -347,14 +356,14 @@ def _on_shaker(
     missed_force, force_noise = measured
     carried = simulation.twin.carried_mass_kg
     of_noise = np.interp(frequency, *force_noise)
-    for one in good:
-        of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(one, frequency)
+    for observation in good:
+        of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(observation, frequency)
     wanted = in_frequency(carried * mean - missed_force)
-    share = own_share(np.abs(wanted) ** 2, of_noise, frequency, rate)
+    share = wiener_gain(np.abs(wanted) ** 2, of_noise, frequency, rate)
     force = in_time(share * wanted, n)[:sampled]
     motion = simulation.places[:sampled, 1].copy()
     motion[:, 2] += mean[:sampled]
-    kept = _kept(n, run.is_free)
+    kept = _untapered(n, run.is_free)
     kept = slice(kept.start, min(kept.stop, sampled))
     time = np.asarray(run.recording["time"].values, np.float64)
     error = float(np.sqrt(sample_variance(share * of_noise, n)))
@@ -369,16 +378,16 @@ def _measured(
     observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]] | None:
     """What the force of the structure on the tank is missed by, and the power of its noise over frequency."""
-    forces = [one for one in believed if one.channel.startswith("force")]
+    forces = [force for force in believed if force.channel.startswith("force")]
     cells = [force for force in forces if force.channel.startswith("force_cell")]
     chosen = cells or forces[:1]
     if not chosen:
         return None
-    n_cells = sum(one.channel.startswith("force_cell") for one in observed)
+    n_cells = sum(observation.channel.startswith("force_cell") for observation in observed)
     scale = n_cells / len(cells) if cells else 1.0
-    total = scale * np.sum([_sign(one) * missed[one.channel] for one in chosen], axis=0)
+    total = scale * np.sum([_sign(observation) * missed[observation.channel] for observation in chosen], axis=0)
     frequency = chosen[0].frequencies_hz
-    noise = scale**2 * np.sum([_noise_power(one, frequency) for one in chosen], axis=0)
+    noise = scale**2 * np.sum([_noise_power(observation, frequency) for observation in chosen], axis=0)
     return total, (frequency, noise)
 
 
@@ -386,18 +395,20 @@ def _sign(observation: Observation) -> float:
     return -1.0 if observation.run.recording[observation.channel].attrs.get("block_from") == "tank" else 1.0
 
 
-def _unequal_cells(
+def _cell_disagreements(
     observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    cells = [one.channel for one in observed if one.channel.startswith("force_cell")]
-    good = [one.channel for one in believed if one.channel in cells]
+    cells = [observation.channel for observation in observed if observation.channel.startswith("force_cell")]
+    good = [observation.channel for observation in believed if observation.channel in cells]
     if len(cells) < 2 or not good:
         return {}
     mean = np.mean([missed[name] for name in good], axis=0)
     return {name: missed[name] - mean for name in cells}
 
 
-def _changed(simulation: Simulation, twin: Blocks, place: str, motion: FloatArray, rate_hz: float) -> FloatArray:
+def _change_of_baseline_force(
+    simulation: Simulation, twin: Blocks, place: str, motion: FloatArray, rate_hz: float
+) -> FloatArray:
     """Baseline forces of a place on the motion that was measured, less those of the simulation."""
     chosen = [i for i, term in enumerate(twin.terms) if term.place == place]
     if not chosen:

@@ -59,32 +59,39 @@ def mismatches(
     found = []
     for observed in runs:
         level = _acceleration_g(observed)
-        for one in observed:
-            residual = one.residual(readings[one.run.name][one.channel])
+        for observation in observed:
+            residual = observation.residual(readings[observation.run.name][observation.channel])
             excess = np.maximum(np.minimum(residual**2, 1e6) - 1.0, 0.0)
             blocks = level if level.size == excess.shape[0] else np.full(excess.shape[0], np.nan)
             found.append(
-                ChannelMismatch(one.run.name, one.channel, one.times_s, one.frequencies_hz, excess, blocks)
+                ChannelMismatch(
+                    observation.run.name,
+                    observation.channel,
+                    observation.times_s,
+                    observation.frequencies_hz,
+                    excess,
+                    blocks,
+                )
             )
     return found
 
 
 def summary(found: Sequence[ChannelMismatch]) -> dict[str, Any]:
     """Channels, times, frequencies and accelerations that hold most of the misfit, as a verdict tells them."""
-    total = sum(one.total for one in found)
+    total = sum(mismatch.total for mismatch in found)
     if total <= 0:
         return {"channels": []}
     by_channel: dict[str, float] = {}
-    for one in found:
-        by_channel[one.channel] = by_channel.get(one.channel, 0.0) + one.total
+    for mismatch in found:
+        by_channel[mismatch.channel] = by_channel.get(mismatch.channel, 0.0) + mismatch.total
     channels = [name for name, size in by_channel.items() if size > _CHANNEL_SHARE * total]
     place: dict[str, Any] = {"channels": sorted(channels, key=lambda name: -by_channel[name])}
-    time = np.concatenate([one.time_s for one in found])
-    per_block = np.concatenate([one.excess.sum(axis=1) for one in found])
+    time = np.concatenate([mismatch.time_s for mismatch in found])
+    per_block = np.concatenate([mismatch.excess.sum(axis=1) for mismatch in found])
     place["time_s"] = _middle(time, per_block)
-    frequency = np.concatenate([one.frequency_hz for one in found])
-    place["frequency_hz"] = _middle(frequency, np.concatenate([one.excess.sum(axis=0) for one in found]))
-    levels = np.concatenate([one.acceleration_g for one in found])
+    frequency = np.concatenate([mismatch.frequency_hz for mismatch in found])
+    place["frequency_hz"] = _middle(frequency, np.concatenate([mismatch.excess.sum(axis=0) for mismatch in found]))
+    levels = np.concatenate([mismatch.acceleration_g for mismatch in found])
     known = np.isfinite(levels)
     if known.any():
         place["acceleration_g"] = _middle(levels[known], per_block[known])
@@ -104,8 +111,8 @@ def _middle(values: FloatArray, weights: FloatArray) -> list[float]:
 
 def _acceleration_g(observed: Sequence[Observation]) -> FloatArray:
     """Amplitude per block: √2 times the RMS of the run's accelerations."""
-    chosen = [one for one in observed if one.channel.startswith("acceleration")]
+    chosen = [observation for observation in observed if observation.channel.startswith("acceleration")]
     if not chosen:
         return np.zeros(0)
-    power = np.mean([(one.spectra**2).mean(axis=1) for one in chosen], axis=0)
+    power = np.mean([(observation.spectra**2).mean(axis=1) for observation in chosen], axis=0)
     return np.asarray(np.sqrt(2 * power) / GRAVITY_M_PER_S2)

@@ -19,26 +19,26 @@ from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.free_run_fit import fitted
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.observations import (
-    FOR_NOTHING,
+    IGNORED_VARIANCE,
     Observation,
     noise_of_sensor,
     observations,
     slow_displacements,
     with_scatter,
     with_typical_scatter,
-    within_band,
+    within_informative_bands,
 )
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
-_N_NOISY: Final = 4
+_N_NOISE_DRAWS: Final = 4
 _N_BLOCKS: Final = 9
-_MOSTLY: Final = 1.0
+_DOMINANT_NOISE_RATIO: Final = 1.0
 """Mean square by the noise of drives over that by the sensor's own, from which it is most of what is there."""
-_SLOWLY: Final = 3.0
+_SLOW_DISPLACEMENT_ERROR: Final = 3.0
 """Standard deviations by noise to which a displacement is known that drift removal has gone over."""
-_REACH: Final = 0.05
+_RELATIVE_REACH: Final = 0.05
 """Of a frequency: twice what is believed to be normal of a mode, as an effect may move it, too."""
 _MOST_OF_STATED: Final = 2.0
 """Of a sensor's noise: drives of repeats that differ by more were not the same."""
@@ -61,7 +61,9 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     """
     plain = {run.name: observations(run, model.compared(run), model.driving(run)) for run in case.runs}
     fit, _ = fitted(
-        FreeRunProblem(model, [_loosened(plain[run.name]) for run in case.runs]), model.believed, n_iterations=5
+        FreeRunProblem(model, [_with_inflated_variance(plain[run.name]) for run in case.runs]),
+        model.believed,
+        n_iterations=5,
     )
     raw = {name: _raw_residual(model, observed, fit) for name, observed in plain.items()}
     if isinstance(model, RigModel):
@@ -72,7 +74,9 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     sensors = {name: _with_simulated(observed, raw[name]) for name, observed in plain.items()}
     noise = _noise_of_drives(case, model, sensors, fit)
     plain = {
-        name: [_louder(one, noise, model.driving(one.run)) for one in observed]
+        name: [
+            _with_noise_of_drive(observation, noise, model.driving(observation.run)) for observation in observed
+        ]
         for name, observed in sensors.items()
     }
     weighted = dict(plain)
@@ -89,8 +93,11 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     for run in alone:
         weighted[run.name] = with_typical_scatter(plain[run.name], repeated)
     return {
-        name: within_band(
-            [_quieted(one, of_sensor, noise) for one, of_sensor in zip(observed, sensors[name], strict=True)]
+        name: within_informative_bands(
+            [
+                _ignored_where_drive_noise_dominates(observation, of_sensor, noise)
+                for observation, of_sensor in zip(observed, sensors[name], strict=True)
+            ]
         )
         for name, observed in weighted.items()
     }
@@ -102,26 +109,32 @@ def _noise_of_drives(
     """Mean square that the noise of driving accelerometers adds to each coefficient, per run and channel.
 
     At a resonance it is narrow: two repeats alone tell its size to a factor of two or three. It is measured by
-    simulations whose drive has as much noise once more, of the colour that repeats tell (`_colour`). Of several
-    that drive together each may have to do so alone, beside an effect on the others, and the noisiest counts.
+    simulations whose drive has as much noise once more, with the spectrum that repeats tell
+    (`_spectrum_of_drive_noise`). Of several that drive together each may have to do so alone, beside an effect on
+    the others, and the noisiest counts.
     """
     if not isinstance(model, RigModel) or case.rig is None:
         return {}
     found: dict[tuple[str, str], FloatArray] = {}
-    colours = {name: _colour(case, name) for run in case.runs for name in model.driving(run) if not run.is_free}
+    spectrum_of = {
+        name: _spectrum_of_drive_noise(case, name)
+        for run in case.runs
+        for name in model.driving(run)
+        if not run.is_free
+    }
     for run in case.runs:
         driving = model.driving(run)
         if run.is_free or not plain[run.name]:
             continue
         for kept in driving:
             recording = run.recording.drop_vars([name for name in driving if name != kept])
-            kept_alone, colour = replace(run, recording=recording), colours[kept]
-            for place, noise in _noise_through(case, kept_alone, kept, colour, plain, fit).items():
-                found[place] = np.maximum(found.get(place, 0.0), _near_by(noise))
+            kept_alone, spectrum = replace(run, recording=recording), spectrum_of[kept]
+            for place, noise in _propagated_noise(case, kept_alone, kept, spectrum, plain, fit).items():
+                found[place] = np.maximum(found.get(place, 0.0), _over_bands_of_a_resonance(noise))
     return found
 
 
-def _louder(
+def _with_noise_of_drive(
     observation: Observation, noise: Mapping[tuple[str, str], FloatArray], driving: Sequence[str]
 ) -> Observation:
     """An observation of a sensor with the noise of drives in its variance.
@@ -131,11 +144,12 @@ def _louder(
     """
     variance = observation.variance + noise.get((observation.run.name, observation.channel), 0.0)
     return replace(
-        observation, variance=np.where(slow_displacements(observation, driving), _SLOWLY**2, 1.0) * variance
+        observation,
+        variance=np.where(slow_displacements(observation, driving), _SLOW_DISPLACEMENT_ERROR**2, 1.0) * variance,
     )
 
 
-def _quieted(
+def _ignored_where_drive_noise_dominates(
     observation: Observation, of_sensor: Observation, noise: Mapping[tuple[str, str], FloatArray]
 ) -> Observation:
     """An observation that counts for nothing where there is nothing but the noise of drives.
@@ -143,15 +157,17 @@ def _quieted(
     There a simulation shows noise that the recording has not, and is nearer to it the less of a resonance it has:
     it would be fitted with more damping, less participation, and a frequency beyond the bands that are compared.
     """
-    is_noise = noise.get((observation.run.name, observation.channel), 0.0) > _MOSTLY * of_sensor.variance
+    is_noise = (
+        noise.get((observation.run.name, observation.channel), 0.0) > _DOMINANT_NOISE_RATIO * of_sensor.variance
+    )
     return replace(
         observation,
-        variance=np.where(is_noise & ~observation.informative, FOR_NOTHING, 1.0) * observation.variance,
+        variance=np.where(is_noise & ~observation.informative, IGNORED_VARIANCE, 1.0) * observation.variance,
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Colour:
+class _NoiseSpectrum:
     """Spectrum of a sensor's noise over that of white noise of the same sensor, at least one.
 
     Attributes
@@ -162,16 +178,16 @@ class _Colour:
     frequencies_hz: FloatArray
     ratios: FloatArray
 
-    def of_white(self, white: FloatArray, rate_hz: float) -> FloatArray:
+    def coloured(self, white: FloatArray, rate_hz: float) -> FloatArray:
         """White noise with this spectrum instead, shape (n,)."""
         at = np.interp(np.fft.rfftfreq(white.size, 1 / rate_hz), self.frequencies_hz, self.ratios)
         return np.asarray(np.fft.irfft(np.fft.rfft(white) * np.sqrt(at), white.size))
 
 
-_WHITE: Final = _Colour(np.zeros(1), np.ones(1))
+_WHITE: Final = _NoiseSpectrum(np.zeros(1), np.ones(1))
 
 
-def _colour(case: Case, name: str) -> _Colour:
+def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
     """Spectrum of a driving sensor's noise, from repeats whose drives differ by no more than noise can.
 
     What accelerometers and their amplifiers add grows towards low frequencies, where structures resonate; the
@@ -180,10 +196,10 @@ def _colour(case: Case, name: str) -> _Colour:
     ratios: list[FloatArray] = []
     frequencies: FloatArray = np.zeros(1)
     for test in case.tests():
-        for one, other in itertools.pairwise(run for run in test if name in run.recording and not run.is_free):
-            rate = one.attributes.sampling_rate_hz
-            a, b = (np.asarray(run.recording[name].values, np.float64) for run in (one, other))
-            std = max(noise_of_sensor(one, name), noise_of_sensor(other, name))
+        for first, other in itertools.pairwise(run for run in test if name in run.recording and not run.is_free):
+            rate = first.attributes.sampling_rate_hz
+            a, b = (np.asarray(run.recording[name].values, np.float64) for run in (first, other))
+            std = max(noise_of_sensor(first, name), noise_of_sensor(other, name))
             if a.size != b.size or rate != other.attributes.sampling_rate_hz or not std > 0:
                 continue
             difference = (a - b) / np.sqrt(2)
@@ -202,11 +218,16 @@ def _colour(case: Case, name: str) -> _Colour:
     high = np.maximum(np.searchsorted(frequencies, frequencies * np.sqrt(2)), low + _FEWEST_LINES)
     sums = np.concatenate([[0.0], np.cumsum(mean)])
     high = np.minimum(high, mean.size)
-    return _Colour(frequencies, np.maximum((sums[high] - sums[low]) / (high - low), 1.0))
+    return _NoiseSpectrum(frequencies, np.maximum((sums[high] - sums[low]) / (high - low), 1.0))
 
 
-def _noise_through(
-    case: Case, run: CaseRun, driving: str, colour: _Colour, plain: dict[str, list[Observation]], fit: FreeRunFit
+def _propagated_noise(
+    case: Case,
+    run: CaseRun,
+    driving: str,
+    spectrum: _NoiseSpectrum,
+    plain: dict[str, list[Observation]],
+    fit: FreeRunFit,
 ) -> dict[tuple[str, str], FloatArray]:
     """Mean square that the noise of one driving accelerometer adds to each coefficient of every other channel."""
     variable = run.recording[driving]
@@ -215,23 +236,28 @@ def _noise_through(
     std, values = noise_of_sensor(run, driving), np.asarray(variable.values, np.float64)
     found: dict[tuple[str, str], FloatArray] = {}
     with suppress(SloshlabError):
-        quiet = _readings(case, run, fit)
-        for seed in range(_N_NOISY):
+        noise_free = _readings(case, run, fit)
+        for seed in range(_N_NOISE_DRAWS):
             white = std * np.random.default_rng(seed).standard_normal(values.size)
-            noise = colour.of_white(white, run.attributes.sampling_rate_hz)
-            louder = run.recording.assign({driving: variable.copy(data=values + noise)})
-            loud = _readings(case, replace(run, recording=louder), fit)
-            for one in plain[run.name]:
-                if one.channel in loud and one.channel != driving:
-                    square = (one.of(loud[one.channel]) - one.of(quiet[one.channel])) ** 2
-                    found[run.name, one.channel] = found.get((run.name, one.channel), 0.0) + square / _N_NOISY
-    for one in plain[run.name]:
-        if one.channel not in run.recording.data_vars:
-            found[run.name, one.channel] = np.full(one.spectra.shape, std**2)
+            noise = spectrum.coloured(white, run.attributes.sampling_rate_hz)
+            noisier = run.recording.assign({driving: variable.copy(data=values + noise)})
+            noisy = _readings(case, replace(run, recording=noisier), fit)
+            for observation in plain[run.name]:
+                if observation.channel in noisy and observation.channel != driving:
+                    square = (
+                        observation.of(noisy[observation.channel])
+                        - observation.of(noise_free[observation.channel])
+                    ) ** 2
+                    found[run.name, observation.channel] = (
+                        found.get((run.name, observation.channel), 0.0) + square / _N_NOISE_DRAWS
+                    )
+    for observation in plain[run.name]:
+        if observation.channel not in run.recording.data_vars:
+            found[run.name, observation.channel] = np.full(observation.spectra.shape, std**2)
     return found
 
 
-def _near_by(square: FloatArray) -> FloatArray:
+def _over_bands_of_a_resonance(square: FloatArray) -> FloatArray:
     """Mean squares over some blocks, the largest of all bands in which a resonance may lie that is in one.
 
     What noise makes of a resonance is steady and as narrow as that is; where it is, only a fit will tell, and a
@@ -239,7 +265,7 @@ def _near_by(square: FloatArray) -> FloatArray:
     """
     steady = uniform_filter(square, (_N_BLOCKS, 1), mode="nearest")
     bands = np.arange(square.shape[1])
-    reach = np.ceil(_REACH * (bands + 0.5)).astype(int)
+    reach = np.ceil(_RELATIVE_REACH * (bands + 0.5)).astype(int)
     return np.stack(
         [steady[:, max(k - n, 0) : k + n + 1].max(axis=1) for k, n in zip(bands, reach, strict=True)], 1
     )
@@ -250,18 +276,21 @@ def _readings(case: Case, run: CaseRun, fit: FreeRunFit) -> dict[str, FloatArray
     return RigModel(case.rig, case.folder, [run]).simulate(run, fit.values, NOTHING)
 
 
-def _loosened(observed: Sequence[Observation]) -> list[Observation]:
+def _with_inflated_variance(observed: Sequence[Observation]) -> list[Observation]:
     """With five per cent of each channel added to its noise: a first fit must not depend on unknown noise."""
     return [
-        replace(one, variance=one.variance + (0.05**2) * float(np.mean(one.spectra**2)))
-        for one in within_band(observed)
+        replace(observation, variance=observation.variance + (0.05**2) * float(np.mean(observation.spectra**2)))
+        for observation in within_informative_bands(observed)
     ]
 
 
 def _with_simulated(observed: Sequence[Observation], raw: Mapping[str, FloatArray]) -> list[Observation]:
     """Observations with what is simulated of them, where it is."""
     return [
-        replace(one, simulated=one.spectra - raw[one.channel]) if one.channel in raw else one for one in observed
+        replace(observation, simulated=observation.spectra - raw[observation.channel])
+        if observation.channel in raw
+        else observation
+        for observation in observed
     ]
 
 
@@ -274,4 +303,7 @@ def _raw_residual(
         readings = model.simulate(observed[0].run, fit.values, NOTHING)
     except SloshlabError:
         return {}
-    return {one.channel: one.residual(readings[one.channel]) * np.sqrt(one.variance) for one in observed}
+    return {
+        observation.channel: observation.residual(readings[observation.channel]) * np.sqrt(observation.variance)
+        for observation in observed
+    }

@@ -23,9 +23,9 @@ ZERO_IS_KNOWN: Final = "zero_is_known"
 """Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
 _SLOWEST_INTEGRATED_HZ: Final = 5 * DRIFT_CORNER_HZ
-_SETTLES_S: Final = 1.0 / DRIFT_CORNER_HZ
+_FILTER_SETTLING_S: Final = 1.0 / DRIFT_CORNER_HZ
 """What a filter that removes drift makes of beginnings and ends."""
-FOR_NOTHING: Final = 100.0
+IGNORED_VARIANCE: Final = 100.0
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
 _LEAST_SHARE: Final = 1e-4
 """No channel is believed to better than this share of its RMS per coefficient; quantisation and rounding."""
@@ -87,8 +87,8 @@ class Observation:
 
         A simulation that is driven by a faulty sensor moves where nothing is recorded.
         """
-        shown = [one for one in (self.spectra, self.simulated) if one is not None]
-        power = np.max([uniform_filter(one**2, (3, 3), mode="nearest") for one in shown], axis=0)
+        shown = [spectra for spectra in (self.spectra, self.simulated) if spectra is not None]
+        power = np.max([uniform_filter(spectra**2, (3, 3), mode="nearest") for spectra in shown], axis=0)
         return np.asarray(power > _INFORMATIVE * self.variance)
 
     def of(self, values: FloatArray) -> FloatArray:
@@ -137,16 +137,16 @@ def observations(
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
         spectra = _spectra(values, known, keeps_mean, n_bands, run)
         least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
-        variance = np.full(spectra.shape, max(_stated(variable), _white_level(spectra), least, 1e-300))
+        variance = np.full(spectra.shape, max(_stated_variance(variable), _white_level(spectra), least, 1e-300))
         is_rough = float(variable.attrs.get("known_to", 0.0)) > 0.0
-        one = Observation(run, name, keeps_mean, known, spectra, variance, is_rough=is_rough)
-        lost = slow_displacements(one, driving)
+        observation = Observation(run, name, keeps_mean, known, spectra, variance, is_rough=is_rough)
+        lost = slow_displacements(observation, driving)
         if lost.any():
-            times = one.times_s
-            at_ends = (times - times[0] < _SETTLES_S) | (times[-1] - times < _SETTLES_S)
-            everywhere = FOR_NOTHING * (spectra[lost] ** 2).mean()
+            times = observation.times_s
+            at_ends = (times - times[0] < _FILTER_SETTLING_S) | (times[-1] - times < _FILTER_SETTLING_S)
+            everywhere = IGNORED_VARIANCE * (spectra[lost] ** 2).mean()
             variance[lost & (at_ends[:, None] | (not knows_noise_of_drive))] += everywhere
-        found.append(one)
+        found.append(observation)
     return found
 
 
@@ -155,7 +155,7 @@ def slow_displacements(observation: Observation, driving: Sequence[str]) -> NDAr
 
     Parameters
     ----------
-    one : Observation
+    observation : Observation
     driving : sequence of str
         Channels that drive the simulation.
     """
@@ -178,14 +178,14 @@ def noise_of_sensor(run: CaseRun, name: str) -> float:
     values, n_bands = np.asarray(variable.values, np.float64), _n_bands(run)
     known = np.isfinite(values)
     white = _white_level(_spectra(values, known, False, n_bands, run)) if known.sum() >= 2 * n_bands else 0.0
-    return float(np.sqrt(max(_stated(variable), white)))
+    return float(np.sqrt(max(_stated_variance(variable), white)))
 
 
 def _n_bands(run: CaseRun) -> int:
     return max(8, 2 * round(0.5 * BLOCK_S * run.attributes.sampling_rate_hz))
 
 
-def _stated(variable: xr.DataArray) -> float:
+def _stated_variance(variable: xr.DataArray) -> float:
     """Variance of the noise and of what no model need describe, as the recording states them; zero where not."""
     return float(variable.attrs.get("noise_std", 0.0)) ** 2 + float(variable.attrs.get("known_to", 0.0)) ** 2
 
@@ -193,10 +193,10 @@ def _stated(variable: xr.DataArray) -> float:
 def _is_integrated(run: CaseRun, driving: Sequence[str]) -> bool:
     """Whether a simulation knows displacements of the base from accelerometers alone."""
     present = [run.recording[name] for name in driving if name in run.recording.data_vars]
-    return any(one.attrs["quantity"] == "acceleration" for one in present)
+    return any(variable.attrs["quantity"] == "acceleration" for variable in present)
 
 
-def within_band(observed: Sequence[Observation]) -> list[Observation]:
+def within_informative_bands(observed: Sequence[Observation]) -> list[Observation]:
     """The channels of a run without the high bands in which none of them stands out of what does not repeat.
 
     Parameters
@@ -204,22 +204,24 @@ def within_band(observed: Sequence[Observation]) -> list[Observation]:
     observed : sequence of Observation
         Of one run.
     """
-    if len({one.n_bands for one in observed}) != 1:
+    if len({observation.n_bands for observation in observed}) != 1:
         return list(observed)
     n_bands, highest = observed[0].n_bands, 0
-    for one in observed:
-        shown = np.flatnonzero(one.informative.mean(axis=0) > _LEAST_SHARE_OF_BLOCKS)
+    for observation in observed:
+        shown = np.flatnonzero(observation.informative.mean(axis=0) > _LEAST_SHARE_OF_BLOCKS)
         highest = max(highest, int(shown[-1]) + 1 if shown.size else 0)
     n_kept = min(n_bands, max(highest + n_bands // 16, n_bands // 8))
     return [
         replace(
-            one,
-            spectra=np.ascontiguousarray(one.spectra[:, :n_kept]),
-            variance=np.ascontiguousarray(one.variance[:, :n_kept]),
-            simulated=None if one.simulated is None else np.ascontiguousarray(one.simulated[:, :n_kept]),
+            observation,
+            spectra=np.ascontiguousarray(observation.spectra[:, :n_kept]),
+            variance=np.ascontiguousarray(observation.variance[:, :n_kept]),
+            simulated=None
+            if observation.simulated is None
+            else np.ascontiguousarray(observation.simulated[:, :n_kept]),
             n_transformed=n_bands,
         )
-        for one in observed
+        for observation in observed
     ]
 
 
@@ -259,9 +261,9 @@ def with_scatter(
             _weighted(observation, np.maximum(scatter[observation.channel], _floor(observation)))
             if observation.channel in scatter
             else observation
-            for observation in one
+            for observation in repeat
         ]
-        for one in group
+        for repeat in group
     ]
 
 
@@ -283,14 +285,17 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
             for source in sources
             if source.channel == observation.channel and source.n_bands == observation.n_bands
         ]
-        if not any(one.informative.any() for one in alike):
+        if not any(source.informative.any() for source in alike):
             weighted.append(observation)
             continue
-        alike = [one for one in alike if one.informative.any()]
-        quiet = np.min([np.median(one.variance, axis=0) for one in alike], axis=0)
+        alike = [source for source in alike if source.informative.any()]
+        quiet = np.min([np.median(source.variance, axis=0) for source in alike], axis=0)
         share = float(
             np.median(
-                [one.variance[one.informative].sum() / (one.spectra**2)[one.informative].sum() for one in alike]
+                [
+                    source.variance[source.informative].sum() / (source.spectra**2)[source.informative].sum()
+                    for source in alike
+                ]
             )
         )
         local = uniform_filter(observation.spectra**2, (3, 9), mode="nearest")

@@ -100,7 +100,7 @@ def require_comparable(case: Case, model: DiagnosedModel) -> None:
             if sizes is not None:
                 recorded, simulated = sizes
                 ratios.setdefault(channel, []).append((recorded / simulated, run.name, recorded, simulated))
-    _require_alike(ratios)
+    _require_same_magnitude(ratios)
 
 
 def _simulated(run: CaseRun, model: DiagnosedModel) -> Mapping[str, FloatArray]:
@@ -132,12 +132,12 @@ def _sizes(run: CaseRun, channel: str, simulated: FloatArray) -> tuple[float, fl
     return (recorded, shown) if shown > 0 else None
 
 
-def _require_alike(ratios: Mapping[str, list[tuple[float, str, float, float]]]) -> None:
+def _require_same_magnitude(ratios: Mapping[str, list[tuple[float, str, float, float]]]) -> None:
     """A channel that is off in every run; one that moves in some is no matter of units."""
     for channel, found in ratios.items():
-        off = [one for one in found if not 1 / LARGEST_RATIO < one[0] < LARGEST_RATIO]
+        off = [ratio for ratio in found if not 1 / LARGEST_RATIO < ratio[0] < LARGEST_RATIO]
         if off and len(off) == len(found):
-            _, name, recorded, simulated = max(off, key=lambda one: abs(np.log(one[0])))
+            _, name, recorded, simulated = max(off, key=lambda ratio: abs(np.log(ratio[0])))
             raise InputError(
                 f"recording {name}: {channel}",
                 got=f"RMS {recorded:.3g} where the twin of the rig reads {simulated:.3g}",

@@ -121,11 +121,13 @@ def residual_maps(
     for observed in runs:
         motion = _motion_per_block(observed)
         turning = _phase(observed)
-        for one in observed:
-            values = readings[one.run.name][one.channel]
-            blocks.setdefault(one.channel, []).append(_sorted_by(one, one.residual(values), motion))
+        for observation in observed:
+            values = readings[observation.run.name][observation.channel]
+            blocks.setdefault(observation.channel, []).append(
+                _sorted_by(observation, observation.residual(values), motion)
+            )
             if turning is not None:
-                phases.setdefault(one.channel, []).append((turning, _in_time(one, values)))
+                phases.setdefault(observation.channel, []).append((turning, _in_time(observation, values)))
     return [_maps(channel, found, phases.get(channel, []), rig) for channel, found in blocks.items()]
 
 
@@ -133,12 +135,12 @@ def _motion_per_block(observed: Sequence[Observation]) -> tuple[FloatArray, Floa
     """Amplitude [m/s²], frequency [Hz] and purity (0 … 1) of the tank's acceleration per block."""
     names = (ACCELERATION_ROOF, ACCELERATION_TIP, ACCELERATION_CONTROL, "acceleration")
     for name in names:
-        chosen = [one for one in observed if one.channel.startswith(name)]
+        chosen = [observation for observation in observed if observation.channel.startswith(name)]
         if chosen:
             break
     else:
         return None
-    power = np.mean([one.spectra**2 for one in chosen], axis=0)
+    power = np.mean([observation.spectra**2 for observation in chosen], axis=0)
     frequency = chosen[0].frequencies_hz
     amplitude = np.sqrt(2 * power.mean(axis=1))
     power = uniform_filter1d(power, 3, axis=0, mode="nearest")  # one block's coefficients depend on the phase
@@ -165,12 +167,18 @@ def _sorted_by(
 
 def _phase(observed: Sequence[Observation]) -> FloatArray | None:
     """Phase of the tank's acceleration at every sample, NaN at the ends; None where it has no single frequency."""
-    chosen = [one for one in observed if one.channel.startswith((ACCELERATION_ROOF, ACCELERATION_TIP))]
+    chosen = [
+        observation
+        for observation in observed
+        if observation.channel.startswith((ACCELERATION_ROOF, ACCELERATION_TIP))
+    ]
     if not chosen:
         return None
     run = chosen[0].run
     rate = run.attributes.sampling_rate_hz
-    series = np.mean([np.nan_to_num(np.asarray(run.recording[one.channel].values)) for one in chosen], axis=0)
+    series = np.mean(
+        [np.nan_to_num(np.asarray(run.recording[observation.channel].values)) for observation in chosen], axis=0
+    )
     power = np.abs(np.fft.rfft(series - series.mean())) ** 2
     frequency = np.fft.rfftfreq(series.size, 1 / rate)
     main = float(frequency[power.argmax()])

@@ -42,14 +42,14 @@ _STEPS_PER_FIRST_PERIOD: Final = 60.0
 _LEAST_STEPS_PER_S: Final = 500.0
 """Of a tank that follows its measured motion: forces that average over a cycle need some tens of steps in it."""
 _MOST_KEPT_BYTES: Final = 5e7
-_MOST_READINGS_TO_COPY: Final = 350_000
+_MOST_READINGS_TO_FORK: Final = 350_000
 """Of all channels and runs: processes that simulate and fit a third more were seen to hold three gigabytes."""
 RELEASE: Final = "release of "
 _FLUCTUATION: Final = "damping of the liquid in "
 _TOLERANCE_OF_FLUCTUATION: Final = 0.05
 """By which a chaotic liquid damps more or less in one run than on average."""
 _DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
-_AS_NORMAL: Final = 1.25
+_BOUND_TOLERANCES: Final = 1.25
 """Tolerances by which masses, frequencies, losses and gains may be off; beyond, something else is the matter."""
 _TOLERANCE_OF_SHAPE: Final = 0.01
 """Of the value at the tip: where a sensor sits, and that a beam is not quite uniform."""
@@ -67,7 +67,7 @@ class _Channels:
 
 
 @dataclass(frozen=True, eq=False)
-class _Truth:
+class _TrueReadings:
     """What perfect sensors show in a run, and motions of the modes, (n, n_modes), for those along a beam."""
 
     channels: dict[str, FloatArray]
@@ -100,11 +100,11 @@ class RigModel:
         self.rig = rig
         self.blocks = BLOCKS
         n_readings = sum(run.recording[name].size for run in runs for name in channels(run.recording))
-        self.may_be_copied = n_readings <= _MOST_READINGS_TO_COPY
+        self.may_be_forked = n_readings <= _MOST_READINGS_TO_FORK
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}
-        self._truths: OrderedDict[tuple[Any, ...], _Truth] = OrderedDict()
+        self._truths: OrderedDict[tuple[Any, ...], _TrueReadings] = OrderedDict()
         self._kept_bytes = 0
         self._lock = threading.Lock()
         self._channels = {run.name: self._channels_of(run) for run in self.runs}
@@ -212,7 +212,7 @@ class RigModel:
             readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
         return readings
 
-    def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> _Truth:
+    def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> _TrueReadings:
         physical = tuple(
             values.get(parameter.name, parameter.believed)
             for parameter in self.parameters
@@ -226,7 +226,7 @@ class RigModel:
                 self._truths.move_to_end(key)
                 return self._truths[key]
         simulation = self._simulation(run, values, extension, undone)
-        known, truth = self._channels[run.name], _Truth({}, {})
+        known, truth = self._channels[run.name], _TrueReadings({}, {})
         moving: dict[int, FloatArray] = {}
         for name in known.compared:
             found = true_channel(simulation, name, known.attributes[name], self.rig, n_cells=known.n_cells)
@@ -249,8 +249,8 @@ class RigModel:
         self, run: CaseRun, values: Mapping[str, float], extension: Extension, undone: Sequence[SensorFault]
     ) -> Simulation:
         drive = self._drive(run, tuple(undone))
-        twin = self._varied(run, values, extension, fluctuation=values.get(_FLUCTUATION + run.name, 1.0))
-        trusted = self._trusted(run, undone)
+        twin = self._retuned(run, values, extension, fluctuation=values.get(_FLUCTUATION + run.name, 1.0))
+        trusted = self._compared_drives(run, undone)
         gains = [values.get(f"gain of {name}", 1.0) for name in trusted]
         excitation = drive.excitation
         if gains:
@@ -265,7 +265,7 @@ class RigModel:
             twin = replace(twin, structure=twin.structure.for_steps_of(1.0 / (rate * n_substeps)))
         return twin.simulate(excitation, initial_displacement_m=start, n_substeps=n_substeps).require_done()
 
-    def _trusted(self, run: CaseRun, undone: Sequence[SensorFault] = ()) -> list[str]:
+    def _compared_drives(self, run: CaseRun, undone: Sequence[SensorFault] = ()) -> list[str]:
         """Channels whose mean moves the tank, and which are compared, too: their gains say how far it moved."""
         faulty = {fault.channel for fault in undone}
         compared = self._channels[run.name].compared
@@ -277,19 +277,19 @@ class RigModel:
         Faults of sensors stay out: they are no part of what is simulated.
         """
         run = next((run for run in self.runs if run.attributes.configuration == "sloshing"), self.runs[0])
-        return self._varied(run, values, extension)
+        return self._retuned(run, values, extension)
 
-    def _varied(
+    def _retuned(
         self, run: CaseRun, values: Mapping[str, float], extension: Extension, *, fluctuation: float = 1.0
     ) -> Twin:
         twin = self.twin
         structure = twin.structure
         if structure is not None:
-            structure = _varied_structure(structure, values)
+            structure = _retuned_structure(structure, values)
             if extension.structure is not None:
                 structure = extension.structure(structure)
         terms = tuple(
-            _fluctuating(_varied_term(term, values), fluctuation)
+            _fluctuating(_retuned_term(term, values), fluctuation)
             for term in twin.terms
             if structure is not None or term.place == "tank"
         )
@@ -313,7 +313,7 @@ class RigModel:
                 return self._drives[key]
         driving = self._drives[(run.name,)].channels if undone else ()
         drive = drive_of(corrected(run, undone, driving), self.twin, by_noise=True)
-        drive = replace(drive, excitation=remembered(drive.excitation))
+        drive = replace(drive, excitation=with_cached_inputs(drive.excitation))
         with self._lock:
             if len(self._drives) > 20 * max(1, len(self.runs)):
                 self._drives = {known: self._drives[known] for known in self._drives if len(known) == 1}
@@ -332,23 +332,25 @@ class RigModel:
     def _parameters(self) -> tuple[BaselineParameter, ...]:
         found: list[BaselineParameter] = []
         if self.twin.structure is not None:
-            found += _of_structure(self.twin.structure, moves=any(not run.is_free for run in self.runs))
+            found += _structure_parameters(self.twin.structure, moves=any(not run.is_free for run in self.runs))
         for term in self.twin.terms:
             for name, value in term.values.items():
                 if name in _TUNED_NUMBERS and value:
                     number = f"{term.name}.{name}"
-                    found.append(BaselineParameter(number, value, 0.2 * abs(value), most_tolerances=_AS_NORMAL))
+                    found.append(
+                        BaselineParameter(number, value, 0.2 * abs(value), most_tolerances=_BOUND_TOLERANCES)
+                    )
         names = sorted({name for run in self.runs for name in self.compared(run)})
         if any(name.startswith("force") for name in names):
-            found.append(BaselineParameter("carried mass", 1.0, 0.01, most_tolerances=_AS_NORMAL))
-        moving = {name for run in self.runs for name in self._trusted(run)}
+            found.append(BaselineParameter("carried mass", 1.0, 0.01, most_tolerances=_BOUND_TOLERANCES))
+        moving = {name for run in self.runs for name in self._compared_drives(run)}
         found += [
             BaselineParameter(
                 f"gain of {name}",
                 1.0,
                 0.01,
                 is_reading=name not in moving,
-                most_tolerances=_AS_NORMAL,
+                most_tolerances=_BOUND_TOLERANCES,
                 channel="" if name in moving else name,
             )
             for name in names
@@ -408,26 +410,27 @@ def steps_per_sample(twin: Twin, sampling_rate_hz: float, per_period: float = ST
     return max(1, min(1000, math.ceil(needed / sampling_rate_hz)))
 
 
-def _of_structure(structure: Structure, *, moves: bool) -> list[BaselineParameter]:
+def _structure_parameters(structure: Structure, *, moves: bool) -> list[BaselineParameter]:
     """Participations hold the gain of the sensor at the base too, which drives the twin and is not compared."""
     n = structure.masses_kg.size
     found = []
     for i in range(n):
         label = f"mode {i + 1}"
-        found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02, most_tolerances=_AS_NORMAL))
-        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2, most_tolerances=_AS_NORMAL))
+        found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02, most_tolerances=_BOUND_TOLERANCES))
+        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2, most_tolerances=_BOUND_TOLERANCES))
     found += [
-        BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01, most_tolerances=_AS_NORMAL) for i in range(n)
+        BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01, most_tolerances=_BOUND_TOLERANCES)
+        for i in range(n)
     ]
     if moves:
         found += [
-            BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02, most_tolerances=_AS_NORMAL)
+            BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02, most_tolerances=_BOUND_TOLERANCES)
             for i in range(n)
         ]
     return found
 
 
-def _varied_structure(structure: Structure, values: Mapping[str, float]) -> Structure:
+def _retuned_structure(structure: Structure, values: Mapping[str, float]) -> Structure:
     n = structure.masses_kg.size
     frequency = np.array([values.get(f"frequency of mode {i + 1}", 1.0) for i in range(n)])
     damping = np.array([values.get(f"damping of mode {i + 1}", 1.0) for i in range(n)])
@@ -442,7 +445,7 @@ def _varied_structure(structure: Structure, values: Mapping[str, float]) -> Stru
     )
 
 
-def _varied_term(term: Term, values: Mapping[str, float]) -> Term:
+def _retuned_term(term: Term, values: Mapping[str, float]) -> Term:
     changed = {name: values[f"{term.name}.{name}"] for name in term.values if f"{term.name}.{name}" in values}
     return term.changed(**changed) if changed else term
 
@@ -494,17 +497,17 @@ def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str
     return recording
 
 
-def remembered(excitation: Excitation) -> Excitation:
+def with_cached_inputs(excitation: Excitation) -> Excitation:
     """The excitation with the interpolated values of earlier simulations kept."""
     inputs = excitation.inputs
     if inputs is None:
         return excitation
     kept: dict[tuple[float, int, float], FloatArray] = {}
 
-    def remembered(time: FloatArray) -> FloatArray:
+    def with_cached_inputs(time: FloatArray) -> FloatArray:
         key = (float(time[0]), time.size, float(time[-1]))
         if key not in kept:
             kept[key] = inputs(time)
         return kept[key]
 
-    return replace(excitation, inputs=remembered)
+    return replace(excitation, inputs=with_cached_inputs)

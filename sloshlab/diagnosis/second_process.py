@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.copied_process import CAN_FORK, copied, ended
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.forked_process import CAN_FORK, forked, terminate
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.side_by_side import works_alone
+from sloshlab.diagnosis.parallel_pieces import is_single_threaded
 
 FloatArray = NDArray[np.float64]
 Runs = Sequence[Sequence[Observation]]
@@ -31,7 +31,7 @@ Work = Callable[[DiagnosedModel, Runs, Values, Sequence[Candidate]], FloatArray]
 """Weighted residuals of runs, one after another."""
 _LEAST_COEFFICIENTS: Final = 20_000
 """Of all runs; a copy and its messages take longer than what is less."""
-_Thing = TypeVar("_Thing")
+_Item = TypeVar("_Item")
 
 
 class SecondProcess:
@@ -60,9 +60,9 @@ class SecondProcess:
         self.n_done = 0
         self.ending = weakref.finalize(model, self._end)
         self._is_busy = threading.Lock()
-        n = sum(one.spectra.size for one in self.observed.all)
+        n = sum(observation.spectra.size for observation in self.observed.all)
         self._shared: FloatArray = np.frombuffer(mmap(-1, 8 * max(1, n)), np.float64)
-        self._process, self._line = copied(
+        self._process, self._line = forked(
             _serve, work, model, self.observed.all, self.candidates.all, self._shared
         )
 
@@ -71,7 +71,7 @@ class SecondProcess:
         if not self._is_busy.acquire(blocking=False):
             return None
         try:
-            of_runs = [[self.observed.number_of(one) for one in run] for run in runs]
+            of_runs = [[self.observed.number_of(observation) for observation in run] for run in runs]
             self._line.send(
                 (of_runs, dict(values), [self.candidates.number_of(candidate) for candidate in candidates])
             )
@@ -84,7 +84,7 @@ class SecondProcess:
             self._is_busy.release()
 
     def _end(self) -> None:
-        ended(self._process, self._line)
+        terminate(self._process, self._line)
 
 
 _PRESENT: Final[weakref.WeakKeyDictionary[DiagnosedModel, SecondProcess]] = weakref.WeakKeyDictionary()
@@ -109,14 +109,14 @@ def second_process(
     SecondProcess or None
         None where it would be of no use or of no good: small problems, other systems, code that is not ours.
     """
-    if works_alone() or not (CAN_FORK and model.may_be_copied):
+    if is_single_threaded() or not (CAN_FORK and model.may_be_forked):
         return None
     present = _PRESENT.get(model)
-    observed = [one for run in runs for one in run]
-    if present is None and sum(one.spectra.size for one in observed) < _LEAST_COEFFICIENTS:
+    observed = [observation for run in runs for observation in run]
+    if present is None and sum(observation.spectra.size for observation in observed) < _LEAST_COEFFICIENTS:
         return None
     if present is not None:
-        unseen = [one for one in observed if one not in present.observed]
+        unseen = [observation for observation in observed if observation not in present.observed]
         unknown = [candidate for candidate in candidates if candidate not in present.candidates]
         if not unseen and not unknown:
             return present
@@ -126,18 +126,18 @@ def second_process(
     return found
 
 
-class _Numbered(Generic[_Thing]):
+class _Numbered(Generic[_Item]):
     """Things in the order in which they were given, told apart by which they are, not by what they equal."""
 
-    def __init__(self, things: Iterable[_Thing]) -> None:
-        self.all = tuple(things)
-        self._numbers = {id(one): i for i, one in enumerate(self.all)}
+    def __init__(self, items: Iterable[_Item]) -> None:
+        self.all = tuple(items)
+        self._numbers = {id(item): i for i, item in enumerate(self.all)}
 
-    def __contains__(self, one: _Thing) -> bool:
-        return id(one) in self._numbers
+    def __contains__(self, item: _Item) -> bool:
+        return id(item) in self._numbers
 
-    def number_of(self, one: _Thing) -> int:
-        return self._numbers[id(one)]
+    def number_of(self, item: _Item) -> int:
+        return self._numbers[id(item)]
 
 
 def _serve(

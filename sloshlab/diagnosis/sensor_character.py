@@ -9,7 +9,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.evidence import ALONE, CLIPS, CLOCK, GAIN, LATE, LEAKS, LINE, SLOW, TALKS
+from sloshlab.diagnosis.evidence import (
+    CLOCK_DRIFT,
+    CROSS_TALK,
+    MAINS_LINE,
+    PROPORTIONAL_TO_INTEGRAL,
+    PROPORTIONAL_TO_RATE,
+    PROPORTIONAL_TO_READING,
+    SATURATING,
+    SINGLE_CHANNEL,
+    TREND,
+)
 from sloshlab.diagnosis.latent_force import RunForces
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.recording import channels
@@ -60,18 +70,18 @@ def sensor_character(
     """
     parts: dict[str, list[tuple[float, float]]] = {}
     for observed, forces in zip(runs, found, strict=True):
-        one = next((each for each in observed if each.channel == channel), None)
-        if one is None or channel not in forces.left:
+        observation = next((each for each in observed if each.channel == channel), None)
+        if observation is None or channel not in forces.left:
             continue
         error = forces.left[channel]
-        for term, columns in _forms(one, error).items():
+        for term, columns in _forms(observation, error).items():
             parts.setdefault(term, []).extend(_explained(error, columns))
     generator = np.random.default_rng(seed)
     shares = {term: _share(table, generator) for term, table in parts.items()}
     if not shares:
         return ()
     top = max(share for share, _, _ in shares.values())
-    answers = [SensorAnswer(ALONE, 1.0, 1.0, 1.0, True)]
+    answers = [SensorAnswer(SINGLE_CHANNEL, 1.0, 1.0, 1.0, True)]
     for term, (share, low, high) in sorted(shares.items(), key=lambda item: -item[1][0]):
         holds = None
         if low > _MUCH and share > top - _CLOSE:
@@ -82,7 +92,7 @@ def sensor_character(
     return tuple(answers)
 
 
-def said(answers: Sequence[SensorAnswer]) -> dict[str, bool]:
+def decided_terms(answers: Sequence[SensorAnswer]) -> dict[str, bool]:
     """Terms that hold, and that do not."""
     return {answer.term: answer.holds for answer in answers if answer.holds is not None}
 
@@ -102,15 +112,15 @@ def _forms(observation: Observation, error: FloatArray) -> Mapping[str, FloatArr
     limit = float(np.abs(reading).max())
     lines = [part for line in _MAINS_HZ if line < 0.5 * rate for part in _line(line, time)]
     forms = {
-        GAIN: truth[:, None],
-        LATE: slope[:, None],
-        LEAKS: integral[:, None],
-        SLOW: np.stack([np.ones_like(time), time], axis=1),
-        CLOCK: (time * slope)[:, None],
-        CLIPS: (truth - np.clip(truth, -limit, limit))[:, None],
+        PROPORTIONAL_TO_READING: truth[:, None],
+        PROPORTIONAL_TO_RATE: slope[:, None],
+        PROPORTIONAL_TO_INTEGRAL: integral[:, None],
+        TREND: np.stack([np.ones_like(time), time], axis=1),
+        CLOCK_DRIFT: (time * slope)[:, None],
+        SATURATING: (truth - np.clip(truth, -limit, limit))[:, None],
     }
     if lines:
-        forms[LINE] = np.stack(lines, axis=1)
+        forms[MAINS_LINE] = np.stack(lines, axis=1)
     others = [
         np.nan_to_num(np.asarray(recording[name].values, np.float64))
         for name in channels(recording)
@@ -118,7 +128,7 @@ def _forms(observation: Observation, error: FloatArray) -> Mapping[str, FloatArr
         and recording[name].attrs.get("quantity") != recording[observation.channel].attrs["quantity"]
     ]
     if others:
-        forms[TALKS] = np.stack([other - other.mean() for other in others], axis=1)
+        forms[CROSS_TALK] = np.stack([other - other.mean() for other in others], axis=1)
     return forms
 
 

@@ -19,7 +19,7 @@ from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
 _BASE: Final = ACCELERATION_ROOT
-_SHARE_OF_ONE_NUMBER: Final = 0.9
+_LARGEST_COHERENCE: Final = 0.9
 """Of the mean square of a channel that may be another one's, with a gain and a delay, before they are alike."""
 _MOST_PEAKS: Final = 3
 ACROSS_A_BAND: Final = (0.0, -0.4, 0.4, -0.8, 0.8)
@@ -63,14 +63,14 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
         longest_run_s=max(observed[0].run.duration_s for observed in fitting),
         blocks=model.blocks,
         peaks=_sizes(fitting, model, lambda values: np.nanmax(np.abs(values))),
-        missed_hz=most_missed_hz(fitting, problem.residual(problem.theta_of(fit.values))),
+        missed_hz=residual_peaks_hz(fitting, problem.residual(problem.theta_of(fit.values))),
         n_modes=0 if model.twin.structure is None else model.twin.structure.masses_kg.size,
-        unlike_base=_unlike_base(fitting),
+        incoherent_with_base=_incoherent_with_base(fitting),
         has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
     )
 
 
-def _unlike_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:
+def _incoherent_with_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:
     """Channels whose analytic signal is not that of the accelerometer of the base times one complex number.
 
     Of all driven runs together: steady motion of one frequency has one such number, motion of several has not.
@@ -87,16 +87,14 @@ def _unlike_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:
             part = np.array([np.vdot(base, own), np.vdot(base, base), np.vdot(own, own)])
             products.setdefault(name, []).append(part)
     sums = {name: np.abs(np.sum(parts, axis=0)) for name, parts in products.items()}
-    return frozenset(
-        name for name, (both, base, own) in sums.items() if both**2 < _SHARE_OF_ONE_NUMBER * base * own
-    )
+    return frozenset(name for name, (both, base, own) in sums.items() if both**2 < _LARGEST_COHERENCE * base * own)
 
 
 def _analytic(values: FloatArray) -> NDArray[np.complex128]:
     return np.asarray(hilbert(np.nan_to_num(np.asarray(values, np.float64) - np.nanmean(values))))
 
 
-def most_missed_hz(
+def residual_peaks_hz(
     fitting: Sequence[Sequence[Observation]], residual: FloatArray, places: Sequence[float] = (0.0,)
 ) -> tuple[float, ...]:
     """Frequencies of the highest peaks of weighted residuals, all runs and channels together.
@@ -114,16 +112,16 @@ def most_missed_hz(
     tuple of float
         Hz, places of the highest peak first.
     """
-    n_bands = max(one.spectra.shape[1] for run in fitting for one in run)
+    n_bands = max(observation.spectra.shape[1] for run in fitting for observation in run)
     power, count, first = np.zeros(n_bands), np.full(n_bands, 1e-300), 0
     frequencies = np.zeros(n_bands)
-    for one in (one for run in fitting for one in run):
-        own = residual[first : first + one.spectra.size].reshape(one.spectra.shape)
-        first += one.spectra.size
-        n = one.spectra.shape[1]
+    for observation in (observation for run in fitting for observation in run):
+        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
+        first += observation.spectra.size
+        n = observation.spectra.shape[1]
         power[:n] += (own**2).sum(axis=0)
-        count[:n] += one.spectra.shape[0]
-        frequencies[:n] = one.frequencies_hz
+        count[:n] += observation.spectra.shape[0]
+        frequencies[:n] = observation.frequencies_hz
     mean = power / count
     beside = np.pad(mean, 1)
     peaks = np.flatnonzero((mean >= beside[:-2]) & (mean >= beside[2:]) & (frequencies > 0))
@@ -141,7 +139,7 @@ def _sizes(
     found: dict[str, float] = {}
     for observed in fitting:
         run = observed[0].run
-        for name in (*[one.channel for one in observed], *model.driving(run)):
+        for name in (*[observation.channel for observation in observed], *model.driving(run)):
             if name in channels(run.recording):
                 found[name] = max(found.get(name, 0.0), float(size(run.recording[name].values)))
     return found

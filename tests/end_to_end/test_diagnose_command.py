@@ -104,17 +104,17 @@ def test_one_run_alone_is_answered_and_what_it_cannot_decide_is_said(lone: Path,
     """Exit 3; a candidate that cannot run is in `failed`; the twin is there, the case as it was."""
     before = contents(lone)
     code = run(["diagnose", str(lone), "--effects", str(lone.parent / "runaway.py"), "--no-report", "--json"])
-    said = capsys.readouterr()
-    assert code == DONE_BUT_FLAGGED, said.err
-    assert "flagged: one run alone: no held-out run" in said.err
-    assert "flagged: no repeats: the noise floor is that of the sensors" in said.err
-    assert "effects of your own: structure.runaway" in said.out
+    decided_terms = capsys.readouterr()
+    assert code == DONE_BUT_FLAGGED, decided_terms.err
+    assert "flagged: one run alone: no held-out run" in decided_terms.err
+    assert "flagged: no repeats: the noise floor is that of the sensors" in decided_terms.err
+    assert "effects of your own: structure.runaway" in decided_terms.out
     verdict = json.loads((lone / "diagnosis" / "verdict.json").read_bytes())
     assert verdict["verdict"] == "nothing_missing"
     assert verdict["effects"] == []
     assert verdict["failed"]["structure.runaway"] == "does not run from any start"
     assert len(verdict["limits"]) == 2
-    assert verdict["statement"] in said.out
+    assert verdict["statement"] in decided_terms.out
     assert {"format", "alternatives", "probabilities", "separating_experiment"} <= verdict.keys()
     assert {
         "metric",
@@ -128,7 +128,7 @@ def test_one_run_alone_is_answered_and_what_it_cannot_decide_is_said(lone: Path,
     assert load_twin(lone / "diagnosis" / "extended_twin.toml").structure is not None
     assert {name: data for name, data in (contents(lone) or {}).items() if "diagnosis" not in name} == before
     assert leftovers(lone) == []
-    assert json.loads(said.out.splitlines()[-1])["verdict"] == "nothing_missing"
+    assert json.loads(decided_terms.out.splitlines()[-1])["verdict"] == "nothing_missing"
 
 
 @pytest.mark.slow

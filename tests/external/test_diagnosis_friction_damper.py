@@ -35,7 +35,7 @@ def test_friction_with_memory_and_play_is_named(
     monkeypatch.setattr(example, "AMPLITUDES", amplitudes)
     found = example.diagnosed(example.write_case(external_data, tmp_path / "case"), report=False)
     assert found["verdict"] == "named"
-    [friction] = [one for one in found["effects"] if one["name"] == "friction_behind_play"]
+    [friction] = [effect for effect in found["effects"] if effect["name"] == "friction_behind_play"]
     assert friction["block"] == "structure"
     play = friction["parameters"]["play_m"]
     assert play["low"] < PLAY_M < play["high"]

@@ -59,12 +59,12 @@ def found(case: Path, example: ModuleType) -> dict[str, Any]:
 
 def test_a_hardening_spring_is_found(found: dict[str, Any]) -> None:
     assert found["verdict"] in ("named", "indistinguishable")
-    effects = {one["name"]: one["parameters"] for one in found["effects"]}
+    effects = {effect["name"]: effect["parameters"] for effect in found["effects"]}
     assert effects["cubic_stiffness"]["stiffness_n_per_m3"]["low"] > 0
 
 
 def test_a_small_quadratic_part_is_found(found: dict[str, Any]) -> None:
-    effects = {one["name"]: one["parameters"] for one in found["effects"]}
+    effects = {effect["name"]: effect["parameters"] for effect in found["effects"]}
     assert "quadratic_stiffness" in effects
     largest_v = 0.3
     cubic = effects["cubic_stiffness"]["stiffness_n_per_m3"]["estimate"] * largest_v**3

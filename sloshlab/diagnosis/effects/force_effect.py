@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final
 
-from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, nowhere, register
+from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, never_distinct, register
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.terms import ForceKind
 
@@ -39,7 +39,7 @@ def force_effect(
     needs: Callable[[Surroundings], bool] | None = None,
     spoken_for_by: tuple[str, ...] = (),
     includes: tuple[str, ...] = (),
-    differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = nowhere,
+    differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = never_distinct,
     variant_of: str = "",
     size: tuple[str, ...] = (),
 ) -> Effect:

@@ -16,8 +16,8 @@ from sloshlab.diagnosis.candidate import (
     Numbers,
     Surroundings,
     channels_of,
+    joined_channels,
     register,
-    together,
 )
 from sloshlab.diagnosis.extension import Extension, Reading, SensorFault
 
@@ -35,7 +35,7 @@ _LARGEST_LEAK_OF_ITS_KIND: Final = 0.2
 def _channels_and_devices(at: Surroundings) -> list[str]:
     """Every channel, and the force cells together: they share an amplifier and a clock."""
     cells = [name for name in at.channels if name.startswith("force_cell")]
-    return [*at.channels, *([together(cells)] if len(cells) > 1 else [])]
+    return [*at.channels, *([joined_channels(cells)] if len(cells) > 1 else [])]
 
 
 def _compared_channels(at: Surroundings) -> list[str]:
@@ -63,8 +63,8 @@ def _sensor_effect(
         read, back = reading(numbers), None if undone is None else undone(numbers)
         return Extension(
             faults=tuple(
-                SensorFault(one, read, back, (f"sensor.{name}.{channel}", one, *sorted(numbers.items())))
-                for one in channels_of(channel)
+                SensorFault(sensor, read, back, (f"sensor.{name}.{channel}", sensor, *sorted(numbers.items())))
+                for sensor in channels_of(channel)
             )
         )
 
@@ -114,7 +114,7 @@ def _delayed(numbers: Numbers) -> Reading:
         """What happened before the recording, or after it, is not known: a held tank that is released jumps."""
         del others
         samples = numbers["delay_s"] * rate
-        moved, place = _later(values, samples), np.arange(values.size)
+        moved, place = _shifted(values, samples), np.arange(values.size)
         unknown = abs(samples) + _RINGING_SAMPLES * min(abs(samples), 1.0)
         outside = np.clip(unknown - (place if samples > 0 else place[::-1]), 0.0, 1.0)
         return np.asarray(np.where(np.isfinite(recorded), moved + outside * (recorded - moved), moved))
@@ -122,15 +122,15 @@ def _delayed(numbers: Numbers) -> Reading:
     return reading
 
 
-def _earlier(numbers: Numbers) -> Reading:
+def _advanced(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
         del others, recorded
-        return _later(values, -numbers["delay_s"] * rate)
+        return _shifted(values, -numbers["delay_s"] * rate)
 
     return reading
 
 
-def _later(values: FloatArray, samples: float) -> FloatArray:
+def _shifted(values: FloatArray, samples: float) -> FloatArray:
     """Values `samples` later, by phase; the series is reflected at its ends."""
     margin = min(values.size - 1, 64 + int(abs(samples)))
     padded = np.concatenate(
@@ -149,7 +149,7 @@ DELAY = _sensor_effect(
     (EffectParameter("delay_s", -0.05, 0.05),),
     lambda at: [{"delay_s": sign * 0.02 / at.frequency_hz} for sign in (1, -1)],
     _delayed,
-    _earlier,
+    _advanced,
     look_alikes=("viscous_damping", "sensor_high_pass"),
     spoken_for_by=("one channel alone", "follows its rate"),
     places=_channels_and_devices,
@@ -172,7 +172,7 @@ def _high_passed(numbers: Numbers) -> Reading:
     return reading
 
 
-def _integrated_back(numbers: Numbers) -> Reading:
+def _high_pass_undone(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
         del others, recorded
         return np.asarray(values + np.nancumsum(values - np.nanmean(values)) / (numbers["time_constant_s"] * rate))
@@ -186,7 +186,7 @@ HIGH_PASS = _sensor_effect(
     (EffectParameter("time_constant_s", 1e-3, 100.0),),
     lambda at: [{"time_constant_s": value} for value in (2.0, 0.2, 0.03)],
     _high_passed,
-    _integrated_back,
+    _high_pass_undone,
     look_alikes=("sensor_delay",),
     spoken_for_by=("one channel alone", "follows its integral"),
     places=_channels_and_devices,
@@ -233,7 +233,7 @@ DRIFT = _sensor_effect(
 )
 
 
-def _humming(line_hz: float, sign: float) -> Callable[[Numbers], Reading]:
+def _with_hum(line_hz: float, sign: float) -> Callable[[Numbers], Reading]:
     def of(numbers: Numbers) -> Reading:
         def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
             """Its phase and the mains' frequency are free in every run: those of what is left."""
@@ -269,8 +269,8 @@ HUM = [
         f"y → y + A cos(2π f t + φ), f about {line:g} Hz, A in the unit of the channel",
         (EffectParameter("amplitude", 0.0, 1e9),),
         lambda at: [{"amplitude": 0.02 * at.reading}],
-        _humming(line, 1.0),
-        _humming(line, -1.0),
+        _with_hum(line, 1.0),
+        _with_hum(line, -1.0),
         separated_by="the channel with nothing moving",
         spoken_for_by=("one channel alone", "a line of the mains"),
         variant_of=variant_of,
@@ -279,18 +279,18 @@ HUM = [
 ]
 
 
-def _stretched(sign: float) -> Callable[[Numbers], Reading]:
+def _with_clock_skew(sign: float) -> Callable[[Numbers], Reading]:
     def of(numbers: Numbers) -> Reading:
         def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
             del rate, others, recorded
-            return _between(values, np.arange(values.size, dtype=np.float64) * (1 + sign * numbers["ratio"]))
+            return _interpolated(values, np.arange(values.size, dtype=np.float64) * (1 + sign * numbers["ratio"]))
 
         return reading
 
     return of
 
 
-def _between(values: FloatArray, places: FloatArray) -> FloatArray:
+def _interpolated(values: FloatArray, places: FloatArray) -> FloatArray:
     """Values between samples by splines; straight lines would take a ninth of what has six samples per cycle.
 
     Beyond the ends the last value stays; what is next to a lost sample is lost.
@@ -308,8 +308,8 @@ CLOCK = _sensor_effect(
     "y(t) → y((1 + ε) t)",
     (EffectParameter("ratio", -0.05, 0.05),),
     lambda at: [{"ratio": sign * 0.02 / (at.frequency_hz * at.longest_run_s)} for sign in (1, -1)],
-    _stretched(1.0),
-    _stretched(-1.0),
+    _with_clock_skew(1.0),
+    _with_clock_skew(-1.0),
     look_alikes=("sensor_delay",),
     spoken_for_by=("one channel alone", "rate growing along the run"),
     places=_channels_and_devices,
@@ -327,16 +327,18 @@ def _pairs(at: Surroundings) -> list[str]:
         for to in at.channels
         for source in at.channels
         if source != to
-        if to.endswith("_root") or not at.has_one_frequency or (source.endswith("_root") and to in at.unlike_base)
-        if not (is_shaker and _are_alike(to, source))
+        if to.endswith("_root")
+        or not at.has_one_frequency
+        or (source.endswith("_root") and to in at.incoherent_with_base)
+        if not (is_shaker and _read_same_quantity(to, source))
     ]
-    pairs.sort(key=lambda pair: not _are_alike(*pair))
+    pairs.sort(key=lambda pair: not _read_same_quantity(*pair))
     return [f"{to}<{source}" for to, source in pairs[:_MOST_PAIRS]]
 
 
-def _are_alike(one: str, other: str) -> bool:
+def _read_same_quantity(first: str, other: str) -> bool:
     """Whether two channels read the same quantity."""
-    return one.partition("_")[0] == other.partition("_")[0]
+    return first.partition("_")[0] == other.partition("_")[0]
 
 
 def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
@@ -356,22 +358,22 @@ def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     return Extension(faults=(SensorFault(to, leaked(1.0), leaked(-1.0), key),))
 
 
-def _all_of_it(at: Surroundings) -> float:
+def _ratio_of_readings(at: Surroundings) -> float:
     """Ratio with which as much would leak as the channel itself reads."""
     to, _, source = at.channel.partition("<")
     return at.channels.get(to, 1.0) / max(at.channels.get(source, 1.0), 1e-300)
 
 
-def _leaks(at: Surroundings) -> list[Numbers]:
-    return [{"ratio": sign * 0.03 * _all_of_it(at)} for sign in (1, -1)]
+def _leak_starts(at: Surroundings) -> list[Numbers]:
+    return [{"ratio": sign * 0.03 * _ratio_of_readings(at)} for sign in (1, -1)]
 
 
 def _largest_leaks(at: Surroundings) -> Mapping[str, tuple[float, float]]:
     to, _, source = at.channel.partition("<")
-    most = _LARGEST_LEAK * _all_of_it(at)
+    most = _LARGEST_LEAK * _ratio_of_readings(at)
     if to.partition("_")[0] == source.partition("_")[0]:
         is_base = to.endswith("_root")  # one that rests reads nothing else
-        most = max(most, _LARGEST_LEAK) if is_base else _LARGEST_LEAK_OF_ITS_KIND * _all_of_it(at)
+        most = max(most, _LARGEST_LEAK) if is_base else _LARGEST_LEAK_OF_ITS_KIND * _ratio_of_readings(at)
     return {"ratio": (-most, most)}
 
 
@@ -381,7 +383,7 @@ CROSS_TALK = register(
         "sensor",
         "y₁ → y₁ + r y₂, r in the unit of the one channel over that of the other",
         (EffectParameter("ratio", -1e6, 1e6, is_between_readings=True),),
-        _leaks,
+        _leak_starts,
         _cross_talk,
         ("mass_error", "sensor_gain"),
         "the second channel disconnected",

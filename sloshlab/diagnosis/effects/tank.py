@@ -19,9 +19,9 @@ from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS
 from sloshlab.twin.terms import Term
 
 _CONTACT_HZ: Final = 50.0
-_LEAST_FLIGHT, _LARGEST_FLIGHT = np.log((0.25, 20.0, 0.05)), np.log((1.3, 200.0, 0.9))
-_PLACES_OF_A_FLIGHT: Final = np.exp(
-    qmc.scale(qmc.Halton(3, scramble=False).random(301)[1:], _LEAST_FLIGHT, _LARGEST_FLIGHT)
+_LOWEST_PLACE, _HIGHEST_PLACE = np.log((0.25, 20.0, 0.05)), np.log((1.3, 200.0, 0.9))
+_PLACES_OF_AN_IMPACT: Final = np.exp(
+    qmc.scale(qmc.Halton(3, scramble=False).random(301)[1:], _LOWEST_PLACE, _HIGHEST_PLACE)
 )
 """Share of the room, frequency [Hz] and damping ratio of a contact: 2 % of the gap make another later bounce."""
 _LEVELS = "decays or sweeps at accelerations below and above the threshold"
@@ -330,7 +330,7 @@ GRADUAL_SATURATION = register(
 )
 
 
-def _flying(
+def _impact_numbers(
     at: Surroundings, room: float, contact_hz: float, damping_ratio: float, share: float = 0.05
 ) -> dict[str, float]:
     """A share of the liquid that flies through so much of the room above it."""
@@ -372,14 +372,14 @@ IMPACT = register(
             EffectParameter("share", 0.002, 1.0, may_rest=True),
         ),
         lambda at: [
-            _flying(at, room, _CONTACT_HZ, 0.3, share) for share in (1.0, 0.2, 0.05) for room in (1.0, 0.6)
+            _impact_numbers(at, room, _CONTACT_HZ, 0.3, share) for share in (1.0, 0.2, 0.05) for room in (1.0, 0.6)
         ],
         _impact,
         ("liquid_sloshing", "clearance"),
         "accelerations below and above 1 g, forces sampled fast",
         spoken_for_by=("takes energy", "impulsive", "onset", "memory"),
         size=("stiffness_n_per_m", "damping_kg_per_s", "share"),
-        sought_at=lambda at: [_flying(at, *place) for place in _PLACES_OF_A_FLIGHT],
+        sought_at=lambda at: [_impact_numbers(at, *place) for place in _PLACES_OF_AN_IMPACT],
     )
 )
 LATERAL = force_effect(

@@ -1,6 +1,6 @@
-"""From a case to fitted explanations: screening, fits, what stands in place of what, refinement, the ceiling."""
+"""Model search: forward selection by free-running fits, restarts, nested and nesting models, the ceiling."""
 
-from sloshlab.diagnosis.search.other_baselines import redrawn
-from sloshlab.diagnosis.search.whole_search import findings_of
+from sloshlab.diagnosis.search.model_search import findings_of
+from sloshlab.diagnosis.search.randomised_baselines import with_randomised_baselines
 
-__all__ = ["findings_of", "redrawn"]
+__all__ = ["findings_of", "with_randomised_baselines"]

@@ -10,35 +10,35 @@ import numpy as np
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.copied_process import is_copy
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest
+from sloshlab.diagnosis.forked_process import is_fork
+from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, best_start, fitted
 from sloshlab.diagnosis.free_run_problem import (
     FreeRunFit,
     FreeRunProblem,
     huber_cost,
     mean_squares,
     mean_squares_of_runs,
-    mean_squares_that_repeat,
+    repeatable_mean_squares,
     residuals_of_runs,
     rms_without_bursts,
     run_of,
 )
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.parallel_pieces import in_parallel
 from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.second_process import second_process
-from sloshlab.diagnosis.side_by_side import side_by_side
 
-_WORSE_THAN_OTHERS: Final = 1.2
-_OTHER_RELEASES: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
+_LEAST_MISFIT_RATIO: Final = 1.2
+_RELEASE_OFFSETS: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
 """Dry friction stops a motion in jumps, and what follows a release has side valleys."""
-_LITTLE_IN_COMMON: Final = 0.25
-_LITTLE_IN_A_CHANNEL: Final = 0.5
-_LITTLE_ALONE: Final = 1.5
+_LITTLE_REPEATABLE: Final = 0.25
+_LITTLE_REPEATABLE_IN_A_CHANNEL: Final = 0.5
+_LITTLE_WITHOUT_REPEAT: Final = 1.5
 """Mean squares, in noise floors: what repeats of a test share, in all channels and in one; what one run leaves in
 most channels."""
-Told = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 _Result = TypeVar("_Result")
 
 
@@ -50,7 +50,7 @@ class Fits:
     model : DiagnosedModel
     fitting, held_out : list of list of Observation
         Runs that are fitted, and runs that choose nothing.
-    told : callable
+    progress : callable
         Takes what is being done, how much of it is done, and how much there is.
     tests : sequence of sequences of str
         Names of the runs of every test.
@@ -68,17 +68,17 @@ class Fits:
         model: DiagnosedModel,
         fitting: list[list[Observation]],
         held_out: list[list[Observation]],
-        told: Told,
+        progress: Progress,
         tests: Sequence[Sequence[str]] = (),
     ) -> None:
         self.model, self.fitting, self.held_out = model, fitting, held_out
-        self.told: Told = lambda what, done, of: None if is_copy() else told(what, done, of)
+        self.progress: Progress = lambda what, done, of: None if is_fork() else progress(what, done, of)
         self.tests = tests
         self.failed: dict[str, str] = {}
         self.screened: dict[str, float] = {}
 
     @cached_property
-    def of_one_repeat(self) -> Fits:
+    def one_repeat_per_test(self) -> Fits:
         """The same with the first fitted run of every test alone; itself where no test has two of them.
 
         Repeats have the same drive: to look at seventy candidates, and to begin fits from afar, one is enough.
@@ -90,30 +90,30 @@ class Fits:
             first.setdefault(test_of.get(name, name), run)
         if len(first) == len(self.fitting):
             return self
-        fewer = Fits(self.model, list(first.values()), self.held_out, self.told, self.tests)
+        fewer = Fits(self.model, list(first.values()), self.held_out, self.progress, self.tests)
         fewer.failed, fewer.screened = self.failed, self.screened
         return fewer
 
     @property
     def n_coefficients(self) -> int:
         """Of the fitted runs."""
-        return sum(one.spectra.size for run in self.fitting for one in run)
+        return sum(observation.spectra.size for run in self.fitting for observation in run)
 
-    def part_of(self, jacobian: BlockJacobian, fit: FreeRunFit, whole: Fits) -> BlockJacobian:
+    def jacobian_of_part(self, jacobian: BlockJacobian, fit: FreeRunFit, whole: Fits) -> BlockJacobian:
         """Of a Jacobian of more fitted runs, at a fit to them, what concerns those that are fitted here."""
         if whole is self:
             return jacobian
         names, all_names = self.problem_of(fit).names, whole.problem_of(fit).names
         present = {run[0].run.name for run in self.fitting}
-        of_runs = [one.run.name for run in whole.fitting for one in run]
+        of_runs = [observation.run.name for run in whole.fitting for observation in run]
         chosen = [i for i, name in enumerate(of_runs) if name in present]
         return jacobian.part(chosen, [all_names.index(name) for name in names])
 
-    def made_known(self, candidates: Sequence[Candidate]) -> None:
+    def share_with_second_process(self, candidates: Sequence[Candidate]) -> None:
         """Tell the second process of many effects at once; of each that it has not seen it would be made anew."""
         second_process(residuals_of_runs, self.model, [*self.fitting, *self.held_out], candidates)
 
-    def side_by_side(
+    def in_parallel(
         self, pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Candidate]
     ) -> list[_Result]:
         """Results of pieces of work that do not depend on each other, in two processes where that can be.
@@ -124,25 +124,25 @@ class Fits:
         candidates : iterable of Candidate
             Those that results may contain.
         """
-        if not self.model.may_be_copied:
+        if not self.model.may_be_forked:
             return [piece() for piece in pieces]
-        return side_by_side(pieces, candidates)
+        return in_parallel(pieces, candidates)
 
     def all_fitted(
         self, pieces: Sequence[Callable[[], FreeRunFit]], candidates: Iterable[Candidate]
     ) -> list[Explanation]:
         """Fits that do not depend on each other, each judged; without those that did not run."""
 
-        def judged(piece: Callable[[], FreeRunFit]) -> Explanation | None:
+        def validated(piece: Callable[[], FreeRunFit]) -> Explanation | None:
             fit = piece()
-            return None if fit.trouble else self.judged(fit)
+            return None if fit.trouble else self.validated(fit)
 
-        found = self.side_by_side([partial(judged, piece) for piece in pieces], candidates)
-        return [one for one in found if one is not None]
+        found = self.in_parallel([partial(validated, piece) for piece in pieces], candidates)
+        return [explanation for explanation in found if explanation is not None]
 
-    def all_judged(self, fits: Sequence[FreeRunFit], candidates: Iterable[Candidate]) -> list[Explanation]:
+    def all_validated(self, fits: Sequence[FreeRunFit], candidates: Iterable[Candidate]) -> list[Explanation]:
         """Fits, each judged; without those that did not run."""
-        return self.side_by_side([partial(self.judged, fit) for fit in fits if not fit.trouble], candidates)
+        return self.in_parallel([partial(self.validated, fit) for fit in fits if not fit.trouble], candidates)
 
     def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
         """The fitted runs with some effects."""
@@ -158,23 +158,23 @@ class Fits:
         theta = problem.theta_of(fit.values)
         return problem.jacobian(theta, problem.residual(theta), range(theta.size))
 
-    def judged(self, fit: FreeRunFit) -> Explanation:
+    def validated(self, fit: FreeRunFit) -> Explanation:
         """A fit with its held-out residuals; only releases and offsets of those runs are fitted to them."""
         shared = {name: value for name, value in fit.values.items() if not run_of(name, self.model)}
-        problem = _WithEffects(self.model, self.held_out, fit.candidates, shared)
+        problem = _ProblemWithFixedEffects(self.model, self.held_out, fit.candidates, shared)
         own: dict[str, float] = {}
         for run in self.held_out:
-            own |= self._of_run_alone(run, fit, shared)
+            own |= self._run_parameters(run, fit, shared)
         residual = problem.residual(problem.theta_of({**fit.values, **own}))
         if not np.isfinite(residual).all():
             return Explanation(fit, np.inf, np.inf)
-        observed = [one for run in problem.runs for one in run]
-        informative = np.concatenate([one.informative.ravel() for one in observed])
+        observed = [observation for run in problem.runs for observation in run]
+        informative = np.concatenate([observation.informative.ravel() for observation in observed])
         chosen = residual[informative] if informative.any() else residual
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
         fitted_to = self.problem_of(fit)
         at_fit = fitted_to.residual(fitted_to.theta_of(fit.values))
-        observed_and_fitted = [*observed, *(one for run in fitted_to.runs for one in run)]
+        observed_and_fitted = [*observed, *(observation for run in fitted_to.runs for observation in run)]
         of_all = np.concatenate([residual, at_fit])
         return Explanation(
             fit,
@@ -183,25 +183,27 @@ class Fits:
             mean_squares(observed, residual),
             mean_squares_of_runs(observed_and_fitted, of_all),
             rms_without_bursts(observed, residual),
-            mean_squares_that_repeat(self.tests, observed_and_fitted, of_all),
+            repeatable_mean_squares(self.tests, observed_and_fitted, of_all),
         )
 
-    def _of_run_alone(self, run: list[Observation], fit: FreeRunFit, shared: dict[str, float]) -> dict[str, float]:
+    def _run_parameters(
+        self, run: list[Observation], fit: FreeRunFit, shared: dict[str, float]
+    ) -> dict[str, float]:
         """Release, offsets and the like of a held-out run; from more releases where it fits worse than others."""
-        problem = _WithEffects(self.model, [run], fit.candidates, shared)
+        problem = _ProblemWithFixedEffects(self.model, [run], fit.candidates, shared)
         if not problem.names:
             return {}
         start = problem.values(problem.theta_of(fit.values))
         best, _ = fitted(problem, start, n_iterations=3)
         usual = fit.misfit / max(self.n_coefficients, 1)
-        n = max(sum(one.spectra.size for one in run), 1)
+        n = max(sum(observation.spectra.size for observation in run), 1)
         releases = [name for name in problem.names if name == f"{RELEASE}{run[0].run.name}"]
-        if not releases or best.trouble or best.misfit / n < _WORSE_THAN_OTHERS * usual:
+        if not releases or best.trouble or best.misfit / n < _LEAST_MISFIT_RATIO * usual:
             return best.values
         [release] = releases
-        places = [{**best.values, release: best.values[release] * (1.0 + share)} for share in _OTHER_RELEASES]
-        near = nearest(problem, places, STAGES[-2])
-        other, _ = fitted(problem, near, n_iterations=3, shares=STAGES[-2:])
+        places = [{**best.values, release: best.values[release] * (1.0 + share)} for share in _RELEASE_OFFSETS]
+        near = best_start(problem, places, INFLATION_STAGES[-2])
+        other, _ = fitted(problem, near, n_iterations=3, stages=INFLATION_STAGES[-2:])
         return best.values if other.trouble or other.cost > best.cost else other.values
 
     def is_complete(self, explanation: Explanation) -> bool:
@@ -216,23 +218,24 @@ class Fits:
         for (run, _), left in explanation.by_run.items():
             if run not in repeated:
                 alone.setdefault(run, []).append(left)
-        return self.shares_little(explanation) and all(
-            float(np.median(left)) < _LITTLE_ALONE for left in alone.values()
+        return self.has_little_repeatable(explanation) and all(
+            float(np.median(left)) < _LITTLE_WITHOUT_REPEAT for left in alone.values()
         )
 
-    def shares_little(self, explanation: Explanation) -> bool:
+    def has_little_repeatable(self, explanation: Explanation) -> bool:
         """Whether repeats have next to nothing in common of what is left; False where no test was repeated."""
-        shared = explanation.shared_by_repeats
+        shared = explanation.repeatable_by_test
         return bool(shared) and all(
-            max(left) < _LITTLE_IN_A_CHANNEL and float(np.mean(left)) < _LITTLE_IN_COMMON for left in shared
+            max(left) < _LITTLE_REPEATABLE_IN_A_CHANNEL and float(np.mean(left)) < _LITTLE_REPEATABLE
+            for left in shared
         )
 
-    def is_strained(self, fit: FreeRunFit) -> bool:
+    def rests_on_baseline_bounds(self, fit: FreeRunFit) -> bool:
         """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""
         problem = self.problem_of(fit)
         return bool(problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline].any())
 
-    def eased(self, fit: FreeRunFit) -> dict[str, float]:
+    def reset_from_bounds(self, fit: FreeRunFit) -> dict[str, float]:
         """Its numbers, those at bounds of the baseline as believed: an effect may take their place."""
         problem = self.problem_of(fit)
         at_bounds = problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline]
@@ -240,12 +243,12 @@ class Fits:
         return {**fit.values, **{name: self.model.believed[name] for name in strained}}
 
 
-def cheapest(explanations: Sequence[Explanation]) -> Explanation | None:
+def best_fitting(explanations: Sequence[Explanation]) -> Explanation | None:
     """The one with the lowest cost on the fitted runs; None of none."""
     return min(explanations, key=lambda explanation: explanation.fit.cost, default=None)
 
 
-class _WithEffects(FreeRunProblem):
+class _ProblemWithFixedEffects(FreeRunProblem):
     """Effects whose numbers are fixed; only what belongs to single runs is free."""
 
     def __init__(

@@ -11,18 +11,18 @@ import numpy as np
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, fitted, nearest
+from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, Start, best_start, coarsely_fitted, fitted
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
-from sloshlab.diagnosis.search.fits import Fits, cheapest
-from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace
+from sloshlab.diagnosis.search.fits import Fits, best_fitting
+from sloshlab.diagnosis.search.substitution import LEAST_COST_DECREASE, Substitution
 
-_MOST_ANEW: Final = 3
+_MOST_RESTARTED: Final = 3
 _MOST_RIVALS: Final = 5
 _LEAST_SHARE_OF_GAIN: Final = 0.5
 """Of that of the best, by which an effect is worth another beginning."""
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)
 """Of what was found: beside a baseline that hides a part of an effect the rest of it is left."""
-_SIZES_BESIDE_FRICTION: Final = (0.5, 0.75, 1.5, 2.0, 3.0)
+_SIZES_UNDER_DRY_FRICTION: Final = (0.5, 0.75, 1.5, 2.0, 3.0)
 """Over that which was found: every fit beside dry friction ends in the side valley in which it begins."""
 _OTHER_FREQUENCIES: Final = tuple(np.geomspace(0.7, 1.4, 6))
 """Over that of a mode: its valley is narrow, and what is left at first does not tell the way there."""
@@ -40,9 +40,9 @@ class Refinement:
 
     def __init__(self, fits: Fits) -> None:
         self.fits = fits
-        self.in_place = InPlace(fits)
+        self.substitution = Substitution(fits)
 
-    def anew(self, base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
+    def restarted_from_prior(self, base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
         """The best effects, fitted again from what is believed of the baseline.
 
         A baseline that was retuned alone hides as much of an effect as it can; from there the effect takes the
@@ -56,10 +56,10 @@ class Refinement:
             With one effect each.
         """
         chosen = takewhile(
-            lambda one: not self.fits.problem_of(one.fit).is_down_to_noise(one.fit),
-            _with_good_gains(base, known)[:_MOST_ANEW],
+            lambda explanation: not self.fits.problem_of(explanation.fit).is_down_to_noise(explanation.fit),
+            _with_good_gains(base, known)[:_MOST_RESTARTED],
         )
-        return self._each_from_believed(list(chosen))
+        return self._each_restarted_from_prior(list(chosen))
 
     def from_other_sizes(self, base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
         """The best effects of one number, fitted again from other sizes where the baseline has dry friction.
@@ -77,17 +77,17 @@ class Refinement:
         worth = _with_good_gains(base, known)
         if not worth or not any(term.kind.dry_friction for term in self.fits.model.twin.terms):
             return []
-        if _is_simple(worth[0]) and self.fits.is_complete(worth[0]):
+        if _has_one_number(worth[0]) and self.fits.is_complete(worth[0]):
             return []
-        simple = [one for one in worth if _is_simple(one)][:_MOST_ANEW]
+        simple = [explanation for explanation in worth if _has_one_number(explanation)][:_MOST_RESTARTED]
         found: list[Explanation] = []
-        for i, one in enumerate(simple):
-            self.fits.told(f"fitting {one.keys[-1]} from other sizes", i, len(simple))
-            sizes = self._sized(one, _SIZES_BESIDE_FRICTION)
-            found += self._better_from(one, [{**base.values, **numbers} for numbers in sizes])
+        for i, explanation in enumerate(simple):
+            self.fits.progress(f"fitting {explanation.keys[-1]} from other sizes", i, len(simple))
+            sizes = self._scaled(explanation, _SIZES_UNDER_DRY_FRICTION)
+            found += self._best_restart(explanation, [{**base.values, **numbers} for numbers in sizes])
         return found
 
-    def unstrained(self, known: Sequence[Explanation]) -> list[Explanation]:
+    def rivals_restarted_from_prior(self, known: Sequence[Explanation]) -> list[Explanation]:
         """The best effect and its rivals from what is believed, where it has the baseline at the end of its range.
 
         The retuned baseline that it was fitted from took as much of it as is allowed. All may describe the
@@ -99,45 +99,45 @@ class Refinement:
             With one effect each.
         """
         rivals = _best_by_effect(known)
-        rivals = [rival for rival in rivals if rival.fit.cost - rivals[0].fit.cost < LEAST_TO_BUILD_ON][
+        rivals = [rival for rival in rivals if rival.fit.cost - rivals[0].fit.cost < LEAST_COST_DECREASE][
             :_MOST_RIVALS
         ]
-        if len(rivals) < 2 or not self.fits.is_strained(rivals[0].fit):
+        if len(rivals) < 2 or not self.fits.rests_on_baseline_bounds(rivals[0].fit):
             return []
-        return self._each_from_believed(rivals)
+        return self._each_restarted_from_prior(rivals)
 
-    def _each_from_believed(self, chosen: Sequence[Explanation]) -> list[Explanation]:
+    def _each_restarted_from_prior(self, chosen: Sequence[Explanation]) -> list[Explanation]:
         def piece(i: int, explanation: Explanation) -> list[Explanation]:
-            self.fits.told(f"fitting {explanation.keys[-1]} from what is believed", i, len(chosen))
-            return self._from_believed(explanation)
+            self.fits.progress(f"fitting {explanation.keys[-1]} from what is believed", i, len(chosen))
+            return self._restarted_from_prior(explanation)
 
-        pieces = [partial(piece, i, one) for i, one in enumerate(chosen)]
-        found = self.fits.side_by_side(pieces, [of for one in chosen for of in one.fit.candidates])
+        pieces = [partial(piece, i, explanation) for i, explanation in enumerate(chosen)]
+        found = self.fits.in_parallel(pieces, [of for explanation in chosen for of in explanation.fit.candidates])
         return [better for of_one in found for better in of_one]
 
-    def _from_believed(self, explanation: Explanation) -> list[Explanation]:
+    def _restarted_from_prior(self, explanation: Explanation) -> list[Explanation]:
         """An effect fitted with the baseline as believed, from some sizes; none where that is no better."""
-        sizes = self._sized(explanation, _OTHER_SIZES)
+        sizes = self._scaled(explanation, _OTHER_SIZES)
         places = [[{**self.fits.model.believed, **numbers} for numbers in sizes]]
         frequency = f"{explanation.keys[-1]}.frequency_hz"
         if frequency in explanation.fit.values:
             moved = [x * explanation.fit.values[frequency] for x in _OTHER_FREQUENCIES]
             places += [[{**size, frequency: other_hz} for size in places[0]] for other_hz in moved]
         problem = self.fits.problem_of(explanation.fit)
-        own, *others = (nearest(problem, starts, STAGES[0]) for starts in places)
-        return self._better_from(explanation, [own, *self._promising(explanation, others)])
+        own, *others = (best_start(problem, starts, INFLATION_STAGES[0]) for starts in places)
+        return self._best_restart(explanation, [own, *self._most_promising(explanation, others)])
 
-    def _promising(
+    def _most_promising(
         self, explanation: Explanation, starts: Sequence[Mapping[str, float]]
     ) -> list[Mapping[str, float]]:
         """Where the best of several beginnings are after two stages on one repeat of every test."""
-        problem = self.fits.of_one_repeat.problem_of(explanation.fit)
+        problem = self.fits.one_repeat_per_test.problem_of(explanation.fit)
 
         def beginning(start: Mapping[str, float]) -> tuple[FreeRunFit, float]:
-            first = begun(problem, [Start(start)])
+            first = coarsely_fitted(problem, [Start(start)])
             return first.fit, first.cost
 
-        reached = self.fits.side_by_side(
+        reached = self.fits.in_parallel(
             [partial(beginning, start) for start in starts], explanation.fit.candidates
         )
         fits = [
@@ -147,21 +147,21 @@ class Refinement:
         ]
         return [values for _, values in sorted(fits, key=lambda each: each[0])[:_MOST_PROMISING]]
 
-    def _sized(self, explanation: Explanation, factors: Sequence[float]) -> list[dict[str, float]]:
+    def _scaled(self, explanation: Explanation, factors: Sequence[float]) -> list[dict[str, float]]:
         """The numbers of its effect, without those of the baseline, larger by factors."""
         effect = {
             name: value for name, value in explanation.fit.values.items() if name not in self.fits.model.believed
         }
         return [explanation.fit.candidates[-1].sized(effect, factor) for factor in factors]
 
-    def _better_from(self, explanation: Explanation, places: Sequence[Mapping[str, float]]) -> list[Explanation]:
+    def _best_restart(self, explanation: Explanation, places: Sequence[Mapping[str, float]]) -> list[Explanation]:
         """The best of fits of the same effects from several places; none where that is no better."""
         problem = self.fits.problem_of(explanation.fit)
         pieces = [partial(_fitted_from, problem, place) for place in places]
-        best = min(self.fits.side_by_side(pieces, explanation.fit.candidates), key=lambda fit: fit.cost)
-        return [self.fits.judged(best)] if not best.trouble and best.cost < explanation.fit.cost else []
+        best = min(self.fits.in_parallel(pieces, explanation.fit.candidates), key=lambda fit: fit.cost)
+        return [self.fits.validated(best)] if not best.trouble and best.cost < explanation.fit.cost else []
 
-    def polished(
+    def converged(
         self, base: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
     ) -> list[Explanation]:
         """The best of one and of two effects to where they converge, special cases in their place, each alone.
@@ -177,32 +177,34 @@ class Refinement:
         """
         found: list[Explanation] = []
         for n in (2, 1):
-            best = cheapest([one for one in (*known, *found) if len(one.keys) == n])
+            best = best_fitting([explanation for explanation in (*known, *found) if len(explanation.keys) == n])
             if best is None:
                 continue
-            self.fits.told(f"polishing {' and '.join(best.keys)}", 0, 1)
-            fit, _ = fitted(self.fits.problem_of(best.fit), best.fit.values, n_iterations=10, shares=STAGES[-2:])
+            self.fits.progress(f"polishing {' and '.join(best.keys)}", 0, 1)
+            fit, _ = fitted(
+                self.fits.problem_of(best.fit), best.fit.values, n_iterations=10, stages=INFLATION_STAGES[-2:]
+            )
             if not fit.trouble and fit.cost < best.fit.cost:
-                best = self.fits.judged(fit)
+                best = self.fits.validated(fit)
                 found.append(best)
-            found += self.in_place.specialised(best, [*known, *found], pool)
+            found += self.substitution.nested_models(best, [*known, *found], pool)
             if n > 1:
-                single = cheapest([one for one in known if len(one.keys) == 1])
-                if single is None or single.fit.cost - best.fit.cost > LEAST_TO_BUILD_ON:
-                    found += self.in_place.exchanged(best, base, [*known, *found], pool)
-                found += self.take_away([best])
+                single = best_fitting([explanation for explanation in known if len(explanation.keys) == 1])
+                if single is None or single.fit.cost - best.fit.cost > LEAST_COST_DECREASE:
+                    found += self.substitution.exchanged(best, base, [*known, *found], pool)
+                found += self.backward_eliminated([best])
         return found
 
-    def take_away(self, pairs: Sequence[Explanation]) -> list[Explanation]:
+    def backward_eliminated(self, pairs: Sequence[Explanation]) -> list[Explanation]:
         """Each effect of the best pair alone, from the numbers that it has there: one of them may be enough."""
-        pair = cheapest(pairs)
+        pair = best_fitting(pairs)
         if pair is None:
             return []
         values = pair.fit.values
 
         def left_alone(candidate: Candidate) -> FreeRunFit:
-            self.fits.told(f"taking away one of two effects: {candidate.key} is left", 0, 1)
-            return fitted(self.fits.problem((candidate,)), values, shares=STAGES[-2:])[0]
+            self.fits.progress(f"taking away one of two effects: {candidate.key} is left", 0, 1)
+            return fitted(self.fits.problem((candidate,)), values, stages=INFLATION_STAGES[-2:])[0]
 
         pieces = [partial(left_alone, candidate) for candidate in pair.fit.candidates]
         return self.fits.all_fitted(pieces, pair.fit.candidates)
@@ -210,15 +212,18 @@ class Refinement:
     def retuned_from(self, known: Sequence[Explanation], retuned: Explanation) -> Explanation:
         """The retuned baseline from where the best explanations have it: what an effect gains must be its own."""
         best = retuned
-        for chosen in (cheapest(known), min(known, key=lambda one: one.held_out, default=None)):
+        for chosen in (
+            best_fitting(known),
+            min(known, key=lambda explanation: explanation.held_out, default=None),
+        ):
             if chosen is None:
                 continue
-            self.fits.told("retuning the baseline from an explanation", 0, 1)
+            self.fits.progress("retuning the baseline from an explanation", 0, 1)
             fit, _ = fitted(
-                self.fits.problem_of(retuned.fit), chosen.fit.values, n_iterations=10, shares=STAGES[-2:]
+                self.fits.problem_of(retuned.fit), chosen.fit.values, n_iterations=10, stages=INFLATION_STAGES[-2:]
             )
             if not fit.trouble and fit.cost < best.fit.cost:
-                best = self.fits.judged(fit)
+                best = self.fits.validated(fit)
         return best
 
 
@@ -229,12 +234,12 @@ def _fitted_from(problem: FreeRunProblem, place: Mapping[str, float]) -> FreeRun
 def _with_good_gains(base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
     """The best fit of each effect that gains a good share of what the best effect does, the best first."""
     ranked = _best_by_effect(known)
-    lowest = min((one.fit.cost for one in ranked), default=base.cost)
-    least = max(LEAST_TO_BUILD_ON, _LEAST_SHARE_OF_GAIN * (base.cost - lowest))
-    return [one for one in ranked if base.cost - one.fit.cost >= least]
+    lowest = min((explanation.fit.cost for explanation in ranked), default=base.cost)
+    least = max(LEAST_COST_DECREASE, _LEAST_SHARE_OF_GAIN * (base.cost - lowest))
+    return [explanation for explanation in ranked if base.cost - explanation.fit.cost >= least]
 
 
-def _is_simple(explanation: Explanation) -> bool:
+def _has_one_number(explanation: Explanation) -> bool:
     """Whether its effect has one number."""
     return len(explanation.fit.candidates[-1].effect.parameters) == 1
 
@@ -242,6 +247,6 @@ def _is_simple(explanation: Explanation) -> bool:
 def _best_by_effect(known: Sequence[Explanation]) -> list[Explanation]:
     """The best fit of each effect, the best effect first."""
     by_key: dict[str, Explanation] = {}
-    for one in sorted(known, key=lambda one: one.fit.cost):
-        by_key.setdefault(one.keys[-1], one)
+    for explanation in sorted(known, key=lambda explanation: explanation.fit.cost):
+        by_key.setdefault(explanation.keys[-1], explanation)
     return list(by_key.values())

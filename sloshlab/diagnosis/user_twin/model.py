@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
-from sloshlab.diagnosis.rig_model import corrected, remembered, steps_per_sample
+from sloshlab.diagnosis.rig_model import corrected, steps_per_sample, with_cached_inputs
 from sloshlab.diagnosis.user_module import one_line
 from sloshlab.diagnosis.user_twin.added_force import AddedForce
 from sloshlab.diagnosis.user_twin.description import Compared, FreeTwin, Parameter, Response, TwinRun, UserTwin
@@ -53,12 +53,13 @@ class UserTwinModel:
         self.name, self.described = name, twin
         self.runs: tuple[CaseRun, ...] = tuple(runs)
         self.blocks: tuple[str, ...] = ("structure", "sensor")
-        self.may_be_copied = False
-        self._lock, self._one_at_a_time = threading.Lock(), threading.Lock()
+        self.may_be_forked = False
+        self._lock, self._user_code_lock = threading.Lock(), threading.Lock()
         self._truths: OrderedDict[tuple[Any, ...], tuple[dict[str, FloatArray], FloatArray]] = OrderedDict()
         self._excitations: OrderedDict[str, Excitation] = OrderedDict()
         self._shown = {
-            channel: one if isinstance(one, Compared) else Compared(one) for channel, one in twin.compared.items()
+            channel: shown if isinstance(shown, Compared) else Compared(shown)
+            for channel, shown in twin.compared.items()
         }
         for run in self.runs:
             self._check_channels(run)
@@ -142,7 +143,7 @@ class UserTwinModel:
                 self._truths.move_to_end(key)
                 return self._truths[key]
         view = _view(run, undone) if undone else self._views[run.name]
-        found = self._of_itself(view, own, extension) if isinstance(self.described, FreeTwin) else None
+        found = self._of_free_twin(view, own, extension) if isinstance(self.described, FreeTwin) else None
         found = found or self._of_engine(view, own, extension)
         with self._lock:
             self._truths[key] = found
@@ -177,19 +178,19 @@ class UserTwinModel:
         self, run: TwinRun, own: Mapping[str, float], extension: Extension
     ) -> tuple[EngineTwin, Mechanism]:
         assert not isinstance(self.described, FreeTwin)
-        mechanism = self._called(self.described.mechanism, run, own)
+        mechanism = self._call_user_code(self.described.mechanism, run, own)
         if not isinstance(mechanism, Mechanism):
             raise InputError(f"{self.name}: mechanism", got=type(mechanism).__name__, allowed="Mechanism")
         return engine_twin(mechanism, extension.terms, run.n_samples), mechanism
 
-    def _of_itself(
+    def _of_free_twin(
         self, run: TwinRun, own: Mapping[str, float], extension: Extension
     ) -> tuple[dict[str, FloatArray], FloatArray]:
         assert isinstance(self.described, FreeTwin)
         speed = self.described.friction_speed_m_per_s or self._speed_m_per_s or 1e-3
         added = AddedForce(extension.terms, speed)
-        with self._one_at_a_time:
-            response = self._called(self.described.simulate, run, own, added)
+        with self._user_code_lock:
+            response = self._call_user_code(self.described.simulate, run, own, added)
         if not isinstance(response, Response):
             raise InputError(f"{self.name}: simulate", got=type(response).__name__, allowed="Response")
         truth = {
@@ -212,7 +213,7 @@ class UserTwinModel:
             raise AnalysisError(f"{self.name}: {what}", got="NaN or infinity", allowed="finite numbers")
         return array
 
-    def _called(self, function: Any, *arguments: Any) -> Any:
+    def _call_user_code(self, function: Any, *arguments: Any) -> Any:
         try:
             return function(*arguments)
         except SloshlabError:
@@ -234,7 +235,7 @@ class UserTwinModel:
             if key in self._excitations:
                 self._excitations.move_to_end(key)
                 return self._excitations[key]
-        excitation = remembered(recorded(rate, acceleration=ready.base, force_n=ready.force_n))
+        excitation = with_cached_inputs(recorded(rate, acceleration=ready.base, force_n=ready.force_n))
         with self._lock:
             self._excitations[key] = excitation
             while len(self._excitations) > max(_MOST_EXCITATIONS, 2 * len(self.runs)):

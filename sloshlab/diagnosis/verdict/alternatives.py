@@ -11,9 +11,9 @@ from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation, Findings, largest_strength
 from sloshlab.diagnosis.verdict.comparison import (
     LEAST_STRENGTH,
-    Scale,
-    has_gained,
-    has_surely_gained,
+    LikelihoodScale,
+    gains_beyond_chance,
+    gains_beyond_shared_noise,
     is_clearly_better,
 )
 
@@ -27,57 +27,65 @@ what leaves no more than this beyond the best is as good then.
 """
 _LEAST_SHARE: Final = 0.5
 """Of the gain of the best that an alternative must have."""
-_LITTLE: Final = 0.05
+_LITTLE_OF_EXPLAINED: Final = 0.05
 _LITTLE_OF_ONE_POWER: Final = 0.1
 """Of a mean square that an effect of one frequency explains, which may be in beginnings and ends; the second one
 for effects whose work grows with the same power of the amplitude, which nothing else could tell apart.
 """
-_EQUALS: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
+_EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure."""
 _BEYOND_ALL_LEVELS: Final = 5.0
 """Of the largest acceleration: what fades there has hardly faded where it was seen."""
-_EQUAL_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_error"}
+_EQUIVALENT_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_error"}
 """The same force in the tank, where the share of the liquid that does not follow is the same at all levels."""
 
 
-def alternatives_of(found: Findings, best: Explanation, scale: Scale) -> list[Explanation]:
+def alternatives_of(found: Findings, best: Explanation, scale: LikelihoodScale) -> list[Explanation]:
     """Explanations of at most as many effects that are as good within chance, the best first.
 
     Special cases that are clearly worse are none, not even at one frequency: a general form such as a mode that is
     missing shows something that they cannot. Nor are general forms that are: other numbers make them so.
     """
-    alike = [best]
+    indistinguishable = [best]
     shares_noise = bool(found.surroundings.driving)
-    seen = {best.named_in_blocks}
+    seen = {best.names_with_blocks}
     for explanation in sorted(found.explanations, key=lambda explanation: -scale.evidence(explanation)):
         if (
             len(explanation.keys) > len(best.keys)
-            or explanation.named_in_blocks in seen
+            or explanation.names_with_blocks in seen
             or not np.isfinite(explanation.held_out)
         ):
             continue
-        if explanation.rests_on_a_bound or (includes(explanation, best) and not _differs(explanation, best)):
+        if explanation.has_effect_at_bound or (
+            includes(explanation, best) and not _is_distinct_from_nested(explanation, best)
+        ):
             continue
         if scale.held_out_gain(found.retuned, explanation) < _LEAST_SHARE * scale.held_out_gain(
             found.retuned, best
         ):
             continue
-        is_alike = scale.evidence(best) - scale.evidence(explanation) < LEAST_SEPARATION
-        is_alike = is_alike or (_differs(explanation, best) and not _shows_less(explanation, best, scale))
+        is_indistinguishable = scale.evidence(best) - scale.evidence(explanation) < LEAST_SEPARATION
+        is_indistinguishable = is_indistinguishable or (
+            _is_distinct_from_nested(explanation, best) and not _is_relevantly_worse(explanation, best, scale)
+        )
         has_as_many = len(explanation.keys) == len(best.keys)
-        is_little = _is_within_scatter(explanation, best) and not has_surely_gained(best, explanation, scale)
-        is_alike = is_alike or (shares_noise and has_as_many and is_little)
-        is_kin = _is_case_of(explanation, best) or _is_case_of(best, explanation)
-        is_less = is_kin and is_clearly_better(best, explanation, scale)
-        if is_alike or (not is_less and _is_alike_at_one_frequency(found, explanation, best)):
-            alike.append(explanation)
-            seen.add(explanation.named_in_blocks)
-    return alike
+        is_little = _is_within_scatter(explanation, best) and not gains_beyond_shared_noise(
+            best, explanation, scale
+        )
+        is_indistinguishable = is_indistinguishable or (shares_noise and has_as_many and is_little)
+        is_nested = _is_nested_in(explanation, best) or _is_nested_in(best, explanation)
+        is_less = is_nested and is_clearly_better(best, explanation, scale)
+        if is_indistinguishable or (
+            not is_less and _are_indistinguishable_at_one_frequency(found, explanation, best)
+        ):
+            indistinguishable.append(explanation)
+            seen.add(explanation.names_with_blocks)
+    return indistinguishable
 
 
-def _shows_less(general: Explanation, special: Explanation, scale: Scale) -> bool:
+def _is_relevantly_worse(general: Explanation, special: Explanation, scale: LikelihoodScale) -> bool:
     """Whether a general form with numbers of its own is worse than its special case by more than scatter."""
-    return has_gained(special, general, scale) and not _is_within_scatter(general, special)
+    return gains_beyond_chance(special, general, scale) and not _is_within_scatter(general, special)
 
 
 def _is_within_scatter(explanation: Explanation, best: Explanation) -> bool:
@@ -85,7 +93,7 @@ def _is_within_scatter(explanation: Explanation, best: Explanation) -> bool:
     return largest_strength(explanation.by_run, best.by_run) < _WITHIN_SCATTER
 
 
-def _is_alike_at_one_frequency(found: Findings, explanation: Explanation, best: Explanation) -> bool:
+def _are_indistinguishable_at_one_frequency(found: Findings, explanation: Explanation, best: Explanation) -> bool:
     """Look-alikes of one frequency that differ by less than the noise floor, or by little of what they explain.
 
     What tells them apart then are beginnings and ends of runs, on which no name should rest; a structure with more
@@ -98,7 +106,7 @@ def _is_alike_at_one_frequency(found: Findings, explanation: Explanation, best: 
     if this.name not in other.look_alikes and other.name not in this.look_alikes:
         return False
     powers = [{term for term in effect.spoken_for_by if term.startswith("work")} for effect in (this, other)]
-    little = _LITTLE_OF_ONE_POWER if powers[0] and powers[0] == powers[1] else _LITTLE
+    little = _LITTLE_OF_ONE_POWER if powers[0] and powers[0] == powers[1] else _LITTLE_OF_EXPLAINED
     return all(
         left - best.by_run[cell] < max(1.0, little * (found.retuned.by_run[cell] - best.by_run[cell]))
         for cell, left in explanation.by_run.items()
@@ -112,17 +120,17 @@ def includes(wider: Explanation, narrower: Explanation) -> bool:
         for candidate in wider.fit.candidates
         for name in (candidate.effect.known_as, *candidate.effect.includes)
     }
-    return held >= set(narrower.named_in_blocks)
+    return held >= set(narrower.names_with_blocks)
 
 
-def _is_case_of(narrower: Explanation, wider: Explanation) -> bool:
+def _is_nested_in(narrower: Explanation, wider: Explanation) -> bool:
     """Whether every effect of the narrower, in whatever block, is a special case of one of the wider."""
     return set(narrower.names) <= {
         name for candidate in wider.fit.candidates for name in candidate.effect.includes
     }
 
 
-def _differs(wider: Explanation, narrower: Explanation) -> bool:
+def _is_distinct_from_nested(wider: Explanation, narrower: Explanation) -> bool:
     """Whether a more general effect has numbers with which it is clearly not its special case."""
     if len(wider.keys) != 1 or len(narrower.keys) != 1:
         return False
@@ -136,21 +144,21 @@ def _differs(wider: Explanation, narrower: Explanation) -> bool:
     )
 
 
-def equals_of(best: Explanation) -> list[tuple[str, ...]]:
+def equivalents_of(best: Explanation) -> list[tuple[str, ...]]:
     """Names of explanations that are the same force, alone or beside other effects."""
     in_structure = [
         candidate.effect.name for candidate in best.fit.candidates if candidate.effect.block == "structure"
     ]
     found = []
-    for one, two in _EQUALS.items():
-        for this, other in ((one, two), (two, one)):
+    for single, pair in _EQUIVALENT_FORCES.items():
+        for this, other in ((single, pair), (pair, single)):
             if set(this) <= set(in_structure):
                 others = [name for name in best.names if name not in this]
                 found.append(tuple(sorted((*others, *other))))
     for mass in best.fit.candidates:
-        if mass.effect.block == "tank" and (mass.effect.name in _EQUAL_MASSES or _never_fades(best, mass)):
+        if mass.effect.block == "tank" and (mass.effect.name in _EQUIVALENT_MASSES or _never_fades(best, mass)):
             others = [each.effect.known_as for each in best.fit.candidates if each is not mass]
-            found.append(tuple(sorted((*others, _EQUAL_MASSES[mass.effect.known_as]))))
+            found.append(tuple(sorted((*others, _EQUIVALENT_MASSES[mass.effect.known_as]))))
     return found
 
 

@@ -13,48 +13,48 @@ import numpy as np
 
 from sloshlab.diagnosis.explanation import Explanation, Findings, largest_strength
 
-LEAST_MORE: Final = 12.0
+LEAST_LOG_LIKELIHOOD_RATIO: Final = 12.0
 """Log-likelihood ratio, on fitted and on held-out runs, by which a further effect must improve on fewer."""
 LEAST_STRENGTH: Final = 0.7
 """What an effect removes from the residual of the channel that shows it most, in noise floors, to be spoken of.
 
 Repeats scatter as much as the floor says; what is removed below it is what one run happened to have.
 """
-_SURELY: Final = 2.0
+_SHARED_NOISE_FACTOR: Final = 2.0
 """Times what is beyond chance, for each channel, from which a gain counts however small it is beside the noise."""
 _CLEAR: Final = 3.0
 """Noise floors that an effect removes, from which it is there whatever its size is told from."""
-_ON_FITTED_RUNS: Final = 2.0
+_FITTED_RUNS_FACTOR: Final = 2.0
 """The same on runs that were fitted, over that on others: what suits them may be theirs alone."""
 
 
 @dataclass(frozen=True)
-class Scale:
+class LikelihoodScale:
     """Sums of squares as log-likelihoods: over twice the mean square that the best description leaves (≥ 1).
 
     Attributes
     ----------
     fitting, held_out : float
-    judged : frozenset of str
+    held_out_runs : frozenset of str
         Names of the held-out runs.
-    per_number : float
+    penalty_per_number : float
         What a number more must gain (Schwarz 1978, doi:10.1214/aos/1176344136).
     """
 
     fitting: float
     held_out: float
-    per_number: float
-    judged: frozenset[str] = frozenset()
+    penalty_per_number: float
+    held_out_runs: frozenset[str] = frozenset()
 
     @classmethod
-    def of(cls, found: Findings) -> Scale:
+    def of(cls, found: Findings) -> LikelihoodScale:
         """The scale of what one search has found."""
         described = [*found.explanations, *found.ceilings, found.retuned]
-        fitting = min(one.fit.misfit for one in described) / max(found.n_fitting, 1)
-        held_out = min(one.held_out for one in described) / max(found.n_held_out, 1)
+        fitting = min(description.fit.misfit for description in described) / max(found.n_fitting, 1)
+        held_out = min(description.held_out for description in described) / max(found.n_held_out, 1)
         n = max(found.n_fitting + found.n_held_out, 2)
-        judged = frozenset(run.name for run in found.split.held_out)
-        return cls(2.0 * max(1.0, fitting), 2.0 * max(1.0, held_out), 0.5 * float(np.log(n)), judged)
+        held_out_runs = frozenset(run.name for run in found.split.held_out)
+        return cls(2.0 * max(1.0, fitting), 2.0 * max(1.0, held_out), 0.5 * float(np.log(n)), held_out_runs)
 
     def fit_gain(self, before: Explanation, after: Explanation) -> float:
         """Of the cost on the runs that are fitted."""
@@ -67,34 +67,39 @@ class Scale:
     def evidence(self, explanation: Explanation) -> float:
         """Log-likelihood of both, less what its numbers cost."""
         likelihood = -explanation.fit.cost / self.fitting - explanation.held_out / self.held_out
-        return likelihood - self.per_number * explanation.n_numbers
+        return likelihood - self.penalty_per_number * explanation.n_numbers
 
 
-def has_gained(more: Explanation, less: Explanation, scale: Scale) -> bool:
+def gains_beyond_chance(more: Explanation, less: Explanation, scale: LikelihoodScale) -> bool:
     """Whether an explanation gains more than chance gives over another, on fitted and on held-out runs."""
-    return scale.held_out_gain(less, more) > LEAST_MORE and scale.fit_gain(less, more) > LEAST_MORE
-
-
-def has_surely_gained(more: Explanation, less: Explanation, scale: Scale) -> bool:
-    """Whether the gain is twice what is beyond chance even if all channels had one noise, as on a driven rig."""
-    alike = _SURELY * max(len({channel for _, channel in more.by_run}), 1)
-    return has_gained(more, less, replace(scale, fitting=alike * scale.fitting, held_out=alike * scale.held_out))
-
-
-def is_clearly_better(more: Explanation, less: Explanation, scale: Scale) -> bool:
-    """By more than chance on both kinds of runs, and on held-out runs by a size that is worth speaking of."""
-    return has_gained(more, less, scale) and strength(less, more) >= LEAST_STRENGTH
-
-
-def shows_more(more: Explanation, less: Explanation, scale: Scale) -> bool:
-    """By more than chance, with a size worth speaking of in a channel of a run, twice as large on fitted ones."""
-    if not has_gained(more, less, scale):
-        return False
-    judged = {place: left for place, left in more.by_run.items() if place[0] in scale.judged}
-    fitted = {place: left for place, left in more.by_run.items() if place[0] not in scale.judged}
     return (
-        largest_strength(less.by_run, judged) >= LEAST_STRENGTH
-        or largest_strength(less.by_run, fitted) >= _ON_FITTED_RUNS * LEAST_STRENGTH
+        scale.held_out_gain(less, more) > LEAST_LOG_LIKELIHOOD_RATIO
+        and scale.fit_gain(less, more) > LEAST_LOG_LIKELIHOOD_RATIO
+    )
+
+
+def gains_beyond_shared_noise(more: Explanation, less: Explanation, scale: LikelihoodScale) -> bool:
+    """Whether the gain is twice what is beyond chance even if all channels had one noise, as on a driven rig."""
+    alike = _SHARED_NOISE_FACTOR * max(len({channel for _, channel in more.by_run}), 1)
+    return gains_beyond_chance(
+        more, less, replace(scale, fitting=alike * scale.fitting, held_out=alike * scale.held_out)
+    )
+
+
+def is_clearly_better(more: Explanation, less: Explanation, scale: LikelihoodScale) -> bool:
+    """By more than chance on both kinds of runs, and on held-out runs by a size that is worth speaking of."""
+    return gains_beyond_chance(more, less, scale) and strength(less, more) >= LEAST_STRENGTH
+
+
+def improves_relevantly(more: Explanation, less: Explanation, scale: LikelihoodScale) -> bool:
+    """By more than chance, with a size worth speaking of in a channel of a run, twice as large on fitted ones."""
+    if not gains_beyond_chance(more, less, scale):
+        return False
+    held_out_runs = {place: left for place, left in more.by_run.items() if place[0] in scale.held_out_runs}
+    fitted = {place: left for place, left in more.by_run.items() if place[0] not in scale.held_out_runs}
+    return (
+        largest_strength(less.by_run, held_out_runs) >= LEAST_STRENGTH
+        or largest_strength(less.by_run, fitted) >= _FITTED_RUNS_FACTOR * LEAST_STRENGTH
     )
 
 
@@ -103,12 +108,12 @@ def explains_half(less: Explanation, more: Explanation) -> bool:
     return more.held_out_rms**2 < 0.5 * less.held_out_rms**2
 
 
-def is_there(less: Explanation, more: Explanation) -> bool:
+def is_unmistakable(less: Explanation, more: Explanation) -> bool:
     """Whether what an explanation adds is there whatever its numbers are told from: clear, or half of all."""
     return explains_half(less, more) or largest_strength(less.by_run, more.by_run) >= _CLEAR
 
 
-def at_its_best(found: Findings, explanation: Explanation) -> Explanation:
+def with_least_residuals(found: Findings, explanation: Explanation) -> Explanation:
     """With the least that any fit of the same effects leaves of each run; jumps of friction leave many valleys."""
     alike = [explanation, *(other for other in found.explanations if set(other.keys) == set(explanation.keys))]
     by_run = {

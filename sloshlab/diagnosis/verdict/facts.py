@@ -8,7 +8,7 @@ from typing import Any
 from sloshlab.diagnosis.candidate import channels_of, known_effects
 from sloshlab.diagnosis.explanation import Findings
 from sloshlab.diagnosis.mismatch import mismatches, summary
-from sloshlab.diagnosis.verdict.alternatives import equals_of
+from sloshlab.diagnosis.verdict.alternatives import equivalents_of
 from sloshlab.diagnosis.verdict.gates import Verdict
 from sloshlab.diagnosis.verdict.interval import LEVEL, interval
 from sloshlab.diagnosis.verdict.wording import where_of
@@ -66,7 +66,7 @@ def _as_known(key: str) -> str:
 def _names_of_alternatives(verdict: Verdict) -> list[list[str]]:
     """Every set of names once; an effect may be in it in two blocks, or with two lines of the mains."""
     sets = [alternative.names for alternative in verdict.alternatives]
-    sets += [names for alternative in verdict.alternatives for names in equals_of(alternative)]
+    sets += [names for alternative in verdict.alternatives for names in equivalents_of(alternative)]
     return [list(fromkey) for fromkey in dict.fromkeys(sets)]
 
 

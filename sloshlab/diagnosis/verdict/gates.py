@@ -9,18 +9,18 @@ from typing import Final
 import numpy as np
 
 from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
-from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equals_of, includes
+from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equivalents_of, includes
 from sloshlab.diagnosis.verdict.comparison import (
-    Scale,
-    at_its_best,
+    LikelihoodScale,
     explains_half,
-    has_gained,
-    has_surely_gained,
+    gains_beyond_chance,
+    gains_beyond_shared_noise,
+    improves_relevantly,
     is_clearly_better,
-    is_there,
-    shows_more,
+    is_unmistakable,
+    with_least_residuals,
 )
-from sloshlab.diagnosis.verdict.interval import is_told_from_nothing
+from sloshlab.diagnosis.verdict.interval import interval_excludes_zero
 from sloshlab.diagnosis.verdict.wording import (
     nothing_statement,
     separating_experiment_of,
@@ -34,11 +34,11 @@ ADEQUATE: Final = 1.15
 """Held-out error over that of the best correction, or over the noise floor, up to which one is adequate."""
 _LARGEST_WITHOUT_REPEATS: Final = 2.0
 """What a baseline may leave and be called complete where only what is said of sensors tells the noise."""
-_LITTLE_IN_COMMON: Final = 0.25
-_MOST_IN_COMMON: Final = 0.5
-_MOST_IN_A_CHANNEL: Final = 1.5
+_LITTLE_REPEATABLE: Final = 0.25
+_MOST_REPEATABLE: Final = 0.5
+_MOST_REPEATABLE_IN_A_CHANNEL: Final = 1.5
 """Mean squares, in noise floors, of what repeats of a test have in common of what is left."""
-_NUMBERS_OF_THE_UNKNOWN: Final = 3
+_NUMBERS_OF_UNKNOWN: Final = 3
 """What it would have if it had a name."""
 
 
@@ -81,28 +81,30 @@ def verdict_of(found: Findings) -> Verdict:
     ----------
     found : Findings
     """
-    scale = Scale.of(found)
+    scale = LikelihoodScale.of(found)
     ceiling = min(
         [*found.explanations, *found.ceilings, found.retuned], key=lambda explanation: explanation.held_out
     )
     gain = scale.held_out_gain(found.retuned, ceiling)
     probabilities = _probabilities(found, scale)
-    described = _in_need_of_all(found, scale)
-    is_more = any(shows_more(one, found.retuned, scale) for one in described)
-    is_complete = not (leaves_more(found, found.retuned) or _leaves_much(found, found.retuned))
+    described = _needing_all_effects(found, scale)
+    is_more = any(improves_relevantly(description, found.retuned, scale) for description in described)
+    is_complete = not (
+        leaves_repeatable_residual(found, found.retuned) or _exceeds_stated_noise(found, found.retuned)
+    )
     if is_complete and not is_more:
-        certain = _certain(probabilities, "none")
+        certain = _weighted_by_decision(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
-    named, is_answer = _shortest_that_holds(found, scale, described, ceiling)
+    named, is_answer = _most_parsimonious_accepted(found, scale, described, ceiling)
     adequacy = named.held_out_rms / max(ceiling.held_out_rms, 1e-300) if named else np.inf
     if named is None or not is_answer:
-        certain = _certain(probabilities, "unknown")
+        certain = _weighted_by_decision(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, unknown_statement(found, named), "", certain)
-    if is_complete and not shows_more(at_its_best(found, named), found.retuned, scale):
-        certain = _certain(probabilities, "none")
+    if is_complete and not improves_relevantly(with_least_residuals(found, named), found.retuned, scale):
+        certain = _weighted_by_decision(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
     alternatives = alternatives_of(found, named, scale)
-    kind = "named" if len(alternatives) == 1 and not equals_of(named) else "indistinguishable"
+    kind = "named" if len(alternatives) == 1 and not equivalents_of(named) else "indistinguishable"
     return Verdict(
         kind,
         named,
@@ -111,86 +113,97 @@ def verdict_of(found: Findings) -> Verdict:
         adequacy,
         statement_of(found, named, alternatives, kind),
         separating_experiment_of(alternatives) if kind == "indistinguishable" else "",
-        _certain(probabilities, *(label_of(alternative) for alternative in alternatives)),
+        _weighted_by_decision(probabilities, *(label_of(alternative) for alternative in alternatives)),
     )
 
 
-def leaves_more(found: Findings, explanation: Explanation) -> bool:
+def leaves_repeatable_residual(found: Findings, explanation: Explanation) -> bool:
     """Whether an explanation leaves what repeats of a test have in common, or too much where none tell.
 
     Parameters
     ----------
     found : Findings
-    one : Explanation
+    explanation : Explanation
     """
-    shared = explanation.shared_by_repeats
-    if any(max(left) > _MOST_IN_A_CHANNEL or float(np.mean(left)) > _MOST_IN_COMMON for left in shared):
+    shared = explanation.repeatable_by_test
+    if any(
+        max(left) > _MOST_REPEATABLE_IN_A_CHANNEL or float(np.mean(left)) > _MOST_REPEATABLE for left in shared
+    ):
         return True
-    is_told = not np.isnan(_in_common_where_judged(found, explanation))
+    is_told = not np.isnan(_held_out_repeatable(found, explanation))
     return found.has_repeats and not is_told and explanation.rms_without_bursts > LARGEST_REMAINDER
 
 
-def _leaves_much(found: Findings, explanation: Explanation) -> bool:
+def _exceeds_stated_noise(found: Findings, explanation: Explanation) -> bool:
     """Whether an explanation leaves more than may be called complete where no repeats tell the noise."""
     return not found.has_repeats and explanation.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
 
 
-def _in_common_where_judged(found: Findings, explanation: Explanation) -> float:
+def _held_out_repeatable(found: Findings, explanation: Explanation) -> float:
     """Mean of what repeats of held-out tests have in common; NaN where none of them is repeated."""
-    left = [in_common for (test, _), in_common in explanation.repeating.items() if test in found.judged_tests]
+    left = [in_common for (test, _), in_common in explanation.repeatable.items() if test in found.held_out_tests]
     return float(np.mean(left)) if left else float("nan")
 
 
-def _in_need_of_all(found: Findings, scale: Scale) -> list[Explanation]:
+def _needing_all_effects(found: Findings, scale: LikelihoodScale) -> list[Explanation]:
     """What shows more than each of its parts: one effect may bring the gain of chance, another one the size."""
     described = [*found.explanations, *found.ceilings]
     parts = [(frozenset(explanation.keys), explanation) for explanation in found.explanations]
     return [
-        one
-        for one in described
+        description
+        for description in described
         if all(
-            shows_more(one, at_its_best(found, part), scale) for keys, part in parts if keys < frozenset(one.keys)
+            improves_relevantly(description, with_least_residuals(found, part), scale)
+            for keys, part in parts
+            if keys < frozenset(description.keys)
         )
     ]
 
 
-def _shortest_that_holds(
-    found: Findings, scale: Scale, described: Sequence[Explanation], ceiling: Explanation
+def _most_parsimonious_accepted(
+    found: Findings, scale: LikelihoodScale, described: Sequence[Explanation], ceiling: Explanation
 ) -> tuple[Explanation | None, bool]:
     """The shortest sufficient explanation, and whether it passes the gates.
 
     Where a single effect does not, two that do are the answer, if they show more than it and explain half.
     """
-    named = _shortest_sufficient(found, scale, ADEQUATE * ceiling.held_out_rms)
-    if named is None or _holds(found, scale, named, described, ceiling):
+    named = _most_parsimonious(found, scale, ADEQUATE * ceiling.held_out_rms)
+    if named is None or _passes_gates(found, scale, named, described, ceiling):
         return named, named is not None
     if len(named.keys) == 1:
         wider = _best_of(found, scale, 2)
         if (
             wider is not None
             and explains_half(found.retuned, wider)
-            and shows_more(wider, at_its_best(found, named), scale)
-            and _holds(found, scale, wider, described, ceiling)
+            and improves_relevantly(wider, with_least_residuals(found, named), scale)
+            and _passes_gates(found, scale, wider, described, ceiling)
         ):
             return wider, True
     return named, False
 
 
-def _holds(
-    found: Findings, scale: Scale, named: Explanation, described: Sequence[Explanation], ceiling: Explanation
+def _passes_gates(
+    found: Findings,
+    scale: LikelihoodScale,
+    named: Explanation,
+    described: Sequence[Explanation],
+    ceiling: Explanation,
 ) -> bool:
     """Whether an explanation passes the gates on held-out runs."""
     return (
         found.split.has_held_out
         and scale.held_out_gain(found.retuned, named) >= LEAST_GAIN
-        and not leaves_more(found, named)
-        and not (_leaves_much(found, named) and not shows_more(at_its_best(found, named), found.retuned, scale))
-        and not _may_be_nothing(found, named)
-        and not _is_bettered(found, named, described, ceiling, scale)
+        and not leaves_repeatable_residual(found, named)
+        and not (
+            _exceeds_stated_noise(found, named)
+            and not improves_relevantly(with_least_residuals(found, named), found.retuned, scale)
+        )
+        and not _may_be_zero(found, named)
+        and not _is_dominated(found, named, described, ceiling, scale)
     )
 
 
-def _shortest_sufficient(found: Findings, scale: Scale, adequate_rms: float) -> Explanation | None:
+def _most_parsimonious(found: Findings, scale: LikelihoodScale, adequate_rms: float) -> Explanation | None:
     """The best single effect, unless two are clearly better, or it is not adequate and two add what is lacking.
 
     What is lacking is added by two that are adequate and leave less than half of the retuned mean square.
@@ -198,73 +211,78 @@ def _shortest_sufficient(found: Findings, scale: Scale, adequate_rms: float) -> 
     single, pair = _best_of(found, scale, 1), _best_of(found, scale, 2)
     if single is None or pair is None:
         return single
-    adds = pair.held_out_rms <= adequate_rms < single.held_out_rms and has_gained(pair, single, scale)
+    adds = pair.held_out_rms <= adequate_rms < single.held_out_rms and gains_beyond_chance(pair, single, scale)
     adds = adds and explains_half(found.retuned, pair)
     return pair if adds or is_clearly_better(pair, single, scale) else single
 
 
-def _best_of(found: Findings, scale: Scale, n: int) -> Explanation | None:
+def _best_of(found: Findings, scale: LikelihoodScale, n: int) -> Explanation | None:
     """The best explanation of so many effects, special cases in their place; None of none."""
     known = [
         explanation
         for explanation in found.explanations
-        if np.isfinite(explanation.held_out) and not explanation.rests_on_a_bound
+        if np.isfinite(explanation.held_out) and not explanation.has_effect_at_bound
     ]
-    alike = [one for one in known if len(one.keys) == n]
-    return _without_excess(max(alike, key=scale.evidence), alike, scale) if alike else None
+    alike = [explanation for explanation in known if len(explanation.keys) == n]
+    return _nested_unless_worse(max(alike, key=scale.evidence), alike, scale) if alike else None
 
 
-def _without_excess(best: Explanation, alike: Sequence[Explanation], scale: Scale) -> Explanation:
+def _nested_unless_worse(best: Explanation, alike: Sequence[Explanation], scale: LikelihoodScale) -> Explanation:
     """A special case of effects in their place, unless the general form is better by a size worth speaking of."""
-    for special in sorted(alike, key=lambda one: -scale.evidence(one)):
+    for special in sorted(alike, key=lambda explanation: -scale.evidence(explanation)):
         is_special = special.n_numbers < best.n_numbers and includes(best, special)
         if is_special and not any(
-            is_more(best, special, scale) for is_more in (is_clearly_better, shows_more, has_surely_gained)
+            is_more(best, special, scale)
+            for is_more in (is_clearly_better, improves_relevantly, gains_beyond_shared_noise)
         ):
             return special
     return best
 
 
-def _may_be_nothing(found: Findings, named: Explanation) -> bool:
+def _may_be_zero(found: Findings, named: Explanation) -> bool:
     """Whether one effect is not told from nothing, and removes little enough for that to be so.
 
     Where masses and gains trade against an effect, or its own numbers against each other, its interval may hold
     zero although no baseline describes the recordings without it; what removes more than what is clear, or half of
     what is left without it, is there.
     """
-    if len(named.keys) > 1 or is_there(found.retuned, named):
+    if len(named.keys) > 1 or is_unmistakable(found.retuned, named):
         return False
-    return not is_told_from_nothing(named, named.fit.candidates[0])
+    return not interval_excludes_zero(named, named.fit.candidates[0])
 
 
-def _is_bettered(
-    found: Findings, named: Explanation, others: Sequence[Explanation], ceiling: Explanation, scale: Scale
+def _is_dominated(
+    found: Findings,
+    named: Explanation,
+    others: Sequence[Explanation],
+    ceiling: Explanation,
+    scale: LikelihoodScale,
 ) -> bool:
     """Whether another description shows more, unless repeats have too little in common of what is left to them.
 
     What they do not have in common is what one run happened to have, such as a liquid that damps more for a while.
     What leaves no more than `ADEQUATE` noise floors is adequate however little a freer description leaves.
     """
-    if _in_common_where_judged(found, named) < _LITTLE_IN_COMMON:
+    if _held_out_repeatable(found, named) < _LITTLE_REPEATABLE:
         return False
     if named.held_out_rms > ADEQUATE * max(ceiling.held_out_rms, 1.0):
         return True
-    return any(shows_more(other, at_its_best(found, named), scale) for other in others)
+    return any(improves_relevantly(other, with_least_residuals(found, named), scale) for other in others)
 
 
-def _probabilities(found: Findings, scale: Scale) -> dict[str, float]:
+def _probabilities(found: Findings, scale: LikelihoodScale) -> dict[str, float]:
     """Weights of the explanations by their likelihood on held-out runs and their number of parameters."""
     scores: dict[str, float] = {"none": -found.retuned.held_out / scale.held_out}
     for explanation in found.explanations:
         if np.isfinite(explanation.held_out):
             label = label_of(explanation)
-            score = -explanation.held_out / scale.held_out - scale.per_number * explanation.n_numbers
+            score = -explanation.held_out / scale.held_out - scale.penalty_per_number * explanation.n_numbers
             scores[label] = max(scores.get(label, -np.inf), score)
     named = {key for explanation in found.explanations for key in explanation.keys}
     for ceiling in found.ceilings:
         if np.isfinite(ceiling.held_out):
             beside = sum(len(each.effect.parameters) for each in ceiling.fit.candidates if each.key in named)
-            score = -ceiling.held_out / scale.held_out - scale.per_number * (_NUMBERS_OF_THE_UNKNOWN + beside)
+            score = -ceiling.held_out / scale.held_out - scale.penalty_per_number * (_NUMBERS_OF_UNKNOWN + beside)
             scores["unknown"] = max(scores.get("unknown", -np.inf), score)
     top = max(scores.values())
     weights = {name: float(np.exp(max(score - top, -700.0))) for name, score in scores.items()}
@@ -272,7 +290,7 @@ def _probabilities(found: Findings, scale: Scale) -> dict[str, float]:
     return {name: weight / total for name, weight in weights.items() if weight / total > 1e-4}
 
 
-def _certain(probabilities: dict[str, float], *decided: str) -> dict[str, float]:
+def _weighted_by_decision(probabilities: dict[str, float], *decided: str) -> dict[str, float]:
     """Probabilities after the gates: half of the weight to what they decided."""
     shared = {key: 0.5 * value for key, value in probabilities.items()}
     labels = tuple(dict.fromkeys(decided))

@@ -14,7 +14,7 @@ _NORMAL_90: Final = 1.6449
 _ERRORS_OVER_STANDARD_ERRORS: Final = 1.25
 """On cases whose truth was known, root of the mean square, where nothing but noise counts."""
 _CALIBRATION: Final = 0.01
-_LENGTHS: Final = {"_n_per_m3": 3, "_n_per_m2": 2, "_n_s2_per_m2": 2, "_n_per_m": 1, "_n_s_per_m": 1}
+_POWER_OF_LENGTH: Final = {"_n_per_m3": 3, "_n_per_m2": 2, "_n_s2_per_m2": 2, "_n_per_m": 1, "_n_s_per_m": 1}
 """Power of a length, or of one per time, by which a force of the unit is divided: its gain counts as often."""
 _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta")
 """Ends of the names of numbers that no gain of a sensor and no mass changes, but for so much per second."""
@@ -37,7 +37,7 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
     return estimate, max(estimate - width, lowest), min(estimate + width, highest)
 
 
-def is_told_from_nothing(best: Explanation, candidate: Candidate) -> bool:
+def interval_excludes_zero(best: Explanation, candidate: Candidate) -> bool:
     """Whether the interval of a number that grows with an effect, bounds aside, does not hold zero.
 
     Parameters
@@ -62,11 +62,13 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
     scatter = max(scatter, best.scatter.get(name, 0.0))
     is_between = _named(candidate, parameter).is_between_readings
     is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s") and not is_between
-    power = next((power for ending, power in _LENGTHS.items() if parameter.endswith(ending)), int(is_between))
+    power = next(
+        (power for ending, power in _POWER_OF_LENGTH.items() if parameter.endswith(ending)), int(is_between)
+    )
     of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(best.fit.values[name])
     elsewhere = max(best.spread.get(name, 0.0), of_belief, of_gain)
     return _NORMAL_90 * float(np.hypot(scatter, elsewhere))
 
 
 def _named(candidate: Candidate, parameter: str) -> EffectParameter:
-    return next(one for one in candidate.effect.parameters if one.name == parameter)
+    return next(known for known in candidate.effect.parameters if known.name == parameter)

@@ -10,7 +10,7 @@ import numpy as np
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.units import named_and_units
-from sloshlab.diagnosis.verdict.alternatives import equals_of
+from sloshlab.diagnosis.verdict.alternatives import equivalents_of
 from sloshlab.diagnosis.verdict.interval import interval
 
 _LEAST_SHARE: Final = 0.1
@@ -31,7 +31,9 @@ def unknown_statement(found: Findings, named: Explanation | None, block: str = "
     closest = ""
     if named is not None and explained_share(found, named) >= _LEAST_SHARE:
         nearest = " and ".join(named_and_placed(candidate) for candidate in named.fit.candidates)
-        same = "".join(f" (the same as {' with '.join(one).replace('_', ' ')})" for one in equals_of(named))
+        same = "".join(
+            f" (the same as {' with '.join(names).replace('_', ' ')})" for names in equivalents_of(named)
+        )
         share = f"{100 * explained_share(found, named):.0f} % of what can be explained"
         closest = f"; the nearest known effect is {nearest}{same}, which explains {share}"
     why = "that has no name here" if found.split.has_held_out else "that one run alone does not tell"
@@ -44,7 +46,7 @@ def statement_of(found: Findings, best: Explanation, alternatives: Sequence[Expl
     text = f"Left out: {named}; explains {100 * explained_share(found, best):.0f} % of what can be explained"
     if kind == "indistinguishable":
         others = [" + ".join(alternative.names).replace("_", " ") for alternative in alternatives[1:]]
-        others += [" + ".join(equal).replace("_", " ") for equal in equals_of(best)]
+        others += [" + ".join(equal).replace("_", " ") for equal in equivalents_of(best)]
         text += f"; cannot be told from {' or '.join(dict.fromkeys(others))}"
     return text + "."
 

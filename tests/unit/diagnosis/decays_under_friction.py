@@ -50,4 +50,4 @@ class Decays:
             **{name: value for candidate in candidates for name, value in candidate.starts()[0].items()},
         }
         fit, _ = fitted(self.fits.problem(candidates), {**start, **numbers}, n_iterations=n_iterations)
-        return self.fits.judged(fit)
+        return self.fits.validated(fit)

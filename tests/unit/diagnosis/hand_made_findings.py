@@ -66,7 +66,7 @@ class HandMade(Findings):
         return self.repeats
 
     @property
-    def judged_tests(self) -> frozenset[str]:
+    def held_out_tests(self) -> frozenset[str]:
         return frozenset({"run_2"})
 
     @property
@@ -103,7 +103,7 @@ def left(
     in_fitted_run: float | None = None,
     rms: float = NOISE,
     surface: str = "",
-    repeating: Mapping[tuple[str, str], float] | None = None,
+    repeatable: Mapping[tuple[str, str], float] | None = None,
 ) -> Explanation:
     """What leaves so much log-likelihood of the fitted and of the held-out runs unexplained.
 
@@ -122,7 +122,7 @@ def left(
         ("run_1", TIP): squares if in_fitted_run is None else in_fitted_run,
         ("run_2", TIP): squares if in_one_run is None else in_one_run,
     }
-    return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run, rms, dict(repeating or {}))
+    return Explanation(fit, N + 2 * held_out, rms, {TIP: squares}, by_run, rms, dict(repeatable or {}))
 
 
 def findings(

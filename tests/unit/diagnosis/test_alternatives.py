@@ -72,8 +72,8 @@ def test_what_is_worse_in_one_noise_of_all_channels_is_not(behind: float, kind: 
     other = left(behind, behind, DRAG, squares=1.1)
     assert judged(BASELINE, [left(0.0, 0.0, FRICTION), other], at=DRIVEN).kind == kind
     best, twice = (
-        replace(one, by_run={**one.by_run, ("run_1", "another"): 1.0})
-        for one in (left(0.0, 0.0, FRICTION), left(2 * behind, 2 * behind, DRAG, squares=1.1))
+        replace(explanation, by_run={**explanation.by_run, ("run_1", "another"): 1.0})
+        for explanation in (left(0.0, 0.0, FRICTION), left(2 * behind, 2 * behind, DRAG, squares=1.1))
     )
     assert judged(BASELINE, [best, twice], at=DRIVEN).kind == kind
 
@@ -143,7 +143,7 @@ def test_one_name_in_two_blocks_is_two_explanations() -> None:
     found = findings(BASELINE, [left(0.0, 0.0, damper[0]), left(1.0, 1.0, damper[1])])
     verdict = verdict_of(found)
     assert verdict.kind == "indistinguishable"
-    assert [alternative.named_in_blocks for alternative in verdict.alternatives] == [
+    assert [alternative.names_with_blocks for alternative in verdict.alternatives] == [
         ("structure.viscous_damping",),
         ("tank.viscous_damping",),
     ]

@@ -13,7 +13,7 @@ from hand_made_findings import BASELINE, DRAG, FRICTION, STRIBECK, TIP, N, findi
 from sloshlab.diagnosis import answer
 from sloshlab.diagnosis.answer import answered
 from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.verdict.interval import is_told_from_nothing
+from sloshlab.diagnosis.verdict.interval import interval_excludes_zero
 
 DRAG_NUMBER, FRICTION_NUMBER = (*DRAG, *FRICTION)
 PAIR = left(0.0, 0.0, {**FRICTION, **DRAG})
@@ -43,7 +43,7 @@ def drawn(
     monkeypatch.setattr(answer, "FreeRunProblem", Without)
     asked: list[tuple[str, ...]] = []
 
-    def redrawn(found: Findings, best: Explanation, told: object) -> Findings:
+    def with_randomised_baselines(found: Findings, best: Explanation, told: object) -> Findings:
         asked.append(best.keys)
         own = {name: spread.get(name, 1e-3) for name in best.fit.names}
         return replace(
@@ -54,7 +54,7 @@ def drawn(
             ],
         )
 
-    monkeypatch.setattr(answer, "redrawn", redrawn)
+    monkeypatch.setattr(answer, "with_randomised_baselines", with_randomised_baselines)
     return asked
 
 
@@ -75,7 +75,7 @@ def test_an_effect_without_which_nothing_changes_has_no_size(
 ) -> None:
     """An effect on one of two sensors that drive gains by leaving the drive to the other one."""
     drawn(monkeypatch, {}, {DRAG_NUMBER: lost})
-    single = left(200.0, 200.0, FRICTION, squares=1.9, rms=1.1, repeating={("run_2", TIP): 0.2})
+    single = left(200.0, 200.0, FRICTION, squares=1.9, rms=1.1, repeatable={("run_2", TIP): 0.2})
     _, verdict = answered(findings(BASELINE, [PAIR, single]))
     assert verdict.kind == "named"
     assert verdict.best is not None
@@ -94,7 +94,7 @@ def test_where_one_of_two_may_be_nothing_all_pairs_are_given_up(
     What the pairs describe better still speaks against one effect, unless repeats share less than 0.25.
     """
     asked = drawn(monkeypatch, {DRAG_NUMBER: 0.5})
-    single = left(200.0, 200.0, FRICTION, squares=1.9, rms=1.1, repeating={("run_2", TIP): in_common})
+    single = left(200.0, 200.0, FRICTION, squares=1.9, rms=1.1, repeatable={("run_2", TIP): in_common})
     other = left(30.0, 30.0, {**STRIBECK, **DRAG})
     found, verdict = answered(findings(BASELINE, [PAIR, other, single]))
     assert verdict.kind == kind
@@ -161,5 +161,5 @@ def test_nothing_is_drawn_where_nothing_is_named(monkeypatch: pytest.MonkeyPatch
 def test_a_size_is_told_from_nothing_by_its_interval(spread: float, is_told: bool) -> None:
     """90 % are 1.645 standard deviations; two standard errors of 0.01 and one per cent are beside the spread."""
     own = (spread**2 - 0.02**2 - 0.0037**2) ** 0.5 if spread else 0.0
-    one = replace(left(0.0, 0.0, FRICTION), spread={FRICTION_NUMBER: own})
-    assert is_told_from_nothing(one, one.fit.candidates[0]) is is_told
+    explanation = replace(left(0.0, 0.0, FRICTION), spread={FRICTION_NUMBER: own})
+    assert interval_excludes_zero(explanation, explanation.fit.candidates[0]) is is_told

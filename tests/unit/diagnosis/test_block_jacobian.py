@@ -139,7 +139,7 @@ def test_steps_along_every_column_make_the_matrix_of_a_linear_problem() -> None:
 def test_a_correction_does_not_depend_on_the_units_of_the_residuals(scale: float) -> None:
     matrix, step = dense(8), np.array([0.3, -1.0, 0.7, 0.2])
     change = np.random.default_rng(9).normal(size=sum(SIZES))
-    one, other = in_blocks(matrix), in_blocks(scale * matrix)
-    one.correct(step, change)
+    jacobian, other = in_blocks(matrix), in_blocks(scale * matrix)
+    jacobian.correct(step, change)
     other.correct(step, scale * change)
-    np.testing.assert_allclose(as_dense(other), scale * as_dense(one), rtol=1e-12)
+    np.testing.assert_allclose(as_dense(other), scale * as_dense(jacobian), rtol=1e-12)

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from sloshlab.diagnosis.free_run_problem import mean_squares_that_repeat, rms_without_bursts
+from sloshlab.diagnosis.free_run_problem import repeatable_mean_squares, rms_without_bursts
 
 
 @dataclass
@@ -50,9 +50,9 @@ def test_what_lasts_longer_counts_with_its_size() -> None:
 def test_channels_have_their_own_quiet_times_and_bands_without_information_do_not_count() -> None:
     first, second = observed(8), observed(8)
     second.informative[:, 10:] = False
-    one, other = np.full((8, 30), 2.0), np.full((8, 30), 1.0)
-    one[0], other[5], other[:, 10:] = 9.0, 9.0, 9.0
-    found = rms_without_bursts(cast(Any, [first, second]), np.concatenate([one.ravel(), other.ravel()]))
+    first_residual, other = np.full((8, 30), 2.0), np.full((8, 30), 1.0)
+    first_residual[0], other[5], other[:, 10:] = 9.0, 9.0, 9.0
+    found = rms_without_bursts(cast(Any, [first, second]), np.concatenate([first_residual.ravel(), other.ravel()]))
     assert found == pytest.approx(np.sqrt((6 * 30 * 4.0 + 6 * 10 * 1.0) / (6 * 40)))
 
 
@@ -69,11 +69,11 @@ def test_what_repeats_share_is_told_from_noise() -> None:
         [(common[:n, :m] + generator.standard_normal((n, m))).ravel() for n, m in ((60, 40), (55, 37))]
         + [generator.standard_normal(60 * 40)]
     )
-    shared = mean_squares_that_repeat([["a", "b"]], cast(Any, observed), residual)
+    shared = repeatable_mean_squares([["a", "b"]], cast(Any, observed), residual)
     assert shared == {("a", "force"): pytest.approx(0.5, abs=0.1)}
-    shared = mean_squares_that_repeat([["c", "a"], ["b"]], cast(Any, observed), residual)
+    shared = repeatable_mean_squares([["c", "a"], ["b"]], cast(Any, observed), residual)
     assert shared == {("c", "force"): pytest.approx(0.0, abs=0.1)}
-    assert mean_squares_that_repeat([["a"], ["b"]], cast(Any, observed), residual) == {}
+    assert repeatable_mean_squares([["a"], ["b"]], cast(Any, observed), residual) == {}
 
 
 def test_only_the_same_channel_and_what_is_informative_is_shared() -> None:
@@ -82,26 +82,26 @@ def test_only_the_same_channel_and_what_is_informative_is_shared() -> None:
     residual = np.concatenate([np.full(240, 2.0), np.full(240, 3.0), np.full(240, 2.0)])
     residual[:240].reshape(8, 30)[:, 20:] = -3.0
     residual[480:].reshape(8, 30)[:, :5] = -3.0
-    shared = mean_squares_that_repeat([["a", "b"]], cast(Any, [first, other, second]), residual)
+    shared = repeatable_mean_squares([["a", "b"]], cast(Any, [first, other, second]), residual)
     assert shared == {("a", "x"): pytest.approx(4.0)}
 
 
 def test_a_channel_that_need_not_be_described_is_not_asked() -> None:
     observed = [of_run("a", (10, 10)), of_run("b", (10, 10))]
-    assert mean_squares_that_repeat([["a", "b"]], cast(Any, observed), np.ones(200)) != {}
-    for one in observed:
-        one.is_rough = True
-    assert mean_squares_that_repeat([["a", "b"]], cast(Any, observed), np.ones(200)) == {}
+    assert repeatable_mean_squares([["a", "b"]], cast(Any, observed), np.ones(200)) != {}
+    for observation in observed:
+        observation.is_rough = True
+    assert repeatable_mean_squares([["a", "b"]], cast(Any, observed), np.ones(200)) == {}
 
 
 def test_what_few_coefficients_show_is_not_told() -> None:
     observed = [of_run("a", (7, 7)), of_run("b", (7, 7))]
-    assert mean_squares_that_repeat([["a", "b"]], cast(Any, observed), np.ones(98)) == {}
+    assert repeatable_mean_squares([["a", "b"]], cast(Any, observed), np.ones(98)) == {}
 
 
 def test_a_burst_is_cut_off_before_it_is_compared() -> None:
     observed = [of_run("a", (10, 10)), of_run("b", (10, 10))]
     residual = np.zeros(200)
     residual[[0, 100]] = 50.0
-    shared = mean_squares_that_repeat([["a", "b"]], cast(Any, observed), residual)
+    shared = repeatable_mean_squares([["a", "b"]], cast(Any, observed), residual)
     assert shared == {("a", "force"): pytest.approx(16.0 / 100)}

@@ -24,7 +24,7 @@ def case(folder: Path, *runs: CaseRun) -> Case:
 
 
 def names(groups: Any) -> list[list[str]]:
-    return [[one.name for one in group] for group in groups]
+    return [[run.name for run in group] for group in groups]
 
 
 def test_the_level_of_a_run_is_the_rms_of_its_acceleration() -> None:
@@ -46,16 +46,16 @@ def test_repeats_share_everything_but_their_number(tmp_path: Path) -> None:
 def test_the_middle_levels_judge_and_the_outer_ones_choose(tmp_path: Path) -> None:
     runs = [run(f"{size}_{n}", size, repeat=n) for size in (4.0, 1.0, 2.0, 8.0) for n in (1, 2)]
     found = split(case(tmp_path, *runs))
-    assert {one.name for one in found.held_out} == {"2.0_1", "2.0_2"}
-    assert {one.name for one in found.fitting} == {one.name for one in runs} - {"2.0_1", "2.0_2"}
+    assert {run.name for run in found.held_out} == {"2.0_1", "2.0_2"}
+    assert {run.name for run in found.fitting} == {run.name for run in runs} - {"2.0_1", "2.0_2"}
     assert found.limits == ()
 
 
 def test_two_levels_leave_the_last_repeat_of_each_to_judge_and_say_so(tmp_path: Path) -> None:
     runs = [run(f"{size}_{n}", size, repeat=n) for size in (1.0, 2.0) for n in (1, 2)]
     found = split(case(tmp_path, *runs))
-    assert sorted(one.name for one in found.held_out) == ["1.0_2", "2.0_2"]
-    assert sorted(one.name for one in found.fitting) == ["1.0_1", "2.0_1"]
+    assert sorted(run.name for run in found.held_out) == ["1.0_2", "2.0_2"]
+    assert sorted(run.name for run in found.fitting) == ["1.0_1", "2.0_1"]
     assert any("nothing is judged at another level" in limit for limit in found.limits)
 
 
@@ -63,7 +63,7 @@ def test_levels_of_different_experiments_are_not_mixed(tmp_path: Path) -> None:
     runs = [run(f"decay_{size}", size) for size in (1.0, 2.0, 3.0)]
     runs += [run(f"random_{size}", size, experiment="other") for size in (0.1, 0.2, 0.3)]
     found = split(case(tmp_path, *runs))
-    assert {one.name for one in found.held_out} == {"decay_2.0", "random_0.2"}
+    assert {run.name for run in found.held_out} == {"decay_2.0", "random_0.2"}
     assert any("no repeats" in limit for limit in found.limits)
 
 
@@ -86,14 +86,14 @@ def test_one_run_alone_fits_and_judges_itself_and_says_so(tmp_path: Path) -> Non
 def written(folder: Path, *runs: CaseRun) -> Path:
     rig(folder)
     (folder / "recordings").mkdir()
-    for one in runs:
-        one.recording.to_netcdf(folder / "recordings" / f"{one.name}.nc")
+    for run in runs:
+        run.recording.to_netcdf(folder / "recordings" / f"{run.name}.nc")
     return folder
 
 
 def test_a_case_is_read_in_the_order_of_its_names(tmp_path: Path) -> None:
     found = read_case(written(tmp_path, run("b", 1.0), run("a", 2.0)))
-    assert [one.name for one in found.runs] == ["a", "b"]
+    assert [run.name for run in found.runs] == ["a", "b"]
     assert found.rig is not None
     assert found.rig.tank.height_m == 0.0272
     assert found.name == tmp_path.name

@@ -70,19 +70,19 @@ def named(name: str) -> list[Effect]:
 @pytest.mark.parametrize(("name", "blocks", "parameters"), VOCABULARY, ids=[name for name, _, _ in VOCABULARY])
 def test_an_effect_has_its_blocks_and_parameters(name: str, blocks: tuple[str, ...], parameters: set[str]) -> None:
     found = named(name)
-    assert sorted(one.block for one in found) == sorted(blocks)
-    for one in found:
-        assert parameters <= {parameter.name for parameter in one.parameters}
-        assert all(parameter.low < parameter.high for parameter in one.parameters)
+    assert sorted(effect.block for effect in found) == sorted(blocks)
+    for effect in found:
+        assert parameters <= {parameter.name for parameter in effect.parameters}
+        assert all(parameter.low < parameter.high for parameter in effect.parameters)
 
 
 def test_no_effect_of_the_program_is_outside_the_vocabulary() -> None:
-    assert {one.known_as for one in built_in()} == {name for name, _, _ in VOCABULARY}
+    assert {effect.known_as for effect in built_in()} == {name for name, _, _ in VOCABULARY}
 
 
 def test_another_form_of_an_effect_answers_with_its_name_block_and_parameters() -> None:
     required = {name: parameters for name, _, parameters in VOCABULARY}
-    forms = [one for one in built_in() if one.variant_of]
+    forms = [effect for effect in built_in() if effect.variant_of]
     assert {"fading_mass", "linear_structural_damping", "mains_hum_60"} <= {form.name for form in forms}
     for form in forms:
         [original] = [other for other in named(form.variant_of) if other.block == form.block]
@@ -91,12 +91,12 @@ def test_another_form_of_an_effect_answers_with_its_name_block_and_parameters() 
         assert required[original.name] <= {parameter.name for parameter in form.parameters}
 
 
-@pytest.mark.parametrize(("one", "other"), LOOK_ALIKES)
-def test_look_alikes_know_each_other_and_what_separates_them(one: str, other: str) -> None:
-    assert any(other in effect.look_alikes for effect in named(one))
+@pytest.mark.parametrize(("first", "other"), LOOK_ALIKES)
+def test_look_alikes_know_each_other_and_what_separates_them(first: str, other: str) -> None:
+    assert any(other in effect.look_alikes for effect in named(first))
     if " + " not in other:
-        assert any(one in effect.look_alikes for effect in named(other))
-    for name in (one, *other.split(" + ")):
+        assert any(first in effect.look_alikes for effect in named(other))
+    for name in (first, *other.split(" + ")):
         assert all(effect.separated_by for effect in named(name))
 
 
@@ -115,7 +115,7 @@ def test_whatever_has_a_look_alike_says_what_separates_it_and_names_known_ones()
 
 
 def test_blocks_and_names_are_checked() -> None:
-    [friction] = [one for one in named("coulomb_friction") if one.block == "structure"]
+    [friction] = [effect for effect in named("coulomb_friction") if effect.block == "structure"]
     with pytest.raises(InputError, match=f"block.*'roof'.*{', '.join(BLOCKS)}"):
         register(Effect("glue", "roof", "", (), friction.starts, friction.extension))
     with pytest.raises(InputError, match="a name that is taken"):

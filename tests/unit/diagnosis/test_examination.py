@@ -11,7 +11,7 @@ import pytest
 from recorded_oscillators import MASS_KG, NOISE, effect, motion, rig, run_of
 
 from sloshlab.diagnosis.candidate import known_effects
-from sloshlab.diagnosis.evidence import FORCE_TERMS, SENSOR_TERMS, TAKES
+from sloshlab.diagnosis.evidence import DISSIPATIVE, FORCE_TERMS, SENSOR_TERMS
 from sloshlab.diagnosis.examination import Examination, examination_facts, examined, owning_block, seen_at
 from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.observations import observations
@@ -38,7 +38,9 @@ def friction(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Examination
         fitting=[observations(run, list(run.recording.data_vars)) for run in runs],
         retuned=retuned,
         explanations=[],
-        readings=lambda one: {run.name: model.simulate(run, one.fit.values, NOTHING) for run in runs},
+        readings=lambda explanation: {
+            run.name: model.simulate(run, explanation.fit.values, NOTHING) for run in runs
+        },
     )
     return found, examined(found)
 
@@ -51,7 +53,7 @@ def test_friction_is_spoken_for_and_a_spring_is_not(friction: tuple[Any, Examina
     examination = friction[1]
     on_friction = examination.evidence_on(effect("structure.coulomb_friction"))
     on_spring = examination.evidence_on(effect("structure.cubic_stiffness"))
-    assert TAKES in on_friction.speaks_for
+    assert DISSIPATIVE in on_friction.speaks_for
     assert not on_friction.speaks_against
     assert len(on_spring.speaks_against) >= 2
 
@@ -110,7 +112,7 @@ def test_the_part_of_the_cycle_in_which_a_force_is_no_spring_and_no_damper(force
     motion = np.column_stack([np.cos(phase), -np.sin(phase), -np.cos(phase)])
     lacking = SimpleNamespace(motion=motion, force_n=force(motion[:, 0], motion[:, 1]))
     cut: Any = SimpleNamespace(forces=lambda place: [lacking])
-    characters: Any = {"structure": SimpleNamespace(is_there=True)}
+    characters: Any = {"structure": SimpleNamespace(exceeds_noise=True)}
     effect_ = SimpleNamespace(effect=SimpleNamespace(block="structure"))
     best: Any = SimpleNamespace(channels=(), fit=SimpleNamespace(candidates=[effect_]))
     assert seen_at(Examination(cut, characters, (), [], {}), best) == words
@@ -135,9 +137,9 @@ def test_levels_that_hold_most_of_it_in_words(held: tuple[float, float], words: 
 def test_the_facts_are_strict_json(friction: tuple[Any, Examination]) -> None:
     facts = json.loads(json.dumps(examination_facts(friction[1], friction[0]), allow_nan=False))
     assert facts["interface_cut"]["doubted_channel"] == ""
-    structure = next(one for one in facts["interface_cut"]["blocks"] if one["block"] == "structure")
+    structure = next(block for block in facts["interface_cut"]["blocks"] if block["block"] == "structure")
     assert structure["share"]["low"] <= structure["share"]["estimate"] <= structure["share"]["high"]
-    questions = [one["question"] for one in facts["characters"]["structure"]["answers"]]
+    questions = [answer["question"] for answer in facts["characters"]["structure"]["answers"]]
     assert {"energy", "state", "history", "onset"} <= set(questions)
 
 

@@ -11,7 +11,7 @@ import pytest
 from recorded_oscillators import DRY_KG, LIQUID_KG, RATE_HZ, RIG, effect, run_of
 
 from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, Surroundings, channels_of, together
+from sloshlab.diagnosis.candidate import Candidate, Surroundings, channels_of, joined_channels
 from sloshlab.diagnosis.free_run_fit import fitted_from
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.observations import observations
@@ -70,11 +70,11 @@ def fit_of(model: RigModel, name: str, place: str) -> tuple[FreeRunFit, float]:
     """The fit of a fault, the shares of the cells free as well, and its misfit per sample."""
     at = surroundings(model)
     candidate = Candidate(effect(f"sensor.{name}"), at, place)
-    held = {one: value for one, value in model.believed.items() if not one.startswith("share")}
+    held = {name: value for name, value in model.believed.items() if not name.startswith("share")}
     [run] = model.runs
     problem = FreeRunProblem(model, [observations(run, CELLS)], [candidate], held)
     fit = fitted_from(problem, [{**model.believed, **start} for start in candidate.starts()])
-    return fit, fit.misfit / sum(one.known.sum() for one in problem.runs[0])
+    return fit, fit.misfit / sum(observation.known.sum() for observation in problem.runs[0])
 
 
 def check(fit: FreeRunFit, label: str, truth: float) -> None:
@@ -115,4 +115,4 @@ def test_what_an_amplifier_or_a_clock_does_is_sought_on_both_cells(tmp_path: Pat
     of_one = replace(of_two, channels={"acceleration_control": 1.0, "force_cell_1": 1.0})
     assert BOTH in effect(f"sensor.{name}").places(of_two)
     assert not any("+" in place for place in effect(f"sensor.{name}").places(of_one))
-    assert channels_of(together(CELLS)) == CELLS
+    assert channels_of(joined_channels(CELLS)) == CELLS

@@ -48,7 +48,7 @@ def asked(
 
 
 def answer(character: ForceCharacter, question: str) -> Answer:
-    return next(one for one in character.answers if one.question == question)
+    return next(answer for answer in character.answers if answer.question == question)
 
 
 def coulomb(t: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -70,9 +70,9 @@ def cubic(t: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndar
 @pytest.mark.parametrize(
     ("law", "amplitude", "frequency", "term", "rate"),
     [
-        (coulomb, 1.0, 0.0, evidence.WORK_1, evidence.RATE_FREE),
-        (viscous, 2.0, 1.0, evidence.WORK_2, evidence.RATE),
-        (drag, 3.0, 2.0, evidence.WORK_3, evidence.RATE),
+        (coulomb, 1.0, 0.0, evidence.WORK_1, evidence.RATE_INDEPENDENT),
+        (viscous, 2.0, 1.0, evidence.WORK_2, evidence.RATE_DEPENDENT),
+        (drag, 3.0, 2.0, evidence.WORK_3, evidence.RATE_DEPENDENT),
     ],
 )
 def test_work_per_cycle_grows_as_the_formula_says(
@@ -84,8 +84,8 @@ def test_work_per_cycle_grows_as_the_formula_says(
     assert answer(character, "work over frequency").value == pytest.approx(frequency, abs=0.12)
     assert character.says[term]
     assert character.says[rate]
-    assert character.says[evidence.TAKES]
-    assert character.says[evidence.FRICTION]
+    assert character.says[evidence.DISSIPATIVE]
+    assert character.says[evidence.ODD_IN_VELOCITY]
 
 
 def test_work_of_dry_friction_in_joule() -> None:
@@ -96,15 +96,15 @@ def test_work_of_dry_friction_in_joule() -> None:
 
 def test_energy_share_of_dry_friction() -> None:
     """Mean |v| over its RMS: 2√2/π of a sine."""
-    one = answer(asked(coulomb), "energy")
-    assert one.value == pytest.approx(2 * np.sqrt(2) / np.pi, abs=0.01)
-    assert one.low <= one.value <= one.high
+    energy = answer(asked(coulomb), "energy")
+    assert energy.value == pytest.approx(2 * np.sqrt(2) / np.pi, abs=0.01)
+    assert energy.low <= energy.value <= energy.high
 
 
 def test_a_force_along_the_velocity_gives_energy() -> None:
     character = asked(lambda t, x, v, a: -viscous(t, x, v, a))
-    assert character.says[evidence.GIVES]
-    assert not character.says[evidence.TAKES]
+    assert character.says[evidence.ENERGY_INPUT]
+    assert not character.says[evidence.DISSIPATIVE]
 
 
 def test_doubt_of_the_own_damping_leaves_the_sign_open() -> None:
@@ -113,23 +113,23 @@ def test_doubt_of_the_own_damping_leaves_the_sign_open() -> None:
     def weakly_damped(t: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         return np.asarray(-5e6 * x**3 - 0.5 * v)
 
-    assert asked(weakly_damped).says[evidence.TAKES]
-    assert evidence.TAKES not in asked(weakly_damped, own=(0.0, 3.0, 0.0)).says
+    assert asked(weakly_damped).says[evidence.DISSIPATIVE]
+    assert evidence.DISSIPATIVE not in asked(weakly_damped, own=(0.0, 3.0, 0.0)).says
 
 
 def test_damping_that_retuning_added_is_given_back() -> None:
     """Retuning hid 2 N s/m: what is left gives energy, together they take it."""
     character = asked(lambda t, x, v, a: 0.5 * v - 0.2 * np.sign(v), shift=2.0)
-    assert character.says[evidence.TAKES]
+    assert character.says[evidence.DISSIPATIVE]
 
 
 def test_a_cubic_spring_is_odd_and_works_nothing_and_has_a_third_order() -> None:
     """sin³ = ¾ sin − ¼ sin 3φ, so a tenth of its variance is at order 3."""
     character = asked(cubic)
-    assert character.says[evidence.NO_WORK]
-    assert character.says[evidence.SPRING]
-    assert not character.says[evidence.FRICTION]
-    assert character.says[evidence.STATE]
+    assert character.says[evidence.CONSERVATIVE]
+    assert character.says[evidence.ODD_IN_DISPLACEMENT]
+    assert not character.says[evidence.ODD_IN_VELOCITY]
+    assert character.says[evidence.STATE_FUNCTION]
     assert not character.says[evidence.MEMORY]
     assert answer(character, "order 3").value == pytest.approx(0.1, abs=0.02)
 
@@ -137,7 +137,7 @@ def test_a_cubic_spring_is_odd_and_works_nothing_and_has_a_third_order() -> None
 def test_a_square_is_even_and_has_a_second_order() -> None:
     character = asked(lambda t, x, v, a: 4e4 * x**2)
     assert character.says[evidence.EVEN]
-    assert not character.says[evidence.SPRING]
+    assert not character.says[evidence.ODD_IN_DISPLACEMENT]
     assert character.says[evidence.SECOND_ORDER]
 
 
@@ -160,10 +160,10 @@ def test_a_clearance_has_an_onset_where_its_gap_closes() -> None:
         return np.asarray(-400.0 * np.sign(x) * np.maximum(np.abs(x) - gap, 0.0))
 
     character = asked(contact, amplitudes=(0.002, 0.003, 0.004, 0.005, 0.006, 0.008), omegas=(omega,))
-    one = answer(character, "onset")
+    found = answer(character, "onset")
     assert character.says[evidence.ONSET]
-    assert one.low <= omega**2 * gap / G <= one.high
-    assert one.value == pytest.approx(omega**2 * gap / G, rel=0.25)
+    assert found.low <= omega**2 * gap / G <= found.high
+    assert found.value == pytest.approx(omega**2 * gap / G, rel=0.25)
 
 
 def test_dry_friction_is_there_at_the_smallest_level() -> None:
@@ -188,8 +188,8 @@ def test_a_slider_on_a_spring_remembers() -> None:
 
 def test_a_force_that_grows_along_the_run() -> None:
     character = asked(lambda t, x, v, a: -1.5 * v * t / DURATION_S)
-    assert character.says[evidence.AGES]
-    assert not asked(viscous).says[evidence.AGES]
+    assert character.says[evidence.TIME_VARYING]
+    assert not asked(viscous).says[evidence.TIME_VARYING]
 
 
 def test_blows() -> None:
@@ -213,18 +213,18 @@ def test_a_run_in_which_the_place_rests_is_left_out(left: tuple[float, float]) -
 
 def test_a_motion_that_stops_dead_has_levels() -> None:
     """Running sums over squares that end in zeros round below zero."""
-    one = latent(viscous, 0.004, 25.0, 3)
+    force = latent(viscous, 0.004, 25.0, 3)
     for seed in range(20):
-        motion = np.random.default_rng(seed).normal(size=one.motion.shape)
-        motion[one.time_s > 0.4 * DURATION_S] = 0.0
-        for part in stretches([replace(one, motion=motion)]):
+        motion = np.random.default_rng(seed).normal(size=force.motion.shape)
+        motion[force.time_s > 0.4 * DURATION_S] = 0.0
+        for part in stretches([replace(force, motion=motion)]):
             assert np.isfinite(part.level_g).all()
             assert np.isfinite(part.omega).all()
 
 
 def test_noise_is_asked_nothing() -> None:
     character = asked(lambda t, x, v, a: np.zeros(t.size))
-    assert not character.is_there
+    assert not character.exceeds_noise
     assert character.says == {}
 
 

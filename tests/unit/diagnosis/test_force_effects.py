@@ -463,7 +463,9 @@ def test_every_force_of_the_vocabulary_is_held_to_its_equation() -> None:
         for known_effect in known_effects()
         if known_effect.extension.__module__.startswith("sloshlab.")
     ]
-    assert {f"{one.block}.{one.name}" for one in built_in if one.block in ("structure", "tank")} == held
+    assert {
+        f"{effect.block}.{effect.name}" for effect in built_in if effect.block in ("structure", "tank")
+    } == held
 
 
 @pytest.mark.parametrize(("structure", "sought"), [("sdof", False), ("beam", True), (None, False)])
@@ -480,5 +482,5 @@ def test_a_lateral_mode_is_sought_where_the_tank_rocks_alone(
     at = surroundings_of(frozen)
     held = {"sdof": at.rig.structure, "beam": beam, None: None}[structure]
     there = candidates(replace(at, rig=at.rig.model_copy(update={"structure": held})))
-    assert ("tank.lateral_mode" in {one.key for one in there}) == sought
-    assert "tank.effective_mass" in {one.key for one in there}
+    assert ("tank.lateral_mode" in {candidate.key for candidate in there}) == sought
+    assert "tank.effective_mass" in {candidate.key for candidate in there}

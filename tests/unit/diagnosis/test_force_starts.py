@@ -64,7 +64,7 @@ def test_gap_and_stiffness_of_a_contact_come_from_its_force(tmp_path: Path) -> N
     starts, known = starts_of(tmp_path, contact)
     found = starts.of(known["structure.clearance"])
     assert found is not None
-    assert found.share_left < 0.02
+    assert found.unexplained_share < 0.02
     assert found.numbers["structure.clearance.gap_m"] == pytest.approx(GAP_M, rel=0.02)
     assert found.numbers["structure.clearance.stiffness_n_per_m"] == pytest.approx(CONTACT_N_PER_M, rel=0.02)
 
@@ -112,7 +112,7 @@ def test_a_share_of_the_liquid_that_flies_is_sought_at_many_places(
     impact = known["tank.ceiling_impact"]
     found = starts.of(impact)
     assert found is not None
-    assert found.share_left < 0.2
+    assert found.unexplained_share < 0.2
     assert found.others
     numbers = {name.rpartition(".")[2]: value for name, value in found.numbers.items()}
     assert numbers["gap_m"] == pytest.approx(flight_m, rel=within)
@@ -120,27 +120,27 @@ def test_a_share_of_the_liquid_that_flies_is_sought_at_many_places(
     rate = np.sqrt(numbers["stiffness_n_per_m"] / (numbers["share"] * LIQUID_KG))
     assert rate / (2 * np.pi) == pytest.approx(CONTACT_HZ, rel=0.15)
     alone = starts.of(replace(impact, effect=replace(impact.effect, sought_at=lambda at: [])))
-    assert (alone is None or alone.share_left > 2 * found.share_left) == is_missed
+    assert (alone is None or alone.unexplained_share > 2 * found.unexplained_share) == is_missed
 
 
 def test_another_effect_explains_less_of_the_same_force(tmp_path: Path) -> None:
     starts, known = starts_of(tmp_path, contact)
     right, wrong = (starts.of(known[f"structure.{name}"]) for name in ("clearance", "stribeck_friction"))
     assert right is not None
-    assert wrong is None or wrong.share_left > 3 * right.share_left
+    assert wrong is None or wrong.unexplained_share > 3 * right.unexplained_share
 
 
 def test_friction_that_falls_with_the_velocity(tmp_path: Path) -> None:
     starts, known = starts_of(tmp_path, stribeck)
     found = starts.of(known["structure.stribeck_friction"])
     assert found is not None
-    assert found.share_left < 0.6
+    assert found.unexplained_share < 0.6
     assert (
         found.numbers["structure.stribeck_friction.static_n"]
         > found.numbers["structure.stribeck_friction.coulomb_n"]
     )
     gap = starts.of(known["structure.clearance"])
-    assert gap is None or gap.share_left > 1.5 * found.share_left
+    assert gap is None or gap.unexplained_share > 1.5 * found.unexplained_share
 
 
 def test_what_the_baseline_can_follow_needs_no_effect(tmp_path: Path) -> None:

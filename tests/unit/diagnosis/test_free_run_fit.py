@@ -29,7 +29,7 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Effect, EffectParameter
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import Extension
-from sloshlab.diagnosis.free_run_fit import STAGES, _step_within_bounds, fitted, fitted_from
+from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, _step_within_bounds, fitted, fitted_from
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost, robust_weights
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
@@ -185,9 +185,9 @@ def test_hidden_numbers_come_back_within_their_intervals(tmp_path: Path, key: st
     )
     fit = fit_of(problem)
     if "friction" in name:  # as the search polishes its best: where a decay sticks has side valleys
-        fit, _ = fitted(problem, fit.values, shares=STAGES[-2:])
+        fit, _ = fitted(problem, fit.values, stages=INFLATION_STAGES[-2:])
     assert fit.trouble == ""
-    assert fit.misfit < 1.25 * sum(one.known.sum() for run in problem.runs for one in run)
+    assert fit.misfit < 1.25 * sum(observation.known.sum() for run in problem.runs for observation in run)
     for parameter, value in truth.items():
         label = f"{key}.{parameter}"
         error, width = fit.values[label] - value, fit.standard_error(label)
@@ -230,7 +230,7 @@ def test_the_covariance_is_the_scatter_of_repeated_fits(tmp_path: Path) -> None:
         again = CaseRun(run.name, noisy, run.attributes)
         observed = observations(again, problem.model.compared(run))
         drawn = FreeRunProblem(problem.model, [observed], problem.candidates, problem.fixed)
-        fit, _ = fitted(drawn, start, n_iterations=4, shares=(0.0,))
+        fit, _ = fitted(drawn, start, n_iterations=4, stages=(0.0,))
         scores.append((fit.values[label] - 0.8) / fit.standard_error(label))
     assert 0.7 < np.std(scores) < 1.35
     assert abs(np.mean(scores)) < 3 / np.sqrt(40)
@@ -353,10 +353,10 @@ def test_no_step_is_simulated_that_promises_next_to_nothing(
         return self._of_runs_in_turn(at)
 
     monkeypatch.setattr(FreeRunProblem, "residual", counted)
-    again, _ = fitted(problem, best.values, shares=STAGES[-1:])
+    again, _ = fitted(problem, best.values, stages=INFLATION_STAGES[-1:])
     assert n_made <= 3
     np.testing.assert_allclose(problem.theta_of(again.values), theta, atol=1e-3)
     n_made = 0
-    far, _ = fitted(problem, problem.values(theta + 2.0), shares=STAGES[-1:])
+    far, _ = fitted(problem, problem.values(theta + 2.0), stages=INFLATION_STAGES[-1:])
     assert n_made > 3
     np.testing.assert_allclose(problem.theta_of(far.values), theta, atol=1e-2)

@@ -9,12 +9,12 @@ import pytest
 from recorded_oscillators import LIQUID_KG, MASS_KG, NOISE, RATE_HZ, motion, rig, run_of
 
 from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.evidence import CLIPS, GAIN, LATE, SLOW
+from sloshlab.diagnosis.evidence import PROPORTIONAL_TO_RATE, PROPORTIONAL_TO_READING, SATURATING, TREND
 from sloshlab.diagnosis.interface_cut import SENSOR, BlockCut, InterfaceCut, interface_cut, own_tolerances
 from sloshlab.diagnosis.latent_force import EITHER, STRUCTURE, TANK
 from sloshlab.diagnosis.observations import Observation, observations
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.sensor_character import said, sensor_character
+from sloshlab.diagnosis.sensor_character import decided_terms, sensor_character
 from sloshlab.twin.recorded_run import drive_of
 
 CHANNELS = ("displacement_tank", "acceleration_tip", "force_interface")
@@ -42,7 +42,7 @@ def cut_of(folder: Path, recorded: list[CaseRun]) -> tuple[InterfaceCut, RigMode
 
 
 def block(cut: InterfaceCut, name: str) -> BlockCut:
-    return next(one for one in cut.blocks if one.block == name)
+    return next(block for block in cut.blocks if block.block == name)
 
 
 @pytest.mark.parametrize(("place", "other"), [(STRUCTURE, TANK), (TANK, STRUCTURE)])
@@ -51,7 +51,7 @@ def test_friction_is_owned_by_the_block_that_has_it(tmp_path: Path, place: str, 
     assert block(cut, place).share > 0.9
     assert block(cut, place).low > 0.8
     assert block(cut, other).share < 0.1
-    assert not cut.doubted
+    assert not cut.suspect
     least = FRICTION_N * np.sqrt(1 - 8 / np.pi**2)  # what the best damper leaves of dry friction in a sine
     assert least < block(cut, place).size < FRICTION_N
 
@@ -60,30 +60,30 @@ def test_without_the_force_between_them_nobody_is_named(tmp_path: Path) -> None:
     cut, _, _ = cut_of(tmp_path, runs(STRUCTURE, measured=False))
     assert cut.places == (EITHER,)
     assert "no force was measured" in block(cut, EITHER).remark
-    assert not any(one.block in (STRUCTURE, TANK) for one in cut.blocks)
+    assert not any(block.block in (STRUCTURE, TANK) for block in cut.blocks)
 
 
 def test_nothing_missing_is_shared_by_nobody(tmp_path: Path) -> None:
     cut, _, _ = cut_of(tmp_path, runs(""))
-    assert all(np.isnan(one.share) for one in cut.blocks)
+    assert all(np.isnan(block.share) for block in cut.blocks)
 
 
 def test_a_wrong_gain_is_found_by_the_forces_that_it_would_need(tmp_path: Path) -> None:
     cut, _, observed = cut_of(tmp_path, runs("", gain=0.75))
-    assert cut.doubted == "displacement_tank"
+    assert cut.suspect == "displacement_tank"
     assert block(cut, SENSOR).share > 0.9
-    answers = sensor_character(observed, cut.runs, cut.doubted)
-    assert said(answers)[GAIN]
-    assert not said(answers)[SLOW]
-    assert not said(answers)[LATE]
-    assert not said(answers)[CLIPS]
-    assert next(answer.share for answer in answers if answer.term == GAIN) > 0.99
+    answers = sensor_character(observed, cut.runs, cut.suspect)
+    assert decided_terms(answers)[PROPORTIONAL_TO_READING]
+    assert not decided_terms(answers)[TREND]
+    assert not decided_terms(answers)[PROPORTIONAL_TO_RATE]
+    assert not decided_terms(answers)[SATURATING]
+    assert next(answer.share for answer in answers if answer.term == PROPORTIONAL_TO_READING) > 0.99
 
 
 def test_two_motions_that_differ_a_little_name_nobody_for_sure(tmp_path: Path) -> None:
     """Without a force and with one decay that the release could explain, a doubt says why."""
     cut, _, _ = cut_of(tmp_path, runs("", measured=False, gain=0.97, starts=(0.01,)))
-    assert cut.doubted in ("", "displacement_tank")
+    assert cut.suspect in ("", "displacement_tank")
     assert cut.remark
 
 
@@ -109,6 +109,6 @@ def test_what_own_parameters_explain_counts_for_nobody(tmp_path: Path) -> None:
     run = run_of("decay", {"displacement_tank": x, "acceleration_tip": a, "force_interface": heavier}, NOISE, 1,
                  initial_displacement_m=0.016)  # fmt: skip
     cut, model, _ = cut_of(tmp_path, [run])
-    assert all(np.isnan(one.share) for one in cut.blocks)
+    assert all(np.isnan(block.share) for block in cut.blocks)
     assert own_tolerances(model, cut.runs[0], TANK)[2] == pytest.approx(0.01 * MASS_KG, rel=1e-6)
     assert LIQUID_KG < MASS_KG

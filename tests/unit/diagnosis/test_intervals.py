@@ -44,7 +44,7 @@ def test_intervals_are_as_wide_as_errors_were_and_wider_where_the_fit_leaves_mor
 def test_an_interval_is_as_wide_as_fits_about_other_baselines_end_elsewhere() -> None:
     spread = replace(left(0.0, 0.0, FRICTION), spread={"structure.coulomb_friction.force_n": 0.04})
     facts = verdict_facts(findings(BASELINE, [spread]), judged(BASELINE, [spread]))
-    [force] = [one["parameters"]["force_n"] for one in facts["effects"]]
+    [force] = [effect["parameters"]["force_n"] for effect in facts["effects"]]
     width = np.hypot(0.0125, 0.04) * norm.ppf(0.95)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
 
@@ -54,7 +54,7 @@ def test_an_interval_is_as_wide_as_runs_disagree(disagree: float, counts: float)
     """Instead of what noise alone would give, where it is more."""
     scatter = replace(left(0.0, 0.0, FRICTION), scatter={"structure.coulomb_friction.force_n": disagree})
     facts = verdict_facts(findings(BASELINE, [scatter]), judged(BASELINE, [scatter]))
-    [force] = [one["parameters"]["force_n"] for one in facts["effects"]]
+    [force] = [effect["parameters"]["force_n"] for effect in facts["effects"]]
     width = np.hypot(counts, 0.0037) * norm.ppf(0.95)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)
 
@@ -77,10 +77,10 @@ def test_standard_errors_by_noise_and_by_what_is_believed_are_told_apart(n: floa
 @pytest.mark.parametrize(("elsewhere", "of_belief"), [(0.003, 0.01), (0.04, 0.04)])
 def test_what_is_not_known_of_the_baseline_counts_once(elsewhere: float, of_belief: float) -> None:
     """As fits end elsewhere, as a belief is sure, or as a gain of one per cent does (0.0037)."""
-    one = replace(
+    explanation = replace(
         left(0.0, 0.0, FRICTION), fit=beside_a_gain(4.0), spread={"structure.coulomb_friction.force_n": elsewhere}
     )
-    facts = verdict_facts(findings(BASELINE, [one]), judged(BASELINE, [one]))
+    facts = verdict_facts(findings(BASELINE, [explanation]), judged(BASELINE, [explanation]))
     [force] = [part["parameters"]["force_n"] for part in facts["effects"]]
     width = np.hypot(1.25 * 0.005, of_belief) * norm.ppf(0.95)
     assert force["high"] - 0.37 == pytest.approx(width, rel=1e-4)

@@ -104,11 +104,11 @@ def test_an_error_of_the_release_is_no_force(tmp_path: Path) -> None:
 
 def test_a_channel_that_is_not_believed_asks_for_nothing(tmp_path: Path) -> None:
     believed = forces_of(tmp_path, in_tank=False, measured=False, pushed=False, gain=0.7)
-    doubted = forces_of(
+    suspect = forces_of(
         tmp_path, in_tank=False, measured=False, pushed=False, gain=0.7, without=frozenset({"displacement_tank"})
     )
-    assert doubted.forces[0].power_n2 < 0.01 * believed.forces[0].power_n2
-    left = doubted.left["displacement_tank"]
+    assert suspect.forces[0].power_n2 < 0.01 * believed.forces[0].power_n2
+    left = suspect.left["displacement_tank"]
     _, x, _, _ = motion(0.01, DURATION_S)
     np.testing.assert_allclose(left[100:-150], -0.3 * x[100:-150], atol=2e-4)
 

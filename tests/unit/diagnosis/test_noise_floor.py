@@ -14,12 +14,12 @@ from sloshlab.diagnosis.case import Case, CaseRun
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.noise_floor import (
     _WHITE,
-    _Colour,
-    _colour,
-    _louder,
-    _near_by,
-    _noise_through,
-    _quieted,
+    _ignored_where_drive_noise_dominates,
+    _NoiseSpectrum,
+    _over_bands_of_a_resonance,
+    _propagated_noise,
+    _spectrum_of_drive_noise,
+    _with_noise_of_drive,
     weighted_observations,
 )
 from sloshlab.diagnosis.observations import Observation, noise_of_sensor, observations
@@ -47,13 +47,15 @@ def test_noise_of_the_base_comes_through_the_resonance_as_its_closed_form_says(t
     run = quiet_run(60.0)
     plain = {"quiet": observations(run, ["acceleration_tip"])}
     fit = FreeRunFit((), {"damping of mode 1": MORE_DAMPING}, 0.0, 0.0)
-    [(place, found)] = _noise_through(case_of(tmp_path, run), run, "acceleration_root", _WHITE, plain, fit).items()
+    [(place, found)] = _propagated_noise(
+        case_of(tmp_path, run), run, "acceleration_root", _WHITE, plain, fit
+    ).items()
     ratio = MORE_DAMPING * DAMPING / (2 * MASS_KG * OMEGA)
     density = 2 * NOISE_M_PER_S2**2 / RATE_HZ
     expected = density * np.pi * OMEGA / (2 * np.pi) * (1 + 4 * ratio**2) / (4 * ratio)
     assert place == ("quiet", "acceleration_tip")
-    louder = _Colour(np.zeros(1), np.array([4.0]))
-    [of_louder] = _noise_through(case_of(tmp_path, run), run, "acceleration_root", louder, plain, fit).values()
+    noisier = _NoiseSpectrum(np.zeros(1), np.array([4.0]))
+    [of_louder] = _propagated_noise(case_of(tmp_path, run), run, "acceleration_root", noisier, plain, fit).values()
     assert of_louder == pytest.approx(4.0 * found)
     assert float(found.mean()) == pytest.approx(expected, rel=0.15)
     frequencies, bands = plain["quiet"][0].frequencies_hz, found.mean(axis=0)
@@ -66,7 +68,7 @@ def test_a_channel_that_is_left_out_of_the_drive_is_compared_with_another_sensor
     plain = {"quiet": observations(run, ["acceleration_tip"])}
     without = CaseRun(run.name, run.recording.drop_vars("acceleration_tip"), run.attributes)
     fit = FreeRunFit((), {}, 0.0, 0.0)
-    [found] = _noise_through(case_of(tmp_path, run), without, "acceleration_root", _WHITE, plain, fit).values()
+    [found] = _propagated_noise(case_of(tmp_path, run), without, "acceleration_root", _WHITE, plain, fit).values()
     assert found == pytest.approx(np.full(found.shape, NOISE_M_PER_S2**2))
 
 
@@ -90,7 +92,7 @@ def test_the_colour_of_a_drives_noise_is_that_of_its_closed_form(tmp_path: Path)
     """White noise beside a first-order process: density over that of all of it as white noise, at least one."""
     motion = 30.0 * np.sin(np.arange(50 * 250) / 9.0)
     runs = [coloured_run(seed, motion) for seed in (1, 2, 3)]
-    found = _colour(case_of(tmp_path, *runs), "acceleration_root")
+    found = _spectrum_of_drive_noise(case_of(tmp_path, *runs), "acceleration_root")
     for frequency in (1.0, 2.0, 4.0, 8.0, 100.0):
         turned = 1 + KEPT**2 - 2 * KEPT * np.cos(2 * np.pi * frequency / RATE_HZ)
         expected = max(WHITE**2 + SLOW**2 * (1 - KEPT**2) / turned, 1.0)
@@ -99,8 +101,10 @@ def test_the_colour_of_a_drives_noise_is_that_of_its_closed_form(tmp_path: Path)
 
 def test_noise_of_a_colour_has_its_spectrum_and_no_other(tmp_path: Path) -> None:
     motion = np.zeros(50 * 250)
-    found = _colour(case_of(tmp_path, *(coloured_run(seed, motion) for seed in (1, 2, 3))), "acceleration_root")
-    noise = found.of_white(np.random.default_rng(9).standard_normal(200 * 250), RATE_HZ)
+    found = _spectrum_of_drive_noise(
+        case_of(tmp_path, *(coloured_run(seed, motion) for seed in (1, 2, 3))), "acceleration_root"
+    )
+    noise = found.coloured(np.random.default_rng(9).standard_normal(200 * 250), RATE_HZ)
     frequencies, density = welch(noise, RATE_HZ, nperseg=1000)
     chosen = (frequencies > 0.5) & (frequencies < 20)
     expected = np.interp(frequencies, found.frequencies_hz, found.ratios) * 2 / RATE_HZ
@@ -113,8 +117,8 @@ def test_drives_that_differ_by_more_than_noise_tell_no_colour(tmp_path: Path) ->
     runs = [coloured_run(1, motion), coloured_run(2, motion + 5.0 * np.sin(np.arange(motion.size) / 40.0))]
     case = case_of(tmp_path, *runs)
     assert len(case.tests()) == 1
-    assert _colour(case, "acceleration_root") is _WHITE
-    assert _colour(case_of(tmp_path, runs[0]), "acceleration_root") is _WHITE
+    assert _spectrum_of_drive_noise(case, "acceleration_root") is _WHITE
+    assert _spectrum_of_drive_noise(case_of(tmp_path, runs[0]), "acceleration_root") is _WHITE
 
 
 def test_the_floor_of_two_repeats_knows_the_noise_of_the_base(tmp_path: Path) -> None:
@@ -123,8 +127,8 @@ def test_the_floor_of_two_repeats_knows_the_noise_of_the_base(tmp_path: Path) ->
     runs[1] = CaseRun("again", runs[0].recording.assign_attrs(repeat=1), runs[1].attributes)
     case = case_of(tmp_path, *runs)
     found = weighted_observations(case, RigModel(case.rig, tmp_path, case.runs))  # type: ignore[arg-type]
-    [one] = found["quiet"]
-    least = one.variance[:, np.argmax(one.variance.mean(axis=0))].mean()
+    [observation] = found["quiet"]
+    least = observation.variance[:, np.argmax(observation.variance.mean(axis=0))].mean()
     assert least > 10 * 1e-3**2
 
 
@@ -146,14 +150,14 @@ def test_what_a_drive_moves_counts_where_nothing_is_recorded(tmp_path: Path) -> 
         runs.append(CaseRun(f"run {repeat}", recording.assign_attrs(repeat=repeat), run.attributes))
     case = case_of(tmp_path, *runs)
     found = weighted_observations(case, RigModel(case.rig, tmp_path, case.runs))  # type: ignore[arg-type]
-    for [one] in found.values():
-        hums = np.abs(one.frequencies_hz - hum_hz) < 1.0
-        assert one.informative[2:-2, hums].all()
-        assert one.simulated is not None
+    for [observation] in found.values():
+        hums = np.abs(observation.frequencies_hz - hum_hz) < 1.0
+        assert observation.informative[2:-2, hums].all()
+        assert observation.simulated is not None
         # well above its resonance a mass on a spring moves by 1/(r² − 1) of its base, and a first fit lessens it
         passed = 1 / ((2 * np.pi * hum_hz / OMEGA) ** 2 - 1)
-        of_base = one.of(hum)
-        power = (one.simulated[3:-3, hums] ** 2).sum() / (of_base[3:-3, hums] ** 2).sum()
+        of_base = observation.of(hum)
+        power = (observation.simulated[3:-3, hums] ** 2).sum() / (of_base[3:-3, hums] ** 2).sum()
         assert np.sqrt(power) == pytest.approx(passed, rel=0.3)
 
 
@@ -161,14 +165,14 @@ def test_noise_of_a_resonance_may_lie_where_the_resonance_may() -> None:
     """One narrow line: as large in all bands within five per cent, at least in the next ones, over some blocks."""
     square = np.zeros((40, 100))
     square[:, 5], square[:, 60] = 1.0, 2.0
-    found = _near_by(square)
+    found = _over_bands_of_a_resonance(square)
     expected = np.zeros(100)
     # band k is at k + 1/2 and looks 0.05 (k + 1/2) bands to both sides, rounded up: 57 and 64 look at 60
     expected[4:7], expected[57:65] = 1.0, 2.0
     np.testing.assert_allclose(found, np.tile(expected, (40, 1)))
     burst = np.zeros((40, 100))
     burst[20, 30] = 9.0
-    assert _near_by(burst)[:, 30].tolist() == [0.0] * 16 + [1.0] * 9 + [0.0] * 15
+    assert _over_bands_of_a_resonance(burst)[:, 30].tolist() == [0.0] * 16 + [1.0] * 9 + [0.0] * 15
 
 
 def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
@@ -178,9 +182,13 @@ def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
 
     def counts_for_less(observation: Observation, share: float) -> bool:
         noise = {place: share * sensor}
-        louder = _louder(observation, noise, ())
-        np.testing.assert_allclose(louder.variance, (1 + share) * sensor)
-        [factor] = np.unique((_quieted(louder, observation, noise).variance / louder.variance).round(6))
+        noisier = _with_noise_of_drive(observation, noise, ())
+        np.testing.assert_allclose(noisier.variance, (1 + share) * sensor)
+        [factor] = np.unique(
+            (_ignored_where_drive_noise_dominates(noisier, observation, noise).variance / noisier.variance).round(
+                6
+            )
+        )
         assert factor in (1.0, 100.0)
         return bool(factor > 1.0)
 
@@ -188,7 +196,7 @@ def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
     assert not counts_for_less(rests, 0.5)
     assert not counts_for_less(replace(rests, spectra=rests.spectra + 10 * np.sqrt(sensor)), 3.0)
     assert not counts_for_less(replace(rests, simulated=np.full(sensor.shape, 10 * np.sqrt(sensor.max()))), 3.0)
-    np.testing.assert_array_equal(_quieted(rests, rests, {}).variance, sensor)
+    np.testing.assert_array_equal(_ignored_where_drive_noise_dominates(rests, rests, {}).variance, sensor)
 
 
 def test_slow_displacements_are_known_to_a_few_times_the_noise_of_the_base(tmp_path: Path) -> None:
@@ -197,16 +205,18 @@ def test_slow_displacements_are_known_to_a_few_times_the_noise_of_the_base(tmp_p
     channels = {"displacement_tank": still + 1e-3, "acceleration_root": still}
     run = run_of("quiet", channels, {"acceleration_root": 0.1, "displacement_tank": 1e-5}, 1, experiment="other")
     driving = ("acceleration_root",)
-    [one] = observations(run, ["displacement_tank"], driving, knows_noise_of_drive=True)
+    [observation] = observations(run, ["displacement_tank"], driving, knows_noise_of_drive=True)
     [unknown] = observations(run, ["displacement_tank"], driving)
-    slow, middle = one.frequencies_hz < 2.5, (one.times_s > 2.5) & (one.times_s < 17.0)
-    sensor = one.variance[-1, -1]
-    assert (one.variance[np.ix_(middle, slow)] == sensor).all()
-    assert (one.variance[np.ix_(~middle, slow)] > 1e3 * sensor).sum() >= 2 * 4 * slow.sum()
+    slow, middle = observation.frequencies_hz < 2.5, (observation.times_s > 2.5) & (observation.times_s < 17.0)
+    sensor = observation.variance[-1, -1]
+    assert (observation.variance[np.ix_(middle, slow)] == sensor).all()
+    assert (observation.variance[np.ix_(~middle, slow)] > 1e3 * sensor).sum() >= 2 * 4 * slow.sum()
     assert (unknown.variance[:, slow] > 1e3 * sensor).all()
     assert (unknown.variance[:, ~slow] == sensor).all()
-    noise = {("quiet", "displacement_tank"): np.full(one.spectra.shape, 7.0 * sensor)}
-    louder = _louder(one, noise, driving).variance
-    np.testing.assert_allclose(louder[np.ix_(middle, slow)], 9 * 8.0 * sensor)
-    np.testing.assert_allclose(louder[:, ~slow], 8.0 * sensor)
-    np.testing.assert_allclose(_louder(one, noise, ()).variance[np.ix_(middle, slow)], 8.0 * sensor)
+    noise = {("quiet", "displacement_tank"): np.full(observation.spectra.shape, 7.0 * sensor)}
+    noisier = _with_noise_of_drive(observation, noise, driving).variance
+    np.testing.assert_allclose(noisier[np.ix_(middle, slow)], 9 * 8.0 * sensor)
+    np.testing.assert_allclose(noisier[:, ~slow], 8.0 * sensor)
+    np.testing.assert_allclose(
+        _with_noise_of_drive(observation, noise, ()).variance[np.ix_(middle, slow)], 8.0 * sensor
+    )

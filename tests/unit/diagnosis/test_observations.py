@@ -24,28 +24,30 @@ def run(values: np.ndarray, channel: str = "acceleration_tip", noise: float = 0.
 
 
 def test_the_stated_noise_is_the_variance() -> None:
-    [one] = observations(run(TONE, noise=0.05), ["acceleration_tip"])
-    np.testing.assert_allclose(one.variance, 0.05**2, rtol=0.25)
-    assert one.variance.min() >= 0.05**2
+    [observation] = observations(run(TONE, noise=0.05), ["acceleration_tip"])
+    np.testing.assert_allclose(observation.variance, 0.05**2, rtol=0.25)
+    assert observation.variance.min() >= 0.05**2
 
 
 def test_what_no_model_need_describe_is_added_in_squares() -> None:
-    [one] = observations(run(TONE, noise=0.03, known_to=0.04), ["acceleration_tip"])
-    np.testing.assert_allclose(one.variance, 0.05**2, rtol=1e-6)
-    assert one.is_rough
+    [observation] = observations(run(TONE, noise=0.03, known_to=0.04), ["acceleration_tip"])
+    np.testing.assert_allclose(observation.variance, 0.05**2, rtol=1e-6)
+    assert observation.is_rough
     [other] = observations(run(TONE, noise=0.03), ["acceleration_tip"])
     assert not other.is_rough
 
 
 def test_noise_that_nobody_stated_is_read_from_the_quiet_end_of_the_spectrum() -> None:
     noisy = TONE + 0.05 * np.random.default_rng(1).normal(size=N)
-    [one] = observations(run(noisy), ["acceleration_tip"])
-    assert np.sqrt(one.variance.max()) == pytest.approx(0.05, rel=0.15)
+    [observation] = observations(run(noisy), ["acceleration_tip"])
+    assert np.sqrt(observation.variance.max()) == pytest.approx(0.05, rel=0.15)
 
 
 def test_no_channel_is_believed_beyond_quantisation() -> None:
-    [one] = observations(run(TONE), ["acceleration_tip"])
-    assert np.sqrt(one.variance.min()) == pytest.approx(1e-4 * np.sqrt(np.mean(one.spectra**2)), rel=0.3)
+    [observation] = observations(run(TONE), ["acceleration_tip"])
+    assert np.sqrt(observation.variance.min()) == pytest.approx(
+        1e-4 * np.sqrt(np.mean(observation.spectra**2)), rel=0.3
+    )
 
 
 def test_a_residual_of_the_noise_alone_is_of_unit_size() -> None:
@@ -61,12 +63,12 @@ def test_lost_and_clipped_samples_are_masked_on_both_sides() -> None:
     values = TONE.copy()
     values[500:520] = np.nan
     clipped = np.clip(values, -1.9, 1.9)
-    [one] = observations(run(clipped, range_min=-1.9, range_max=1.9), ["acceleration_tip"])
-    np.testing.assert_array_equal(one.known, np.isfinite(values) & (np.abs(values) < 1.9))
-    assert np.isfinite(one.spectra).all()
+    [observation] = observations(run(clipped, range_min=-1.9, range_max=1.9), ["acceleration_tip"])
+    np.testing.assert_array_equal(observation.known, np.isfinite(values) & (np.abs(values) < 1.9))
+    assert np.isfinite(observation.spectra).all()
     # what a simulation shows in the masked samples does not matter
-    wild = np.where(one.known, clipped, 1e6)
-    assert np.abs(one.residual(wild)).max() < 1e-6
+    wild = np.where(observation.known, clipped, 1e6)
+    assert np.abs(observation.residual(wild)).max() < 1e-6
 
 
 def test_a_channel_that_is_mostly_lost_is_no_observation() -> None:
@@ -77,18 +79,20 @@ def test_a_channel_that_is_mostly_lost_is_no_observation() -> None:
 
 def test_the_zero_of_an_accelerometer_means_nothing_and_that_of_a_displacement_does() -> None:
     for channel, matters in (("acceleration_tip", False), ("displacement_tank", True)):
-        [one] = observations(run(TONE + 0.3, channel), [channel])
-        assert one.keeps_mean == matters
-        moved = np.abs(one.residual(TONE)).max()
+        [observation] = observations(run(TONE + 0.3, channel), [channel])
+        assert observation.keeps_mean == matters
+        moved = np.abs(observation.residual(TONE)).max()
         assert (moved > 10) == matters, channel
 
 
 def test_the_end_of_a_shorter_simulation_is_taken_as_zero() -> None:
-    [one] = observations(run(TONE), ["acceleration_tip"])
+    [observation] = observations(run(TONE), ["acceleration_tip"])
     short, padded = TONE[:2000], np.where(np.arange(N) < 2000, TONE, 0.0)
     mean_free = padded.copy()
     mean_free[:2000] -= short.mean()
-    np.testing.assert_allclose(one.of(short), lapped_spectra(faded(mean_free, one), one.n_bands), atol=1e-9)
+    np.testing.assert_allclose(
+        observation.of(short), lapped_spectra(faded(mean_free, observation), observation.n_bands), atol=1e-9
+    )
 
 
 def faded(values: np.ndarray, observation: Observation) -> np.ndarray:
@@ -102,9 +106,9 @@ def faded(values: np.ndarray, observation: Observation) -> np.ndarray:
 
 def test_an_abrupt_end_does_not_spread_over_all_bands() -> None:
     """An error of the tone's size, such as a sensor's gain, stays where the tone is."""
-    [one] = observations(run(TONE), ["acceleration_tip"])
-    error = (0.99 * one.spectra - one.of(TONE))[-3:] ** 2
-    near = np.abs(one.frequencies_hz - 6.0) < 8.0
+    [observation] = observations(run(TONE), ["acceleration_tip"])
+    error = (0.99 * observation.spectra - observation.of(TONE))[-3:] ** 2
+    near = np.abs(observation.frequencies_hz - 6.0) < 8.0
     assert error[:, ~near].sum() < 1e-3 * error.sum()
 
 
@@ -131,14 +135,14 @@ def test_an_equal_error_in_all_repeats_is_no_scatter() -> None:
     """What the model misses in every repeat alike must stay visible."""
     group = [observations(run(TONE, noise=0.02), ["acceleration_tip"]) for _ in range(3)]
     same = {"acceleration_tip": np.full(group[0][0].spectra.shape, 5.0)}
-    for one in with_scatter(group, [same] * 3):
-        np.testing.assert_allclose(one[0].variance, group[0][0].variance.min())
+    for repeat in with_scatter(group, [same] * 3):
+        np.testing.assert_allclose(repeat[0].variance, group[0][0].variance.min())
 
 
 def test_a_test_without_repeats_is_weighted_as_its_channels_scatter_elsewhere() -> None:
     group = [observations(repeat, ["acceleration_tip"]) for repeat in repeats(6, 0.05)]
-    raw = [{"acceleration_tip": one[0].spectra - group[0][0].spectra} for one in group]
-    weighted = [one for each in with_scatter(group, raw) for one in each]
+    raw = [{"acceleration_tip": repeat[0].spectra - group[0][0].spectra} for repeat in group]
+    weighted = [observation for each in with_scatter(group, raw) for observation in each]
     [target] = with_typical_scatter(observations(run(3.0 * TONE, noise=0.02), ["acceleration_tip"]), weighted)
     tone = np.argmax(np.mean(target.spectra**2, axis=0))
     share = target.variance[3:-3, tone].mean() / (target.spectra[3:-3, tone] ** 2).mean()

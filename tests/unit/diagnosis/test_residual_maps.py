@@ -37,8 +37,8 @@ def maps_of(extra: np.ndarray, folder: Path, simulated: np.ndarray = TONE) -> Re
 @pytest.mark.parametrize("order", [0.5, 2.0, 3.0])
 def test_a_tone_lies_at_its_order(tmp_path: Path, order: float) -> None:
     at = maps_of(0.5 * np.cos(order * PHASE), tmp_path).at_orders()
-    assert max(at, key=lambda one: at[one]) == order
-    assert at[order] > 20 * max(size for one, size in at.items() if one != order)
+    assert max(at, key=lambda order: at[order]) == order
+    assert at[order] > 20 * max(size for other, size in at.items() if other != order)
 
 
 def test_what_is_followed_to_its_noise_has_no_excess(tmp_path: Path) -> None:

@@ -105,9 +105,9 @@ def test_masses_frequencies_losses_and_gains_may_be_off_by_what_is_normal(damped
         assert found[name].tolerance == pytest.approx(tolerance)
         assert found[name].most_tolerances == 1.25
     for number in ("damping of the liquid", "release of", "offset of displacement_tank"):
-        of_one_run = [one for name, one in found.items() if name.startswith(number)]
+        of_one_run = [parameter for name, parameter in found.items() if name.startswith(number)]
         assert len(of_one_run) >= 2
-        assert {one.most_tolerances for one in of_one_run} == {4.0}
+        assert {parameter.most_tolerances for parameter in of_one_run} == {4.0}
     assert found["damping of the liquid in decay_0"].tolerance == 0.05
 
 

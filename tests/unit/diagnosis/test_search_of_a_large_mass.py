@@ -10,14 +10,14 @@ from recorded_oscillators import MASS_KG, decays, effect, rig, surroundings
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.free_run_fit import STAGES, begun, finished, fitted
+from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, coarsely_fitted, fitted, refined
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search import screening
 from sloshlab.diagnosis.search.fits import Fits
-from sloshlab.diagnosis.search.screening import Promise, Screening
-from sloshlab.diagnosis.search.start_numbers import of_growing_sizes
+from sloshlab.diagnosis.search.screening import ScreenedCandidate, Screening
+from sloshlab.diagnosis.search.start_values import starts_of_growing_size
 
 assert effects.__all__
 MASS, FRICTION, CUBIC = "structure.mass_error", "structure.coulomb_friction", "structure.cubic_stiffness"
@@ -35,9 +35,9 @@ class Light:
         self.pool = [Candidate(effect(key), surroundings(model)) for key in (MASS, FRICTION, CUBIC)]
         self.baseline: FreeRunFit = fitted(self.fits.problem(), model.believed, n_iterations=6)[0]
 
-    def chosen(self) -> list[Promise]:
+    def chosen(self) -> list[ScreenedCandidate]:
         jacobian = self.fits.jacobian(self.baseline)
-        return Screening(self.fits).chosen(self.baseline, jacobian, self.pool, "", STAGES, is_near=False)
+        return Screening(self.fits).chosen(self.baseline, jacobian, self.pool, "", INFLATION_STAGES, is_near=False)
 
 
 @pytest.fixture(scope="module")
@@ -51,10 +51,10 @@ def test_a_large_mass_is_begun_where_it_is_nearest(light: Light, monkeypatch: py
     Decays tell a mass to what is believed of the frequency.
     """
     monkeypatch.setattr(screening, "_MOST_FITTED", 0)
-    [promise] = [one for one in light.chosen() if one.candidate.key == MASS]
-    assert promise.much_larger is not None
-    assert promise.much_larger[f"{MASS}.mass_kg"] == pytest.approx(LACKING_KG, rel=0.25)
-    done = finished(begun(light.fits.problem((promise.candidate,)), promise.starts))
+    [promise] = [promise for promise in light.chosen() if promise.candidate.key == MASS]
+    assert promise.distant_start is not None
+    assert promise.distant_start[f"{MASS}.mass_kg"] == pytest.approx(LACKING_KG, rel=0.25)
+    done = refined(coarsely_fitted(light.fits.problem((promise.candidate,)), promise.starts))
     mass_kg = done.values["modal mass of mode 1"] * MASS_KG
     faster = done.values["frequency of mode 1"] ** 2 * mass_kg / (mass_kg + done.values[f"{MASS}.mass_kg"])
     assert faster == pytest.approx(MASS_KG / (MASS_KG + LACKING_KG), rel=2e-3)
@@ -62,11 +62,14 @@ def test_a_large_mass_is_begun_where_it_is_nearest(light: Light, monkeypatch: py
 
 
 def test_nothing_large_is_sought_beside_a_baseline_that_is_right(tmp_path: Path) -> None:
-    assert [one.much_larger for one in Light(tmp_path, MASS_KG).chosen() if one.much_larger] == []
+    assert [promise.distant_start for promise in Light(tmp_path, MASS_KG).chosen() if promise.distant_start] == []
 
 
 def test_only_what_does_no_work_is_sought_at_a_hundred_times_its_size(light: Light) -> None:
-    sizes = {one.key: [next(iter(start.values())) for start in of_growing_sizes(one)] for one in light.pool}
+    sizes = {
+        candidate.key: [next(iter(start.values())) for start in starts_of_growing_size(candidate)]
+        for candidate in light.pool
+    }
     assert sizes[FRICTION] == []
     first = next(iter(light.pool[0].starts()[0].values()))
     assert min(sizes[MASS], key=abs) == pytest.approx(1.5 * first)

@@ -24,21 +24,36 @@ from decays_under_friction import (
 )
 from recorded_oscillators import decays, effect, rig, surroundings
 
-from sloshlab.diagnosis import copied_process, effects
+from sloshlab.diagnosis import effects, forked_process
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.explanation import Explanation, Findings
 from sloshlab.diagnosis.force_starts import ForceStart
-from sloshlab.diagnosis.free_run_fit import STAGES, Start, begun, finished, fitted, on_more_runs, soft_cost
+from sloshlab.diagnosis.free_run_fit import (
+    INFLATION_STAGES,
+    Start,
+    coarsely_fitted,
+    extended_to_all_runs,
+    fitted,
+    inflated_cost,
+    refined,
+)
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import fits, in_place, redrawn, refinement, screening, whole_search
-from sloshlab.diagnosis.search.fits import Fits, cheapest
-from sloshlab.diagnosis.search.in_place import InPlace
-from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
+from sloshlab.diagnosis.search import (
+    fits,
+    model_search,
+    refinement,
+    screening,
+    substitution,
+    with_randomised_baselines,
+)
+from sloshlab.diagnosis.search.fits import Fits, best_fitting
+from sloshlab.diagnosis.search.forward_selection import ForwardSelection
 from sloshlab.diagnosis.search.refinement import Refinement
 from sloshlab.diagnosis.search.screening import Screening
+from sloshlab.diagnosis.search.substitution import Substitution
 from sloshlab.diagnosis.split import Split
 
 assert effects.__all__
@@ -55,8 +70,8 @@ def coulomb(case: Decays) -> Explanation:
 
 
 def test_friction_of_one_direction_is_fitted_from_that_of_both(case: Decays, coulomb: Explanation) -> None:
-    found = InPlace(case.fits).generalised(case.baseline, [coulomb], list(case.pool.values()), "")
-    best = cheapest([one for one in found if one.keys == (ASYMMETRIC,)])
+    found = Substitution(case.fits).nesting_models(case.baseline, [coulomb], list(case.pool.values()), "")
+    best = best_fitting([explanation for explanation in found if explanation.keys == (ASYMMETRIC,)])
     assert best is not None
     assert best.fit.cost <= coulomb.fit.cost
     up, down = (best.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
@@ -64,12 +79,12 @@ def test_friction_of_one_direction_is_fitted_from_that_of_both(case: Decays, cou
 
 
 def test_it_is_fitted_where_it_clearly_differs_too(case: Decays, coulomb: Explanation) -> None:
-    found = InPlace(case.fits).generalised(case.baseline, [coulomb], list(case.pool.values()), "")
+    found = Substitution(case.fits).nesting_models(case.baseline, [coulomb], list(case.pool.values()), "")
     size = coulomb.fit.values[COULOMB_N]
     sides = [
-        sorted(one.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
-        for one in found
-        if one.keys == (ASYMMETRIC,)
+        sorted(explanation.fit.values[f"{ASYMMETRIC}.force_{side}_n"] for side in ("up", "down"))
+        for explanation in found
+        if explanation.keys == (ASYMMETRIC,)
     ]
     assert sum(less <= 0.66 * size and more >= 1.34 * size for less, more in sides) >= 1
 
@@ -77,23 +92,23 @@ def test_it_is_fitted_where_it_clearly_differs_too(case: Decays, coulomb: Explan
 def test_a_general_form_is_left_out_where_it_is_known(case: Decays, coulomb: Explanation) -> None:
     """Only the forms that clearly differ are fitted again."""
     wide = case.fit(ASYMMETRIC)
-    found = InPlace(case.fits).generalised(case.baseline, [coulomb, wide], list(case.pool.values()), "")
-    assert len([one for one in found if one.keys == (ASYMMETRIC,)]) <= 2
+    found = Substitution(case.fits).nesting_models(case.baseline, [coulomb, wide], list(case.pool.values()), "")
+    assert len([explanation for explanation in found if explanation.keys == (ASYMMETRIC,)]) <= 2
 
 
 def test_the_special_case_takes_the_place_of_the_general_form_once(case: Decays, coulomb: Explanation) -> None:
     stribeck = case.fit(STRIBECK)
     pool = list(case.pool.values())
-    found = InPlace(case.fits).specialised(stribeck, [stribeck], pool)
-    assert [one.keys for one in found] == [(COULOMB,)]
+    found = Substitution(case.fits).nested_models(stribeck, [stribeck], pool)
+    assert [explanation.keys for explanation in found] == [(COULOMB,)]
     assert found[0].fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.02)
-    assert InPlace(case.fits).specialised(stribeck, [stribeck, coulomb], pool) == []
+    assert Substitution(case.fits).nested_models(stribeck, [stribeck, coulomb], pool) == []
 
 
 def test_the_special_case_is_fitted_again_from_a_better_place(case: Decays, coulomb: Explanation) -> None:
     stribeck, pool = case.fit(STRIBECK), list(case.pool.values())
     stuck = replace(coulomb, fit=replace(coulomb.fit, cost=1e9))
-    [found] = InPlace(case.fits).specialised(stribeck, [stribeck, stuck], pool)
+    [found] = Substitution(case.fits).nested_models(stribeck, [stribeck, stuck], pool)
     assert found.keys == (COULOMB,)
     assert found.fit.cost == pytest.approx(coulomb.fit.cost, rel=0.02)
 
@@ -101,8 +116,8 @@ def test_the_special_case_is_fitted_again_from_a_better_place(case: Decays, coul
 def test_one_effect_takes_the_place_of_two(case: Decays, coulomb: Explanation) -> None:
     """Friction of two directions is what friction and a constant force are together."""
     both = case.fit(COULOMB, CONSTANT)
-    found = InPlace(case.fits).one_for_all(both.fit, case.baseline, list(case.pool.values()))
-    best = cheapest(found)
+    found = Substitution(case.fits).replaced_by_single(both.fit, case.baseline, list(case.pool.values()))
+    best = best_fitting(found)
     assert best is not None
     assert best.keys == (ASYMMETRIC,)
     assert best.fit.cost == pytest.approx(both.fit.cost, rel=0.02)
@@ -117,9 +132,11 @@ def test_a_look_alike_that_is_far_behind_is_not_fitted_to_the_end(
     """Twice what was reached is far behind; after the first stage, that is, and with its softness."""
     problem = case.fits.problem([case.pool[CUBIC]])
     start = {**case.believed, **case.pool[CUBIC].starts()[0]}
-    first, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:-2], is_last=False)
-    found = in_place._fitted_unless_behind(problem, start, reached * soft_cost(problem, first, STAGES[-3]))
-    whole, _ = fitted(problem, start, n_iterations=6, shares=STAGES[-3:])
+    first, _ = fitted(problem, start, n_iterations=6, stages=INFLATION_STAGES[-3:-2], is_last=False)
+    found = substitution._fitted_unless_abandoned(
+        problem, start, reached * inflated_cost(problem, first, INFLATION_STAGES[-3])
+    )
+    whole, _ = fitted(problem, start, n_iterations=6, stages=INFLATION_STAGES[-3:])
     assert whole.cost < 0.999 * first.cost
     assert found.cost == pytest.approx((first if is_left else whole).cost, rel=1e-4)
 
@@ -129,17 +146,17 @@ def test_a_look_alike_takes_the_place_of_one_of_two_effects(case: Decays) -> Non
     viscous = Candidate(effect("structure.viscous_damping"), case.pool[CUBIC].surroundings)
     candidates = (viscous, case.pool[CONSTANT])
     start = {**case.believed, **viscous.starts()[0], **case.pool[CONSTANT].starts()[0]}
-    pair = case.fits.judged(fitted(case.fits.problem(candidates), start, n_iterations=6)[0])
+    pair = case.fits.validated(fitted(case.fits.problem(candidates), start, n_iterations=6)[0])
     pool = [viscous, *(case.pool[key] for key in (COULOMB, CUBIC, CONSTANT))]
-    [found] = InPlace(case.fits).exchanged(pair, case.baseline, [pair], pool)
+    [found] = Substitution(case.fits).exchanged(pair, case.baseline, [pair], pool)
     assert set(found.keys) == {CONSTANT, COULOMB}
     assert found.fit.cost < 0.5 * pair.fit.cost
     assert found.fit.values[COULOMB_N] == pytest.approx((UP_N + DOWN_N) / 2, rel=0.03)
-    assert InPlace(case.fits).exchanged(pair, case.baseline, [pair, found], pool) == []
+    assert Substitution(case.fits).exchanged(pair, case.baseline, [pair, found], pool) == []
 
 
 def test_what_is_no_nearer_than_the_baseline_takes_no_place(case: Decays, coulomb: Explanation) -> None:
-    assert InPlace(case.fits).one_for_all(coulomb.fit, coulomb.fit, list(case.pool.values())) == []
+    assert Substitution(case.fits).replaced_by_single(coulomb.fit, coulomb.fit, list(case.pool.values())) == []
 
 
 def test_a_held_out_run_is_tried_with_other_releases(
@@ -155,13 +172,13 @@ def test_a_held_out_run_is_tried_with_other_releases(
     monkeypatch.setattr(fits, "fitted", stuck)
     believed = case.believed[release]
     beside, right = (
-        case.fits.judged(replace(coulomb.fit, values={**coulomb.fit.values, release: share * believed}))
+        case.fits.validated(replace(coulomb.fit, values={**coulomb.fit.values, release: share * believed}))
         for share in (1 / 1.02, 1.0)
     )
     assert beside.held_out == pytest.approx(right.held_out, rel=1e-6)
-    monkeypatch.setattr(fits, "_OTHER_RELEASES", (0.0,))
+    monkeypatch.setattr(fits, "_RELEASE_OFFSETS", (0.0,))
     alone = replace(coulomb.fit, values={**coulomb.fit.values, release: believed / 1.02})
-    assert case.fits.judged(alone).held_out > 2 * right.held_out
+    assert case.fits.validated(alone).held_out > 2 * right.held_out
 
 
 def strained(case: Decays, coulomb: Explanation) -> Explanation:
@@ -174,17 +191,17 @@ def strained(case: Decays, coulomb: Explanation) -> Explanation:
 def test_an_effect_is_fitted_again_from_what_is_believed(
     case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun: list[Mapping[str, float]] = []
+    coarsely_fitted: list[Mapping[str, float]] = []
 
     def watched(problem: FreeRunProblem, start: Mapping[str, float]) -> Any:
-        begun.append(start)
+        coarsely_fitted.append(start)
         return fitted(problem, start)
 
     monkeypatch.setattr(refinement, "fitted", watched)
-    [found] = Refinement(case.fits).anew(case.baseline, [strained(case, coulomb)])
+    [found] = Refinement(case.fits).restarted_from_prior(case.baseline, [strained(case, coulomb)])
     assert found.keys == (COULOMB,)
     assert found.fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
-    [start] = begun
+    [start] = coarsely_fitted
     assert {name: value for name, value in start.items() if name in case.believed} == case.believed
     assert start[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N])
 
@@ -203,17 +220,17 @@ def test_a_mode_is_fitted_again_from_other_frequencies(case: Decays, monkeypatch
         first.append(start.values)
         moved = {**start.values, frequency: 1.01 * start.values[frequency]}
         trouble = "does not run" if start.values[frequency] == pytest.approx(12.188, rel=1e-3) else ""
-        begun_fit = replace(fit, values=moved, trouble=trouble)
-        return SimpleNamespace(fit=begun_fit, cost=abs(start.values[frequency] - 12.0))
+        coarse_fit = replace(fit, values=moved, trouble=trouble)
+        return SimpleNamespace(fit=coarse_fit, cost=abs(start.values[frequency] - 12.0))
 
     def watched(problem: FreeRunProblem, start: Mapping[str, float]) -> Any:
         last.append(start)
         return replace(fit, values=dict(start), cost=fit.cost - 50.0 + abs(start[frequency] - 12.0)), None
 
-    monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
-    monkeypatch.setattr(refinement, "begun", beginning)
+    monkeypatch.setattr(forked_process, "N_WORKERS", 1)  # a copy of this process would watch for itself
+    monkeypatch.setattr(refinement, "coarsely_fitted", beginning)
     monkeypatch.setattr(refinement, "fitted", watched)
-    [found] = Refinement(case.fits).anew(case.baseline, [Explanation(fit, 0.0, 1.0)])
+    [found] = Refinement(case.fits).restarted_from_prior(case.baseline, [Explanation(fit, 0.0, 1.0)])
     begun_hz, ended_hz = ([start[frequency] for start in starts] for starts in (first, last))
     np.testing.assert_allclose(begun_hz, [7.0, 8.041, 9.237, 10.61, 12.188, 14.0], rtol=1e-3)
     np.testing.assert_allclose(ended_hz, [10.0, 1.01 * 10.61, 1.01 * 14.0], rtol=1e-3)
@@ -243,29 +260,29 @@ def test_beside_dry_friction_simple_effects_are_fitted_from_other_sizes(
 ) -> None:
     """Each side valley keeps what begins in it; here the one about twice the size is the deepest."""
     size, cost = coulomb.fit.values[COULOMB_N], coulomb.fit.cost
-    begun: list[Mapping[str, float]] = []
+    coarsely_fitted: list[Mapping[str, float]] = []
 
     def stays(problem: FreeRunProblem, start: Mapping[str, float]) -> Any:
-        begun.append(start)
+        coarsely_fitted.append(start)
         left = cost - 50.0 + 10.0 * abs(start[COULOMB_N] / size - 2.0)
         return replace(coulomb.fit, values=dict(start), cost=left), None
 
-    monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)  # a copy of this process would watch for itself
+    monkeypatch.setattr(forked_process, "N_WORKERS", 1)  # a copy of this process would watch for itself
     monkeypatch.setattr(refinement, "fitted", stays)
-    monkeypatch.setattr(Fits, "is_complete", lambda self, one: is_complete)
+    monkeypatch.setattr(Fits, "is_complete", lambda self, explanation: is_complete)
     terms = (SimpleNamespace(kind=SimpleNamespace(dry_friction=is_dry)),)
     monkeypatch.setattr(case.fits.model, "twin", SimpleNamespace(terms=terms))
-    monkeypatch.setattr(case.fits, "judged", lambda fit: Explanation(fit, 0.0, 1.0))
+    monkeypatch.setattr(case.fits, "validated", lambda fit: Explanation(fit, 0.0, 1.0))
     known = [coulomb]
     if also_general:
         general = Candidate(effect(STRIBECK), case.pool[COULOMB].surroundings)
         known.append(replace(coulomb, fit=replace(coulomb.fit, candidates=(general,), cost=cost - 10.0)))
     found = Refinement(case.fits).from_other_sizes(case.baseline, known)
     if not is_tried:
-        assert (found, begun) == ([], [])
+        assert (found, coarsely_fitted) == ([], [])
         return
-    np.testing.assert_allclose([start[COULOMB_N] / size for start in begun], [0.5, 0.75, 1.5, 2.0, 3.0])
-    assert all(start[name] == value for start in begun for name, value in case.baseline.values.items())
+    np.testing.assert_allclose([start[COULOMB_N] / size for start in coarsely_fitted], [0.5, 0.75, 1.5, 2.0, 3.0])
+    assert all(start[name] == value for start in coarsely_fitted for name, value in case.baseline.values.items())
     [best] = found
     assert best.fit.values[COULOMB_N] == pytest.approx(2.0 * size)
 
@@ -277,25 +294,25 @@ def test_rivals_beside_a_strained_baseline_are_fitted_from_what_is_believed(
     best = strained(case, coulomb)
     other = case.fit(STRIBECK)
     near, far = (replace(other, fit=replace(other.fit, cost=best.fit.cost + more)) for more in (23.0, 25.0))
-    found = Refinement(case.fits).unstrained([near, best])
-    assert {one.keys for one in found} <= {(COULOMB,), (STRIBECK,)}
+    found = Refinement(case.fits).rivals_restarted_from_prior([near, best])
+    assert {explanation.keys for explanation in found} <= {(COULOMB,), (STRIBECK,)}
     assert found[0].keys == (COULOMB,)
     assert found[0].fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
-    assert not case.fits.is_strained(found[0].fit)
-    assert Refinement(case.fits).unstrained([far, best]) == []
+    assert not case.fits.rests_on_baseline_bounds(found[0].fit)
+    assert Refinement(case.fits).rivals_restarted_from_prior([far, best]) == []
     relaxed = replace(coulomb, fit=replace(coulomb.fit, cost=best.fit.cost))
-    assert not case.fits.is_strained(relaxed.fit)
-    assert Refinement(case.fits).unstrained([near, relaxed]) == []
-    assert Refinement(case.fits).unstrained([]) == []
+    assert not case.fits.rests_on_baseline_bounds(relaxed.fit)
+    assert Refinement(case.fits).rivals_restarted_from_prior([near, relaxed]) == []
+    assert Refinement(case.fits).rivals_restarted_from_prior([]) == []
 
 
 def test_what_gains_nothing_is_not_fitted_again(case: Decays, coulomb: Explanation) -> None:
     no_gain = replace(coulomb, fit=replace(coulomb.fit, cost=case.baseline.cost - 10.0))
-    assert Refinement(case.fits).anew(case.baseline, [no_gain]) == []
+    assert Refinement(case.fits).restarted_from_prior(case.baseline, [no_gain]) == []
 
 
 def findings(case: Decays, *explanations: Explanation) -> Findings:
-    baseline = case.fits.judged(case.baseline)
+    baseline = case.fits.validated(case.baseline)
     return Findings(
         cast(Case, SimpleNamespace(names_by_test=list)), case.fits.model, Split((), (), ()), cast(Any, None),
         case.fits.fitting, case.fits.held_out, baseline, baseline, list(explanations), [], {}, {},
@@ -305,19 +322,19 @@ def findings(case: Decays, *explanations: Explanation) -> Findings:
 def test_numbers_spread_as_far_as_what_is_believed_leaves_them(case: Decays, coulomb: Explanation) -> None:
     """Friction is known to the modal mass and the gains, a per cent each, but not to a tenth of that."""
     other = case.fit(CUBIC)
-    found = redrawn(findings(case, other, coulomb), coulomb).explanations
-    assert [one.keys for one in found] == [(COULOMB,), (CUBIC,)]
+    found = with_randomised_baselines(findings(case, other, coulomb), coulomb).explanations
+    assert [explanation.keys for explanation in found] == [(COULOMB,), (CUBIC,)]
     assert found[1].spread == {}
     assert 6e-3 < found[0].spread[COULOMB_N] / coulomb.fit.values[COULOMB_N] < 2.5e-2
 
 
 def test_a_better_place_takes_the_place_of_what_was_found(case: Decays, coulomb: Explanation) -> None:
-    worse = case.fits.judged(strained(case, coulomb).fit)
+    worse = case.fits.validated(strained(case, coulomb).fit)
     at_worse = huber_cost(
         case.fits.problem_of(worse.fit).residual(case.fits.problem_of(worse.fit).theta_of(worse.fit.values))
     )
     worse = replace(worse, fit=replace(worse.fit, misfit=at_worse, cost=at_worse + 4.0))
-    [found] = redrawn(findings(case, worse), worse).explanations
+    [found] = with_randomised_baselines(findings(case, worse), worse).explanations
     assert found.fit.cost < 0.5 * at_worse
     assert found.fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
 
@@ -336,34 +353,34 @@ def test_derivatives_and_places_are_the_same_on_one_core_and_on_two(
         return np.array(residuals), np.array([jacobian.times(unit) for unit in units])
 
     on_two = found()
-    monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)
-    for one, other in zip(found(), on_two, strict=True):
-        np.testing.assert_array_equal(one, other)
+    monkeypatch.setattr(forked_process, "N_WORKERS", 1)
+    for explanation, other in zip(found(), on_two, strict=True):
+        np.testing.assert_array_equal(explanation, other)
     for residual, place in zip(on_two[0], places, strict=True):
         np.testing.assert_array_equal(residual, problem.residual(place))
 
 
 def test_polishing_takes_a_fit_to_its_end(case: Decays) -> None:
-    begun = case.fit(COULOMB, n_iterations=1)
-    found = Refinement(case.fits).polished(begun.fit, [begun], [])
-    best = cheapest(found)
+    coarsely_fitted = case.fit(COULOMB, n_iterations=1)
+    found = Refinement(case.fits).converged(coarsely_fitted.fit, [coarsely_fitted], [])
+    best = best_fitting(found)
     assert best is not None
-    assert best.fit.cost < begun.fit.cost
+    assert best.fit.cost < coarsely_fitted.fit.cost
     assert best.fit.values[COULOMB_N] == pytest.approx((UP_N + DOWN_N) / 2, rel=0.05)
 
 
 def test_each_of_a_pair_is_fitted_alone(case: Decays) -> None:
     pair = case.fit(COULOMB, CUBIC)
-    alone = Refinement(case.fits).take_away([pair])
-    assert [one.keys for one in alone] == [(COULOMB,), (CUBIC,)]
+    alone = Refinement(case.fits).backward_eliminated([pair])
+    assert [explanation.keys for explanation in alone] == [(COULOMB,), (CUBIC,)]
     assert alone[0].fit.cost < alone[1].fit.cost
-    assert Refinement(case.fits).take_away([]) == []
+    assert Refinement(case.fits).backward_eliminated([]) == []
 
 
 def test_the_baseline_is_retuned_from_an_explanation_and_never_worse(case: Decays, coulomb: Explanation) -> None:
     numbers = {name: value for name, value in case.believed.items()}
     poor = FreeRunFit((), numbers, 1e12, 1e12)
-    before = case.fits.judged(poor)
+    before = case.fits.validated(poor)
     after = Refinement(case.fits).retuned_from([coulomb], before)
     assert after.keys == ()
     assert after.fit.cost <= 1.001 * case.baseline.cost
@@ -374,23 +391,25 @@ def test_numbers_at_their_bounds_are_eased_to_what_is_believed(case: Decays) -> 
     problem = case.fits.problem()
     values = {**case.believed, "damping of mode 1": 1.25, "frequency of mode 1": 1.003}
     fit = FreeRunFit((), problem.values(problem.theta_of(values)), 0.0, 0.0)
-    assert case.fits.is_strained(fit)
-    eased = case.fits.eased(fit)
-    assert eased["damping of mode 1"] == case.believed["damping of mode 1"]
-    assert eased["frequency of mode 1"] == pytest.approx(1.003)
-    assert not case.fits.is_strained(FreeRunFit((), case.believed, 0.0, 0.0))
+    assert case.fits.rests_on_baseline_bounds(fit)
+    reset_from_bounds = case.fits.reset_from_bounds(fit)
+    assert reset_from_bounds["damping of mode 1"] == case.believed["damping of mode 1"]
+    assert reset_from_bounds["frequency of mode 1"] == pytest.approx(1.003)
+    assert not case.fits.rests_on_baseline_bounds(FreeRunFit((), case.believed, 0.0, 0.0))
 
 
 def test_screening_keeps_what_explains_and_begins_it_near(case: Decays, monkeypatch: pytest.MonkeyPatch) -> None:
     """Places to begin from afar are sought for those alone that are fitted: each costs simulations."""
     sought: list[str] = []
 
-    def from_afar(self: Screening, base: object, problem: FreeRunProblem, *others: Any) -> list[Start]:
+    def starts_from_prior_and_fit(
+        self: Screening, base: object, problem: FreeRunProblem, *others: Any
+    ) -> list[Start]:
         sought.append(problem.candidates[-1].key)
         return plain(self, base, problem, *others)  # type: ignore[arg-type]
 
-    plain = Screening._from_afar
-    monkeypatch.setattr(Screening, "_from_afar", from_afar)
+    plain = Screening._starts_from_prior_and_fit
+    monkeypatch.setattr(Screening, "_starts_from_prior_and_fit", starts_from_prior_and_fit)
     monkeypatch.setattr(screening, "_MOST_FITTED", 3)
     problem = case.fits.problem()
     theta = problem.theta_of(case.baseline.values)
@@ -427,19 +446,19 @@ def repeated(tmp_path_factory: pytest.TempPathFactory) -> Repeated:
 
 
 def test_one_repeat_of_every_test_is_looked_at(case: Decays, repeated: Repeated) -> None:
-    few = repeated.fits.of_one_repeat
+    few = repeated.fits.one_repeat_per_test
     assert [run[0].run.name for run in few.fitting] == ["decay_0", "decay_2"]
-    assert few is repeated.fits.of_one_repeat
-    assert few.of_one_repeat is few
+    assert few is repeated.fits.one_repeat_per_test
+    assert few.one_repeat_per_test is few
     assert few.failed is repeated.fits.failed
     assert few.screened is repeated.fits.screened
-    assert case.fits.of_one_repeat is case.fits
+    assert case.fits.one_repeat_per_test is case.fits
     assert repeated.fits.n_coefficients > 1.4 * few.n_coefficients
 
 
 def test_the_part_of_a_jacobian_is_that_of_fewer_runs(repeated: Repeated) -> None:
-    few, fit = repeated.fits.of_one_repeat, repeated.baseline
-    part = few.part_of(repeated.fits.jacobian(fit), fit, repeated.fits)
+    few, fit = repeated.fits.one_repeat_per_test, repeated.baseline
+    part = few.jacobian_of_part(repeated.fits.jacobian(fit), fit, repeated.fits)
     expected = few.jacobian(fit)
     assert part.n_columns == expected.n_columns == len(few.problem().names) < len(repeated.fits.problem().names)
     for unit in np.eye(part.n_columns):
@@ -447,19 +466,21 @@ def test_the_part_of_a_jacobian_is_that_of_fewer_runs(repeated: Repeated) -> Non
 
 
 def test_what_is_begun_on_some_runs_is_finished_on_all(repeated: Repeated) -> None:
-    few, fits, base = repeated.fits.of_one_repeat, repeated.fits, repeated.baseline
+    few, fits, base = repeated.fits.one_repeat_per_test, repeated.fits, repeated.baseline
     candidate = repeated.pool[COULOMB]
     jacobian = fits.jacobian(base)
     start = Start({**base.values, **candidate.starts()[0]}, is_near=True)
-    one = begun(few.problem((candidate,)), [start], near=few.part_of(jacobian, base, fits))
-    whole = on_more_runs(one, fits.problem((candidate,)), base.values, jacobian)
+    coarse_fit = coarsely_fitted(
+        few.problem((candidate,)), [start], near=few.jacobian_of_part(jacobian, base, fits)
+    )
+    whole = extended_to_all_runs(coarse_fit, fits.problem((candidate,)), base.values, jacobian)
     assert whole.fit.values["release of decay_1"] == base.values["release of decay_1"]
-    assert whole.fit.values[COULOMB_N] == one.fit.values[COULOMB_N]
+    assert whole.fit.values[COULOMB_N] == coarse_fit.fit.values[COULOMB_N]
     assert whole.jacobian.n_columns == len(fits.problem((candidate,)).names)
-    done = finished(whole)
+    done = refined(whole)
     assert done.values[COULOMB_N] == pytest.approx(0.5 * (UP_N + DOWN_N), rel=0.15)
     assert done.cost < base.cost
-    [found, *_] = OneMoreEffect(fits).fitted(base, jacobian, [candidate], "")
+    [found, *_] = ForwardSelection(fits).fitted(base, jacobian, [candidate], "")
     assert found.fit.cost == pytest.approx(done.cost, rel=0.02)
     assert set(found.fit.names) == {*fits.problem().names, COULOMB_N}
 
@@ -479,7 +500,9 @@ def test_what_comes_in_jumps_is_begun_at_the_best_of_places_and_sizes(
     jacobian = case.fits.jacobian(base)
 
     def begun_from(candidate: Candidate) -> list[dict[str, float]]:
-        [promise] = Screening(case.fits).chosen(base, jacobian, [candidate], "", STAGES[-2:], is_near=True)
+        [promise] = Screening(case.fits).chosen(
+            base, jacobian, [candidate], "", INFLATION_STAGES[-2:], is_near=True
+        )
         return [{name: start.values[name] for name in near} for start in promise.starts]
 
     assert begun_from(smooth)[0] == far
@@ -495,13 +518,13 @@ def test_look_alikes_are_fitted_from_a_better_size(
     other = replace(coulomb, fit=replace(coulomb.fit, cost=coulomb.fit.cost - other_size_gains + 1.0))
     alike, asked = case.fit(STRIBECK, n_iterations=1), []
 
-    def look_alikes(self: InPlace, base: FreeRunFit, kept: Any, pool: Any, what: str, most: int) -> Any:
+    def look_alikes(self: Substitution, base: FreeRunFit, kept: Any, pool: Any, what: str, most: int) -> Any:
         asked.append((base, kept, most))
         return [alike]
 
     monkeypatch.setattr(Refinement, "from_other_sizes", lambda self, base, known: [other])
-    monkeypatch.setattr(InPlace, "look_alikes", look_alikes)
-    found = whole_search._beside_friction(case.fits, case.baseline, [coulomb], list(case.pool.values()))
+    monkeypatch.setattr(Substitution, "look_alikes", look_alikes)
+    found = model_search._restarted_from_other_sizes(case.fits, case.baseline, [coulomb], list(case.pool.values()))
     if other_size_gains:
         assert found == [other, alike]
         assert asked == [(case.baseline, [other], 6)]

@@ -11,7 +11,7 @@ from recorded_oscillators import decays, effect, rig, surroundings
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import start_numbers
+from sloshlab.diagnosis.search import start_values
 
 assert effects.__all__
 
@@ -53,7 +53,7 @@ def test_an_effect_grows_by_the_numbers_without_which_it_is_nothing(
 
 def test_an_effect_is_looked_at_a_tenth_of_its_size_too(at: Surroundings) -> None:
     candidate = Candidate(effect("tank.fading_mass"), at)
-    found = start_numbers.with_smaller_ones(candidate)
+    found = start_values.starts_with_smaller_sizes(candidate)
     assert found[:2] == candidate.starts()
     assert [numbers(start)["beta"] for start in found] == pytest.approx([0.1, -0.1, 0.01, -0.01])
     assert len({numbers(start)["fade_g"] for start in found}) == 1
@@ -62,7 +62,7 @@ def test_an_effect_is_looked_at_a_tenth_of_its_size_too(at: Surroundings) -> Non
 def test_a_look_alike_starts_from_a_thirtieth_to_three_times_its_size(at: Surroundings) -> None:
     candidate = Candidate(effect("structure.coulomb_friction"), at)
     sizes = [numbers(start)["force_n"] for start in candidate.starts()]
-    found = [numbers(start)["force_n"] for start in start_numbers.of_many_sizes(candidate)]
+    found = [numbers(start)["force_n"] for start in start_values.starts_of_many_sizes(candidate)]
     assert found == pytest.approx([size * factor for size in sizes for factor in (0.03, 0.1, 0.3, 1.0, 3.0)])
 
 
@@ -72,7 +72,7 @@ def test_a_start_is_as_large_as_a_first_step_says_within_a_decade(
 ) -> None:
     candidate = Candidate(effect("tank.fading_mass"), at)
     start = candidate.starts()[0]
-    found = numbers(start_numbers.resized(candidate, start, promised))
+    found = numbers(start_values.resized(candidate, start, promised))
     assert found["beta"] == pytest.approx(0.1 * factor)
     assert found["fade_g"] == numbers(start)["fade_g"]
 
@@ -80,5 +80,5 @@ def test_a_start_is_as_large_as_a_first_step_says_within_a_decade(
 def test_a_mass_that_moves_by_itself_is_one_that_the_tank_may_lack(at: Surroundings) -> None:
     mass, cushion = Candidate(effect("tank.mass_error"), at), Candidate(effect("tank.air_cushion"), at)
     fit = SimpleNamespace(values={**cushion.starts()[0], "tank.air_cushion.mass_kg": 0.18})
-    found = start_numbers.as_its_general_form(mass, cushion, cast(Any, fit))
+    found = start_values.starts_from_nesting(mass, cushion, cast(Any, fit))
     assert [numbers(start)["mass_kg"] for start in found[len(mass.starts()) :]] == [0.18, -0.18]

@@ -14,7 +14,7 @@ from sloshlab.diagnosis.candidate import Candidate, candidates
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search import whole_search
+from sloshlab.diagnosis.search import model_search
 from sloshlab.diagnosis.search.fits import Fits
 
 
@@ -34,10 +34,10 @@ class Tried:
 
     def __init__(self, pairs: dict[tuple[str, ...], list[Any]]) -> None:
         self.pairs, self.beside, self.for_all = pairs, [], []
-        self.in_place = SimpleNamespace(
-            one_for_all=lambda wider, base, pool: self.for_all.append(wider.keys) or [],
+        self.substitution = SimpleNamespace(
+            replaced_by_single=lambda wider, base, pool: self.for_all.append(wider.keys) or [],
             look_alikes=lambda *all_: [],
-            generalised=lambda *all_: [],
+            nesting_models=lambda *all_: [],
         )
 
     def fitted(self, base: Any, jacobian: Any, pool: Any, what: str) -> list[Any]:
@@ -56,24 +56,26 @@ def sought(
     *,
     is_noise: bool = False,
     retuned: Any = RETUNED,
-    shares_little: bool = True,
+    has_little_repeatable: bool = True,
     known: tuple[Any, ...] = (),
     is_complete: bool = False,
 ) -> tuple[Tried, list[Any]]:
     tried = Tried({BEST.keys: [pair], SECOND.keys: [explanation(1000.0, "hum", "missing_mode", left=0.9)]})
     fits = SimpleNamespace(
-        is_complete=lambda one: is_complete,
+        is_complete=lambda explanation: is_complete,
         problem_of=lambda fit: SimpleNamespace(is_down_to_noise=lambda fit: is_noise),
         jacobian=lambda fit: None,
-        shares_little=lambda one: shares_little,
-        made_known=lambda pool: None,
+        has_little_repeatable=lambda explanation: has_little_repeatable,
+        share_with_second_process=lambda pool: None,
     )
-    monkeypatch.setattr(whole_search, "OneMoreEffect", lambda fits: tried)
-    monkeypatch.setattr(whole_search, "_possible_beside", lambda best, at, pool: [])
+    monkeypatch.setattr(model_search, "ForwardSelection", lambda fits: tried)
+    monkeypatch.setattr(model_search, "_candidates_beside", lambda best, at, pool: [])
     monkeypatch.setattr(
-        whole_search, "Refinement", lambda fits: SimpleNamespace(take_away=lambda pairs: [SECOND] if pairs else [])
+        model_search,
+        "Refinement",
+        lambda fits: SimpleNamespace(backward_eliminated=lambda pairs: [SECOND] if pairs else []),
     )
-    return tried, whole_search._second_effects(  # type: ignore[arg-type]
+    return tried, model_search._second_effects(  # type: ignore[arg-type]
         fits, [*known, BEST], retuned, cast(Any, None), []
     )
 
@@ -83,7 +85,11 @@ def test_where_the_best_pair_leaves_too_much_its_first_effect_is_exchanged(
 ) -> None:
     tried, found = sought(monkeypatch, explanation(2000.0, "stiffness_change", "hum"))
     assert tried.beside == [("stiffness_change",), ("hum",)]
-    assert [one.keys for one in found] == [("stiffness_change", "hum"), ("hum", "missing_mode"), ("hum",)]
+    assert [explanation.keys for explanation in found] == [
+        ("stiffness_change", "hum"),
+        ("hum", "missing_mode"),
+        ("hum",),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -129,9 +135,11 @@ def test_only_a_pair_that_gains_a_fifth_tells_that_its_first_effect_is_wrong(
 def test_a_burst_in_one_channel_of_a_run_alone_is_no_physics() -> None:
     fits = Fits(cast(Any, None), [], [], lambda what, done, of: None, [["a", "b"], ["c"]])
     places = {("c", "tip"): 0.9, ("c", "force"): 0.9, ("c", "root"): 15.0}
-    one = Explanation(FreeRunFit((), {}, 0.0, 0.0), 0.0, 1.0, by_run=places, repeating={("a", "tip"): 0.1})
-    assert fits.is_complete(one)
-    assert not fits.is_complete(replace(one, by_run={**places, ("c", "force"): 15.0}))
+    explanation = Explanation(
+        FreeRunFit((), {}, 0.0, 0.0), 0.0, 1.0, by_run=places, repeatable={("a", "tip"): 0.1}
+    )
+    assert fits.is_complete(explanation)
+    assert not fits.is_complete(replace(explanation, by_run={**places, ("c", "force"): 15.0}))
 
 
 def test_nothing_is_sought_beside_what_leaves_noise(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,10 +167,10 @@ def test_nothing_more_is_sought_where_repeats_share_nothing_more(
         held_out=0.0,
         held_out_rms=1.0,
         by_run={("a", "tip"): 9.0, ("b", "tip"): 9.0, ("c", "tip"): alone},
-        repeating={("a", "tip"): shared[0], ("a", "force"): shared[1]},
+        repeatable={("a", "tip"): shared[0], ("a", "force"): shared[1]},
     )
     assert fits.is_complete(left) is is_complete
-    assert not fits.is_complete(replace(left, repeating={}))
+    assert not fits.is_complete(replace(left, repeatable={}))
 
 
 @pytest.mark.parametrize(("removed", "is_tried"), [(0.4, False), (0.6, True)])
@@ -175,7 +183,7 @@ def test_pairs_are_not_tried_where_no_effect_removes_anything_to_speak_of(
         explanation(5000.0, in_a_channel=1 + removed**2),
     )
     assert bool(sought(monkeypatch, pair, retuned=retuned)[0].beside) == is_tried
-    assert sought(monkeypatch, pair, retuned=retuned, shares_little=False)[0].beside
+    assert sought(monkeypatch, pair, retuned=retuned, has_little_repeatable=False)[0].beside
 
 
 @pytest.mark.parametrize(
@@ -193,7 +201,7 @@ def test_what_acts_on_the_damping_of_liquid_is_possible_beside_what_brings_it(
     model = RigModel(rig(tmp_path), tmp_path, decays((0.02,), 1.0))
     at = surroundings(model)
     pool = candidates(at)
-    assert "tank.breakup_delay" not in {one.key for one in pool}
+    assert "tank.breakup_delay" not in {candidate.key for candidate in pool}
     first = Candidate(effect(key), at)
     best = Explanation(FreeRunFit((first,), first.starts()[0], 0.0, 0.0), 0.0, 1.0)
-    assert {one.key for one in whole_search._possible_beside(best, at, pool)} == beside
+    assert {candidate.key for candidate in model_search._candidates_beside(best, at, pool)} == beside

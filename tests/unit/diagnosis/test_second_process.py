@@ -11,7 +11,7 @@ import pytest
 from decays_under_friction import COULOMB, CUBIC, STRIBECK, Decays
 from recorded_oscillators import decays, rig
 
-from sloshlab.diagnosis import copied_process, rig_model
+from sloshlab.diagnosis import forked_process, rig_model
 from sloshlab.diagnosis import second_process as module
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem, residuals_of_runs
@@ -19,7 +19,7 @@ from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.second_process import SecondProcess
 from sloshlab.recording import channels
 
-pytestmark = pytest.mark.skipif(not copied_process.CAN_FORK, reason="no copies of a process here")
+pytestmark = pytest.mark.skipif(not forked_process.CAN_FORK, reason="no copies of a process here")
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_it_gives_the_same_numbers_bit_for_bit(case: Decays, monkeypatch: pytest
     jacobian = problem.jacobian(theta, residuals[0], range(theta.size))
     assert made(problem) is beside
     assert beside.n_done > 0
-    monkeypatch.setattr(copied_process, "N_AT_ONCE", 1)
+    monkeypatch.setattr(forked_process, "N_WORKERS", 1)
     for found, expected in zip(residuals, problem.residuals(places), strict=True):
         np.testing.assert_array_equal(found, expected)
     alone = problem.jacobian(theta, residuals[0], range(theta.size))
@@ -63,16 +63,16 @@ def test_it_is_made_anew_for_an_effect_that_it_has_not_seen(case: Decays) -> Non
     known = made(case.fits.problem([case.pool[COULOMB]]))
     problem = case.fits.problem([case.pool[COULOMB], case.pool[CUBIC]])
     assert case.pool[CUBIC] not in known.candidates
-    anew = made(problem)
-    assert anew is not known
+    restarted_from_prior = made(problem)
+    assert restarted_from_prior is not known
     assert known.done(problem.runs[:1], case.believed, ()) is None  # it has ended
     forgotten = weakref.ref(known)
     del known
     gc.collect()
     assert forgotten() is None  # and holds no memory until the model ends
-    assert made(case.fits.problem([case.pool[CUBIC]])) is anew
+    assert made(case.fits.problem([case.pool[CUBIC]])) is restarted_from_prior
     alike = Candidate(case.pool[CUBIC].effect, case.pool[CUBIC].surroundings)  # equal, and yet another one
-    assert made(case.fits.problem([alike])) is not anew
+    assert made(case.fits.problem([alike])) is not restarted_from_prior
 
 
 def test_all_is_done_here_where_it_has_ended_or_is_busy(case: Decays) -> None:
@@ -108,10 +108,10 @@ def test_there_is_none_for_code_of_others_for_little_work_or_on_one_core(
         problem = Decays(tmp_path).fits.problem()
         assert process_of(problem) is None
     with monkeypatch.context() as changed:
-        changed.setattr(problem.model, "may_be_copied", False)
+        changed.setattr(problem.model, "may_be_forked", False)
         assert process_of(problem) is None
     with monkeypatch.context() as changed:
-        changed.setattr(copied_process, "N_AT_ONCE", 1)
+        changed.setattr(forked_process, "N_WORKERS", 1)
         assert process_of(problem) is None
     assert process_of(problem) is not None
 
@@ -123,6 +123,6 @@ def test_there_is_none_where_copies_of_the_recordings_would_take_the_memory(
     n_readings = sum(run.recording[name].size for run in runs for name in channels(run.recording))
     may_be = []
     for most in (n_readings, n_readings - 1):
-        monkeypatch.setattr(rig_model, "_MOST_READINGS_TO_COPY", most)
-        may_be.append(RigModel(rig(tmp_path), tmp_path, runs).may_be_copied)
+        monkeypatch.setattr(rig_model, "_MOST_READINGS_TO_FORK", most)
+        may_be.append(RigModel(rig(tmp_path), tmp_path, runs).may_be_forked)
     assert may_be == [True, False]

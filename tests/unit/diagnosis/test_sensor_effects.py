@@ -40,19 +40,21 @@ def read(sensor_fault: SensorFault, values: np.ndarray, recorded: np.ndarray | N
 
 
 def test_gain_makes_the_reading_larger_by_its_ratio(model: RigModel) -> None:
-    one = fault(model, "sensor_gain", {"ratio": 0.07})
-    np.testing.assert_allclose(read(one, SIGNAL), 1.07 * SIGNAL)
-    assert one.undone is not None
-    np.testing.assert_allclose(one.undone(1.07 * SIGNAL, RATE, {}, SIGNAL), SIGNAL)
+    sensor_fault = fault(model, "sensor_gain", {"ratio": 0.07})
+    np.testing.assert_allclose(read(sensor_fault, SIGNAL), 1.07 * SIGNAL)
+    assert sensor_fault.undone is not None
+    np.testing.assert_allclose(sensor_fault.undone(1.07 * SIGNAL, RATE, {}, SIGNAL), SIGNAL)
 
 
 @pytest.mark.parametrize("delay_s", [0.0043, -0.0021])
 def test_a_delayed_channel_shows_what_was_there_earlier(model: RigModel, delay_s: float) -> None:
-    one = fault(model, "sensor_delay", {"delay_s": delay_s})
+    sensor_fault = fault(model, "sensor_delay", {"delay_s": delay_s})
     expected = AMPLITUDE * np.cos(OMEGA * (T - delay_s) + PHASE)
-    np.testing.assert_allclose(read(one, SIGNAL)[200:-200], expected[200:-200], atol=2e-3 * AMPLITUDE)
-    assert one.undone is not None
-    np.testing.assert_allclose(one.undone(expected, RATE, {}, SIGNAL)[200:-200], SIGNAL[200:-200], atol=6e-3)
+    np.testing.assert_allclose(read(sensor_fault, SIGNAL)[200:-200], expected[200:-200], atol=2e-3 * AMPLITUDE)
+    assert sensor_fault.undone is not None
+    np.testing.assert_allclose(
+        sensor_fault.undone(expected, RATE, {}, SIGNAL)[200:-200], SIGNAL[200:-200], atol=6e-3
+    )
 
 
 @pytest.mark.parametrize(
@@ -63,9 +65,9 @@ def test_what_was_before_a_delayed_channel_is_not_known(
     model: RigModel, delay_samples: float, known: slice
 ) -> None:
     """A held tank reads nothing before it is released, and filters make of the jump what they will."""
-    one = fault(model, "sensor_delay", {"delay_s": delay_samples / RATE})
+    sensor_fault = fault(model, "sensor_delay", {"delay_s": delay_samples / RATE})
     recorded = SIGNAL + 100.0
-    reading = read(one, SIGNAL, recorded)
+    reading = read(sensor_fault, SIGNAL, recorded)
     is_known = np.zeros(SIGNAL.size, bool)
     is_known[known] = True
     expected = AMPLITUDE * np.cos(OMEGA * (T - delay_samples / RATE) + PHASE)
@@ -73,42 +75,42 @@ def test_what_was_before_a_delayed_channel_is_not_known(
     if abs(delay_samples) >= 1.0:
         np.testing.assert_allclose(reading[~is_known], recorded[~is_known])
     lost = np.full(SIGNAL.size, np.nan)
-    assert np.isfinite(read(one, SIGNAL, lost)).all()
+    assert np.isfinite(read(sensor_fault, SIGNAL, lost)).all()
 
 
 def test_a_discharging_sensor_leads_and_loses_low_frequencies(model: RigModel) -> None:
     """jωτ/(1 + jωτ) after the charge of the first sample has leaked away."""
     tau = 0.03
-    one = fault(model, "sensor_high_pass", {"time_constant_s": tau})
+    sensor_fault = fault(model, "sensor_high_pass", {"time_constant_s": tau})
     factor = 1j * OMEGA * tau / (1 + 1j * OMEGA * tau)
     steady = AMPLITUDE * np.real(factor * np.exp(1j * (OMEGA * T + PHASE)))
-    np.testing.assert_allclose(read(one, SIGNAL, steady)[400:], steady[400:], atol=2e-3 * AMPLITUDE)
+    np.testing.assert_allclose(read(sensor_fault, SIGNAL, steady)[400:], steady[400:], atol=2e-3 * AMPLITUDE)
 
 
 @pytest.mark.parametrize("charge", [0.0, 2.0, -5.0])
 def test_a_sensor_that_was_charged_before_the_run_is_no_misfit(model: RigModel, charge: float) -> None:
     tau = 0.2
-    one = fault(model, "sensor_high_pass", {"time_constant_s": tau})
+    sensor_fault = fault(model, "sensor_high_pass", {"time_constant_s": tau})
     factor = 1j * OMEGA * tau / (1 + 1j * OMEGA * tau)
     steady = AMPLITUDE * np.real(factor * np.exp(1j * (OMEGA * T + PHASE)))
     recorded = steady + charge * np.exp(-T / tau)
-    np.testing.assert_allclose(read(one, SIGNAL, recorded), recorded, atol=4e-3 * AMPLITUDE)
+    np.testing.assert_allclose(read(sensor_fault, SIGNAL, recorded), recorded, atol=4e-3 * AMPLITUDE)
 
 
 def test_a_charge_that_has_leaked_away_before_the_first_known_sample_is_none(model: RigModel) -> None:
-    one = fault(model, "sensor_high_pass", {"time_constant_s": 1.0 / RATE})
+    sensor_fault = fault(model, "sensor_high_pass", {"time_constant_s": 1.0 / RATE})
     recorded = np.where(T[-1] - 4.0 / RATE > T, np.nan, SIGNAL)
-    assert np.isfinite(read(one, SIGNAL, recorded)).all()
+    assert np.isfinite(read(sensor_fault, SIGNAL, recorded)).all()
 
 
 def test_clipping_stops_at_the_limit_of_the_channel(model: RigModel) -> None:
-    one = fault(model, "sensor_clipping", {"limit": 2.5})
-    reading = read(one, SIGNAL)
+    sensor_fault = fault(model, "sensor_clipping", {"limit": 2.5})
+    reading = read(sensor_fault, SIGNAL)
     assert reading.max() == 2.5
     assert reading.min() == -2.5
     inside = np.abs(SIGNAL) < 2.5
     np.testing.assert_array_equal(reading[inside], SIGNAL[inside])
-    assert one.undone is None
+    assert sensor_fault.undone is None
 
 
 def test_drift_adds_its_rate_every_second(model: RigModel) -> None:
@@ -122,50 +124,52 @@ def test_drift_adds_its_rate_every_second(model: RigModel) -> None:
 )
 def test_hum_finds_the_phase_and_the_frequency_of_the_mains(model: RigModel, name: str, line_hz: float) -> None:
     line = 0.2 * np.cos(2 * np.pi * line_hz * T + 1.9)
-    one = fault(model, name, {"amplitude": 0.2})
-    np.testing.assert_allclose(read(one, SIGNAL, SIGNAL + line) - SIGNAL, line, atol=0.03 * 0.2)
+    sensor_fault = fault(model, name, {"amplitude": 0.2})
+    np.testing.assert_allclose(read(sensor_fault, SIGNAL, SIGNAL + line) - SIGNAL, line, atol=0.03 * 0.2)
     half = fault(model, name, {"amplitude": 0.1})
     np.testing.assert_allclose(read(half, SIGNAL, SIGNAL + line) - SIGNAL, 0.5 * line, atol=0.03 * 0.1)
-    assert one.undone is not None
-    np.testing.assert_allclose(one.undone(SIGNAL + line, RATE, {}, SIGNAL + line), SIGNAL, atol=0.06)
+    assert sensor_fault.undone is not None
+    np.testing.assert_allclose(sensor_fault.undone(SIGNAL + line, RATE, {}, SIGNAL + line), SIGNAL, atol=0.06)
 
 
 def test_no_hum_where_the_recording_is_too_slow_for_it(model: RigModel) -> None:
-    one = fault(model, "mains_hum", {"amplitude": 0.2})
-    np.testing.assert_array_equal(one.reading(SIGNAL, 90.0, {}, SIGNAL), SIGNAL)
+    sensor_fault = fault(model, "mains_hum", {"amplitude": 0.2})
+    np.testing.assert_array_equal(sensor_fault.reading(SIGNAL, 90.0, {}, SIGNAL), SIGNAL)
 
 
 def test_a_fast_clock_shows_later_instants(model: RigModel) -> None:
     ratio = 8e-4
-    one = fault(model, "clock_skew", {"ratio": ratio})
+    sensor_fault = fault(model, "clock_skew", {"ratio": ratio})
     expected = AMPLITUDE * np.cos(OMEGA * (1 + ratio) * T + PHASE)
-    np.testing.assert_allclose(read(one, SIGNAL)[:-10], expected[:-10], atol=2e-3 * AMPLITUDE)
-    assert one.undone is not None
-    np.testing.assert_allclose(one.undone(expected, RATE, {}, SIGNAL)[:-10], SIGNAL[:-10], atol=4e-3 * AMPLITUDE)
+    np.testing.assert_allclose(read(sensor_fault, SIGNAL)[:-10], expected[:-10], atol=2e-3 * AMPLITUDE)
+    assert sensor_fault.undone is not None
+    np.testing.assert_allclose(
+        sensor_fault.undone(expected, RATE, {}, SIGNAL)[:-10], SIGNAL[:-10], atol=4e-3 * AMPLITUDE
+    )
 
 
 def test_cross_talk_adds_a_share_of_the_other_channel(model: RigModel) -> None:
     other = np.sin(3 * T)
-    one = fault(model, "cross_talk", {"ratio": 0.25}, f"{CHANNEL}<acceleration_root")
-    assert one.channel == CHANNEL
+    sensor_fault = fault(model, "cross_talk", {"ratio": 0.25}, f"{CHANNEL}<acceleration_root")
+    assert sensor_fault.channel == CHANNEL
     np.testing.assert_allclose(
-        one.reading(SIGNAL, RATE, {"acceleration_root": other}, SIGNAL), SIGNAL + 0.25 * other
+        sensor_fault.reading(SIGNAL, RATE, {"acceleration_root": other}, SIGNAL), SIGNAL + 0.25 * other
     )
-    assert one.undone is not None
-    back = one.undone(SIGNAL + 0.25 * other, RATE, {"acceleration_root": other}, SIGNAL)
+    assert sensor_fault.undone is not None
+    back = sensor_fault.undone(SIGNAL + 0.25 * other, RATE, {"acceleration_root": other}, SIGNAL)
     np.testing.assert_allclose(back, SIGNAL)
 
 
 def test_a_fast_clock_keeps_the_size_of_what_has_seven_samples_per_cycle(model: RigModel) -> None:
     """Straight lines between samples would take a tenth of it; a lost sample loses its neighbours only."""
     fast = np.cos(2 * np.pi * 150.0 * T)
-    one = fault(model, "clock_skew", {"ratio": 8e-4})
+    sensor_fault = fault(model, "clock_skew", {"ratio": 8e-4})
     expected = np.cos(2 * np.pi * 150.0 * (1 + 8e-4) * T)
-    np.testing.assert_allclose(read(one, fast)[10:-20], expected[10:-20], atol=5e-3)
+    np.testing.assert_allclose(read(sensor_fault, fast)[10:-20], expected[10:-20], atol=5e-3)
     gappy = np.where(T[2000] == T, np.nan, fast)
-    found = read(one, gappy)
+    found = read(sensor_fault, gappy)
     assert 1 <= np.isnan(found).sum() <= 2
-    np.testing.assert_array_equal(np.isnan(read(one, np.full(N, np.nan))), True)
+    np.testing.assert_array_equal(np.isnan(read(sensor_fault, np.full(N, np.nan))), True)
 
 
 def test_a_leak_from_what_moves_alike_is_a_gain_and_is_not_sought(model: RigModel) -> None:
@@ -190,7 +194,7 @@ def test_at_one_frequency_the_base_leaks_only_into_what_it_does_not_move_alike(m
     leaks = effect("sensor.cross_talk")
     into_the_base = {"acceleration_root<acceleration_tip", "acceleration_root<displacement_tank"}
     assert set(leaks.places(at)) == into_the_base
-    unlike = replace(at, unlike_base=frozenset({"acceleration_tip"}))
+    unlike = replace(at, incoherent_with_base=frozenset({"acceleration_tip"}))
     assert set(leaks.places(unlike)) == into_the_base | {"acceleration_tip<acceleration_root"}
 
 

@@ -62,7 +62,9 @@ def test_a_force_of_the_page_is_a_candidate_and_acts_as_it_says(tmp_path: Path) 
     )
     same = Candidate(viscous, at).extension({"damping_n_s_per_m": 1.0})
     leaking = Candidate(own, at).extension({"damping_n_s_per_m": 1.0, "speed_m_per_s": 0.05})
-    x = [model.simulate(run, model.believed, one)["displacement_tank"] for one in (slow, same, leaking)]
+    x = [
+        model.simulate(run, model.believed, extension)["displacement_tank"] for extension in (slow, same, leaking)
+    ]
     np.testing.assert_allclose(x[0], x[1], atol=1e-9)
     assert np.abs(x[2][-100:]).max() > 1.05 * np.abs(x[1][-100:]).max()
 

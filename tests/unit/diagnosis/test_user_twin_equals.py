@@ -8,7 +8,7 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, known_effects
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
-from sloshlab.diagnosis.verdict.alternatives import equals_of
+from sloshlab.diagnosis.verdict.alternatives import equivalents_of
 
 assert effects.__all__
 
@@ -37,4 +37,4 @@ def explained_by(*keys: str) -> Explanation:
     ],
 )
 def test_equals(keys: tuple[str, ...], expected: list[tuple[str, ...]]) -> None:
-    assert equals_of(explained_by(*keys)) == expected
+    assert equivalents_of(explained_by(*keys)) == expected

@@ -79,7 +79,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_friction_is_named_and_the_extended_twin_follows_the_closed_form(case: Path) -> None:
     assert command(["diagnose", str(case), "--twin", str(case.parent / "cart_twin.py"), "--no-report"]) in (0, 3)
     found = json.loads((case / "diagnosis" / "verdict.json").read_text())
-    names = [one["name"] for one in found["effects"]]
+    names = [effect["name"] for effect in found["effects"]]
     assert found["verdict"] == "named"
     assert names == ["coulomb_friction"]
     force = found["effects"][0]["parameters"]["force_n"]

@@ -56,16 +56,14 @@ def test_one_run_alone_names_nothing() -> None:
     assert verdict.kind == "unknown"
     assert verdict.statement.startswith("Something is missing that one run alone does not tell, most likely in")
     assert "the nearest known effect is coulomb friction" in verdict.statement
-    assert [one["name"] for one in verdict_facts(alone, verdict)["effects"]] == ["unknown"]
+    assert [effect["name"] for effect in verdict_facts(alone, verdict)["effects"]] == ["unknown"]
 
 
 @pytest.mark.parametrize(("rms", "is_near"), [(1.91, True), (1.93, False)])
 def test_what_explains_next_to_nothing_is_not_called_near(rms: float, is_near: bool) -> None:
     """Of 2² − 1², (2² − 1.91²)/3 is 12 %, (2² − 1.93²)/3 is 9 %; ten are needed."""
-    any_force = left(0.0, 0.0, surface="structure")
-    verdict = judged(
-        left(500.0, 500.0, rms=2.0), [left(450.0, 450.0, FRICTION, squares=9.0, rms=rms)], [any_force]
-    )
+    ceiling = left(0.0, 0.0, surface="structure")
+    verdict = judged(left(500.0, 500.0, rms=2.0), [left(450.0, 450.0, FRICTION, squares=9.0, rms=rms)], [ceiling])
     assert verdict.kind == "unknown"
     assert ("nearest" in verdict.statement) is is_near
 
@@ -184,8 +182,8 @@ def test_what_leaves_more_than_repeats_differ_by_is_unknown(repeats: bool, rms: 
 )
 def test_what_repeats_share_is_something_however_small(in_common: float, left_in_common: float, kind: str) -> None:
     """A gain beyond chance without a size worth a word."""
-    baseline = left(500.0, 500.0, squares=1.4, repeating={("run_2", TIP): in_common})
-    friction = left(0.0, 0.0, FRICTION, squares=1.0, repeating={("run_2", TIP): left_in_common})
+    baseline = left(500.0, 500.0, squares=1.4, repeatable={("run_2", TIP): in_common})
+    friction = left(0.0, 0.0, FRICTION, squares=1.0, repeatable={("run_2", TIP): left_in_common})
     assert judged(baseline, [friction], repeats=True).kind == kind
 
 
@@ -212,7 +210,7 @@ def test_without_repeats_twice_the_noise_is_not_nothing_and_a_name_may_leave_it(
 
 
 @pytest.mark.parametrize(
-    ("repeating", "more"),
+    ("repeatable", "more"),
     [
         pytest.param({("run_2", TIP): 0.49}, False, id="noise of the held-out test"),
         pytest.param({("run_2", TIP): 0.51}, True, id="common to its repeats"),
@@ -224,14 +222,14 @@ def test_without_repeats_twice_the_noise_is_not_nothing_and_a_name_may_leave_it(
 )
 @pytest.mark.parametrize("rms", [1.0, 1.45])
 def test_what_repeats_share_of_a_remainder_is_missing_and_nothing_else(
-    repeating: dict[tuple[str, str], float], more: bool, rms: float
+    repeatable: dict[tuple[str, str], float], more: bool, rms: float
 ) -> None:
     """A sensor that stands in for a quieter one leaves more noise; physics is missing alike each time."""
-    if not any(test == "run_2" for test, _ in repeating):
-        repeating = {**repeating, ("run_2", TIP): 0.0}
-    loud = left(0.0, 0.0, FRICTION, rms=rms, repeating=repeating)
+    if not any(test == "run_2" for test, _ in repeatable):
+        repeatable = {**repeatable, ("run_2", TIP): 0.0}
+    loud = left(0.0, 0.0, FRICTION, rms=rms, repeatable=repeatable)
     assert judged(BASELINE, [loud], repeats=True).kind == ("unknown" if more else "named")
-    quiet = left(0.0, 0.0, rms=rms, repeating=repeating)
+    quiet = left(0.0, 0.0, rms=rms, repeatable=repeatable)
     assert judged(quiet, [], repeats=True).kind == ("unknown" if more else "nothing_missing")
 
 
@@ -273,8 +271,8 @@ def test_two_effects_are_named_where_one_does_not_pass_the_gates(
 ) -> None:
     """One is as good on held-out runs as any force, but leaves what repeats have in common."""
     in_common = {("run_1", TIP): 0.6}
-    single = left(gain, gain, FRICTION, squares=1.2, in_fitted_run=in_fitted_run, rms=1.14, repeating=in_common)
-    both = left(0.0, 0.0, {**FRICTION, **HUM}, rms=1.1, repeating={("run_1", TIP): left_by_pair})
+    single = left(gain, gain, FRICTION, squares=1.2, in_fitted_run=in_fitted_run, rms=1.14, repeatable=in_common)
+    both = left(0.0, 0.0, {**FRICTION, **HUM}, rms=1.1, repeatable={("run_1", TIP): left_by_pair})
     baseline = replace(BASELINE, held_out_rms=baseline_rms)
     verdict = judged(baseline, [single, both], repeats=True)
     assert (verdict.best.names if verdict.best and verdict.kind == "named" else ()) == named
@@ -283,12 +281,12 @@ def test_two_effects_are_named_where_one_does_not_pass_the_gates(
 @pytest.mark.parametrize(("in_common", "kind"), [(0.24, "named"), (0.26, "unknown")])
 def test_what_the_best_description_adds_must_be_left_to_repeats_alike(in_common: float, kind: str) -> None:
     """A fifth more error than the best description leaves, which only one run of two happened to have."""
-    friction = left(20.0, 20.0, FRICTION, squares=1.1, rms=1.2, repeating={("run_2", TIP): in_common})
+    friction = left(20.0, 20.0, FRICTION, squares=1.1, rms=1.2, repeatable={("run_2", TIP): in_common})
     assert judged(BASELINE, [friction], [left(19.0, 19.0, surface="structure")], repeats=True).kind == kind
 
 
 @pytest.mark.parametrize(
-    ("repeating", "kind"),
+    ("repeatable", "kind"),
     [
         ({("run_2", TIP): 0.24}, "named"),
         ({("run_2", TIP): 0.26}, "unknown"),
@@ -297,9 +295,9 @@ def test_what_the_best_description_adds_must_be_left_to_repeats_alike(in_common:
     ],
 )
 def test_what_any_force_adds_to_a_name_must_be_left_to_repeats_alike(
-    repeating: dict[tuple[str, str], float], kind: str
+    repeatable: dict[tuple[str, str], float], kind: str
 ) -> None:
-    friction = left(40.0, 40.0, FRICTION, squares=2.0, repeating=repeating)
+    friction = left(40.0, 40.0, FRICTION, squares=2.0, repeatable=repeatable)
     assert judged(BASELINE, [friction], [ANY_FORCE]).kind == kind
 
 
@@ -320,9 +318,9 @@ def test_of_each_run_counts_what_the_best_fit_of_the_same_effects_leaves() -> No
     found = judged(BASELINE, [first, second, more])
     assert (found.kind, found.best) == ("named", first)
     assert judged(BASELINE, [first, more]).kind == "unknown"
-    any_force = left(-40.0, -40.0, surface="structure")
-    assert judged(BASELINE, [first, second], [any_force]).kind == "named"
-    assert judged(BASELINE, [first], [any_force]).kind == "unknown"
+    ceiling = left(-40.0, -40.0, surface="structure")
+    assert judged(BASELINE, [first, second], [ceiling]).kind == "named"
+    assert judged(BASELINE, [first], [ceiling]).kind == "unknown"
 
 
 def test_what_has_no_name_at_all_is_unknown_in_the_block_that_a_force_helps() -> None:
@@ -364,12 +362,12 @@ def test_an_exponent_may_rest_at_its_bound_and_a_gap_may_not(exponent: float, ga
     stop = {"gap_m": gap_m, "stiffness_n_per_m": 500.0}
     numbers = {f"structure.hysteresis.{name}": size for name, size in loop.items()}
     numbers |= {f"structure.clearance.{name}": size for name, size in stop.items()}
-    assert left(0.0, 0.0, numbers).rests_on_a_bound == rests
+    assert left(0.0, 0.0, numbers).has_effect_at_bound == rests
 
 
 def test_a_bound_of_zero_is_a_size_like_others() -> None:
-    assert not left(0.0, 0.0, {"structure.viscous_damping.damping_n_s_per_m": 0.0}).rests_on_a_bound
-    assert left(0.0, 0.0, {"structure.viscous_damping.damping_n_s_per_m": 1e4}).rests_on_a_bound
+    assert not left(0.0, 0.0, {"structure.viscous_damping.damping_n_s_per_m": 0.0}).has_effect_at_bound
+    assert left(0.0, 0.0, {"structure.viscous_damping.damping_n_s_per_m": 1e4}).has_effect_at_bound
 
 
 @pytest.mark.parametrize(

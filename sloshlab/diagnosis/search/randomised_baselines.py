@@ -11,25 +11,27 @@ from numpy.typing import NDArray
 from scipy.stats import norm, qmc, t
 
 from sloshlab.diagnosis.explanation import Explanation, Findings
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted, soft_cost
+from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, fitted, inflated_cost
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
-from sloshlab.diagnosis.search.fits import Fits, Told
-from sloshlab.diagnosis.search.scatter_of_runs import scatter_of_runs
+from sloshlab.diagnosis.search.cluster_robust_errors import cluster_robust_errors
+from sloshlab.diagnosis.search.fits import Fits, Progress
 
 FloatArray = NDArray[np.float64]
 _N_DRAWN: Final = 6
 _MOST_TOLERANCES: Final = 1.25
-_OF_A_NUMBER: Final = 0.3
+_START_DEVIATION: Final = 0.3
 """Standard deviation of the logarithm of an effect's numbers where the fits begin."""
 _AS_GOOD: Final = 0.1
 """Of the misfit: fits whose error is 1.05 times the least are as good, where friction makes side valleys."""
-_LEFT_BEHIND: Final = 2.0
+_ABANDON_COST_RATIO: Final = 2.0
 """Cost after the first stage, over that of the best, beyond which a fit has gone astray."""
-_CHANCE: Final = 12.0
+_LEAST_COST_DECREASE: Final = 12.0
 """The same, at least."""
 
 
-def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, of: None) -> Findings:
+def with_randomised_baselines(
+    found: Findings, best: Explanation, progress: Progress = lambda what, done, of: None
+) -> Findings:
     """Findings with spread and scatter of the numbers of one explanation, and a better place if one is found.
 
     What is believed of the baseline is drawn anew several times, as it could have been believed, and everything is
@@ -41,41 +43,43 @@ def redrawn(found: Findings, best: Explanation, told: Told = lambda what, done, 
     found : Findings
     best : Explanation
         One of them, with effects.
-    told : callable, optional
+    progress : callable, optional
         Takes what is being done, how much of it is done, and how much there is.
     """
     candidates = best.fit.candidates
-    fits = Fits(found.model, found.fitting, found.held_out, told, found.case.names_by_test())
+    fits = Fits(found.model, found.fitting, found.held_out, progress, found.case.names_by_test())
     plain = fits.problem(candidates)
     draws = norm.ppf(qmc.Halton(len(plain.names), seed=0).random(_N_DRAWN))
     at_best, is_baseline = plain.theta_of(best.fit.values), plain.prior > 0
-    at_best_softly = soft_cost(plain, best.fit, STAGES[-3])
+    at_best_softly = inflated_cost(plain, best.fit, INFLATION_STAGES[-3])
 
     def from_draw(i: int, draw: FloatArray) -> FreeRunFit:
-        fits.told("fitting about other baselines", i, _N_DRAWN)
+        fits.progress("fitting about other baselines", i, _N_DRAWN)
         expected = plain.values(np.where(is_baseline, draw, 0.0))
         far = (i + 1) / _N_DRAWN
-        start = np.where(is_baseline, at_best + far * draw, at_best * np.exp(far * _OF_A_NUMBER * draw))
+        start = np.where(is_baseline, at_best + far * draw, at_best * np.exp(far * _START_DEVIATION * draw))
         problem = FreeRunProblem(found.model, found.fitting, candidates, expected=expected)
-        fit, jacobian = fitted(problem, plain.values(start), n_iterations=6, shares=STAGES[-3:-2], is_last=False)
-        if fit.trouble or soft_cost(plain, fit, STAGES[-3]) > _LEFT_BEHIND * at_best_softly:
+        fit, jacobian = fitted(
+            problem, plain.values(start), n_iterations=6, stages=INFLATION_STAGES[-3:-2], is_last=False
+        )
+        if fit.trouble or inflated_cost(plain, fit, INFLATION_STAGES[-3]) > _ABANDON_COST_RATIO * at_best_softly:
             return replace(fit, trouble=fit.trouble or "has gone astray")
-        return fitted(problem, fit.values, n_iterations=6, shares=STAGES[-2:], known=jacobian)[0]
+        return fitted(problem, fit.values, n_iterations=6, stages=INFLATION_STAGES[-2:], known=jacobian)[0]
 
     draws = np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)
-    reached = fits.side_by_side([partial(from_draw, i, draw) for i, draw in enumerate(draws)], candidates)
+    reached = fits.in_parallel([partial(from_draw, i, draw) for i, draw in enumerate(draws)], candidates)
     ends = [best.fit, *(fit for fit in reached if not fit.trouble)]
     lowest = min(ends, key=lambda end: end.misfit)
     better = best
-    if lowest.misfit < best.fit.misfit - _CHANCE:
-        fit, _ = fitted(plain, lowest.values, n_iterations=6, shares=STAGES[-2:])
-        if not fit.trouble and fit.cost < best.fit.cost - _CHANCE:
-            better = fits.judged(fit)
+    if lowest.misfit < best.fit.misfit - _LEAST_COST_DECREASE:
+        fit, _ = fitted(plain, lowest.values, n_iterations=6, stages=INFLATION_STAGES[-2:])
+        if not fit.trouble and fit.cost < best.fit.cost - _LEAST_COST_DECREASE:
+            better = fits.validated(fit)
             ends.append(fit)
-    most = max((1 + _AS_GOOD) * lowest.misfit, lowest.misfit + _CHANCE)
+    most = max((1 + _AS_GOOD) * lowest.misfit, lowest.misfit + _LEAST_COST_DECREASE)
     spread = _spread([end for end in ends if end.misfit < most], better)
     problem = fits.problem_of(better.fit)
-    scatter = scatter_of_runs(problem, better.fit, fits.jacobian(better.fit))
+    scatter = cluster_robust_errors(problem, better.fit, fits.jacobian(better.fit))
     others = [explanation for explanation in found.explanations if explanation is not best]
     return replace(found, explanations=[replace(better, spread=spread, scatter=scatter), *others])
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from sloshlab.diagnosis.candidate import Candidate, Surroundings
 from sloshlab.diagnosis.explanation import Explanation
 from sloshlab.diagnosis.force_surface import surface_effect
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted
+from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, fitted
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
-from sloshlab.diagnosis.search.fits import Fits, cheapest
+from sloshlab.diagnosis.search.fits import Fits, best_fitting
 
 
 def ceilings(fits: Fits, at: Surroundings, known: Sequence[Explanation], retuned: FreeRunFit) -> list[Explanation]:
@@ -22,17 +22,18 @@ def ceilings(fits: Fits, at: Surroundings, known: Sequence[Explanation], retuned
     known : sequence of Explanation
     retuned : FreeRunFit
     """
-    best = cheapest(known)
+    best = best_fitting(known)
     if best is None:
-        return _with_any_force(fits, at, retuned)
+        return _with_force_surface(fits, at, retuned)
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
-    alone = _with_any_force(fits, at, retuned)
-    helpful = [one.fit.candidates[-1].effect.block for one in sorted(alone, key=lambda one: one.fit.cost)]
-    return [*alone, *_with_any_force(fits, at, best.fit, helpful[:1])]
+    alone = _with_force_surface(fits, at, retuned)
+    by_cost = sorted(alone, key=lambda explanation: explanation.fit.cost)
+    helpful = [explanation.fit.candidates[-1].effect.block for explanation in by_cost]
+    return [*alone, *_with_force_surface(fits, at, best.fit, helpful[:1])]
 
 
-def _with_any_force(
+def _with_force_surface(
     fits: Fits, at: Surroundings, base: FreeRunFit, blocks: Sequence[str] = ("structure", "tank")
 ) -> list[Explanation]:
     found = []
@@ -40,11 +41,11 @@ def _with_any_force(
         effect = surface_effect(block)
         if block not in at.blocks or not effect.needs(at):
             continue
-        fits.told("finding what any force could explain", i, len(blocks))
+        fits.progress("finding what any force could explain", i, len(blocks))
         candidate = Candidate(effect, at)
         problem = fits.problem((*base.candidates, candidate))
         start = {**base.values, **candidate.starts()[0]}
-        fit, _ = fitted(problem, start, n_iterations=3, shares=(STAGES[1], 0.0))
+        fit, _ = fitted(problem, start, n_iterations=3, stages=(INFLATION_STAGES[1], 0.0))
         if not fit.trouble:
-            found.append(fits.judged(fit))
+            found.append(fits.validated(fit))
     return found

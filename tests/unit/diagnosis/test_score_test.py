@@ -12,8 +12,8 @@ from recorded_oscillators import RATE_HZ, run_of
 
 from sloshlab.diagnosis import surroundings
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.first_look import FirstLook
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem
+from sloshlab.diagnosis.score_test import ScoreTest
 
 N, N_NUMBERS = 60, 4
 
@@ -30,7 +30,7 @@ class Linear:
     def prior(self) -> np.ndarray:
         return np.array([1.0] * self.n_baseline + [0.0] * (self.fixed.size - self.n_baseline))
 
-    def softness(self, share: float) -> np.ndarray:
+    def inflation_weights(self, share: float) -> np.ndarray:
         return np.full(N, self.soft)
 
     def at_bounds(self, theta: np.ndarray) -> np.ndarray:
@@ -50,7 +50,7 @@ def test_the_gain_does_not_depend_on_the_size_of_a_change_however_large() -> Non
     generator = np.random.default_rng(3)
     jacobian, residual, change = (generator.standard_normal(shape) for shape in ((2, N), (N,), (N,)))
     problem = cast(FreeRunProblem, cast(Any, Linear(np.zeros(2, bool))))
-    look = FirstLook(problem, np.zeros(2), 1e4 * residual, BlockJacobian.of_columns(list(jacobian), [N]), 0.1)
+    look = ScoreTest(problem, np.zeros(2), 1e4 * residual, BlockJacobian.of_columns(list(jacobian), [N]), 0.1)
     gain, factor = look.gain(change)
     large, small = look.gain(1e153 * change)
     assert large == pytest.approx(gain, rel=1e-9)
@@ -70,7 +70,7 @@ def test_the_gain_is_that_of_least_squares_with_the_numbers_that_can_follow(
     theta = np.array([0.4, -0.7, 0.2, 0.1])
     problem = cast(FreeRunProblem, cast(Any, Linear(np.array(fixed), soft)))
     known = BlockJacobian.of_columns(list(jacobian.T), [25, N - 25])
-    gain, size = FirstLook(problem, theta, residual, known, 0.1).gain(change)
+    gain, size = ScoreTest(problem, theta, residual, known, 0.1).gain(change)
     free = ~np.array(fixed)
     prior, place = np.array([1.0, 1.0, 0.0, 0.0])[free], theta[free]
     without = least(soft * jacobian[:, free], soft * residual, prior, place)
@@ -85,7 +85,7 @@ def test_a_change_that_the_baseline_can_make_promises_nothing() -> None:
     generator = np.random.default_rng(4)
     jacobian, residual = generator.standard_normal((N, N_NUMBERS)), generator.standard_normal(N)
     problem = cast(FreeRunProblem, cast(Any, Linear(np.zeros(N_NUMBERS, bool), n_baseline=0)))
-    look = FirstLook(problem, np.zeros(N_NUMBERS), residual, BlockJacobian.of_columns(list(jacobian.T), [N]), 0.1)
+    look = ScoreTest(problem, np.zeros(N_NUMBERS), residual, BlockJacobian.of_columns(list(jacobian.T), [N]), 0.1)
     assert look.gain(jacobian @ [1.0, -2.0, 0.5, 3.0])[0] < 1e-9
 
 
@@ -118,7 +118,7 @@ def test_a_channel_is_unlike_the_base_where_no_complex_number_turns_one_into_the
         "acceleration_beam_1": np.full(time.size, np.nan),  # a sensor that did not work
     }
     run = run_of("run", signals, {}, 0, experiment="other")
-    found = surroundings._unlike_base([[cast(Any, SimpleNamespace(run=run))]])
+    found = surroundings._incoherent_with_base([[cast(Any, SimpleNamespace(run=run))]])
     assert ("acceleration_tip" in found) == is_unlike
     assert not found & {"acceleration_root", "acceleration_beam_1"}
 
@@ -131,7 +131,7 @@ def test_modes_are_sought_at_the_highest_peaks_of_all_channels_together() -> Non
     loud[:, 21] = 4.5  # a shoulder, no peak of its own
     runs = [[Spectra(quiet, frequencies)], [Spectra(loud, frequencies)]]
     residual = np.concatenate([quiet.ravel(), loud.ravel()])
-    found = surroundings.most_missed_hz(cast(Any, runs), residual)
+    found = surroundings.residual_peaks_hz(cast(Any, runs), residual)
     assert found == (10.0, 15.0, 3.5)
-    across = surroundings.most_missed_hz(cast(Any, runs), residual, (0.0, -0.8, 0.8))
+    across = surroundings.residual_peaks_hz(cast(Any, runs), residual, (0.0, -0.8, 0.8))
     assert across == pytest.approx((10.0, 9.8, 10.2, 15.0, 14.8, 15.2, 3.5, 3.3, 3.7))

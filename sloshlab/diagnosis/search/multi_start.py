@@ -11,42 +11,42 @@ from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.free_run_fit import STAGES, fitted, nearest, soft_cost
+from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, best_start, fitted, inflated_cost
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.rig_model import RELEASE
-from sloshlab.diagnosis.search.fits import Fits, cheapest
+from sloshlab.diagnosis.search.fits import Fits, best_fitting
 
-_N_PLACES: Final = 48
-_LEAST_SHARE: Final = 0.01
+_N_PERTURBED_STARTS: Final = 48
+_LEAST_RELATIVE_GAIN: Final = 0.01
 """Of the cost: a throw that gains less is in vain, as crumbs lead nowhere."""
-_FAR_BEHIND: Final = 1.1
+_ABANDON_COST_RATIO: Final = 1.1
 """Cost, channels known to a share of their RMS only, over that of the best fit."""
-_RELEASES: Final = tuple(np.linspace(0.94, 1.06, 41))
+_RELEASE_FACTORS: Final = tuple(np.linspace(0.94, 1.06, 41))
 """Over that of a run, each tried for the run by itself."""
 
 
 @dataclass(frozen=True)
-class _Throws:
+class _Perturbation:
     """How far and how often numbers are thrown.
 
     Attributes
     ----------
-    most, most_in_vain : int
-    spreads : tuple of float
+    max_restarts, max_restarts_in_vain : int
+    log_deviations : tuple of float
         Standard deviations of the logarithm of a number over places about one, in turns.
     """
 
-    most: int
-    most_in_vain: int
-    spreads: tuple[float, ...]
+    max_restarts: int
+    max_restarts_in_vain: int
+    log_deviations: tuple[float, ...]
 
 
-_ALONG_RIDGES: Final = _Throws(16, 4, (0.4, 0.15))
-_IN_JUMPS: Final = _Throws(32, 8, (0.1, 0.03))
-_IN_JUMPS_BESIDE_ANOTHER: Final = _Throws(16, 4, (0.1, 0.03))
+_ALONG_RIDGE: Final = _Perturbation(16, 4, (0.4, 0.15))
+_MULTIMODAL: Final = _Perturbation(32, 8, (0.1, 0.03))
+_MULTIMODAL_BESIDE_ANOTHER: Final = _Perturbation(16, 4, (0.1, 0.03))
 
 
-def climbed(fits: Fits, known: Sequence[Explanation]) -> list[Explanation]:
+def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explanation]:
     """The best effect of several numbers from the nearest of many places about it, time and again.
 
     Of two effects that which comes in jumps is thrown, and stays beside the other one. Contacts and friction make
@@ -59,56 +59,62 @@ def climbed(fits: Fits, known: Sequence[Explanation]) -> list[Explanation]:
     fits : Fits
     known : sequence of Explanation
     """
-    best = cheapest(known)
-    thrown = _thrown(best) if best is not None else None
-    if best is None or thrown is None:
+    best = best_fitting(known)
+    perturbed = _perturbed_candidate(best) if best is not None else None
+    if best is None or perturbed is None:
         return []
-    throws = _ALONG_RIDGES
-    if thrown.comes_in_jumps:
-        throws = _IN_JUMPS if len(best.keys) == 1 else _IN_JUMPS_BESIDE_ANOTHER
+    perturbation = _ALONG_RIDGE
+    if perturbed.is_multimodal:
+        perturbation = _MULTIMODAL if len(best.keys) == 1 else _MULTIMODAL_BESIDE_ANOTHER
     problem, fit, n_in_vain = fits.problem_of(best.fit), best.fit, 0
     further: Mapping[str, float] | None = None
-    may_release = True
-    for i in range(throws.most):
-        if n_in_vain >= throws.most_in_vain:
+    may_scan_releases = True
+    for i in range(perturbation.max_restarts):
+        if n_in_vain >= perturbation.max_restarts_in_vain:
             break
-        fits.told(f"fitting {thrown.key} from places about it", i, throws.most)
-        start = further or nearest(problem, _places_about(fit, thrown, i, throws.spreads), STAGES[2])
-        if thrown.comes_in_jumps:
-            other, _ = fitted(problem, start, n_iterations=6, shares=STAGES[1:])
+        fits.progress(f"fitting {perturbed.key} from places about it", i, perturbation.max_restarts)
+        start = further or best_start(
+            problem, _perturbed_starts(fit, perturbed, i, perturbation.log_deviations), INFLATION_STAGES[2]
+        )
+        if perturbed.is_multimodal:
+            other, _ = fitted(problem, start, n_iterations=6, stages=INFLATION_STAGES[1:])
         else:
-            other = _from_throw(problem, start, fit)
+            other = _fitted_from_restart(problem, start, fit)
         if not _is_better(other, fit):
             n_in_vain += further is None
             further = None
-            if not may_release:
+            if not may_scan_releases:
                 continue
-            other = _released_anew(problem, fit)
-            may_release = _gain(other, fit) > _LEAST_SHARE
-            if not may_release:
+            other = _with_releases_scanned(problem, fit)
+            may_scan_releases = _gain(other, fit) > _LEAST_RELATIVE_GAIN
+            if not may_scan_releases:
                 continue
-        may_release = True
-        n_in_vain = 0 if _gain(other, fit) > _LEAST_SHARE else n_in_vain + 1
+        may_scan_releases = True
+        n_in_vain = 0 if _gain(other, fit) > _LEAST_RELATIVE_GAIN else n_in_vain + 1
         further = {name: value + (value - fit.values[name]) for name, value in other.values.items()}
         fit = other
-    return [fits.judged(fit)] if fit is not best.fit else []
+    return [fits.validated(fit)] if fit is not best.fit else []
 
 
-def _thrown(best: Explanation) -> Candidate | None:
+def _perturbed_candidate(best: Explanation) -> Candidate | None:
     """The effect whose numbers are thrown: one of several numbers alone, of two the one that comes in jumps."""
     if len(best.keys) > 1:
-        return next((candidate for candidate in best.fit.candidates if candidate.comes_in_jumps), None)
+        return next((candidate for candidate in best.fit.candidates if candidate.is_multimodal), None)
     last = best.fit.candidates[-1]
     return last if len(last.effect.parameters) > 1 else None
 
 
-def _from_throw(problem: FreeRunProblem, start: Mapping[str, float], best: FreeRunFit) -> FreeRunFit:
+def _fitted_from_restart(problem: FreeRunProblem, start: Mapping[str, float], best: FreeRunFit) -> FreeRunFit:
     """A fit along a ridge, given up half way where it is far behind the best one there."""
-    share = STAGES[2]
-    first, jacobian = fitted(problem, start, n_iterations=6, shares=(STAGES[1], share), is_last=False)
-    if first.trouble or soft_cost(problem, first, share) > _FAR_BEHIND * soft_cost(problem, best, share):
+    inflation = INFLATION_STAGES[2]
+    first, jacobian = fitted(
+        problem, start, n_iterations=6, stages=(INFLATION_STAGES[1], inflation), is_last=False
+    )
+    if first.trouble or inflated_cost(problem, first, inflation) > _ABANDON_COST_RATIO * inflated_cost(
+        problem, best, inflation
+    ):
         return replace(first, trouble=first.trouble or "is far behind")
-    return fitted(problem, first.values, n_iterations=6, shares=STAGES[3:], known=jacobian)[0]
+    return fitted(problem, first.values, n_iterations=6, stages=INFLATION_STAGES[3:], known=jacobian)[0]
 
 
 def _is_better(other: FreeRunFit, fit: FreeRunFit) -> bool:
@@ -120,7 +126,7 @@ def _gain(other: FreeRunFit, fit: FreeRunFit) -> float:
     return 1.0 - other.cost / fit.cost
 
 
-def _released_anew(problem: FreeRunProblem, fit: FreeRunFit) -> FreeRunFit:
+def _with_releases_scanned(problem: FreeRunProblem, fit: FreeRunFit) -> FreeRunFit:
     """The fit from other releases of its runs, each the best for its run alone; itself where none is better.
 
     Contacts and friction change what follows a release in jumps, of every run by itself.
@@ -131,21 +137,21 @@ def _released_anew(problem: FreeRunProblem, fit: FreeRunFit) -> FreeRunFit:
         if not name.startswith(RELEASE):
             continue
         least = huber_cost(residual)
-        for factor in _RELEASES:
+        for factor in _RELEASE_FACTORS:
             moved = problem.theta_of({**fit.values, name: factor * fit.values[name]})
             cost = huber_cost(problem.residual_moved(moved, column, residual))
             if cost < least:
                 least, values[name] = cost, factor * fit.values[name]
-    return fit if values == fit.values else fitted(problem, values, shares=STAGES[-2:])[0]
+    return fit if values == fit.values else fitted(problem, values, stages=INFLATION_STAGES[-2:])[0]
 
 
-def _places_about(
-    fit: FreeRunFit, thrown: Candidate, turn: int, spreads: Sequence[float]
+def _perturbed_starts(
+    fit: FreeRunFit, perturbed: Candidate, turn: int, log_deviations: Sequence[float]
 ) -> list[dict[str, float]]:
     """Values of a fit, some numbers larger or smaller by factors drawn evenly; others at every turn."""
-    names = [f"{thrown.key}.{parameter.name}" for parameter in thrown.effect.parameters]
-    spread = spreads[turn % len(spreads)]
-    factors = np.exp(spread * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PLACES)))
+    names = [f"{perturbed.key}.{parameter.name}" for parameter in perturbed.effect.parameters]
+    log_deviation = log_deviations[turn % len(log_deviations)]
+    factors = np.exp(log_deviation * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PERTURBED_STARTS)))
     return [
         {**fit.values, **{name: fit.values[name] * float(factor) for name, factor in zip(names, row, strict=True)}}
         for row in factors

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm, t
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.search.scatter_of_runs import scatter_of_runs
+from sloshlab.diagnosis.search.cluster_robust_errors import cluster_robust_errors
 
 N_TIMES, N_BANDS = 8, 5
 EFFECT = "tank.viscous_damping.damping_n_s_per_m"
@@ -31,7 +31,7 @@ def scatter_of(offsets: np.ndarray, n_runs: int) -> float:
         residual=lambda theta: residual,
     )
     jacobian = BlockJacobian.of_columns([-np.ones(residual.size)], [N_TIMES * N_BANDS] * n_runs)
-    found = scatter_of_runs(cast(Any, problem), cast(Any, SimpleNamespace(values={})), jacobian)
+    found = cluster_robust_errors(cast(Any, problem), cast(Any, SimpleNamespace(values={})), jacobian)
     return found[EFFECT] if found else float("nan")
 
 

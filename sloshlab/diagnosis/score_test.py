@@ -13,7 +13,7 @@ from sloshlab.diagnosis.free_run_problem import FreeRunProblem, robust_weights
 FloatArray = NDArray[np.float64]
 
 
-class FirstLook:
+class ScoreTest:
     """What one Gauss–Newton step promises, with channels believed to a share of their RMS.
 
     Parameters at their bounds cannot follow an effect; all others do, and what is believed of them counts.
@@ -25,7 +25,7 @@ class FirstLook:
         Where it was fitted, and what is left there.
     jacobian : BlockJacobian
         There.
-    share : float
+    inflation : float
     """
 
     def __init__(
@@ -34,10 +34,10 @@ class FirstLook:
         theta: FloatArray,
         residual: FloatArray,
         jacobian: BlockJacobian,
-        share: float,
+        inflation: float,
     ) -> None:
-        softness = problem.softness(share)
-        self._weights = softness * robust_weights(softness * residual, 10.0)
+        inflation_weights = problem.inflation_weights(inflation)
+        self._weights = inflation_weights * robust_weights(inflation_weights * residual, 10.0)
         self._weighted, self._left = jacobian.weighted(self._weights), self._weights * residual
         self._can_move = np.flatnonzero(~problem.at_bounds(theta))
         prior = problem.prior
@@ -52,6 +52,8 @@ class FirstLook:
         followed = self._inverse @ touched
         size = float(direction @ direction - followed @ touched)
         along = float(direction @ self._left - followed @ self._gradient)
-        share = along / size if size > 0 else 0.0
-        gain = along * share
-        return (gain, -share) if isfinite(gain) else (0.0, 0.0)  # what explodes without a bound promises nothing
+        inflation = along / size if size > 0 else 0.0
+        gain = along * inflation
+        return (
+            (gain, -inflation) if isfinite(gain) else (0.0, 0.0)
+        )  # what explodes without a bound promises nothing

@@ -16,7 +16,7 @@ _PARTS_OF_A_RUN: Final = (1, 4)
 _QUANTILE: Final = 0.95
 
 
-def scatter_of_runs(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJacobian) -> dict[str, float]:
+def cluster_robust_errors(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJacobian) -> dict[str, float]:
     """Standard errors of the effects' numbers if what is left belongs to runs, or parts of runs, as a whole.
 
     Residuals of one stretch of a run are not independent: a chaotic liquid damps more for a while than it does on
@@ -67,8 +67,8 @@ def _parts(problem: FreeRunProblem, n: int) -> NDArray[np.intp]:
     """Number of the part of a run that each residual belongs to, shape (n_residuals,)."""
     found = []
     for i, run in enumerate(problem.runs):
-        for one in run:
-            n_times, n_bands = one.spectra.shape
+        for observation in run:
+            n_times, n_bands = observation.spectra.shape
             of_times = i * n + np.arange(n_times) * n // n_times
             found.append(np.repeat(of_times, n_bands))
     return np.concatenate(found)

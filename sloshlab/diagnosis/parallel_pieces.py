@@ -15,25 +15,25 @@ from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import Synchronized
 from typing import TypeVar
 
-from sloshlab.diagnosis import copied_process
+from sloshlab.diagnosis import forked_process
 from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.copied_process import CAN_FORK, copied, ended, is_copy
+from sloshlab.diagnosis.forked_process import CAN_FORK, forked, is_fork, terminate
 
 _Result = TypeVar("_Result")
 
 
-class _Here:
+class _ThisProcess:
     """This process."""
 
-    has_company = False
+    shares_cores = False
 
 
-def works_alone() -> bool:
+def is_single_threaded() -> bool:
     """Whether one thread does everything: on one core, or beside another process that has the other core."""
-    return copied_process.N_AT_ONCE == 1 or _Here.has_company or is_copy()
+    return forked_process.N_WORKERS == 1 or _ThisProcess.shares_cores or is_fork()
 
 
-def side_by_side(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Candidate]) -> list[_Result]:
+def in_parallel(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Candidate]) -> list[_Result]:
     """Results of pieces of work that do not depend on each other, each done in one of two processes.
 
     To be called while no other thread works.
@@ -45,31 +45,31 @@ def side_by_side(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[C
     candidates : iterable of Candidate
         Those that results may contain.
     """
-    if len(pieces) < 2 or not CAN_FORK or works_alone():
+    if len(pieces) < 2 or not CAN_FORK or is_single_threaded():
         return [piece() for piece in pieces]
     known = {id(candidate): candidate for candidate in candidates}
     taken = multiprocessing.get_context("fork").Value("i", 0)
-    copy, line = copied(_take_what_is_left, pieces, taken, known)
+    fork, line = forked(_work_off_queue, pieces, taken, known)
     try:
-        with _in_company():
-            results = {i: pieces[i]() for i in _numbers(taken, len(pieces))}
+        with _sharing_cores():
+            results = {i: pieces[i]() for i in _untaken_pieces(taken, len(pieces))}
         with suppress(OSError, EOFError):  # it has ended before its time
             results |= _Reader(io.BytesIO(line.recv_bytes()), known).load()
     finally:
-        ended(copy, line)
+        terminate(fork, line)
     return [results[i] if i in results else piece() for i, piece in enumerate(pieces)]
 
 
 @contextmanager
-def _in_company() -> Iterator[None]:
-    _Here.has_company = True
+def _sharing_cores() -> Iterator[None]:
+    _ThisProcess.shares_cores = True
     try:
         yield
     finally:
-        _Here.has_company = False
+        _ThisProcess.shares_cores = False
 
 
-def _numbers(taken: Synchronized[int], n: int) -> Iterator[int]:
+def _untaken_pieces(taken: Synchronized[int], n: int) -> Iterator[int]:
     """Numbers of pieces that nobody has taken, one at a time."""
     while True:
         with taken.get_lock():
@@ -80,7 +80,7 @@ def _numbers(taken: Synchronized[int], n: int) -> Iterator[int]:
         yield i
 
 
-def _take_what_is_left(
+def _work_off_queue(
     line: Connection,
     pieces: Sequence[Callable[[], object]],
     taken: Synchronized[int],
@@ -88,7 +88,7 @@ def _take_what_is_left(
 ) -> None:
     """Take pieces until none is left, then hand over what came of them."""
     results = {}
-    for i in _numbers(taken, len(pieces)):
+    for i in _untaken_pieces(taken, len(pieces)):
         with suppress(Exception):  # whatever it is, the first process meets it when it does the piece itself
             results[i] = pieces[i]()
     written = io.BytesIO()

@@ -16,37 +16,37 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_
 from sloshlab.diagnosis.noise_floor import weighted_observations
 from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
 from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.search.any_force import ceilings
-from sloshlab.diagnosis.search.climbing import climbed
-from sloshlab.diagnosis.search.fits import Fits, Told, cheapest
-from sloshlab.diagnosis.search.in_place import LEAST_TO_BUILD_ON, InPlace, is_special_case
-from sloshlab.diagnosis.search.one_more_effect import OneMoreEffect
+from sloshlab.diagnosis.search.ceiling import ceilings
+from sloshlab.diagnosis.search.fits import Fits, Progress, best_fitting
+from sloshlab.diagnosis.search.forward_selection import ForwardSelection
+from sloshlab.diagnosis.search.multi_start import multi_start_refined
 from sloshlab.diagnosis.search.refinement import Refinement
+from sloshlab.diagnosis.search.substitution import LEAST_COST_DECREASE, Substitution, is_nested_in
 from sloshlab.diagnosis.split import split
 from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import InputError
 
 assert effects.__all__  # importing the vocabulary makes it known
 
-_NOTHING_TO_SPEAK_OF: Final = 0.5
+_LEAST_STRENGTH_FOR_PAIRS: Final = 0.5
 """Noise floors that single effects remove at most where pairs are not tried: below what a verdict speaks of."""
 _SHARE_LEFT_BY_A_PAIR: Final = 0.8
 """Of what its first effect leaves; a second one that gains less does not tell that the first one is wrong."""
-_LOOK_ALIKES_BESIDE_FRICTION: Final = 6
+_LOOK_ALIKES_AFTER_RESTART: Final = 6
 """Fitted where the best effect has left its side valley: what is nearest at first may be in that of another."""
-_SHARE_OF_A_SPECIAL_CASE: Final = 0.5
+_SHARE_OF_A_NESTED_MODEL: Final = 0.5
 """Of what the general form gains; what gains less has little of it."""
 
 
 def findings_of(
-    case: Case, told: Told = lambda what, done, of: None, model: DiagnosedModel | None = None
+    case: Case, progress: Progress = lambda what, done, of: None, model: DiagnosedModel | None = None
 ) -> Findings:
     """Retune, fit every candidate, add greedily, and find the ceiling.
 
     Parameters
     ----------
     case : Case
-    told : callable, optional
+    progress : callable, optional
         Takes what is being done, how much of it is done, and how much there is.
     model : DiagnosedModel, optional
         A user's own twin of the same runs; that of the rig file by default.
@@ -58,46 +58,46 @@ def findings_of(
         model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs))
     require_comparable(case, model)
     parts = split(case)
-    told("retuning the baseline", 0, 1)
+    progress("retuning the baseline", 0, 1)
     weighted = weighted_observations(case, model)
     fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
     held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]]
-    fits = Fits(model, fitting, held_out, told, case.names_by_test())
+    fits = Fits(model, fitting, held_out, progress, case.names_by_test())
     problem = fits.problem()
     believed_values = problem.values(problem.theta_of(model.believed))
     at_believed = huber_cost(problem.residual(problem.theta_of(believed_values)))
-    believed = fits.judged(FreeRunFit((), believed_values, at_believed, at_believed))
+    believed = fits.validated(FreeRunFit((), believed_values, at_believed, at_believed))
     retuned_fit, jacobian = fitted_baseline(problem)
-    retuned = fits.judged(retuned_fit)
+    retuned = fits.validated(retuned_fit)
     surroundings = surroundings_of(problem, retuned_fit, case.rig)
     pool = candidates(surroundings)
-    fits.made_known(pool)
-    found = OneMoreEffect(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
-    refinement, best = Refinement(fits), cheapest(found)
+    fits.share_with_second_process(pool)
+    found = ForwardSelection(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
+    refinement, best = Refinement(fits), best_fitting(found)
     if not fits.is_complete(retuned):
-        found += _beside_friction(fits, retuned_fit, found, pool)
-        best = cheapest(found)
+        found += _restarted_from_other_sizes(fits, retuned_fit, found, pool)
+        best = best_fitting(found)
     is_complete = fits.is_complete(best or retuned)
     if not is_complete and best is not None:
-        found += InPlace(fits).specialised(best, found, pool)
-        best = cheapest(found)
+        found += Substitution(fits).nested_models(best, found, pool)
+        best = best_fitting(found)
         is_complete = best is not None and fits.is_complete(best)
     if is_complete:
-        found += refinement.unstrained(found)
+        found += refinement.rivals_restarted_from_prior(found)
     else:
-        found += refinement.anew(retuned_fit, found)
-        found += climbed(fits, found)
-        best = cheapest(found)
+        found += refinement.restarted_from_prior(retuned_fit, found)
+        found += multi_start_refined(fits, found)
+        best = best_fitting(found)
         is_complete = best is not None and fits.is_complete(best)
     if not is_complete:
         pairs = _second_effects(fits, found, retuned, surroundings, pool)
-        found += [*pairs, *climbed(fits, [pair for pair in pairs if len(pair.keys) > 1])]
-    found += refinement.polished(retuned_fit, found, pool)
+        found += [*pairs, *multi_start_refined(fits, [pair for pair in pairs if len(pair.keys) > 1])]
+    found += refinement.converged(retuned_fit, found, pool)
     retuned = refinement.retuned_from(found, retuned)
-    any_force = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
-    best, highest = cheapest(found), cheapest(any_force)
-    if best is not None and highest is not None and best.fit.cost - highest.fit.cost > LEAST_TO_BUILD_ON:
-        found += InPlace(fits).one_for_all(highest.fit, retuned_fit, pool)
+    ceiling = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
+    best, highest = best_fitting(found), best_fitting(ceiling)
+    if best is not None and highest is not None and best.fit.cost - highest.fit.cost > LEAST_COST_DECREASE:
+        found += Substitution(fits).replaced_by_single(highest.fit, retuned_fit, pool)
     return Findings(
         case,
         model,
@@ -108,13 +108,13 @@ def findings_of(
         believed,
         retuned,
         found,
-        any_force,
+        ceiling,
         fits.failed,
         fits.screened,
     )
 
 
-def _beside_friction(
+def _restarted_from_other_sizes(
     fits: Fits, retuned: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
 ) -> list[Explanation]:
     """Effects of one number from other sizes, and what looks like them from where the best is one of these.
@@ -122,10 +122,10 @@ def _beside_friction(
     Look-alikes that were fitted before may be in the side valley that it has left.
     """
     found = Refinement(fits).from_other_sizes(retuned, known)
-    best = cheapest([*known, *found])
+    best = best_fitting([*known, *found])
     if best not in found:
         return found
-    alike = InPlace(fits).look_alikes(retuned, [best], pool, "fitting one effect", _LOOK_ALIKES_BESIDE_FRICTION)
+    alike = Substitution(fits).look_alikes(retuned, [best], pool, "fitting one effect", _LOOK_ALIKES_AFTER_RESTART)
     return [*found, *alike]
 
 
@@ -142,53 +142,53 @@ def _second_effects(
     leave is noise then. Where pairs leave too much, others are tried beside the special case of the best effect,
     whose other numbers stood for a second one, and beside the second of the best pair: the first was best alone.
     """
-    best = cheapest(known)
-    if best is None or retuned.fit.cost - best.fit.cost < LEAST_TO_BUILD_ON:
+    best = best_fitting(known)
+    if best is None or retuned.fit.cost - best.fit.cost < LEAST_COST_DECREASE:
         return []
-    largest = max(largest_strength(retuned.by_run, one.by_run) for one in known)
-    if largest < _NOTHING_TO_SPEAK_OF and fits.shares_little(retuned):
+    largest = max(largest_strength(retuned.by_run, explanation.by_run) for explanation in known)
+    if largest < _LEAST_STRENGTH_FOR_PAIRS and fits.has_little_repeatable(retuned):
         return []
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
-    more = OneMoreEffect(fits)
-    pool = [*pool, *_possible_beside(best, at, pool)]
-    fits.made_known(pool)
+    more = ForwardSelection(fits)
+    pool = [*pool, *_candidates_beside(best, at, pool)]
+    fits.share_with_second_process(pool)
     pairs = more.fitted(best.fit, fits.jacobian(best.fit), pool, "fitting a second effect")
     alone = []
-    pair = cheapest(pairs)
-    special = _special_case_of(best, known, retuned)
+    pair = best_fitting(pairs)
+    special = _nested_model_of(best, known, retuned)
     if special is not None and (pair is None or not fits.is_complete(pair)):
         pairs += more.fitted(special.fit, fits.jacobian(special.fit), pool, "fitting one beside a special case")
-        pair = cheapest(pairs)
-    if pair is not None and best.fit.cost - pair.fit.cost > LEAST_TO_BUILD_ON:
-        alone += more.in_place.one_for_all(pair.fit, retuned.fit, pool)
-    alone += Refinement(fits).take_away([pair for pair in pairs if pair.keys[:-1] == best.keys])
-    cost = min((one.fit.cost for one in alone), default=best.fit.cost)
+        pair = best_fitting(pairs)
+    if pair is not None and best.fit.cost - pair.fit.cost > LEAST_COST_DECREASE:
+        alone += more.substitution.replaced_by_single(pair.fit, retuned.fit, pool)
+    alone += Refinement(fits).backward_eliminated([pair for pair in pairs if pair.keys[:-1] == best.keys])
+    cost = min((explanation.fit.cost for explanation in alone), default=best.fit.cost)
     if cost < best.fit.cost:
-        alone += more.in_place.look_alikes(retuned.fit, alone, pool, "fitting one effect")
-        alone += more.in_place.generalised(retuned.fit, alone, pool, "fitting one effect")
+        alone += more.substitution.look_alikes(retuned.fit, alone, pool, "fitting one effect")
+        alone += more.substitution.nesting_models(retuned.fit, alone, pool, "fitting one effect")
     if pair is None or pair.fit.cost > _SHARE_LEFT_BY_A_PAIR * best.fit.cost:
         return [*pairs, *alone]
     if pair.held_out_rms > LARGEST_REMAINDER:
-        second = cheapest([one for one in alone if one.keys == pair.keys[1:]])
+        second = best_fitting([explanation for explanation in alone if explanation.keys == pair.keys[1:]])
         if second is not None:
             pairs += more.fitted(second.fit, fits.jacobian(second.fit), pool, "exchanging the first effect")
     return [*pairs, *alone]
 
 
-def _special_case_of(best: Explanation, known: Sequence[Explanation], retuned: Explanation) -> Explanation | None:
+def _nested_model_of(best: Explanation, known: Sequence[Explanation], retuned: Explanation) -> Explanation | None:
     """The best explanation by a special case of an effect that gains a good share of what that does."""
-    least = _SHARE_OF_A_SPECIAL_CASE * (retuned.fit.cost - best.fit.cost)
+    least = _SHARE_OF_A_NESTED_MODEL * (retuned.fit.cost - best.fit.cost)
     general = best.fit.candidates[-1]
-    specials = [one for one in known if is_special_case(one.fit.candidates[-1], general)]
-    return cheapest([special for special in specials if retuned.fit.cost - special.fit.cost > least])
+    specials = [explanation for explanation in known if is_nested_in(explanation.fit.candidates[-1], general)]
+    return best_fitting([special for special in specials if retuned.fit.cost - special.fit.cost > least])
 
 
-def _possible_beside(best: Explanation, at: Surroundings, pool: Sequence[Candidate]) -> list[Candidate]:
+def _candidates_beside(best: Explanation, at: Surroundings, pool: Sequence[Candidate]) -> list[Candidate]:
     """Effects that act on forces which only the best effect has brought, such as on the damping of a liquid."""
     forces = extension_of(best.fit.candidates, best.fit.values).terms
     if not forces:
         return []
-    known = {one.key for one in pool}
+    known = {candidate.key for candidate in pool}
     beside = candidates(replace(at, twin=replace(at.twin, terms=(*at.twin.terms, *forces))))
-    return [one for one in beside if one.key not in known]
+    return [candidate for candidate in beside if candidate.key not in known]

@@ -10,13 +10,13 @@ from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.units import named_and_units
 
-_SIZES: Final = (0.03, 0.1, 0.3, 1.0, 3.0)
+_SIZE_FACTORS: Final = (0.03, 0.1, 0.3, 1.0, 3.0)
 _DOES_NO_WORK: Final = "does no work"
-_GROWING: Final = tuple(1.5**i for i in range(1, 12))
+_GROWING_FACTORS: Final = tuple(1.5**i for i in range(1, 12))
 """What moves a resonance by more than its width is missed by every step from a small start."""
 
 
-def as_its_special_case(wider: Candidate, special: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
+def starts_from_nested(wider: Candidate, special: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
     """Starts of an effect with all numbers of one unit as large as that of its special case was found."""
     name = special.effect.parameters[0].name
     unit, size = _unit(name), fit.values[f"{special.key}.{name}"]
@@ -25,7 +25,7 @@ def as_its_special_case(wider: Candidate, special: Candidate, fit: FreeRunFit) -
     ]
 
 
-def as_its_general_form(special: Candidate, general: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
+def starts_from_nesting(special: Candidate, general: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
     """Starts of a special case, and some with its number as large as those of one unit of the general form.
 
     Of either sign: a mass that moves by itself is one that the tank lacks.
@@ -42,19 +42,19 @@ def as_its_general_form(special: Candidate, general: Candidate, fit: FreeRunFit)
     return starts
 
 
-def of_many_sizes(candidate: Candidate) -> list[dict[str, float]]:
+def starts_of_many_sizes(candidate: Candidate) -> list[dict[str, float]]:
     """Starts of an effect, each at several sizes."""
-    return [candidate.sized(start, factor) for start in candidate.starts() for factor in _SIZES]
+    return [candidate.sized(start, factor) for start in candidate.starts() for factor in _SIZE_FACTORS]
 
 
-def of_growing_sizes(candidate: Candidate) -> list[dict[str, float]]:
+def starts_of_growing_size(candidate: Candidate) -> list[dict[str, float]]:
     """Starts of an effect of one number that does no work, up to a hundred times as large; none of others."""
     if len(candidate.effect.parameters) > 1 or _DOES_NO_WORK not in candidate.effect.spoken_for_by:
         return []
-    return [candidate.sized(start, factor) for start in candidate.starts() for factor in _GROWING]
+    return [candidate.sized(start, factor) for start in candidate.starts() for factor in _GROWING_FACTORS]
 
 
-def with_smaller_ones(candidate: Candidate) -> list[dict[str, float]]:
+def starts_with_smaller_sizes(candidate: Candidate) -> list[dict[str, float]]:
     """Starts of an effect, and at a tenth of their size too: the step from the full one may lead nowhere."""
     starts = candidate.starts()
     return [*starts, *(candidate.sized(start, 0.1) for start in starts)]

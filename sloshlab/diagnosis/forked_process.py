@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import ForkProcess
 from typing import Any, Final
 
-N_AT_ONCE = 2
+N_WORKERS = 2
 """Threads or processes that work at once."""
 CAN_FORK: Final = sys.platform == "linux"
 """Elsewhere there are no copies (Windows), or none that system libraries bear (macOS)."""
@@ -24,18 +24,18 @@ _PR_SET_PDEATHSIG: Final = 1
 """Signal for when the process that made this one ends (prctl(2))."""
 
 
-class _Here:
+class _ThisProcess:
     """This process."""
 
-    is_copy = False
+    is_fork = False
 
 
-def is_copy() -> bool:
+def is_fork() -> bool:
     """Whether this process is a copy: nobody reads what it says."""
-    return _Here.is_copy
+    return _ThisProcess.is_fork
 
 
-def copied(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Connection]:
+def forked(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Connection]:
     """A copy that does some work, and our end of a line to it.
 
     It ends with its work, with this process, or where the work ends as the line does. To be called while no other
@@ -50,7 +50,7 @@ def copied(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Con
     """
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
-    process = context.Process(target=_as_copy, args=(os.getpid(), ours, theirs, work, arguments), daemon=True)
+    process = context.Process(target=_in_fork, args=(os.getpid(), ours, theirs, work, arguments), daemon=True)
     with warnings.catch_warnings():  # other threads wait for work meanwhile, and hold no lock
         warnings.simplefilter("ignore", DeprecationWarning)
         process.start()
@@ -58,14 +58,14 @@ def copied(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Con
     return process, ours
 
 
-def ended(process: ForkProcess, line: Connection) -> None:
+def terminate(process: ForkProcess, line: Connection) -> None:
     """See to it that a copy has ended; nothing happens where it has."""
     line.close()
     process.kill()
     process.join()
 
 
-def _as_copy(
+def _in_fork(
     first: int, ours: Connection, theirs: Connection, work: Callable[..., None], arguments: tuple[Any, ...]
 ) -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -75,5 +75,5 @@ def _as_copy(
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process, which ends this one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     gc.freeze()  # what was there already is not looked through, which would copy it
-    _Here.is_copy = True
+    _ThisProcess.is_fork = True
     work(theirs, *arguments)
