@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.metadata
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Generic, TypeVar
 
@@ -29,6 +30,10 @@ class Registry(Generic[T]):
         What an entry is, for messages.
     group : str
         Entry-point group in which other packages declare entries; empty for none.
+    error : type of InputError
+        What is raised for a name that is unknown, or whose entry cannot be imported.
+    remedy : str
+        What to do about an unknown name.
 
     Examples
     --------
@@ -40,9 +45,11 @@ class Registry(Generic[T]):
     (True, 24, ('box',))
     """
 
-    def __init__(self, kind: str, *, group: str = "") -> None:
+    def __init__(
+        self, kind: str, *, group: str = "", error: type[InputError] = InputError, remedy: str = ""
+    ) -> None:
         self.kind = kind
-        self._group = group
+        self.group, self._error, self._remedy = group, error, remedy
         self._entries: dict[str, T] = {}
         self._references: dict[str, str] = {}
 
@@ -59,6 +66,11 @@ class Registry(Generic[T]):
         """Make the entry ``module:attribute`` known without importing its module before it is asked for."""
         self._references[name] = reference
 
+    @property
+    def declared(self) -> dict[str, str]:
+        """What was declared here: name → ``module:attribute``."""
+        return dict(self._references)
+
     def withdraw(self, name: str) -> None:
         """Forget an entry that was added."""
         del self._entries[name]
@@ -66,7 +78,7 @@ class Registry(Generic[T]):
     @property
     def names(self) -> tuple[str, ...]:
         """Known names: what was declared here, what was added, what other packages declare."""
-        return tuple(dict.fromkeys((*self._references, *self._entries, *self._declared)))
+        return tuple(dict.fromkeys((*self._references, *self._entries, *self._offered)))
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
@@ -75,20 +87,60 @@ class Registry(Generic[T]):
         return (self[name] for name in self.names)
 
     def __getitem__(self, name: str) -> T:
+        return self.named(name, asked_for=self.kind)
+
+    def named(self, name: str, *, asked_for: str) -> T:
+        """The entry of a name.
+
+        Parameters
+        ----------
+        name : str
+        asked_for : str
+            Beginning of messages: who wants it.
+
+        Raises
+        ------
+        InputError
+            Or the error of this registry, if the name is unknown, more than one package brings an entry of it,
+            or the entry cannot be imported.
+        """
         if name in self._entries:
             return self._entries[name]
-        if name in self._references:
-            entry: T = loaded(self._references[name])
-        elif name in self._declared:
-            entry = self._declared[name].load()
-        else:
-            raise InputError(self.kind, got=repr(name)[:80], allowed=", ".join(self.names))
-        return self._entries.setdefault(name, entry)
+        # an editable and a plain installation side by side name the same one twice
+        found = dict.fromkeys(filter(None, (self._references.get(name), *self._offered.get(name, ()))))
+        if len(found) != 1:
+            raise self._error(
+                asked_for,
+                got=f"{name!r}, which is that of {len(found)} {self.kind}s" if found else repr(name)[:80],
+                allowed=", ".join(self.names),
+                remedy=self._remedy,
+            )
+        (reference,) = found
+        try:
+            entry: T = loaded(reference)  # Python keeps what it has imported
+        except (ImportError, AttributeError) as error:
+            raise self._error(
+                asked_for,
+                got=f"{self.kind} {reference} that cannot be imported ({error})",
+                remedy="install what it needs",
+            ) from error
+        return entry
 
-    @functools.cached_property
-    def _declared(self) -> dict[str, importlib.metadata.EntryPoint]:
-        found = importlib.metadata.entry_points(group=self._group) if self._group else ()
-        return {point.name: point for point in sorted(found, key=lambda point: point.name)}
+    @property
+    def _offered(self) -> dict[str, list[str]]:
+        return _offered_by_packages(self.group, tuple(sys.path)) if self.group else {}
+
+
+@functools.lru_cache(maxsize=64)
+def _offered_by_packages(group: str, search_path: tuple[str, ...]) -> dict[str, list[str]]:
+    """References of a group by name: those of other packages, and of this one, which declares its own, too.
+
+    Looking through all installed packages takes milliseconds; it is done again when the search path changes.
+    """
+    offered: dict[str, list[str]] = {}
+    for point in sorted(importlib.metadata.entry_points(group=group), key=lambda point: point.name):
+        offered.setdefault(point.name, []).append(point.value)
+    return offered
 
 
 def loaded(reference: str) -> Any:

@@ -19,20 +19,20 @@ from acquisition.devices.truth import Truth
 from acquisition.devices.wire import Wire
 from acquisition.samples.channel import Channel
 from acquisition.sources.interface import SourceURL
-from acquisition.sources.plug_ins import PlugIns
 from sloshlab.errors import FaultsError, SourceError
+from sloshlab.registry import Registry
 
 LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
 
-APPEARANCES: Final = PlugIns(
-    "sloshlab.appearances",
+APPEARANCES: Final[Registry[Callable[..., Appearance]]] = Registry(
     "appearance",
-    {
-        "serial": "acquisition.devices.serial_appearance:SerialAppearance",
-        "can": "acquisition.devices.can_appearance:can_appearance",
-    },
+    group="sloshlab.appearances",
+    error=SourceError,
+    remedy="check the word before the colon, or install the package that brings the appearance",
 )
-"""Classes or functions that make an `Appearance` of a URL, given as `appearance` is."""
+"""By the scheme of a URL: classes or functions that make an `Appearance` of it, given as `appearance` is."""
+APPEARANCES.declare("serial", "acquisition.devices.serial_appearance:SerialAppearance")
+APPEARANCES.declare("can", "acquisition.devices.can_appearance:can_appearance")
 
 
 class Appearance(ABC):
@@ -148,8 +148,7 @@ def appearance(url: SourceURL, *, number: int, expose: str | None = None) -> App
     SourceError
         If it cannot be understood, or its scheme is not known.
     """
-    make: Callable[..., Appearance] = APPEARANCES.named(url.scheme, asked_for=f"--as {url.text}")
-    return make(url, number=number, expose=expose)
+    return APPEARANCES.named(url.scheme, asked_for=f"--as {url.text}")(url, number=number, expose=expose)
 
 
 def listening_host(url: SourceURL, host: str, expose: str | None) -> str:

@@ -14,20 +14,24 @@ from typing import Final
 from urllib.parse import unquote
 
 from acquisition.sources.interface import Source, SourceURL
-from acquisition.sources.plug_ins import PlugIns
 from sloshlab.errors import SourceError
+from sloshlab.registry import Registry
 
-BACKENDS: Final = PlugIns(
-    "sloshlab.sources",
+BACKENDS: Final[Registry[Callable[[SourceURL], Source]]] = Registry(
     "backend",
-    {
-        "can": "acquisition.sources.can_source:CanSource",
-        "file": "acquisition.sources.file_source:FileSource",
-        "serial": "acquisition.sources.serial_source:SerialSource",
-        "sim": "acquisition.sources.simulated_source:SimulatedSource",
-    },
+    group="sloshlab.sources",
+    error=SourceError,
+    remedy="check the word before the colon, or install the package that brings the backend",
 )
-"""Classes or functions that make a source of a URL."""
+"""By the scheme of a URL: classes or functions that make a source of it."""
+for _scheme, _backend in {
+    "can": "acquisition.sources.can_source:CanSource",
+    "file": "acquisition.sources.file_source:FileSource",
+    "serial": "acquisition.sources.serial_source:SerialSource",
+    "sim": "acquisition.sources.simulated_source:SimulatedSource",
+}.items():
+    BACKENDS.declare(_scheme, _backend)
+
 LONGEST_URL: Final = 4096
 """Characters; longer ones are refused."""
 
@@ -96,8 +100,7 @@ def open_source(text: str) -> Source:
         imported or refuses target or options.
     """
     url = parse_url(text)
-    backend: Callable[[SourceURL], Source] = BACKENDS.named(url.scheme, asked_for=f"source {url.text}")
-    return backend(url)
+    return BACKENDS.named(url.scheme, asked_for=f"source {url.text}")(url)
 
 
 def _parsed_options(text: str, query: str) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import tomllib
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from acquisition.devices.appearance import APPEARANCES, Appearance, appearance
 from acquisition.devices.serial_appearance import SerialAppearance
 from acquisition.sources import parse_url, urls
 from pipelines.recording.replay import ReplaySettings, replay
+from sloshlab import registry
 from sloshlab.errors import FaultsError, InputError, SourceError
 
 PATTERN = "pattern:channels=2&sampling_rate_hz=1000&bits=16&duration_s=0.5"
@@ -85,24 +85,23 @@ def test_an_unknown_scheme_names_those_there_are():
 
 
 def test_an_appearance_that_cannot_be_imported_is_one_line(monkeypatch):
-    entry = importlib.metadata.EntryPoint("bench", "no_such_package:Bench", APPEARANCES.group)
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: (entry,))
+    monkeypatch.setitem(APPEARANCES._offered, "bench", ["no_such_package:Bench"])
     with pytest.raises(SourceError, match="appearance no_such_package:Bench that cannot be imported") as caught:
         appearance(parse_url("bench:1"), number=1)
     assert "\n" not in str(caught.value)
 
 
 def test_an_installation_that_declares_nothing_knows_the_built_in_ones(monkeypatch, tmp_path):
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: ())
+    monkeypatch.setattr(registry, "_offered_by_packages", lambda group, search_path: {})
     made = appearance(parse_url(f"serial:{tmp_path}/tty"), number=1)
     assert isinstance(made, SerialAppearance)
     assert made.device == "device_1"
 
 
-@pytest.mark.parametrize("plug_ins", [APPEARANCES, urls.BACKENDS])
-def test_the_built_in_ones_are_those_that_the_package_declares(repository, plug_ins):
+@pytest.mark.parametrize("built_in", [APPEARANCES, urls.BACKENDS], ids=lambda known: known.kind)
+def test_the_built_in_ones_are_those_that_the_package_declares(repository, built_in):
     project = tomllib.loads((repository / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["entry-points"][plug_ins.group] == dict(plug_ins.built_in)
+    assert project["entry-points"][built_in.group] == plug_ins.declared
 
 
 def test_an_appearance_must_say_what_its_frames_and_its_place_are():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 import re
 import sys
@@ -246,9 +245,9 @@ HELD = register(
 @pytest.fixture
 def registered() -> Iterator[None]:
     """What a test registers is forgotten at its end."""
-    before = TANK_MODELS.names
+    before = set(TANK_MODELS._entries)
     yield
-    for name in set(TANK_MODELS.names) - set(before):
+    for name in set(TANK_MODELS._entries) - before:
         TANK_MODELS.withdraw(name)
 
 
@@ -281,13 +280,12 @@ def test_a_tank_model_that_nobody_registered_is_refused_with_all_names(registere
 
 
 def test_a_tank_model_of_another_package_is_known_by_its_entry_point(
-    monkeypatch: pytest.MonkeyPatch, registered: None
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    point = importlib.metadata.EntryPoint("of_a_package", "tests_of_a_package:model", "sloshlab.tank_models")
     module = types.ModuleType("tests_of_a_package")
     module.model = lambda rig, parameters, folder: (HELD(damping_n_s_per_m=parameters["c"]),)
     monkeypatch.setitem(sys.modules, "tests_of_a_package", module)
-    monkeypatch.setitem(TANK_MODELS._declared, "of_a_package", point)
+    monkeypatch.setitem(TANK_MODELS._offered, "of_a_package", ["tests_of_a_package:model"])
     [term] = tank_terms(rig_of("of_a_package", "c = 2.5"))
     assert term.values["damping_n_s_per_m"] == 2.5
 

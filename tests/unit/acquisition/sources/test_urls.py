@@ -1,7 +1,5 @@
 """URLs of sources: taken apart, their backends found, every mistake one line."""
 
-import importlib.metadata
-
 import pytest
 
 from acquisition.sources import open_source, parse_url, urls
@@ -63,13 +61,9 @@ def test_an_unknown_scheme_names_those_there_are():
         open_source("usb:1")
 
 
-def entry_point(name, value):
-    return importlib.metadata.EntryPoint(name, value, urls.BACKENDS.group)
-
-
 def test_a_plug_in_brings_its_own_scheme(monkeypatch):
-    made = entry_point("bench", "fractions:Fraction")
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: (made, made))
+    # an editable and a plain installation side by side declare it twice
+    monkeypatch.setitem(urls.BACKENDS._offered, "bench", ["fractions:Fraction", "fractions:Fraction"])
     monkeypatch.setattr("fractions.Fraction", lambda url: ("made of", url.target))
     assert open_source("bench:7") == ("made of", "7")
 
@@ -79,14 +73,13 @@ def test_a_plug_in_brings_its_own_scheme(monkeypatch):
     [("no_such_package:Source", "cannot be imported"), ("fractions:NoSuchClass", "cannot be imported")],
 )
 def test_a_backend_that_cannot_be_imported_is_one_line(monkeypatch, value, said):
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: (entry_point("bench", value),))
+    monkeypatch.setitem(urls.BACKENDS._offered, "bench", [value])
     with pytest.raises(SourceError, match=said):
         open_source("bench:7")
 
 
 def test_two_backends_of_one_scheme_are_refused(monkeypatch):
-    both = (entry_point("bench", "fractions:Fraction"), entry_point("bench", "decimal:Decimal"))
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: both)
+    monkeypatch.setitem(urls.BACKENDS._offered, "bench", ["fractions:Fraction", "decimal:Decimal"])
     with pytest.raises(SourceError, match="2 backends"):
         open_source("bench:7")
 
