@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import runpy
 import subprocess
 import tarfile
 import tomllib
@@ -209,6 +210,21 @@ def test_lines_of_markdown_are_not_longer_than_120_characters() -> None:
         if len(line) > 120 and not BARE_LINK.fullmatch(line)
     ]
     assert long == []
+
+
+def test_a_row_that_begins_with_an_ellipsis_goes_on_with_the_row_above() -> None:
+    hook = runpy.run_path(str(DOCS / "table_rows.py"))["joined_rows"]
+    head, code = "| a | b |\n|---|---|\n", "| z | |\n\n```\n| c |\n| … |\n```"
+    page = f"{head}| `x` | one, |\n| … | two \\| 2 |\n| … y | three |\n{code}"
+    assert hook(page) == f"{head}| `x`<br>y | one, two \\| 2<br>three |\n{code}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_rows_of_a_table_have_as_many_cells_as_its_head(page: Path) -> None:
+    joined = runpy.run_path(str(DOCS / "table_rows.py"))["joined_rows"](page.read_text(encoding="utf-8"))
+    tables = re.findall(r"(?:^\|.*\n)+", re.sub(FENCE, "", joined), flags=re.MULTILINE)
+    widths = [{len(re.split(r"(?<!\\)\|", row)) for row in table.splitlines()} for table in tables]
+    assert [width for width in widths if len(width) > 1] == []
 
 
 def test_make_targets_that_are_named_exist() -> None:
