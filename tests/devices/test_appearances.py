@@ -101,7 +101,7 @@ def test_an_installation_that_declares_nothing_knows_the_built_in_ones(monkeypat
 @pytest.mark.parametrize("built_in", [APPEARANCES, urls.BACKENDS], ids=lambda known: known.kind)
 def test_the_built_in_ones_are_those_that_the_package_declares(repository, built_in):
     project = tomllib.loads((repository / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["entry-points"][built_in.group] == plug_ins.declared
+    assert project["entry-points"][built_in.group] == built_in.declared
 
 
 def test_an_appearance_must_say_what_its_frames_and_its_place_are():

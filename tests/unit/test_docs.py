@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import runpy
 import subprocess
 import tarfile
 import tomllib
@@ -27,6 +28,7 @@ OLD_TRIALS = REPOSITORY / "sealed_trial" / "archive" / "trials_1_to_13.tar.xz"
 COMMANDS = typer.main.get_command(app).commands
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 NAMED_FILE = re.compile(r"^`([\w.]+\.\w+)`:[^`]*?\n\n```\w+\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BARE_LINK = re.compile(r"\s*(?:[-*] |\[[^\]]*\]: )?<?https?://\S+")
 LOCAL_LINK = re.compile(r"\]\((?!https?://|#)([^)#\s]+)")
 
 
@@ -151,7 +153,9 @@ def test_the_first_screen_of_the_readme_has_two_commands_and_a_picture() -> None
     assert len(first_screen.splitlines()) <= 25
 
 
-@pytest.mark.parametrize("page", [REPOSITORY / "README.md", *PAGES], ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page", [REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md", *PAGES], ids=lambda page: page.stem
+)
 def test_local_links_lead_somewhere(page: Path) -> None:
     targets = LOCAL_LINK.findall(page.read_text(encoding="utf-8"))
     assert [target for target in targets if not (page.parent / target).exists()] == []
@@ -198,11 +202,37 @@ def test_the_table_of_all_trials_says_what_their_scores_say() -> None:
     assert shown == sorted(counts(score) for score in scores)
 
 
+def test_lines_of_markdown_are_not_longer_than_120_characters() -> None:
+    long = [
+        f"{path.relative_to(REPOSITORY)}:{number}"
+        for path in tracked_text_files()
+        if path.suffix == ".md"
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if len(line) > 120 and not BARE_LINK.fullmatch(line)
+    ]
+    assert long == []
+
+
+def test_a_row_that_begins_with_an_ellipsis_goes_on_with_the_row_above() -> None:
+    hook = runpy.run_path(str(DOCS / "table_rows.py"))["joined_rows"]
+    head, code = "| a | b |\n|---|---|\n", "| z | |\n\n```\n| c |\n| … |\n```"
+    page = f"{head}| `x` | one, |\n| … | two \\| 2 |\n| … y | three |\n{code}"
+    assert hook(page) == f"{head}| `x`<br>y | one, two \\| 2<br>three |\n{code}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_rows_of_a_table_have_as_many_cells_as_its_head(page: Path) -> None:
+    joined = runpy.run_path(str(DOCS / "table_rows.py"))["joined_rows"](page.read_text(encoding="utf-8"))
+    tables = re.findall(r"(?:^\|.*\n)+", re.sub(FENCE, "", joined), flags=re.MULTILINE)
+    widths = [{len(re.split(r"(?<!\\)\|", row)) for row in table.splitlines()} for table in tables]
+    assert [width for width in widths if len(width) > 1] == []
+
+
 def test_make_targets_that_are_named_exist() -> None:
     makefile = (REPOSITORY / "Makefile").read_text(encoding="utf-8")
     targets = set(re.findall(r"^([a-z-]+):", makefile, flags=re.MULTILINE))
     named: set[str] = set()
-    for page in [REPOSITORY / "README.md", *PAGES]:
+    for page in [REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md", *PAGES]:
         named |= set(re.findall(r"(?:`|^)make ([a-z-]+)", page.read_text(encoding="utf-8"), flags=re.MULTILINE))
     assert {"shaker", "test", "bench", "docs"} <= named <= targets
 
