@@ -119,12 +119,12 @@ _RELEASED: Final[Mapping[str, Any]] = {
     "report_sections": ("decays",),
 }
 RANDOM_LOWEST_HZ: Final = 8.0
-"""Of random motion of the shaker; lower frequencies would use up the stroke."""
+"""Of random motion; lower frequencies would use up the stroke."""
 
 for _experiment in (
     Experiment(
         "shaker_sweep",
-        "a sweep of the frequency at one acceleration, on the shaker",
+        "a sweep at one acceleration",
         **{
             **_SWEPT,
             "optional_attributes": (
@@ -141,7 +141,7 @@ for _experiment in (
     ),
     Experiment(
         "shaker_vfa",
-        "frequency and amplitude vary, on the shaker",
+        "frequency and amplitude vary",
         **_SWEPT,
         is_modulated=True,
         stages=("signs",),
@@ -149,28 +149,28 @@ for _experiment in (
     ),
     Experiment(
         "sudden_start",
-        "one frequency from rest, on the shaker",
+        "one frequency from rest",
         **_SHAKEN,
         is_recorded=False,
         virtual_options={**_SHAKER_OPTIONS, "start_hz": "frequency_hz"},
     ),
     Experiment(
         "shaker_random",
-        "random motion of the shaker",
+        "random motion",
         **_SHAKEN,
         is_recorded=False,
         virtual_options={**_SHAKER_OPTIONS, "start_hz": RANDOM_LOWEST_HZ},
     ),
     Experiment(
         "shaker_two_tone",
-        "two frequencies at once, on the shaker",
+        "two frequencies at once",
         **_SHAKEN,
         is_recorded=False,
         virtual_options={**_SHAKER_OPTIONS, "start_hz": "frequency_hz", "stop_hz": "second_frequency_hz"},
     ),
     Experiment(
         "beam_free",
-        "a beam with the tank at its tip, deflected and let go",
+        "a beam with the tank at its tip, let go",
         **_RELEASED,
         structure="beam",
         # a weight of 7 kg pulls the beam of the source down by 14.6 mm
@@ -191,7 +191,7 @@ for _experiment in (
     ),
     Experiment(
         "sdof_free",
-        "a tank on a guide and springs, deflected and let go",
+        "a tank on a guide and springs, let go",
         **_RELEASED,
         structure="sdof",
         # the guided tank of the source is held 64 mm above its rest
