@@ -184,7 +184,9 @@ def _accelerometer_agreement(
     recording: xr.Dataset, qualities: tuple[ChannelQuality, ...]
 ) -> tuple[SensorAgreement | None, list[str]]:
     """The agreement, or None with the reason why it could not be had."""
-    alive = {channel.name for channel in qualities if channel.n_lost < channel.n_samples and not channel.is_constant}
+    alive = {
+        channel.name for channel in qualities if channel.n_lost < channel.n_samples and not channel.is_constant
+    }
     names = [name for name in redundant_accelerometers(recording) if name in alive]
     if len(names) < 2:
         return None, []
