@@ -225,11 +225,11 @@ def _least_squares(
         np.asarray(fit.residues / scale, dtype=np.complex128),
         fit.constant.astype(np.complex128),
     )
-    blocks, error = _linearised(s, shares, h, weights, *found)
+    blocks, error = _linearised(s, shares, h, weights, found)
     for _ in range(_N_STEPS):
         change = np.asarray(np.linalg.lstsq(blocks, _stacked(weights * error), rcond=None)[0], dtype=np.float64)
         moved = _moved(found, change)
-        moved_blocks, moved_error = _linearised(s, shares, h, weights, *moved)
+        moved_blocks, moved_error = _linearised(s, shares, h, weights, moved)
         before, after = (float((np.abs(weights * residual) ** 2).sum()) for residual in (error, moved_error))
         if after > before * (1 - 1e-12):
             break
@@ -279,11 +279,10 @@ def _linearised(
     shares: FloatArray,
     h: ComplexArray,
     weights: FloatArray,
-    poles: ComplexArray,
-    residues: ComplexArray,
-    constant: ComplexArray,
+    found: tuple[ComplexArray, ComplexArray, ComplexArray],
 ) -> tuple[FloatArray, ComplexArray]:
     """Weighted Jacobian over Re p, Im p of all poles, then Re r, Im r, d of each output; error of each output."""
+    poles, residues, constant = found
     n, n_outputs = poles.size, h.shape[0]
     pair = (poles.imag != 0).astype(float)
     # s holds the points of the line shape of each line, shape (n_lines, n_points)

@@ -10,6 +10,7 @@ and therefore has no delay.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -126,7 +127,9 @@ def measured_phase(
     for iteration in range(3):
         spline = CubicSpline(times, phase)
         window_s = _WINDOW_CYCLES * 2 * np.pi / np.maximum(spline(times, 1), 1e-6)
-        z, power, lost = _demodulated(decimated, weight, rate_hz, times, window_s, spline.c, spline.x)
+        z, power, lost = _demodulated(
+            decimated, weight, rate_hz, _Knots(times, window_s), _PhaseSpline(spline.c, spline.x)
+        )
         amplitude = np.abs(z)
         moving = (amplitude > _SMALLEST_RELATIVE_AMPLITUDE * amplitude.max()) & ~lost
         moving &= 0.5 * amplitude**2 > _SMALLEST_SHARE_OF_POWER * power
@@ -264,22 +267,29 @@ def _isolated_loss(moving: BoolArray) -> BoolArray:
     return inside & ~moving
 
 
+class _Knots(NamedTuple):
+    """Where the motion is demodulated, and under how long a window."""
+
+    times: FloatArray
+    window_s: FloatArray
+
+
+class _PhaseSpline(NamedTuple):
+    """The cubic spline φ(t)."""
+
+    coefficients: FloatArray  # (4, n_pieces), the highest power first
+    breaks: FloatArray  # (n_pieces + 1,)
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _demodulated(
-    motion: FloatArray,
-    weight: FloatArray,
-    rate_hz: float,
-    times: FloatArray,
-    window_s: FloatArray,
-    coefficients: FloatArray,
-    breaks: FloatArray,
+    motion: FloatArray, weight: FloatArray, rate_hz: float, knots: _Knots, spline: _PhaseSpline
 ) -> tuple[npt.NDArray[np.complex128], FloatArray, BoolArray]:
     """Amplitude, twice the mean of motion·e^{-jφ}, and mean square under a Hann window at each knot.
 
     The third result is True where samples were lost.
-
-    ``coefficients`` and ``breaks`` are those of the cubic spline φ(t).
     """
+    times, window_s, coefficients, breaks = knots.times, knots.window_s, spline.coefficients, spline.breaks
     result = np.zeros(times.size, dtype=np.complex128)
     power = np.zeros(times.size)
     lost = np.zeros(times.size, dtype=np.bool_)

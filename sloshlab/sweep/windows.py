@@ -112,7 +112,7 @@ def evaluate_windows(
     for window in window_slices(cycles, chosen):
         at = _steady(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
         if at.size >= chosen.smallest_n_cycles:
-            row = _row(cycles, at, law, start_time_s, rig, noise_power)
+            row = _row(cycles, at, law, start_time_s, rig=rig, noise_power=noise_power)
             if abs(_number(row, "growth_per_cycle")) < _LARGEST_GROWTH_PER_CYCLE:
                 rows.append(row)
             else:
@@ -168,6 +168,7 @@ def _row(
     at: npt.NDArray[np.intp],
     law: SweepLaw | None,
     start_time_s: float,
+    *,
     rig: Rig | None,
     noise_power: float,
 ) -> dict[str, object]:
