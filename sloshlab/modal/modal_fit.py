@@ -231,11 +231,13 @@ def _least_squares(
         moved = _moved(found, change)
         moved_blocks, moved_error = _linearised(s, shares, h, weights, moved)
         before, after = (float((np.abs(weights * residual) ** 2).sum()) for residual in (error, moved_error))
+        # the model it ends with is the last one that was better
         if after > before * (1 - 1e-12):
             break
         found, blocks, error = moved, moved_blocks, moved_error
     poles, residues, _ = found
     n_free = max(2 * h.size - int(np.linalg.matrix_rank(blocks)), 1)
+    # sandwich: neighbouring lines of a Hann window are correlated, which the inverse of JᵀJ alone does not know
     bread = np.linalg.pinv(blocks.T @ blocks, rcond=1e-18)
     scatter = _scatter(blocks.reshape(-1, f.size, blocks.shape[1]), offsets.size > 1)
     cost = float((np.abs(weights * error) ** 2).sum())

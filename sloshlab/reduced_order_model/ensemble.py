@@ -231,7 +231,7 @@ def fit_ensemble(
         records.append(record)
         if record.interrupted:
             break
-    if len(members) < 2:
+    if len(members) < 2:  # nothing that could disagree
         raise KeyboardInterrupt
     return Ensemble(tuple(members), residual_spread(members, validation)), records
 

@@ -57,6 +57,7 @@ def evaluate(kind, theta, phi, features, factors):  # type: ignore[no-untyped-de
         largest = max(largest, -squared)
     total = 0.0
     for i in range(m):
+        # shares are ratios: relative to the nearest centre, far from all of them they would be 0/0
         features[i] = np.exp(features[i] - (largest if kind == NORMALISED else 0.0))
         total += features[i]
     offset = 0 if kind == NORMALISED else 1
@@ -116,6 +117,7 @@ def free_run_sums(model, x, y, stretch, sums):  # type: ignore[no-untyped-def]
         free[k] = evaluate(model.kind, theta, phi, features, factors)
         if not abs(free[k]) <= model.bound:
             return np.inf
+        # sensitivities of as many past outputs as are fed back, in a ring
         now = history[k % (longest + 1)]
         for b in range(n_out):
             slope[b] = 0.0
@@ -129,7 +131,7 @@ def free_run_sums(model, x, y, stretch, sums):  # type: ignore[no-untyped-def]
             now[m * p] = 1.0
         for b in range(n_out):
             before = history[(k - output_delays[b]) % (longest + 1)]
-            if k - output_delays[b] >= stretch.first:
+            if k - output_delays[b] >= stretch.first:  # measured outputs before it depend on no parameter
                 for j in range(n_theta):
                     now[j] += slope[b] * before[j]
         error = y[k] - free[k]

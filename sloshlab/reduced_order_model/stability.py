@@ -157,6 +157,7 @@ def growth_rate(model, x, y, settling):  # type: ignore[no-untyped-def]
         for b in range(reach - 1, 0, -1):
             difference[b] = difference[b - 1]
         difference[0] = new
+        # brought back to size 1 at every sample, so that its growth neither overflows nor vanishes
         size = np.sqrt(np.sum(difference * difference))
         if size < 1e-300:
             return -np.inf

@@ -227,6 +227,7 @@ def _train_once(
     for problem, backend in stages:
         is_last = problem is stages[-1][0]
         own = best if is_last else _Best()
+        # one step ahead only prepares the free run: a rising validation error does not end it
         own_settings = settings if is_last else replace(settings, patience=settings.n_epochs)
         theta, number = _descend(
             replace(task, backend=backend),

@@ -211,6 +211,7 @@ def _complete(signals: _Signals, start: float, stop: float) -> bool:
     """True if no sample that the cycle needs is lost or flagged."""
     force, motion, unusable = signals.force, signals.motion, signals.unusable
     first, last = int(np.ceil(start)) - MARGIN_SAMPLES, int(np.floor(stop)) + MARGIN_SAMPLES
+    # a sum is finite if all its terms are; one test per cycle instead of two per sample
     total = 0.0
     for i in range(first, last + 1):
         total += force[i] + motion[i]
@@ -255,6 +256,7 @@ def _one_cycle(signals: _Signals, cycle: _OneCycle, scalars: FloatArray, phasors
         half_angle = np.pi * turn
         half = np.cos(half_angle) - 1j * np.sin(half_angle)
         unit = half * half
+        # channels of 16 bits stay in single precision, which halves the memory traffic; the sums are double
         f, a = float(force[i]), float(motion[i])
         v = a if motion_is_velocity else velocity
         t = (x - 0.5) * duration
@@ -286,6 +288,7 @@ def _one_cycle(signals: _Signals, cycle: _OneCycle, scalars: FloatArray, phasors
         if p <= i <= q:
             highest, lowest = max(highest, d), min(lowest, d)
     two_per_duration = 2.0 / duration
+    # both constants of integration are corrected in the sums, so that the samples are gone through once
     drift = 0.0 if motion_is_velocity else sum_motion / duration
     mean_velocity = sum_velocity / duration
     scalars[_WORK] = work - mean_velocity * sum_force - drift * sum_force_time
@@ -299,6 +302,7 @@ def _one_cycle(signals: _Signals, cycle: _OneCycle, scalars: FloatArray, phasors
         factor = 1j * omega * (k + 1) if motion_is_velocity else 1.0 + 0.0j
         phasors[N_HARMONICS + k] = two_per_duration * motion_k[k] * factor
     phasors[2 * N_HARMONICS] = velocity_1
+    # half a turn of Ω/2 passes in a cycle: what alternates has the other sign in every second one
     sign = 1.0 - 2.0 * cycle.parity
     phasors[2 * N_HARMONICS + 1] = sign * two_per_duration * half_1
     phasors[2 * N_HARMONICS + 2] = sign * two_per_duration * half_3

@@ -27,7 +27,9 @@ _DEMODULATION_RATE_HZ = 1000.0
 """The motion is averaged down to about this rate before its phase is taken."""
 _KNOTS_PER_CYCLE = 1.0
 _CYCLES_PER_BLOCK = 8.0
+"""Of the spectra that tell the frequency to begin with."""
 _BLOCKS_AT_ONCE = 16
+"""Blocks overlap by half and are padded to four times their length: those of a long recording come in portions."""
 _STRONG_LINE = 0.4
 """The fundamental has at least this part of the largest line of a block."""
 _LOBE_LINES = 13
@@ -124,6 +126,7 @@ def measured_phase(
     times, phase = _phase_knots(knots, frequency, decimated.size / rate_hz)
     amplitude = np.empty(0)
     moving = np.empty(0, dtype=np.bool_)
+    # the window follows the frequency of the last phase, which the block spectra give only roughly
     for iteration in range(3):
         spline = CubicSpline(times, phase)
         window_s = _WINDOW_CYCLES * 2 * np.pi / np.maximum(spline(times, 1), 1e-6)
@@ -209,7 +212,8 @@ def _peaks(
     frequency = np.fft.rfftfreq(4 * n_block, 1 / rate_hz)
     lowest = 2.0 * rate_hz / n_block
     spectrum[:, (frequency < lowest) | (frequency > 0.4 * rate_hz)] = 0.0
-    # the fundamental is the first strong line, a harmonic may be the strongest
+    # The fundamental is the first strong line, a harmonic may be the strongest. With the spectrum over f instead,
+    # noise below 1 Hz won in signals of large dynamic range.
     first = (spectrum >= _STRONG_LINE * spectrum.max(axis=1, keepdims=True)).argmax(axis=1)
     lobe = np.minimum(first[:, None] + np.arange(_LOBE_LINES), frequency.size - 1)
     rows = np.arange(starts.size)
@@ -247,6 +251,7 @@ def _unwrapped(angle: FloatArray, moving: BoolArray) -> FloatArray:
     at = np.flatnonzero(moving)
     if at.size == 0:
         return np.zeros_like(angle)
+    # angles where nothing moves are noise and would add turns
     return np.interp(np.arange(angle.size), at, np.unwrap(angle[at]))
 
 

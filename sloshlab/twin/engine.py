@@ -28,8 +28,10 @@ from sloshlab.twin.status import Status
 DONE, UNSTABLE, FAULT, CHATTER, NO_ACCELERATION = (int(status) for status in Status)
 
 _SWITCH_TOLERANCE = 1e-13
+"""An event function so little below zero has not changed its sign: rounding, right after its own event."""
 _EVENT_TIME_TOLERANCE_S = 1e-12
 _MOST_EVENTS_PER_STEP = 50
+"""More of them within one step are chatter, which the engine does not follow."""
 _SHARE_TOLERANCE = 1e-6
 """Of a step: an instant so close to its end is its end."""
 
@@ -78,6 +80,7 @@ def _margin(m: Model, y: FloatArray, s: Scratch) -> float:
 def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scratch) -> float:
     """Share of the whole step after which the first event has just come; `trial` is the state there."""
     step = past.step_s
+    # regula falsi needs values on both sides; until one above zero is known the interval is halved
     low, high, above, below = 0.0, past.share, -1.0, past.margin
     kept = 0
     for _ in range(100):
@@ -86,10 +89,12 @@ def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scra
         middle = 0.5 * (low + high)
         if above > 0.0:
             middle = low + (high - low) * above / (above - below)
+            # away from both ends, or the bracket hardly shrinks
             middle = min(max(middle, low + 0.01 * (high - low)), high - 0.01 * (high - low))
         advance_once(m, excited, start, Time(middle * step, 2.0 * middle), s)
         value = _margin(m, s.trial, s)
         if value < -_SWITCH_TOLERANCE or not np.isfinite(value):
+            # Illinois: an end that stays while the other moves twice counts half, so that it moves, too
             high, below = middle, value
             above *= 0.5 if kept == 1 else 1.0
             kept = 1
@@ -97,6 +102,7 @@ def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scra
             low, above = middle, max(value, 0.0)
             below *= 0.5 if kept == -1 else 1.0
             kept = -1
+    # the far side of the event, where its function is negative: there the switch turns and stays turned
     advance_once(m, excited, start, Time(high * step, 2.0 * high), s)
     return high
 
@@ -243,6 +249,7 @@ def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Out
             index = (row - 1) * n_substeps + substep
             done, n_switched = 0.0, 0
             while done < 1.0:
+                # instants are counted from the start and never summed up, so that they do not drift
                 now, share = Time((index + done) * step, 2.0 * (index + done)), 1.0 - done
                 is_last = not (due - now.seconds) / step < share - _SHARE_TOLERANCE
                 if not is_last:

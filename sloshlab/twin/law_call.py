@@ -13,6 +13,7 @@ from numba.extending import intrinsic
 @intrinsic  # type: ignore[untyped-decorator]
 def call_law(typing: Any, address: Any, arrays: Any, offsets: Any) -> Any:
     """Call the law at `address` with motion, parameters, memory and rates, flat arrays, each from an offset on."""
+    # a pointer, not a typed callee: a new force compiles nothing but itself, and the engine stays as it is
     flat = types.Array(types.float64, 1, "C")
     signature = types.float64(types.int64, types.UniTuple(flat, 4), types.UniTuple(types.int64, 4))
 

@@ -35,6 +35,7 @@ Watch = Callable[[int, int], None]
 
 _LARGEST_EVENT_LOG: Final = 100_000
 _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S, _LARGEST_MEMORY = 100.0, 1e6, 1e15
+"""Beyond any rig; a motion that reaches them is unstable."""
 _LARGEST_OUTPUTS_BYTES: Final = 4 * 2**30
 _HALF_STEPS_AT_ONCE = 1 << 17
 """So that the excitation of a long run is never held whole, and progress can be told."""
@@ -186,6 +187,7 @@ def run(
     inputs = _KeptInputs(np.zeros(n_rows), np.zeros((n_rows, 3)))
     step = 1.0 / (excitation.sampling_rate_hz * n_substeps)
     status, filled, where = int(Status.DONE), 1, -1
+    # each stretch is cut with a margin, so that one stretch or many give the same bytes
     for first_row, last_row in _stretches(n_rows, n_substeps):
         excited = _excited(excitation, n_substeps, first_row - 1, last_row - 1)
         _keep_inputs(excited, n_substeps, first_row - 1, last_row, inputs)

@@ -34,6 +34,7 @@ from sloshlab.twin.model import (
 _MOST_ITERATIONS = 30
 _MOST_SECANTS = 6
 _LEAST_CHORD = 1e-6
+"""Of two accelerations closer than this, relatively, the slope of the chord is lost in rounding."""
 _ACCELERATION_TOLERANCE = 1e-12
 
 
@@ -46,6 +47,7 @@ def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
         return
     place = position - excited.first
     nearest = min(max(int(place + 0.5), 0), n - 1)
+    # steps that no event has cut land on rows, and take them as they are
     if abs(place - nearest) < 1e-9 or n < 6:
         for column in range(inputs.size):
             inputs[column] = table[nearest, column]
@@ -69,7 +71,7 @@ def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
         s.motion[at + TIME] = time
         s.motion[at + DISPLACEMENT] = x + frame * s.inputs[0]
         s.motion[at + VELOCITY] = v + frame * s.inputs[1]
-        s.motion[at + ACCELERATION] = np.nan
+        s.motion[at + ACCELERATION] = np.nan  # a law that reads it without saying so spoils its result, visibly
         s.motion[at + BASE_ACCELERATION] = s.inputs[2]
         s.motion[at + PHASE] = s.inputs[3]
         s.motion[at + FREQUENCY] = s.inputs[4]
@@ -120,6 +122,7 @@ def _solve_acceleration(m: Model, free: float, known: float, stage: Stage, s: Sc
         if abs(correction) <= _ACCELERATION_TOLERANCE * (1.0 + abs(a)):
             s.slope[0] = slope
             return a  # type: ignore[no-any-return]
+    # where secants do not converge: Newton's method, with a difference quotient at every point
     a = start
     for _ in range(_MOST_ITERATIONS):
         nearby = a + 1e-3 * (1.0 + abs(a))
@@ -209,6 +212,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
     total, good = _known_force(m, stage, s), True
     if m.uses_acceleration or s.friction[0] == STICKS:
         total, good = _difficult_force(m, free, total, stage, s)
+    # all forces act at one place of the modes, so that the mass they add needs no system of equations
     a = (free + m.mobility * total) * m.inverse_inertia
     total -= m.added_mass * a
     for j in range(n):
@@ -278,6 +282,7 @@ def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     if m.mobility == 0.0:  # prescribed motion cannot be held
         s.friction[0] = -1.0 if velocity < 0.0 else 1.0
         return
+    # what is left of the velocity is rounding of the event; an impulse at the place takes it out of all modes
     for j in range(n):
         s.state[n + j] -= m.shape[j] * m.inverse_mass[j] * velocity / m.mobility
     s.friction[0] = STICKS
