@@ -33,6 +33,7 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
+        # mkstemp makes files that nobody else may read; the mask can only be read by setting it
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
@@ -58,6 +59,7 @@ def filled_folder(folder: str | os.PathLike[str]) -> Iterator[Path]:
         An empty folder on the same file system.
     """
     target = Path(folder).absolute()
+    # on the same file system as the target, or a move would be a copy that an interrupt leaves half done
     beside = target if target.is_dir() else target.parent
     beside.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=beside))

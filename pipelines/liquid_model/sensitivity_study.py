@@ -230,8 +230,8 @@ def train_case(task: _Task, say_share: Callable[[float], None]) -> CaseResult:
             Delays.tapped(case.delays, case.output_delays),
             task.training,
             task.validation,
-            task.sampling_rate_hz,
-            settings,
+            sampling_rate_hz=task.sampling_rate_hz,
+            settings=settings,
             told=told,
         )
     except AnalysisError as error:

@@ -157,8 +157,8 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
             wanted.delay_lines(),
             [one.run() for one in runs.training],
             [one.run() for one in runs.validation],
-            runs.rate_hz,
-            settings,
+            sampling_rate_hz=runs.rate_hz,
+            settings=settings,
             agitation=wanted.agitation(),
             told=told,
         )

@@ -268,8 +268,10 @@ def _jacobian(search: _Search, point: FloatArray) -> FloatArray:
 def _intervals(search: _Search, best: OptimizeResult, settings: SearchSettings) -> tuple[ParameterInterval, ...]:
     n, p = best.fun.size, best.x.size
     factor = float(student_t.ppf(0.5 + CONFIDENCE / 2, n - p))
+    # only where profiles start to look: by itself the Jacobian gave intervals at whose ends the sum of squares had
+    # grown up to 1600 times as much as it should
     covariance = 2 * best.cost / (n - p) * _inverse(best.jac.T @ best.jac)
-    return tuple(_interval(search, best, i, factor, covariance, settings) for i in range(p))
+    return tuple(_interval(search, best, i, factor, covariance, settings=settings) for i in range(p))
 
 
 def _inverse(matrix: FloatArray) -> FloatArray:
@@ -280,12 +282,23 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 
 
 def _interval(
-    search: _Search, best: OptimizeResult, i: int, factor: float, covariance: FloatArray, settings: SearchSettings
+    search: _Search,
+    best: OptimizeResult,
+    i: int,
+    factor: float,
+    covariance: FloatArray,
+    *,
+    settings: SearchSettings,
 ) -> ParameterInterval:
     centre, half = float(best.x[i]), factor * float(np.sqrt(covariance[i, i]))
     growth = factor**2 * 2 * best.cost / (best.fun.size - best.x.size)
     ends = [
-        _end(_Profile(search, best, i, side, covariance, settings), half, max(growth, 1e-300)) for side in (-1, 1)
+        _end(
+            _Profile(search, best, i, side, covariance, n_evaluations=settings.n_local_evaluations // 2),
+            half,
+            max(growth, 1e-300),
+        )
+        for side in (-1, 1)
     ]
     values, open_ends = [], (-np.inf, np.inf)
     for (distance, _), side, open_end in zip(ends, (-1, 1), open_ends, strict=True):
@@ -322,11 +335,12 @@ class _Profile:
         i: int,
         side: int,
         covariance: FloatArray,
-        settings: SearchSettings,
+        *,
+        n_evaluations: int,
     ) -> None:
         self._search, self._best, self._side = search, best, side
         self._free = np.arange(best.x.size) != i
-        self._n_evaluations = settings.n_local_evaluations // 2
+        self._n_evaluations = n_evaluations
         self._direction = side * covariance[:, i] / covariance[i, i]
         self.room = float(best.x[i] if side < 0 else 1 - best.x[i])
 

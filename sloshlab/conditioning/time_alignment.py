@@ -251,6 +251,7 @@ def _candidates(
     reference: SampledSignal, other: SampledSignal, largest_delay_s: float, largest_drift_ppm: float
 ) -> list[_Line]:
     """Lines at the highest maxima of the correlation, over the drifts that change it noticeably."""
+    # coarse, because every drift needs a correlation of its own; the maxima are refined afterwards
     step_s = max(reference.step_s, 1.0 / _COARSE_RATE_HZ)
     n = int(reference.values.size * reference.step_s / step_s)
     time = np.asarray(reference.start_s + step_s * np.arange(n), dtype=np.float64)

@@ -90,6 +90,7 @@ def energy_maps(
     covered = used if extent is None else extent
     grids = _grids(covered["frequency_hz"].values, covered["amplitude_m"].values, rig, n_grid)
     mask = [_measured(plane, used, group, grid) for grid in grids]
+    # W/(u₀Ω)², of which W̄ and W are multiples: the same smoothing serves both
     work = field("dissipated_mass_kg")
     chosen = {"work_j": cross_validation(work)}
     variables = _axes(grids, rig)

@@ -110,6 +110,7 @@ def interpolated(
         error of the interpolation itself, which `cross_validation` estimates.
     """
     points = field.coordinates[chosen.coordinates]
+    # interpolation is linear in the values: its weights, found once, carry values and standard errors alike
     unit_vectors = np.eye(points.shape[0])
     operator = _interpolator(points, unit_vectors, field.weights(chosen.smoothing))(at[chosen.coordinates])
     return operator @ field.values, np.sqrt(operator**2 @ field.std**2)
@@ -126,6 +127,7 @@ def cross_validation(field: ScatteredField, *, n_folds: int = 5) -> CrossValidat
     """
     runs = _inner_runs(field)
     chosen = (next(iter(field.coordinates)), DEFAULT_SMOOTHING)
+    # smoothing is not chosen by left-out runs: on a thinned field they asked for too little of it
     if runs:
         thinned = _thinned(field)
         folds = _every(thinned, n_folds)
@@ -183,6 +185,7 @@ def _left_out_rms(
 
 
 def _interpolator(points: FloatArray, values: FloatArray, smoothing: FloatArray) -> RBFInterpolator:
+    # a run by itself may lie on a line, on which a thin plate with a linear part is not determined
     in_the_plane = np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6) == 2
     kernel, degree = (KERNEL, 1) if in_the_plane else ("linear", 0)
     return RBFInterpolator(points, values, kernel=kernel, degree=degree, smoothing=smoothing)

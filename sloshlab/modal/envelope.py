@@ -84,9 +84,12 @@ def envelope(
     middle = np.array([time[i : i + n_points].mean() for i in starts])
     std = noise.at(middle)
     rows = []
-    for start, one_std in zip(starts, std, strict=True):
+    bandwidth_hz = BANDWIDTH_SHARE * frequency_hz
+    for start, noise_std in zip(starts, std, strict=True):
         part = slice(start, start + n_points)
-        rows.append(_slopes(time[part], log_amplitude[part], phase[part], frequency_hz, sampling_rate_hz, one_std))
+        # ∫ 4 G² σ²/f_s df of the analytic noise; one half of it in phase with the motion, one across
+        variance = 2 * np.sqrt(np.pi) * bandwidth_hz / sampling_rate_hz * noise_std**2
+        rows.append(_slopes(time[part], log_amplitude[part], phase[part], bandwidth_hz, variance))
     decay, omega, amplitude, slope_std, amplitude_std = np.array(rows).reshape(-1, 5).T
     damping, damping_std = damping_ratio_of(decay, omega, slope_std, slope_std)
     return InstantaneousDamping(
@@ -111,19 +114,17 @@ def _slopes(
     time: FloatArray,
     log_amplitude: FloatArray,
     phase: FloatArray,
-    frequency_hz: float,
-    sampling_rate_hz: float,
-    noise_std: float,
+    bandwidth_hz: float,
+    noise_variance: float,
 ) -> tuple[float, float, float, float, float]:
     """Decay, ω, amplitude, standard error of both slopes, relative standard error of the amplitude."""
     centred = time - time.mean()
     weight = centred / (centred**2).sum()
     inverse = np.exp(-log_amplitude)
-    bandwidth = BANDWIDTH_SHARE * frequency_hz
     lag = centred[:, None] - centred[None, :]
-    # ∫ 4 G² σ²/f_s e^{j2πfτ} df of the analytic noise; one half of it in phase with the motion, one across
-    variance = 2 * np.sqrt(np.pi) * bandwidth / sampling_rate_hz * noise_std**2
-    covariance = variance * np.exp(-((np.pi * bandwidth * lag) ** 2)) * inverse[:, None] * inverse[None, :]
+    covariance = (
+        noise_variance * np.exp(-((np.pi * bandwidth_hz * lag) ** 2)) * inverse[:, None] * inverse[None, :]
+    )
     slope_std = float(np.sqrt(max(weight @ covariance @ weight, 0.0)))
     amplitude_std = float(np.sqrt(max(covariance.mean(), 0.0)))
     amplitude = float(np.exp(log_amplitude.mean()))

@@ -99,9 +99,11 @@ def analyse_free_decay(
         )
     release = find_release(signal, sampling_rate_hz, frequency_range_hz=frequency_range_hz)
     first, last = (round(at * sampling_rate_hz) for at in (release.release_s, release.rest_s))
+    # to the end of the motion only: what dry friction holds has no extrema and no phase
     part = np.asarray(signal, dtype=np.float64)[first : last + 1]
     frequency = release.frequency_hz
     by_fit, noise = local_sine_fit(part, sampling_rate_hz, frequency_hz=frequency, n_cycles=n_cycles)
+    # judged by the sine fit, whose stretches do not overlap: its errors are independent
     _refuse_without_decay(by_fit)
     _refuse_other_frequency(by_fit, frequency_range_hz)
     by_envelope = envelope(part, sampling_rate_hz, frequency_hz=frequency, noise=noise, n_cycles=n_cycles)

@@ -93,6 +93,7 @@ def local_sine_fit(
     for first, last in itertools.pairwise(edges):
         fit = fit_decaying_sine(signal[first:last], sampling_rate_hz, frequency_hz=guess[0], decay_per_s=guess[1])
         fits.append(fit)
+        # a stretch of noise must not lead the next one astray
         if _is_clear(fit, fit.noise_std):
             guess = fit.omega_rad_per_s / (2 * np.pi), fit.decay_per_s
     time = 0.5 * (edges[:-1] + edges[1:] - 1) / sampling_rate_hz
@@ -137,6 +138,7 @@ def _noise(fits: list[DecayingSine], time_s: FloatArray, n_cycles: int) -> Decay
     pooled = np.concatenate(shares) if shares else np.ones(1)
     colour = float(pooled.mean()) if pooled.size else 1.0
     n_free = float(sum(fit.residual.size - N_PARAMETERS for fit in fits))
+    # a periodogram line has two degrees of freedom
     if pooled.size:
         n_free = min(2.0 * pooled.size, n_free)
     return DecayNoise(time_s, levels * np.sqrt(colour), max(n_free, 1.0))
@@ -144,6 +146,7 @@ def _noise(fits: list[DecayingSine], time_s: FloatArray, n_cycles: int) -> Decay
 
 def _line_shares(fit: DecayingSine, lines: npt.NDArray[np.int64]) -> FloatArray:
     """Power of the residual at lines, over what a fit to white noise of the same level leaves there."""
+    # the fit takes up noise in the directions of its Jacobian; without the correction errors come out too small
     taken_up = np.linalg.qr(fit.jacobian)[0]
     left = 1 - (np.abs(np.fft.rfft(taken_up, axis=0)[lines]) ** 2).sum(axis=1) / fit.residual.size
     power = np.abs(np.fft.rfft(fit.residual)[lines]) ** 2 / fit.residual.size

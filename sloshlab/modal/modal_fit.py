@@ -225,17 +225,19 @@ def _least_squares(
         np.asarray(fit.residues / scale, dtype=np.complex128),
         fit.constant.astype(np.complex128),
     )
-    blocks, error = _linearised(s, shares, h, weights, *found)
+    blocks, error = _linearised(s, shares, h, weights, found)
     for _ in range(_N_STEPS):
         change = np.asarray(np.linalg.lstsq(blocks, _stacked(weights * error), rcond=None)[0], dtype=np.float64)
         moved = _moved(found, change)
-        moved_blocks, moved_error = _linearised(s, shares, h, weights, *moved)
+        moved_blocks, moved_error = _linearised(s, shares, h, weights, moved)
         before, after = (float((np.abs(weights * residual) ** 2).sum()) for residual in (error, moved_error))
+        # the model it ends with is the last one that was better
         if after > before * (1 - 1e-12):
             break
         found, blocks, error = moved, moved_blocks, moved_error
     poles, residues, _ = found
     n_free = max(2 * h.size - int(np.linalg.matrix_rank(blocks)), 1)
+    # sandwich: neighbouring lines of a Hann window are correlated, which the inverse of JᵀJ alone does not know
     bread = np.linalg.pinv(blocks.T @ blocks, rcond=1e-18)
     scatter = _scatter(blocks.reshape(-1, f.size, blocks.shape[1]), offsets.size > 1)
     cost = float((np.abs(weights * error) ** 2).sum())
@@ -279,11 +281,10 @@ def _linearised(
     shares: FloatArray,
     h: ComplexArray,
     weights: FloatArray,
-    poles: ComplexArray,
-    residues: ComplexArray,
-    constant: ComplexArray,
+    found: tuple[ComplexArray, ComplexArray, ComplexArray],
 ) -> tuple[FloatArray, ComplexArray]:
     """Weighted Jacobian over Re p, Im p of all poles, then Re r, Im r, d of each output; error of each output."""
+    poles, residues, constant = found
     n, n_outputs = poles.size, h.shape[0]
     pair = (poles.imag != 0).astype(float)
     # s holds the points of the line shape of each line, shape (n_lines, n_points)

@@ -18,9 +18,12 @@ from sloshlab.modal.decaying_sine import fit_decaying_sine
 FloatArray = npt.NDArray[np.float64]
 
 _RATIO_TO_LATER = 3.0
+"""A cycle of the transient leaves more than this many times what later cycles leave."""
 _SMALLEST_SHARE = 0.02
+"""Less than this share of the amplitude is no transient, however clean the later cycles are."""
 _LARGEST_N_CYCLES = 5
 _N_LATER = 10
+"""Cycles after those five that tell what a decaying sine leaves."""
 _LARGEST_RANGE = 1e50
 """Its square, and that of its inverse, are still numbers."""
 _REST_SHARE = 1e-6
@@ -82,6 +85,7 @@ def find_release(
     start = int(np.argmax(np.abs(centred) > 0.5 * np.abs(centred).max()))
     frequency = largest_line_hz(centred[start:], sampling_rate_hz, frequency_range_hz)
     per_cycle = sampling_rate_hz / frequency
+    # a record that begins in motion was cut at or after the release
     if start < 0.5 * per_cycle:
         start = 0
     n_cycles = int((values.size - start) / per_cycle)

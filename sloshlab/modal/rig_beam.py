@@ -27,9 +27,11 @@ ALUMINIUM_KG_PER_M3: Final = 2700.0
 """Material of the beam, which the rig file does not state."""
 
 _LARGEST_MASS_RATIO = 100.0
+"""Of the tip to the beam, up to which the tip mass is sought."""
 _MASSES_AGREE = 0.25
 
 
+# channels of a simulation ask for it per sensor, and finding the tip mass takes longer than the simulation
 @lru_cache(maxsize=64)
 def beam_of_rig(described: Structure) -> Cantilever | None:
     """The uniform beam with the tip mass of the module's text; None where the file has no dimensions.
@@ -54,6 +56,7 @@ def beam_of_rig(described: Structure) -> Cantilever | None:
         return described.modal_masses_kg[0] / described.tip_mode_shape[0] ** 2 - float(modes.modal_mass_kg[0])
 
     largest = _LARGEST_MASS_RATIO * bare.mass_per_length_kg_per_m * bare.length_m
+    # the frequency tells the tip mass of an aluminium beam, the modal mass that of a beam of another material
     for error in (frequency_error, mass_error):
         tip = _root(error, largest)
         if tip is not None:

@@ -19,6 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
 _SMALLEST_SIGMA = 1e-8
+"""Of the scaling function at infinity, by which its other coefficients are divided (relaxed vector fitting)."""
 
 
 class FitStatus(StrEnum):
@@ -191,10 +192,13 @@ def _relocated(
     for response, weight in zip(h, w, strict=True):
         scaled = weight / max(float(np.linalg.norm(weight * response)), 1e-300)
         system = scaled[:, None] * np.hstack([numerator, -response[:, None] * denominator])
+        # only the scaling function is common to all outputs: of each output's system what is left after its own
+        # residues are eliminated goes on, so that the systems do not grow with the number of outputs
         triangle = np.asarray(np.linalg.qr(_real(system), mode="r"))
         n_first = numerator.shape[1]
         rows.append(triangle[n_first : n_first + denominator.shape[1], n_first:])
         right.append(np.zeros(rows[-1].shape[0]))
+    # the real part of the scaling function has the mean 1, so that it is not zero, yet free at infinity
     mean = denominator.sum(axis=0).real / s.size
     rows.append(mean[None, :])
     right.append(np.ones(1))
@@ -210,6 +214,7 @@ def _real(system: ComplexArray) -> FloatArray:
 
 
 def _scaled_least_squares(system: FloatArray, right: FloatArray) -> FloatArray:
+    # columns of unlike units and sizes: scaled to length 1, or lstsq drops the small ones as rank deficiency
     lengths = np.linalg.norm(system, axis=0)
     lengths[lengths == 0] = 1.0
     return np.asarray(np.linalg.lstsq(system / lengths, right, rcond=None)[0] / lengths)
@@ -229,6 +234,7 @@ def _zeros(poles: ComplexArray, coefficients: FloatArray) -> ComplexArray:
             column[row] = 2.0
             row += 2
     values = np.linalg.eigvals(matrix - np.outer(column, coefficients))
+    # eigenvalues that are real but for rounding stay single, or each would become a pair
     values = np.where(np.abs(values.imag) < 1e-13 * np.abs(values), values.real, values)
     kept = values[values.imag >= 0]
     return np.asarray(kept[np.argsort(np.abs(kept))], dtype=np.complex128)

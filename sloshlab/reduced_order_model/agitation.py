@@ -95,10 +95,9 @@ class Agitation:
         velocity = np.ascontiguousarray(velocity_m_per_s, np.float64)
         rows = []
         for time_constant_s in self.time_constants_s:
-            row = np.empty(velocity.size)
             unknown = round(FORGOTTEN * time_constant_s * sampling_rate_hz)
-            _follow(KINDS.index(self.kind), velocity, 1 / sampling_rate_hz, time_constant_s, unknown, row)
-            rows.append(np.sqrt(row))
+            state = _follow(KINDS.index(self.kind), velocity, 1 / sampling_rate_hz, time_constant_s, unknown)
+            rows.append(np.sqrt(state))
         return np.stack(rows)
 
     def regressors(self, velocity_m_per_s: FloatArray, sampling_rate_hz: float) -> FloatArray:
@@ -162,9 +161,9 @@ class Agitation:
 
 
 @njit(cache=True)
-def _follow(kind, velocity, step_s, time_constant_s, unknown, state):  # type: ignore[no-untyped-def]
+def _follow(kind, velocity, step_s, time_constant_s, unknown):  # type: ignore[no-untyped-def]
     """One state along a run; exact for a p that is constant over each step."""
-    value, wait = 0.0, 0
+    state, value, wait = np.empty(velocity.size), 0.0, 0
     for k in range(velocity.size):
         if k:
             last = velocity[k - 1]
@@ -181,3 +180,4 @@ def _follow(kind, velocity, step_s, time_constant_s, unknown, state):  # type: i
                 value = stirred + (value - stirred) * math.exp(-step_s / time_constant_s)
                 wait = max(wait - 1, 0)
         state[k] = np.nan if wait else value
+    return state

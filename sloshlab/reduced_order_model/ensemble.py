@@ -172,9 +172,9 @@ def fit_ensemble(
     delays: Delays,
     training: Sequence[Run],
     validation: Sequence[Run],
+    *,
     sampling_rate_hz: float,
     settings: TrainingSettings | None = None,
-    *,
     n_members: int = 8,
     block_s: float = 5.0,
     agitation: Agitation | None = None,
@@ -221,8 +221,8 @@ def fit_ensemble(
             delays,
             drawn_blocks(training, size, rng),
             validation,
-            sampling_rate_hz,
-            replace(chosen, seed=chosen.seed + 1000 * (number + 1)),
+            sampling_rate_hz=sampling_rate_hz,
+            settings=replace(chosen, seed=chosen.seed + 1000 * (number + 1)),
             agitation=agitation,
             backend=backend,
             told=None if told is None else lambda epoch, number=number: told(number, epoch),  # type: ignore[misc]
@@ -231,7 +231,7 @@ def fit_ensemble(
         records.append(record)
         if record.interrupted:
             break
-    if len(members) < 2:
+    if len(members) < 2:  # nothing that could disagree
         raise KeyboardInterrupt
     return Ensemble(tuple(members), residual_spread(members, validation)), records
 

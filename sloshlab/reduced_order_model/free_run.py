@@ -7,14 +7,40 @@ recurrent learning, Williams & Zipser 1989).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 NORMALISED, PLAIN = 0, 1
+
+
+class FeedbackModel(NamedTuple):
+    """A radial basis network with its delay lines, as the compiled loops take it."""
+
+    kind: int  # NORMALISED or PLAIN
+    theta: FloatArray  # (n_parameters,)
+    n_neurons: int
+    input_delays: IntArray
+    output_delays: IntArray
+    bound: float  # of |ŷ|, beyond which it runs away
+
+
+class Stretch(NamedTuple):
+    """Samples `first` … `last` − 1 of a run, for which all regressors are known."""
+
+    first: int
+    last: int
+
+
+class SensitivitySums(NamedTuple):
+    """Sums over the samples of the sensitivities S = ∂ŷ/∂θ and errors e, added to in place."""
+
+    matrix: FloatArray  # Σ S Sᵀ, the lower triangle
+    gradient: FloatArray  # Σ S e
 
 
 @njit(cache=True)
@@ -31,6 +57,7 @@ def evaluate(kind, theta, phi, features, factors):  # type: ignore[no-untyped-de
         largest = max(largest, -squared)
     total = 0.0
     for i in range(m):
+        # shares are ratios: relative to the nearest centre, far from all of them they would be 0/0
         features[i] = np.exp(features[i] - (largest if kind == NORMALISED else 0.0))
         total += features[i]
     offset = 0 if kind == NORMALISED else 1
@@ -46,48 +73,51 @@ def evaluate(kind, theta, phi, features, factors):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def fill_regressors(phi, x, y, k, input_delays, output_delays):  # type: ignore[no-untyped-def]
+def fill_regressors(model, x, y, k, phi):  # type: ignore[no-untyped-def]
     """Write φ(k) into `phi`; y may hold model outputs."""
-    n = input_delays.size
+    n = model.input_delays.size
     for a in range(n):
-        phi[a] = x[k - input_delays[a]]
-    for b in range(output_delays.size):
-        phi[n + b] = y[k - output_delays[b]]
+        phi[a] = x[k - model.input_delays[a]]
+    for b in range(model.output_delays.size):
+        phi[n + b] = y[k - model.output_delays[b]]
 
 
 @njit(cache=True)
-def run_free(kind, theta, m, x, y, first, last, input_delays, output_delays, bound):  # type: ignore[no-untyped-def]
-    """Overwrite y[first:last] with the model's own outputs; return how far it got before |ŷ| > bound."""
-    phi = np.empty(input_delays.size + output_delays.size)
+def run_free(model, x, y, stretch):  # type: ignore[no-untyped-def]
+    """Overwrite y of the stretch with the model's own outputs; return how far it got before |ŷ| > bound."""
+    # arrays are taken out of the tuple before the loop: each access counts a reference up and down
+    kind, theta, m, bound = model.kind, model.theta, model.n_neurons, model.bound
+    phi = np.empty(model.input_delays.size + model.output_delays.size)
     features, factors = np.empty(m), np.empty(m)
-    for k in range(first, last):
-        fill_regressors(phi, x, y, k, input_delays, output_delays)
+    for k in range(stretch.first, stretch.last):
+        fill_regressors(model, x, y, k, phi)
         y[k] = evaluate(kind, theta, phi, features, factors)
         if not abs(y[k]) <= bound:
             return k
-    return last
+    return stretch.last
 
 
 @njit(cache=True)
-def free_run_sums(  # type: ignore[no-untyped-def]
-    kind, theta, m, x, y, first, last, input_delays, output_delays, bound, matrix, gradient
-):
-    """Add Σ S Sᵀ to `matrix` (lower triangle) and Σ S e to `gradient`; return Σ e², infinite if it runs away."""
-    p, n_in, n_out = input_delays.size + output_delays.size, input_delays.size, output_delays.size
-    n_theta = theta.size
-    offset = 0 if kind == NORMALISED else 1
+def free_run_sums(model, x, y, stretch, sums):  # type: ignore[no-untyped-def]
+    """Add to the sums what the errors of a free run over a stretch give; return Σ e², infinite if it runs away."""
+    theta, m, output_delays = model.theta, model.n_neurons, model.output_delays
+    matrix, gradient = sums.matrix, sums.gradient
+    n_in, n_out = model.input_delays.size, output_delays.size
+    p, n_theta = n_in + n_out, theta.size
+    offset = 0 if model.kind == NORMALISED else 1
     longest = 0
     for b in range(n_out):
         longest = max(longest, output_delays[b])
     history = np.zeros((longest + 1, n_theta))
-    model = y.copy()
+    free = y.copy()
     phi, features, factors, slope = np.empty(p), np.empty(m), np.empty(m), np.empty(n_out)
     squares = 0.0
-    for k in range(first, last):
-        fill_regressors(phi, x, model, k, input_delays, output_delays)
-        model[k] = evaluate(kind, theta, phi, features, factors)
-        if not abs(model[k]) <= bound:
+    for k in range(stretch.first, stretch.last):
+        fill_regressors(model, x, free, k, phi)
+        free[k] = evaluate(model.kind, theta, phi, features, factors)
+        if not abs(free[k]) <= model.bound:
             return np.inf
+        # sensitivities of as many past outputs as are fed back, in a ring
         now = history[k % (longest + 1)]
         for b in range(n_out):
             slope[b] = 0.0
@@ -101,10 +131,10 @@ def free_run_sums(  # type: ignore[no-untyped-def]
             now[m * p] = 1.0
         for b in range(n_out):
             before = history[(k - output_delays[b]) % (longest + 1)]
-            if k - output_delays[b] >= first:
+            if k - output_delays[b] >= stretch.first:  # measured outputs before it depend on no parameter
                 for j in range(n_theta):
                     now[j] += slope[b] * before[j]
-        error = y[k] - model[k]
+        error = y[k] - free[k]
         squares += error * error
         for j in range(n_theta):
             gradient[j] += error * now[j]

@@ -22,8 +22,11 @@ FIRST_DAMPING: Final = 1e-3
 LARGEST_DAMPING: Final = 1e10
 _SMALLEST_DAMPING: Final = 1e-6
 _RIDGE: Final = 1e-10
+"""Of the mean diagonal, added for linear parameters: neurons that coincide leave them undetermined."""
 _FLOOR: Final = 1e-9
+"""Of the largest diagonal: parameters that nothing depends on are damped, too."""
 _RATIO: Final = 4.0
+"""Between the dampings that are tried one after the other."""
 _MARKEDLY: Final = 1.01
 
 
@@ -154,6 +157,7 @@ def _solved(xp: Any, matrix: Array, added: Array, right: Array) -> Array | None:
     flat = xp.reshape(matrix, (-1,), copy=True)
     flat[:: n + 1] = flat[:: n + 1] + added
     damped = xp.reshape(flat, (n, n))
+    # Cholesky for NumPy: half the work of LU, and it refuses a matrix that rounding has made indefinite
     if not isinstance(damped, np.ndarray):
         return xp.linalg.solve(damped, right[:, None])[:, 0]
     try:

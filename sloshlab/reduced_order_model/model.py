@@ -162,13 +162,10 @@ class ReducedOrderModel:
             return self.predict(values, np.zeros_like(values))
         outputs = np.zeros_like(values) if start is None else np.nan_to_num(np.asarray(start, np.float64))
         run = self.scaling.scaled(Run.of(values, outputs))
-        theta, n_neurons, kind = self.compiled()
-        simulated, delays = np.full(values.size, np.nan), self.delays
-        for first, last in segments(run, delays):
+        model, simulated = self.compiled(), np.full(values.size, np.nan)
+        for first, last in segments(run, self.delays):
             own = run.y.copy()
-            reached = free_run.run_free(
-                kind, theta, n_neurons, run.x, own, first, last, *delay_arrays(delays), RUNAWAY
-            )
+            reached = free_run.run_free(model, run.x, own, free_run.Stretch(first, last))
             if reached < last:
                 raise AnalysisError(
                     "free run of the model",
@@ -178,8 +175,8 @@ class ReducedOrderModel:
             simulated[first:last] = own[first:last]
         return self.scaling.output_of(simulated)
 
-    def compiled(self) -> tuple[FloatArray, int, int]:
-        """Parameters, neurons and number of the network for the compiled loops of a free run.
+    def compiled(self) -> free_run.FeedbackModel:
+        """Network and delay lines for the compiled loops of a free run.
 
         Raises
         ------
@@ -190,9 +187,10 @@ class ReducedOrderModel:
             raise AnalysisError(
                 "model with feedback", got=self.network.kind, allowed="normalised_rbf, rbf", remedy="use NFIR"
             )
-        return self.theta, self.network.n_neurons, free_run.kind_of(self.network)
+        return feedback_model(self.network, self.theta, self.delays)
 
 
-def delay_arrays(delays: Delays) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return input and output delays as arrays for the compiled loops."""
-    return np.array(delays.inputs, np.int64), np.array(delays.outputs, np.int64)
+def feedback_model(network: Any, theta: FloatArray, delays: Delays) -> free_run.FeedbackModel:
+    """Return a radial basis network with its delay lines for the compiled loops."""
+    inputs, outputs = np.array(delays.inputs, np.int64), np.array(delays.outputs, np.int64)
+    return free_run.FeedbackModel(free_run.kind_of(network), theta, network.n_neurons, inputs, outputs, RUNAWAY)

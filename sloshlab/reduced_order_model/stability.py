@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sloshlab.errors import AnalysisError
 from sloshlab.reduced_order_model import free_run
-from sloshlab.reduced_order_model.model import ReducedOrderModel, delay_arrays
+from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis
 
 FloatArray = NDArray[np.float64]
@@ -102,10 +102,9 @@ def stability(
     if not model.has_feedback:
         simulated = model.simulate(x)
         return Stability(-math.inf, _bound(model), float(np.nanmax(np.abs(simulated))))
-    theta, n_neurons, kind = model.compiled()
     run_x = (x - model.scaling.input_offset) / model.scaling.input_scale
     y = np.full(n_samples, -model.scaling.output_offset / model.scaling.output_scale)
-    rate = growth_rate(kind, theta, n_neurons, run_x, y, *delay_arrays(model.delays), round(_SETTLING * n_samples))
+    rate = growth_rate(model.compiled(), run_x, y, round(_SETTLING * n_samples))
     largest = float(np.abs(model.scaling.output_of(y)).max())
     return Stability(rate * model.sampling_rate_hz, _bound(model), largest)
 
@@ -132,10 +131,9 @@ def _bound(model: ReducedOrderModel) -> float:
 
 
 @njit(cache=True)
-def growth_rate(  # type: ignore[no-untyped-def]
-    kind, theta, m, x, y, input_delays, output_delays, settling
-):
+def growth_rate(model, x, y, settling):  # type: ignore[no-untyped-def]
     """Mean growth of a small difference of the past outputs, per sample; overwrites y by the free run."""
+    theta, m, input_delays, output_delays = model.theta, model.n_neurons, model.input_delays, model.output_delays
     n_in, n_out = input_delays.size, output_delays.size
     p = n_in + n_out
     first, reach = 0, 0
@@ -148,8 +146,8 @@ def growth_rate(  # type: ignore[no-untyped-def]
     difference = np.ones(reach) / np.sqrt(reach)  # of the last outputs, the latest first
     total, count = 0.0, 0
     for k in range(first, x.size):
-        free_run.fill_regressors(phi, x, y, k, input_delays, output_delays)
-        y[k] = free_run.evaluate(kind, theta, phi, features, factors)
+        free_run.fill_regressors(model, x, y, k, phi)
+        y[k] = free_run.evaluate(model.kind, theta, phi, features, factors)
         new = 0.0
         for b in range(n_out):
             slope = 0.0
@@ -159,6 +157,7 @@ def growth_rate(  # type: ignore[no-untyped-def]
         for b in range(reach - 1, 0, -1):
             difference[b] = difference[b - 1]
         difference[0] = new
+        # brought back to size 1 at every sample, so that its growth neither overflows nor vanishes
         size = np.sqrt(np.sum(difference * difference))
         if size < 1e-300:
             return -np.inf

@@ -17,7 +17,7 @@ from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend, array_backend
 from sloshlab.reduced_order_model.early_stop import EarlyStop
 from sloshlab.reduced_order_model.least_squares import LeastSquaresProblem, OneStepProblem, Step, next_step
-from sloshlab.reduced_order_model.model import RUNAWAY, ReducedOrderModel, Scaling, delay_arrays, scaled_run
+from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling, feedback_model, scaled_run
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.networks.network import Network, NormalSums
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
@@ -135,9 +135,9 @@ def fit(
     delays: Delays,
     training: Sequence[Run],
     validation: Sequence[Run],
+    *,
     sampling_rate_hz: float,
     settings: TrainingSettings | None = None,
-    *,
     agitation: Agitation | None = None,
     backend: ArrayBackend | None = None,
     told: Callable[[Epoch], None] | None = None,
@@ -191,7 +191,7 @@ def fit(
     best, started, interrupted = _Best(), time.monotonic(), False
     try:
         for start in range(chosen.n_starts):
-            _train_once(task, chosen, start, best, started, told or (lambda epoch: None))
+            _train_once(task, chosen, start, best, started=started, told=told or (lambda epoch: None))
     except KeyboardInterrupt:
         interrupted = True
         if best.theta is None:
@@ -208,6 +208,7 @@ def _train_once(
     settings: TrainingSettings,
     start: int,
     best: _Best,
+    *,
     started: float,
     told: Callable[[Epoch], None],
 ) -> None:
@@ -226,6 +227,7 @@ def _train_once(
     for problem, backend in stages:
         is_last = problem is stages[-1][0]
         own = best if is_last else _Best()
+        # one step ahead only prepares the free run: a rising validation error does not end it
         own_settings = settings if is_last else replace(settings, patience=settings.n_epochs)
         theta, number = _descend(
             replace(task, backend=backend),
@@ -233,8 +235,8 @@ def _train_once(
             backend.asarray(theta),
             own_settings,
             own,
-            (start, number, started),
-            told,
+            place=(start, number, started),
+            told=told,
         )
 
 
@@ -244,6 +246,7 @@ def _descend(
     theta: Array,
     settings: TrainingSettings,
     best: _Best,
+    *,
     place: tuple[int, int, float],
     told: Callable[[Epoch], None],
 ) -> tuple[FloatArray, int]:
@@ -290,29 +293,18 @@ class _FreeRunProblem:
     delays: Delays
     runs: list[Run]
 
-    def _stretches(self) -> Iterator[tuple[Run, int, int]]:
+    def _stretches(self) -> Iterator[tuple[Run, free_run.Stretch]]:
         for run in self.runs:
             for first, last in segments(run, self.delays):
-                yield run, first, last
+                yield run, free_run.Stretch(first, last)
 
     def normal_sums(self, theta: Array) -> NormalSums:
         n = self.network.n_parameters
-        matrix, gradient, squares = np.zeros((n, n)), np.zeros(n), 0.0
-        for run, first, last in self._stretches():
-            squares += free_run.free_run_sums(
-                free_run.kind_of(self.network),
-                theta,
-                self.network.n_neurons,
-                run.x,
-                run.y,
-                first,
-                last,
-                *delay_arrays(self.delays),
-                RUNAWAY,
-                matrix,
-                gradient,
-            )
-        return NormalSums(matrix + np.tril(matrix, -1).T, gradient, squares)
+        sums, squares = free_run.SensitivitySums(np.zeros((n, n)), np.zeros(n)), 0.0
+        model = feedback_model(self.network, theta, self.delays)
+        for run, stretch in self._stretches():
+            squares += free_run.free_run_sums(model, run.x, run.y, stretch, sums)
+        return NormalSums(sums.matrix + np.tril(sums.matrix, -1).T, sums.gradient, squares)
 
     def improved(self, theta: Array) -> tuple[Array, float]:
         return theta, _free_squares(self.network, self.delays, theta, self.runs)
@@ -327,14 +319,11 @@ def _free_squares(network: Network, delays: Delays, theta: FloatArray, runs: Seq
             squares += float(error @ error)
         return squares
     squares = 0.0
-    radial: Any = network
+    model = feedback_model(network, theta, delays)
     for run in runs:
         for first, last in segments(run, delays):
             own = run.y.copy()
-            reached = free_run.run_free(
-                free_run.kind_of(radial), theta, radial.n_neurons, run.x, own, first, last,
-                *delay_arrays(delays), RUNAWAY,
-            )  # fmt: skip
+            reached = free_run.run_free(model, run.x, own, free_run.Stretch(first, last))
             if reached < last:
                 return math.inf
             squares += float(np.sum((run.y[first:last] - own[first:last]) ** 2))

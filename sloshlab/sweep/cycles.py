@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -137,17 +138,15 @@ def evaluate_cycles(
     inside = (positions[:-1] >= MARGIN_SAMPLES + 1) & (positions[1:] <= force.size - MARGIN_SAMPLES - 2)
     long_enough = np.diff(positions) > 4
     slope = np.gradient(np.arange(positions.size, dtype=np.float64), positions, edge_order=2)
-    scalars, phasors = _kernel(
+    signals = _Signals(
         force,
         motion,
-        positions,
-        slope,
-        inside & long_enough,
+        np.zeros(0, dtype=np.bool_) if unusable is None else unusable,
         1.0 / sampling_rate_hz,
         inertia_kg,
         motion_is_velocity,
-        np.zeros(0, dtype=np.bool_) if unusable is None else unusable,
     )
+    scalars, phasors = _kernel(signals, positions, slope, inside & long_enough)
     return Cycles(
         start_s=np.asarray(boundaries_s[:-1]),
         stop_s=np.asarray(boundaries_s[1:]),
@@ -166,44 +165,53 @@ def evaluate_cycles(
     )
 
 
+class _Signals(NamedTuple):
+    """Force and motion of the tank, and how they are to be read."""
+
+    force: FloatArray
+    motion: FloatArray
+    unusable: BoolArray  # empty if no sample is flagged
+    step_s: float
+    inertia_kg: float
+    motion_is_velocity: bool
+
+
+class _OneCycle(NamedTuple):
+    """A cycle among the samples."""
+
+    start: float  # in samples
+    stop: float
+    slope_start: float  # of the cycles counted over the part of this cycle that has gone by, at its ends
+    slope_stop: float
+    parity: int  # 1 for every second cycle
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _kernel(
-    force: FloatArray,
-    motion: FloatArray,
-    positions: FloatArray,
-    slope: FloatArray,
-    evaluable: BoolArray,
-    step_s: float,
-    inertia_kg: float,
-    motion_is_velocity: bool,
-    unusable: BoolArray,
+    signals: _Signals, positions: FloatArray, slope: FloatArray, evaluable: BoolArray
 ) -> tuple[FloatArray, ComplexArray]:
     n_cycles = positions.size - 1
     scalars = np.full((n_cycles, _N_SCALARS), np.nan)
     phasors = np.full((n_cycles, 2 * N_HARMONICS + 3), np.nan + 0j)
     for n in range(n_cycles):
-        if evaluable[n] and _complete(force, motion, unusable, positions[n], positions[n + 1]):
-            _one_cycle(
-                force,
-                motion,
+        if evaluable[n] and _complete(signals, positions[n], positions[n + 1]):
+            cycle = _OneCycle(
                 positions[n],
                 positions[n + 1],
                 slope[n] * (positions[n + 1] - positions[n]),
                 slope[n + 1] * (positions[n + 1] - positions[n]),
-                step_s,
-                inertia_kg,
-                motion_is_velocity,
                 n % 2,
-                scalars[n],
-                phasors[n],
             )
+            _one_cycle(signals, cycle, scalars[n], phasors[n])
     return scalars, phasors
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _complete(force: FloatArray, motion: FloatArray, unusable: BoolArray, start: float, stop: float) -> bool:
+def _complete(signals: _Signals, start: float, stop: float) -> bool:
     """True if no sample that the cycle needs is lost or flagged."""
+    force, motion, unusable = signals.force, signals.motion, signals.unusable
     first, last = int(np.ceil(start)) - MARGIN_SAMPLES, int(np.floor(stop)) + MARGIN_SAMPLES
+    # a sum is finite if all its terms are; one test per cycle instead of two per sample
     total = 0.0
     for i in range(first, last + 1):
         total += force[i] + motion[i]
@@ -217,20 +225,9 @@ def _complete(force: FloatArray, motion: FloatArray, unusable: BoolArray, start:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nsz", "arcp"})  # type: ignore[untyped-decorator]
-def _one_cycle(
-    force: FloatArray,
-    motion: FloatArray,
-    start: float,
-    stop: float,
-    slope_start: float,
-    slope_stop: float,
-    step_s: float,
-    inertia_kg: float,
-    motion_is_velocity: bool,
-    parity: int,
-    scalars: FloatArray,
-    phasors: ComplexArray,
-) -> None:
+def _one_cycle(signals: _Signals, cycle: _OneCycle, scalars: FloatArray, phasors: ComplexArray) -> None:
+    force, motion, motion_is_velocity = signals.force, signals.motion, signals.motion_is_velocity
+    step_s, inertia_kg, start, stop = signals.step_s, signals.inertia_kg, cycle.start, cycle.stop
     p, q = int(np.ceil(start)), int(np.floor(stop))
     length = stop - start
     duration = length * step_s
@@ -238,7 +235,7 @@ def _one_cycle(
     boundary_weights(p - start, left)
     boundary_weights(stop - q, right)
     # φ/2π of the cycle as the cubic x + x (1-x) (c₀ (1-x) - c₁ x) with the measured slopes at both ends
-    c_start, c_stop = slope_start - 1.0, slope_stop - 1.0
+    c_start, c_stop = cycle.slope_start - 1.0, cycle.slope_stop - 1.0
     work = sum_force = sum_force_time = sum_velocity = sum_motion = 0.0
     sum_d = sum_d2 = 0.0
     highest, lowest = -np.inf, np.inf
@@ -259,6 +256,7 @@ def _one_cycle(
         half_angle = np.pi * turn
         half = np.cos(half_angle) - 1j * np.sin(half_angle)
         unit = half * half
+        # channels of 16 bits stay in single precision, which halves the memory traffic; the sums are double
         f, a = float(force[i]), float(motion[i])
         v = a if motion_is_velocity else velocity
         t = (x - 0.5) * duration
@@ -290,6 +288,7 @@ def _one_cycle(
         if p <= i <= q:
             highest, lowest = max(highest, d), min(lowest, d)
     two_per_duration = 2.0 / duration
+    # both constants of integration are corrected in the sums, so that the samples are gone through once
     drift = 0.0 if motion_is_velocity else sum_motion / duration
     mean_velocity = sum_velocity / duration
     scalars[_WORK] = work - mean_velocity * sum_force - drift * sum_force_time
@@ -303,6 +302,7 @@ def _one_cycle(
         factor = 1j * omega * (k + 1) if motion_is_velocity else 1.0 + 0.0j
         phasors[N_HARMONICS + k] = two_per_duration * motion_k[k] * factor
     phasors[2 * N_HARMONICS] = velocity_1
-    sign = 1.0 - 2.0 * parity
+    # half a turn of Ω/2 passes in a cycle: what alternates has the other sign in every second one
+    sign = 1.0 - 2.0 * cycle.parity
     phasors[2 * N_HARMONICS + 1] = sign * two_per_duration * half_1
     phasors[2 * N_HARMONICS + 2] = sign * two_per_duration * half_3

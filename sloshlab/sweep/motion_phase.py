@@ -10,6 +10,7 @@ and therefore has no delay.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +27,9 @@ _DEMODULATION_RATE_HZ = 1000.0
 """The motion is averaged down to about this rate before its phase is taken."""
 _KNOTS_PER_CYCLE = 1.0
 _CYCLES_PER_BLOCK = 8.0
+"""Of the spectra that tell the frequency to begin with."""
 _BLOCKS_AT_ONCE = 16
+"""Blocks overlap by half and are padded to four times their length: those of a long recording come in portions."""
 _STRONG_LINE = 0.4
 """The fundamental has at least this part of the largest line of a block."""
 _LOBE_LINES = 13
@@ -123,10 +126,13 @@ def measured_phase(
     times, phase = _phase_knots(knots, frequency, decimated.size / rate_hz)
     amplitude = np.empty(0)
     moving = np.empty(0, dtype=np.bool_)
+    # the window follows the frequency of the last phase, which the block spectra give only roughly
     for iteration in range(3):
         spline = CubicSpline(times, phase)
         window_s = _WINDOW_CYCLES * 2 * np.pi / np.maximum(spline(times, 1), 1e-6)
-        z, power, lost = _demodulated(decimated, weight, rate_hz, times, window_s, spline.c, spline.x)
+        z, power, lost = _demodulated(
+            decimated, weight, rate_hz, _Knots(times, window_s), _PhaseSpline(spline.c, spline.x)
+        )
         amplitude = np.abs(z)
         moving = (amplitude > _SMALLEST_RELATIVE_AMPLITUDE * amplitude.max()) & ~lost
         moving &= 0.5 * amplitude**2 > _SMALLEST_SHARE_OF_POWER * power
@@ -206,7 +212,8 @@ def _peaks(
     frequency = np.fft.rfftfreq(4 * n_block, 1 / rate_hz)
     lowest = 2.0 * rate_hz / n_block
     spectrum[:, (frequency < lowest) | (frequency > 0.4 * rate_hz)] = 0.0
-    # the fundamental is the first strong line, a harmonic may be the strongest
+    # The fundamental is the first strong line, a harmonic may be the strongest. With the spectrum over f instead,
+    # noise below 1 Hz won in signals of large dynamic range.
     first = (spectrum >= _STRONG_LINE * spectrum.max(axis=1, keepdims=True)).argmax(axis=1)
     lobe = np.minimum(first[:, None] + np.arange(_LOBE_LINES), frequency.size - 1)
     rows = np.arange(starts.size)
@@ -244,6 +251,7 @@ def _unwrapped(angle: FloatArray, moving: BoolArray) -> FloatArray:
     at = np.flatnonzero(moving)
     if at.size == 0:
         return np.zeros_like(angle)
+    # angles where nothing moves are noise and would add turns
     return np.interp(np.arange(angle.size), at, np.unwrap(angle[at]))
 
 
@@ -264,22 +272,29 @@ def _isolated_loss(moving: BoolArray) -> BoolArray:
     return inside & ~moving
 
 
+class _Knots(NamedTuple):
+    """Where the motion is demodulated, and under how long a window."""
+
+    times: FloatArray
+    window_s: FloatArray
+
+
+class _PhaseSpline(NamedTuple):
+    """The cubic spline φ(t)."""
+
+    coefficients: FloatArray  # (4, n_pieces), the highest power first
+    breaks: FloatArray  # (n_pieces + 1,)
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _demodulated(
-    motion: FloatArray,
-    weight: FloatArray,
-    rate_hz: float,
-    times: FloatArray,
-    window_s: FloatArray,
-    coefficients: FloatArray,
-    breaks: FloatArray,
+    motion: FloatArray, weight: FloatArray, rate_hz: float, knots: _Knots, spline: _PhaseSpline
 ) -> tuple[npt.NDArray[np.complex128], FloatArray, BoolArray]:
     """Amplitude, twice the mean of motion·e^{-jφ}, and mean square under a Hann window at each knot.
 
     The third result is True where samples were lost.
-
-    ``coefficients`` and ``breaks`` are those of the cubic spline φ(t).
     """
+    times, window_s, coefficients, breaks = knots.times, knots.window_s, spline.coefficients, spline.breaks
     result = np.zeros(times.size, dtype=np.complex128)
     power = np.zeros(times.size)
     lost = np.zeros(times.size, dtype=np.bool_)

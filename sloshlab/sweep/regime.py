@@ -98,6 +98,7 @@ def classify(
     beside_fundamental = np.sqrt(2 * others) / reference_force_n if reference_force_n > 0 else np.nan
     if force_ratio < QUIET_FORCE_RATIO:
         label = QUIET
+    # of a smooth response that dissipates the shares are rounding, which must not decide
     elif beside_fundamental < QUIET_FORCE_RATIO:
         label = FARADAY
     else:

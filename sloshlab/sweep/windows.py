@@ -61,6 +61,7 @@ def window_slices(cycles: Cycles, settings: WindowSettings) -> Iterator[slice]:
     With P = 6 and M = 24, a sweep of 68 cycles has windows 4–16, 28–40 and 52–64.
     """
     frequency = cycles.omega_rad_per_s
+    # a stepped sweep: no window may average two frequencies
     jumps = np.flatnonzero(np.abs(np.diff(frequency)) > _LARGEST_CHANGE_PER_CYCLE * frequency[:-1]) + 1
     edges = np.concatenate([[0], jumps, [frequency.size]])
     width = 2 * settings.half_width_cycles
@@ -112,7 +113,7 @@ def evaluate_windows(
     for window in window_slices(cycles, chosen):
         at = _steady(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
         if at.size >= chosen.smallest_n_cycles:
-            row = _row(cycles, at, law, start_time_s, rig, noise_power)
+            row = _row(cycles, at, law, start_time_s, rig=rig, noise_power=noise_power)
             if abs(_number(row, "growth_per_cycle")) < _LARGEST_GROWTH_PER_CYCLE:
                 rows.append(row)
             else:
@@ -155,10 +156,12 @@ def _steady(cycles: Cycles, at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
     amplitude = np.abs(cycles.acceleration_phasor[at, 0])
     frequency = np.log(cycles.omega_rad_per_s[at])
     trend = np.median(np.diff(frequency) / np.diff(at)) * (at - at.mean())
+    # medians throughout: the transition that is sought must not shift the trend it is measured against
     deviation = np.abs(frequency - trend - np.median(frequency - trend))
     moving = amplitude > _SMALLEST_AMPLITUDE_RATIO * np.median(amplitude)
     limit = max(_SMALLEST_OUTLIER, _OUTLIER_SIGMA * 1.4826 * float(np.median(deviation)))
     transition = ~moving | (deviation >= limit)
+    # the phase is smoothed over two cycles, so that a neighbour has part of the transition
     beside = np.convolve(transition, np.ones(3), mode="same") > 0
     return np.asarray(at[~beside])
 
@@ -168,6 +171,7 @@ def _row(
     at: npt.NDArray[np.intp],
     law: SweepLaw | None,
     start_time_s: float,
+    *,
     rig: Rig | None,
     noise_power: float,
 ) -> dict[str, object]:
@@ -271,6 +275,7 @@ def _regime(
     first = _pair_starts(at)
     mass = rig.liquid_mass_kg if rig is not None else abs(_number(row, "apparent_mass_kg"))
     lead = np.angle(cycles.acceleration_phasor[at, 0])
+    # relative to the acceleration's phase, in which the part at Ω that is inertia is the real one
     dynamic = cycles.dynamic_phasor[at] * np.exp(-1j * np.outer(lead, np.arange(1, N_HARMONICS + 1)))
     subharmonic = _pair_means(cycles.subharmonic_phasor[at], first)
     regime = classify(

@@ -14,22 +14,34 @@ Newton's method at every stage.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from sloshlab.twin.law import N_MOTION, VELOCITY
 from sloshlab.twin.law_call import call_law
-from sloshlab.twin.model import NO_FRICTION, STICKS, Excited, FloatArray, Model, Outputs, Scratch
+from sloshlab.twin.model import NO_FRICTION, STICKS, Excited, FloatArray, Model, Outputs, Scratch, Stretch, Time
 from sloshlab.twin.rates import advance, advance_once, let_go, rates_once, set_friction
 from sloshlab.twin.status import Status
 
 DONE, UNSTABLE, FAULT, CHATTER, NO_ACCELERATION = (int(status) for status in Status)
 
 _SWITCH_TOLERANCE = 1e-13
+"""An event function so little below zero has not changed its sign: rounding, right after its own event."""
 _EVENT_TIME_TOLERANCE_S = 1e-12
 _MOST_EVENTS_PER_STEP = 50
+"""More of them within one step are chatter, which the engine does not follow."""
 _SHARE_TOLERANCE = 1e-6
 """Of a step: an instant so close to its end is its end."""
+
+
+class _PastEvent(NamedTuple):
+    """A trial step that went past an event."""
+
+    step_s: float  # the whole step
+    share: float  # of it, that was tried
+    margin: float  # smallest event function at its end, negative
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -41,7 +53,7 @@ def _copy(source: FloatArray, target: FloatArray) -> None:
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
 def _events(m: Model, i: int, y: FloatArray, s: Scratch) -> None:
     motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
-    call_law(m.events[i], s.motion, motion, m.parameters, m.parameters_at[i], y, at, s.values, 0)
+    call_law(m.events[i], (s.motion, m.parameters, y, s.values), (motion, m.parameters_at[i], at, 0))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -65,11 +77,11 @@ def _margin(m: Model, y: FloatArray, s: Scratch) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _to_event(
-    m: Model, excited: Excited, time: float, position: float, step: float, share: float, gap: float, s: Scratch
-) -> float:
+def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scratch) -> float:
     """Share of the whole step after which the first event has just come; `trial` is the state there."""
-    low, high, above, below = 0.0, share, -1.0, gap
+    step = past.step_s
+    # regula falsi needs values on both sides; until one above zero is known the interval is halved
+    low, high, above, below = 0.0, past.share, -1.0, past.margin
     kept = 0
     for _ in range(100):
         if (high - low) * step <= _EVENT_TIME_TOLERANCE_S:
@@ -77,10 +89,12 @@ def _to_event(
         middle = 0.5 * (low + high)
         if above > 0.0:
             middle = low + (high - low) * above / (above - below)
+            # away from both ends, or the bracket hardly shrinks
             middle = min(max(middle, low + 0.01 * (high - low)), high - 0.01 * (high - low))
-        advance_once(m, excited, time, position, middle * step, 2.0 * middle, s)
+        advance_once(m, excited, start, Time(middle * step, 2.0 * middle), s)
         value = _margin(m, s.trial, s)
         if value < -_SWITCH_TOLERANCE or not np.isfinite(value):
+            # Illinois: an end that stays while the other moves twice counts half, so that it moves, too
             high, below = middle, value
             above *= 0.5 if kept == 1 else 1.0
             kept = 1
@@ -88,15 +102,14 @@ def _to_event(
             low, above = middle, max(value, 0.0)
             below *= 0.5 if kept == -1 else 1.0
             kept = -1
-    advance_once(m, excited, time, position, high * step, 2.0 * high, s)
+    # the far side of the event, where its function is negative: there the switch turns and stays turned
+    advance_once(m, excited, start, Time(high * step, 2.0 * high), s)
     return high
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _switch(
-    m: Model, excited: Excited, time: float, position: float, s: Scratch, log: FloatArray, n_logged: int
-) -> tuple[int, int]:
-    """Turn every switch whose event has come; returns events logged and the term that met its limit, or −1."""
+def _switch(m: Model, excited: Excited, now: Time, s: Scratch, out: Outputs) -> int:
+    """Turn every switch whose event has come; returns the term that met its limit, or −1."""
     for i in range(m.law.size):
         if m.events[i] == 0:
             continue
@@ -105,25 +118,26 @@ def _switch(
         for k in range(m.n_switches[i] + m.n_limits[i]):
             if k >= m.n_switches[i]:
                 if s.values[k] < 0.0:
-                    return n_logged, i
+                    return i
             elif s.state[at + k] * s.values[k] < 0.0:
                 s.state[at + k] = -s.state[at + k]
-                n_logged = _logged(log, n_logged, time, i, k, s.state[at + k])
+                _log(out, now, i, k, s.state[at + k])
     before = s.friction[0]
     if before == STICKS:
         let_go(s)
     elif before != NO_FRICTION and before * s.motion[m.friction_frame * N_MOTION + VELOCITY] < 0.0:
-        set_friction(m, excited, time, position, s)
+        set_friction(m, excited, now, s)
     if s.friction[0] != before:
-        n_logged = _logged(log, n_logged, time, -1, 0, s.friction[0])
-    return n_logged, -1
+        _log(out, now, -1, 0, s.friction[0])
+    return -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def _logged(log: FloatArray, n: int, time: float, term: int, event: int, value: float) -> int:
+def _log(out: Outputs, now: Time, term: int, event: int, value: float) -> None:
+    log, n = out.log, out.n_events[0]
     if n < log.shape[0]:
-        log[n, 0], log[n, 1], log[n, 2], log[n, 3] = time, term, event, value
-    return n + 1
+        log[n, 0], log[n, 1], log[n, 2], log[n, 3] = now.seconds, term, event, value
+    out.n_events[0] = n + 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -156,8 +170,9 @@ def _fault_of(y: FloatArray, largest: FloatArray) -> int:
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
     """Set the switches and the friction of the start and record it; the term that is beyond its limit, or −1."""
-    rates_once(m, excited, 0.0, 0.0, s.state, s.slopes[0], s.powers[0], s)
-    _update_due(m, excited, 0.0, 0.0, 0.0, s)
+    start = Time(0.0, 0.0)
+    rates_once(m, excited, start, s)
+    _update_due(m, excited, start, 0.0, s)
     for i in range(m.law.size):
         if m.events[i]:
             _events(m, i, s.state, s)
@@ -171,14 +186,14 @@ def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
         velocity = s.motion[m.friction_frame * N_MOTION + VELOCITY]
         s.friction[0] = -1.0 if velocity < 0.0 else 1.0
         if velocity == 0.0:
-            set_friction(m, excited, 0.0, 0.0, s)
-    rates_once(m, excited, 0.0, 0.0, s.state, s.slopes[0], s.powers[0], s)
+            set_friction(m, excited, start, s)
+    rates_once(m, excited, start, s)
     _record(m, 0, s, out)
     return -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _update(m: Model, excited: Excited, time: float, position: float, s: Scratch) -> None:
+def _update(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     """Let models in discrete time that follow the output take their step."""
     updated = False
     for i in range(m.law.size):
@@ -186,26 +201,26 @@ def _update(m: Model, excited: Excited, time: float, position: float, s: Scratch
             _update_one(m, i, s)
             updated = True
     if updated:
-        rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+        rates_once(m, excited, now, s)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def _update_one(m: Model, i: int, s: Scratch) -> None:
     motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
-    call_law(m.update[i], s.motion, motion, m.parameters, m.parameters_at[i], s.state, at, s.slopes[4], at)
+    call_law(m.update[i], (s.motion, m.parameters, s.state, s.slopes[4]), (motion, m.parameters_at[i], at, at))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _update_due(m: Model, excited: Excited, time: float, position: float, tolerance_s: float, s: Scratch) -> None:
+def _update_due(m: Model, excited: Excited, now: Time, tolerance_s: float, s: Scratch) -> None:
     """Let models in discrete time whose own instant this is take their step."""
     updated = False
     for i in range(m.law.size):
-        if m.update_period[i] > 0.0 and s.updates[i] * m.update_period[i] <= time + tolerance_s:
+        if m.update_period[i] > 0.0 and s.updates[i] * m.update_period[i] <= now.seconds + tolerance_s:
             _update_one(m, i, s)
             s.updates[i] += 1.0
             updated = True
     if updated:
-        rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+        rates_once(m, excited, now, s)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
@@ -219,65 +234,56 @@ def _next_update(m: Model, s: Scratch) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def integrate(
-    m: Model,
-    excited: Excited,
-    s: Scratch,
-    largest: FloatArray,
-    step: float,
-    n_substeps: int,
-    first_row: int,
-    last_row: int,
-    out: Outputs,
-    n_logged: int,
-) -> tuple[int, int, int, int]:
-    """Integrate on and fill the rows from `first_row` (not 0) up to and without `last_row`.
+def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Outputs) -> tuple[int, int, int]:
+    """Integrate on and fill the rows of a stretch.
 
     Returns
     -------
     tuple of int
-        Status, rows filled, term or state that ended the simulation, number of events so far.
+        Status, rows filled, term or state that ended the simulation.
     """
+    step, n_substeps = stretch.step_s, stretch.n_substeps
     due = _next_update(m, s)
-    for row in range(first_row, last_row):
+    for row in range(stretch.first_row, stretch.last_row):
         for substep in range(n_substeps):
             index = (row - 1) * n_substeps + substep
             done, n_switched = 0.0, 0
             while done < 1.0:
-                time, position, share = (index + done) * step, 2.0 * (index + done), 1.0 - done
-                is_last = not (due - time) / step < share - _SHARE_TOLERANCE
+                # instants are counted from the start and never summed up, so that they do not drift
+                now, share = Time((index + done) * step, 2.0 * (index + done)), 1.0 - done
+                is_last = not (due - now.seconds) / step < share - _SHARE_TOLERANCE
                 if not is_last:
-                    share = max((due - time) / step, 0.0)
-                good = advance(m, excited, time, position, share * step, 2.0 * share, s)
+                    share = max((due - now.seconds) / step, 0.0)
+                good = advance(m, excited, now, Time(share * step, 2.0 * share), s)
                 gap = _margin(m, s.trial, s)
                 if not good:
-                    where = _fault_of(s.trial, largest)
-                    return (NO_ACCELERATION if where < 0 else UNSTABLE), row, where, n_logged
+                    where = _fault_of(s.trial, stretch.largest)
+                    return (NO_ACCELERATION if where < 0 else UNSTABLE), row, where
                 if not gap < -_SWITCH_TOLERANCE:
                     _accept(s)
                     done = 1.0 if is_last else done + share
-                    time = (index + done) * step
-                    if due <= time + _SHARE_TOLERANCE * step:
-                        _update_due(m, excited, time, 2.0 * (index + done), _SHARE_TOLERANCE * step, s)
+                    now = Time((index + done) * step, 2.0 * (index + done))
+                    if due <= now.seconds + _SHARE_TOLERANCE * step:
+                        _update_due(m, excited, now, _SHARE_TOLERANCE * step, s)
                         due = _next_update(m, s)
                     continue
-                done += _to_event(m, excited, time, position, step, share, gap, s)
+                done += _to_event(m, excited, now, _PastEvent(step, share, gap), s)
                 _accept(s)
-                time, position = (index + done) * step, 2.0 * (index + done)
-                n_logged, where = _switch(m, excited, time, position, s, out.log, n_logged)
+                now = Time((index + done) * step, 2.0 * (index + done))
+                where = _switch(m, excited, now, s, out)
                 if where >= 0:
-                    return FAULT, row, where, n_logged
-                rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+                    return FAULT, row, where
+                rates_once(m, excited, now, s)
                 n_switched += 1
                 if n_switched > _MOST_EVENTS_PER_STEP:
-                    return CHATTER, row, -1, n_logged
+                    return CHATTER, row, -1
         if m.updates:
-            _update(m, excited, row * n_substeps * step, 2.0 * row * n_substeps, s)
-        where = _fault_of(s.state, largest)
+            _update(m, excited, Time(row * n_substeps * step, 2.0 * row * n_substeps), s)
+        where = _fault_of(s.state, stretch.largest)
         if where >= 0:
-            return UNSTABLE, row, where, n_logged
+            return UNSTABLE, row, where
         _record(m, row, s, out)
-    return DONE, last_row, -1, n_logged
+    return DONE, stretch.last_row, -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]

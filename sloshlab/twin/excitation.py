@@ -150,7 +150,7 @@ def stepped_sine(
             chirp += dw * slope / change_s
             after = np.maximum(time - start - change_s, 0.0)
             phase += dw * (change_s * (2.5 * x**4 - 3 * x**5 + x**6) + after)
-        return _motion(u, phase, frequency, rate, curvature, chirp)
+        return _motion(u, phase, frequency, rate=rate, curvature=curvature, chirp=chirp)
 
     duration = omega.size * (dwell_s + change_s)
     return Excitation(sampling_rate_hz, _n_samples(duration, sampling_rate_hz), inputs, moves_base=True)
@@ -160,6 +160,7 @@ def _motion(
     amplitude: FloatArray,
     phase: FloatArray,
     frequency: FloatArray,
+    *,
     rate: FloatArray | float = 0.0,
     curvature: FloatArray | float = 0.0,
     chirp: FloatArray | float = 0.0,

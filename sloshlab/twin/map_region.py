@@ -46,7 +46,9 @@ def outside_remarks(term: Term, time_s: FloatArray, motion: FloatArray, memory: 
         (outside & small, f"below the smallest measured amplitude (u_bar {smallest:.3g})"),
         (outside & ~small, "outside of the measured region"),
     )
-    return tuple(_remark(term.name, what, where, time_s, omega_bar, u_bar) for where, what in cases if where.any())
+    return tuple(
+        _remark(term.name, what, where, time_s, (omega_bar, u_bar)) for where, what in cases if where.any()
+    )
 
 
 def _region(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -64,9 +66,9 @@ def _place_in_map(term: Term, motion: FloatArray, memory: FloatArray) -> tuple[F
 
 
 def _remark(
-    name: str, what: str, where: BoolArray, time_s: FloatArray, omega_bar: FloatArray, u_bar: FloatArray
+    name: str, what: str, where: BoolArray, time_s: FloatArray, place: tuple[FloatArray, FloatArray]
 ) -> str:
-    first = int(np.argmax(where))
+    first, (omega_bar, u_bar) = int(np.argmax(where)), place
     return (
         f"{name}: {what} for {100 * where.mean():.3g} % of the time, first at t = {time_s[first]:.6g} s "
         f"(omega_bar {omega_bar[first]:.3g}, u_bar {u_bar[first]:.3g}); the nearest measured value acts there"

@@ -83,6 +83,21 @@ class Scratch(NamedTuple):
     trial_works: FloatArray  # (n_works,)
 
 
+class Stage(NamedTuple):
+    """A state, and where its rates and the powers of all forces are written."""
+
+    state: FloatArray  # (n_states,)
+    rates: FloatArray  # (n_states,)
+    powers: FloatArray  # (n_works,)
+
+
+class Time(NamedTuple):
+    """An instant since the start, or a length of time, in both measures: exact in the grid of the excitation."""
+
+    seconds: float
+    half_steps: float
+
+
 class Excited(NamedTuple):
     """The excitation of one stretch."""
 
@@ -98,6 +113,17 @@ class Outputs(NamedTuple):
 
     rows: FloatArray  # (n, 3 n_modes + n_memory + n_terms + n_works): q, q̇, q̈, memory, forces, works at a sample
     log: FloatArray  # (largest number of events kept, 4)
+    n_events: IntArray  # (1,) of all events so far, more than are kept if need be
+
+
+class Stretch(NamedTuple):
+    """The rows of the outputs that one call of the engine fills, and how finely it steps between them."""
+
+    first_row: int  # not 0, which is the start
+    last_row: int  # not included
+    n_substeps: int
+    step_s: float
+    largest: FloatArray  # (n_states,) bounds of the state, beyond which the simulation is unstable
 
 
 def n_columns(n_modes: int, n_terms: int, n_memory: int) -> int:

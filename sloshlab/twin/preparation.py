@@ -20,7 +20,7 @@ from sloshlab.twin.model import (
     Excited,
     Model,
     Outputs,
-    Scratch,
+    Stretch,
     columns,
     n_columns,
     scratch,
@@ -35,6 +35,7 @@ Watch = Callable[[int, int], None]
 
 _LARGEST_EVENT_LOG: Final = 100_000
 _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S, _LARGEST_MEMORY = 100.0, 1e6, 1e15
+"""Beyond any rig; a motion that reaches them is unstable."""
 _LARGEST_OUTPUTS_BYTES: Final = 4 * 2**30
 _HALF_STEPS_AT_ONCE = 1 << 17
 """So that the excitation of a long run is never held whole, and progress can be told."""
@@ -178,31 +179,31 @@ def run(
     """Integrate stretch by stretch; `watch` is told samples done and samples in all after each."""
     ready = prepared(twin.terms, twin.structure, excitation)
     model, n_rows = ready.model, excitation.n_samples
+    largest = _largest(model.stiffness.size, ready.memory.size)
     s = scratch(model, start_state(twin, ready, excitation.at_start(), *start), _n_event_functions(twin.terms))
-    largest = _largest(s, ready)
     n_kept = n_columns(model.stiffness.size, model.law.size, ready.memory.size)
     _check_size(n_rows, n_kept)
-    out = Outputs(np.empty((n_rows, n_kept)), np.empty((_LARGEST_EVENT_LOG, 4)))
-    external, base_motion = np.zeros(n_rows), np.zeros((n_rows, 3))
+    out = Outputs(np.empty((n_rows, n_kept)), np.empty((_LARGEST_EVENT_LOG, 4)), np.zeros(1, np.int64))
+    inputs = _KeptInputs(np.zeros(n_rows), np.zeros((n_rows, 3)))
     step = 1.0 / (excitation.sampling_rate_hz * n_substeps)
-    status, filled, where, n_events = int(Status.DONE), 1, -1, 0
+    status, filled, where = int(Status.DONE), 1, -1
+    # each stretch is cut with a margin, so that one stretch or many give the same bytes
     for first_row, last_row in _stretches(n_rows, n_substeps):
         excited = _excited(excitation, n_substeps, first_row - 1, last_row - 1)
-        _keep_inputs(excited, n_substeps, first_row - 1, last_row, external, base_motion)
+        _keep_inputs(excited, n_substeps, first_row - 1, last_row, inputs)
         if first_row == 1:
             where = engine.begin(model, excited, s, out)
             if where >= 0:
                 status, filled = int(Status.FAULT), 0
                 break
-        status, filled, where, n_events = engine.integrate(
-            model, excited, s, largest, step, n_substeps, first_row, last_row, out, n_events
-        )
+        stretch = Stretch(first_row, last_row, n_substeps, step, largest)
+        status, filled, where = engine.integrate(model, excited, s, stretch, out)
         if watch is not None:
             watch(filled, n_rows)
         if status != Status.DONE:
             break
     ending = Ending(Status(status), filled / excitation.sampling_rate_hz, _place_of(twin, model, status, where))
-    return _simulation(twin, excitation, ending, out, external, base_motion, filled, n_events)
+    return _simulation(twin, excitation.sampling_rate_hz, ending, inputs, out, n_filled=filled)
 
 
 def _check_size(n_rows: int, n_kept: int) -> None:
@@ -229,20 +230,26 @@ def _excited(excitation: Excitation, n_substeps: int, first_sample: int, last_sa
     return Excited(excitation.half_steps(n_substeps, first, stop), first)
 
 
-def _keep_inputs(
-    excited: Excited, n_substeps: int, first: int, stop: int, external: FloatArray, base_motion: FloatArray
-) -> None:
+@dataclass(frozen=True, eq=False)
+class _KeptInputs:
+    """What of the excitation is kept at the samples: force on the tank, and motion of the base (n, 3)."""
+
+    external_force_n: FloatArray
+    base_motion: FloatArray
+
+
+def _keep_inputs(excited: Excited, n_substeps: int, first: int, stop: int, inputs: _KeptInputs) -> None:
     if excited.table.size:
         begin, per_row = 2 * n_substeps * first - excited.first, 2 * n_substeps
         of_rows = excited.table[begin : begin + per_row * (stop - first) : per_row]
-        base_motion[first:stop] = of_rows[:, :3]
-        external[first:stop] = of_rows[:, INPUTS.index("force")]
+        inputs.base_motion[first:stop] = of_rows[:, :3]
+        inputs.external_force_n[first:stop] = of_rows[:, INPUTS.index("force")]
 
 
-def _largest(s: Scratch, ready: Prepared) -> FloatArray:
-    n = ready.model.stiffness.size
-    bounds = np.full(s.state.size, _LARGEST_MEMORY)
-    bounds[:n], bounds[n : 2 * n] = _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S
+def _largest(n_modes: int, n_memory: int) -> FloatArray:
+    """Bounds of the state: displacement and velocity of the modes, memory of the terms."""
+    bounds = np.full(2 * n_modes + n_memory, _LARGEST_MEMORY)
+    bounds[:n_modes], bounds[n_modes : 2 * n_modes] = _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S
     return bounds
 
 
@@ -266,25 +273,24 @@ def _place_of(twin: Blocks, model: Model, status: int, where: int) -> str:
 
 def _simulation(
     twin: Blocks,
-    excitation: Excitation,
+    sampling_rate_hz: float,
     ending: Ending,
+    inputs: _KeptInputs,
     out: Outputs,
-    external: FloatArray,
-    base_motion: FloatArray,
-    filled: int,
-    n_events: int,
+    *,
+    n_filled: int,
 ) -> Simulation:
     n_modes = 0 if twin.structure is None else twin.structure.masses_kg.size
-    n_terms = len(twin.terms)
+    n_terms, n_events = len(twin.terms), int(out.n_events[0])
     n_memory = out.rows.shape[1] - n_columns(n_modes, n_terms, 0)
-    modes, memory, forces, works = columns(out.rows[:filled], n_modes, n_terms, n_memory)
+    modes, memory, forces, works = columns(out.rows[:n_filled], n_modes, n_terms, n_memory)
     return Simulation(
         twin=twin,
-        sampling_rate_hz=excitation.sampling_rate_hz,
+        sampling_rate_hz=sampling_rate_hz,
         ending=ending,
         modes=modes,
-        base_motion=base_motion[:filled],
-        external_force_n=external[:filled],
+        base_motion=inputs.base_motion[:n_filled],
+        external_force_n=inputs.external_force_n[:n_filled],
         forces_n=forces,
         memory=memory,
         works_j=works,

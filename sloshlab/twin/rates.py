@@ -27,11 +27,14 @@ from sloshlab.twin.model import (
     FloatArray,
     Model,
     Scratch,
+    Stage,
+    Time,
 )
 
 _MOST_ITERATIONS = 30
 _MOST_SECANTS = 6
 _LEAST_CHORD = 1e-6
+"""Of two accelerations closer than this, relatively, the slope of the chord is lost in rounding."""
 _ACCELERATION_TOLERANCE = 1e-12
 
 
@@ -44,6 +47,7 @@ def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
         return
     place = position - excited.first
     nearest = min(max(int(place + 0.5), 0), n - 1)
+    # steps that no event has cut land on rows, and take them as they are
     if abs(place - nearest) < 1e-9 or n < 6:
         for column in range(inputs.size):
             inputs[column] = table[nearest, column]
@@ -67,7 +71,7 @@ def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
         s.motion[at + TIME] = time
         s.motion[at + DISPLACEMENT] = x + frame * s.inputs[0]
         s.motion[at + VELOCITY] = v + frame * s.inputs[1]
-        s.motion[at + ACCELERATION] = np.nan
+        s.motion[at + ACCELERATION] = np.nan  # a law that reads it without saying so spoils its result, visibly
         s.motion[at + BASE_ACCELERATION] = s.inputs[2]
         s.motion[at + PHASE] = s.inputs[3]
         s.motion[at + FREQUENCY] = s.inputs[4]
@@ -75,28 +79,30 @@ def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def _force(m: Model, i: int, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
+def _force(m: Model, i: int, stage: Stage, s: Scratch) -> float:
     at = m.memory_at[i]
     return call_law(  # type: ignore[no-any-return]
-        m.law[i], s.motion, m.frame[i] * N_MOTION, m.parameters, m.parameters_at[i], y, at, dy, at
+        m.law[i],
+        (s.motion, m.parameters, stage.state, stage.rates),
+        (m.frame[i] * N_MOTION, m.parameters_at[i], at, at),
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _forces_at(m: Model, a: float, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
+def _forces_at(m: Model, a: float, stage: Stage, s: Scratch) -> float:
     """Sum of the forces that depend on the acceleration, at the relative acceleration a."""
     s.motion[RELATIVE * N_MOTION + ACCELERATION] = a
     s.motion[ABSOLUTE * N_MOTION + ACCELERATION] = a + s.inputs[2]
     total = 0.0
     for i in range(m.law.size):
         if m.kind[i] & USES_ACCELERATION:
-            s.force[i] = _force(m, i, y, dy, s)
+            s.force[i] = _force(m, i, stage, s)
             total += s.force[i]
     return total
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
+def _solve_acceleration(m: Model, free: float, known: float, stage: Stage, s: Scratch) -> float:
     """The relative acceleration under forces that depend on it; NaN if there is none.
 
     Secants from the slope of the last time, which most laws keep, or else Newton's method.
@@ -105,7 +111,7 @@ def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: 
     start = (free + m.mobility * known) * m.inverse_inertia
     a, slope, before, force_before = start, s.slope[0], np.nan, 0.0
     for _ in range(_MOST_SECANTS):
-        there = _forces_at(m, a, y, dy, s)
+        there = _forces_at(m, a, stage, s)
         if abs(a - before) > _LEAST_CHORD * (1.0 + abs(a)):
             slope = (there - force_before) / (a - before)
         correction = (free + m.mobility * (known + there) - inertia * a) / (inertia - m.mobility * slope)
@@ -116,11 +122,12 @@ def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: 
         if abs(correction) <= _ACCELERATION_TOLERANCE * (1.0 + abs(a)):
             s.slope[0] = slope
             return a  # type: ignore[no-any-return]
+    # where secants do not converge: Newton's method, with a difference quotient at every point
     a = start
     for _ in range(_MOST_ITERATIONS):
         nearby = a + 1e-3 * (1.0 + abs(a))
-        slope = _forces_at(m, nearby, y, dy, s)
-        there = _forces_at(m, a, y, dy, s)
+        slope = _forces_at(m, nearby, stage, s)
+        there = _forces_at(m, a, stage, s)
         slope = (slope - there) / (nearby - a)
         correction = free + m.mobility * (known + there) - inertia * a
         correction /= inertia - m.mobility * slope
@@ -134,7 +141,7 @@ def _solve_acceleration(m: Model, free: float, known: float, y: FloatArray, dy: 
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _hold(m: Model, holding: float, y: FloatArray, dy: FloatArray, s: Scratch) -> None:
+def _hold(m: Model, holding: float, stage: Stage, s: Scratch) -> None:
     """Bounds of the holding force of sticking friction, and its shares of the friction terms."""
     at = m.friction_frame * N_MOTION
     velocity = s.motion[at + VELOCITY]
@@ -144,7 +151,7 @@ def _hold(m: Model, holding: float, y: FloatArray, dy: FloatArray, s: Scratch) -
         s.friction[2 + side] = 0.0
         for i in range(m.law.size):
             if m.kind[i] & DRY_FRICTION:
-                limit = _force(m, i, y, dy, s)
+                limit = _force(m, i, stage, s)
                 s.friction[2 + side] += limit
                 if (holding > 0) == (side == 1):
                     s.force[i] = limit
@@ -158,7 +165,7 @@ def _hold(m: Model, holding: float, y: FloatArray, dy: FloatArray, s: Scratch) -
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def _known_force(m: Model, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
+def _known_force(m: Model, stage: Stage, s: Scratch) -> float:
     """External force and those terms that depend neither on the acceleration nor on what friction has to hold."""
     later = USES_ACCELERATION | DRY_FRICTION if s.friction[0] == STICKS else USES_ACCELERATION
     total = s.inputs[5] - m.added_mass * s.inputs[2]
@@ -166,43 +173,32 @@ def _known_force(m: Model, y: FloatArray, dy: FloatArray, s: Scratch) -> float:
         if m.kind[i] & later:
             s.force[i] = 0.0
         else:
-            s.force[i] = _force(m, i, y, dy, s)
+            s.force[i] = _force(m, i, stage, s)
             total += s.force[i]
     return total  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _difficult_force(
-    m: Model, free: float, known: float, y: FloatArray, dy: FloatArray, s: Scratch
-) -> tuple[float, bool]:
+def _difficult_force(m: Model, free: float, known: float, stage: Stage, s: Scratch) -> tuple[float, bool]:
     """Sum of all forces where some depend on the acceleration or friction holds, and whether there is one."""
     inertia = 1.0 + m.added_mass * m.mobility
     if s.friction[0] == STICKS:
         a = -s.inputs[2] if m.friction_frame == ABSOLUTE else 0.0
-        known += _forces_at(m, a, y, dy, s)
+        known += _forces_at(m, a, stage, s)
         holding = (inertia * a - free) / m.mobility - known
-        _hold(m, holding, y, dy, s)
+        _hold(m, holding, stage, s)
         return known + holding, True
     if m.mobility == 0.0:
-        return known + _forces_at(m, 0.0, y, dy, s), True
-    a = _solve_acceleration(m, free, known, y, dy, s)
+        return known + _forces_at(m, 0.0, stage, s), True
+    a = _solve_acceleration(m, free, known, stage, s)
     return (inertia * a - free) / m.mobility, np.isfinite(a)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def rates(
-    m: Model,
-    excited: Excited,
-    time: float,
-    position: float,
-    y: FloatArray,
-    dy: FloatArray,
-    power: FloatArray,
-    s: Scratch,
-) -> bool:
+def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bool:
     """Time derivatives of the state and of the works; forces and motions stay in `s`."""
-    n = m.stiffness.size
-    _read_inputs(excited, position, s.inputs)
+    n, y, dy = m.stiffness.size, stage.state, stage.rates
+    _read_inputs(excited, now.half_steps, s.inputs)
     base = s.inputs[2]
     x, v, free = 0.0, 0.0, 0.0
     for j in range(n):
@@ -212,10 +208,11 @@ def rates(
         x += m.shape[j] * y[j]
         v += m.shape[j] * y[n + j]
         free += m.shape[j] * residual
-    _set_motion(s, time, x, v)
-    total, good = _known_force(m, y, dy, s), True
+    _set_motion(s, now.seconds, x, v)
+    total, good = _known_force(m, stage, s), True
     if m.uses_acceleration or s.friction[0] == STICKS:
-        total, good = _difficult_force(m, free, total, y, dy, s)
+        total, good = _difficult_force(m, free, total, stage, s)
+    # all forces act at one place of the modes, so that the mass they add needs no system of equations
     a = (free + m.mobility * total) * m.inverse_inertia
     total -= m.added_mass * a
     for j in range(n):
@@ -223,14 +220,15 @@ def rates(
         dy[n + j] = s.residual[j] + m.shape[j] * m.inverse_mass[j] * total
     s.motion[ACCELERATION] = a
     s.motion[N_MOTION + ACCELERATION] = a + base
-    _set_powers(m, y, power, v, s)
+    _set_powers(m, stage, v, s)
     return good
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def _set_powers(m: Model, y: FloatArray, power: FloatArray, v: float, s: Scratch) -> None:
+def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
     """Power of each term on the modes and in its own frame, then those of `N_OTHER_WORKS`."""
     n, n_terms, base = m.stiffness.size, m.law.size, s.inputs[2]
+    y, power = stage.state, stage.powers
     for i in range(n_terms):
         s.force[i] -= m.mass[i] * s.motion[N_MOTION + ACCELERATION]
         power[2 * i] = s.force[i] * v
@@ -244,26 +242,16 @@ def _set_powers(m: Model, y: FloatArray, power: FloatArray, v: float, s: Scratch
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def rates_once(
-    m: Model,
-    excited: Excited,
-    time: float,
-    position: float,
-    y: FloatArray,
-    dy: FloatArray,
-    power: FloatArray,
-    s: Scratch,
-) -> bool:
-    """The rates for those who need them now and then."""
-    return rates(m, excited, time, position, y, dy, power, s)  # type: ignore[no-any-return]
+def rates_once(m: Model, excited: Excited, now: Time, s: Scratch) -> bool:
+    """The rates of the present state, into the first slopes, for those who need them now and then."""
+    return rates(m, excited, now, Stage(s.state, s.slopes[0], s.powers[0]), s)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def advance(
-    m: Model, excited: Excited, time: float, position: float, step: float, half_steps: float, s: Scratch
-) -> bool:
+def advance(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
     """One Runge–Kutta step from `state` to `trial`, the rates at its start being in the first slopes."""
     y, k, p, new = s.state, s.slopes, s.powers, s.trial
+    step = length.seconds
     good = True
     for stage in range(1, 5):  # one place where the rates are taken, because they are compiled into it
         c = 1.0 if stage >= 3 else 0.5
@@ -273,32 +261,32 @@ def advance(
         else:
             for j in range(y.size):
                 new[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
-        good &= rates(m, excited, time + c * step, position + c * half_steps, new, k[stage], p[stage], s)
+        now = Time(start.seconds + c * step, start.half_steps + c * length.half_steps)
+        good &= rates(m, excited, now, Stage(new, k[stage], p[stage]), s)
     for j in range(s.works.size):
         s.trial_works[j] = s.works[j] + step / 6.0 * (p[0, j] + 2.0 * (p[1, j] + p[2, j]) + p[3, j])
     return good
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def advance_once(
-    m: Model, excited: Excited, time: float, position: float, step: float, half_steps: float, s: Scratch
-) -> bool:
+def advance_once(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
     """The step for those who need it now and then; a call hands over two hundred numbers, a third of a step."""
-    return advance(m, excited, time, position, step, half_steps, s)  # type: ignore[no-any-return]
+    return advance(m, excited, start, length, s)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def set_friction(m: Model, excited: Excited, time: float, position: float, s: Scratch) -> None:
+def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     """At rest: stick if the holding force allows, else slide the way the other forces push."""
     n = m.stiffness.size
     velocity = s.motion[m.friction_frame * N_MOTION + VELOCITY]
     if m.mobility == 0.0:  # prescribed motion cannot be held
         s.friction[0] = -1.0 if velocity < 0.0 else 1.0
         return
+    # what is left of the velocity is rounding of the event; an impulse at the place takes it out of all modes
     for j in range(n):
         s.state[n + j] -= m.shape[j] * m.inverse_mass[j] * velocity / m.mobility
     s.friction[0] = STICKS
-    rates_once(m, excited, time, position, s.state, s.slopes[0], s.powers[0], s)
+    rates_once(m, excited, now, s)
     let_go(s)
 
 

@@ -19,7 +19,7 @@ and then the workspace that a simulation writes::
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -49,24 +49,32 @@ _FORCES, _SHARE, _VELOCITY, _LINES = 1, 5, 6, 7
 """Places in the workspace: four forces, the state of the liquid, then the delay lines."""
 
 
+class _Layers(NamedTuple):
+    """Feedforward network: TANH or RADIAL, neurons of each layer, θ."""
+
+    activation: int
+    sizes: FloatArray
+    theta: FloatArray
+
+
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
 def _workspace_at(numbers):
     return N_VALUES + int(numbers[N_VALUES])
 
 
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def multilayer(activation, sizes, theta, phi, values, excited):
+def multilayer(layers, phi, values, excited):
     """Output of a feedforward network for one sample; `values` and `excited` take the values of a layer."""
-    n_before, place = phi.size, 0
+    theta, n_before, place = layers.theta, phi.size, 0
     for a in range(n_before):
         values[a] = phi[a]
-    for size in sizes:
+    for size in layers.sizes:
         n = int(size)
         for i in range(n):
             total = theta[place + n * n_before + i]
             for a in range(n_before):
                 total += theta[place + i * n_before + a] * values[a]
-            excited[i] = math.tanh(total) if activation == TANH else math.exp(-total * total)
+            excited[i] = math.tanh(total) if layers.activation == TANH else math.exp(-total * total)
         for i in range(n):
             values[i] = excited[i]
         place += (n_before + 1) * n
@@ -95,7 +103,7 @@ def next_output(table, lines, n_line):
     first = lines[2 * n_line + p : 2 * n_line + p + width]
     second = lines[2 * n_line + p + width :]
     if network in (TANH, RADIAL):
-        return multilayer(network, sizes, theta, phi, first, second)
+        return multilayer(_Layers(network, sizes, theta), phi, first, second)
     return evaluate(network, theta, phi, first[: int(sizes[0])], second[: int(sizes[0])])
 
 

@@ -104,6 +104,7 @@ class Structure:
         oscillates = (squared > 0.0) & (squared + decay**2 < (_LONGEST_STEP / step_s) ** 2)
         meant = (-decay + 1j * np.sqrt(np.where(oscillates, squared, 0.0))) * step_s
         z = meant.copy()
+        # Newton's method for R(z) = exp(λh), started at λh, where R is nearly the exponential already
         for _ in range(_N_NEWTON):
             slope = 1 + z * (1 + z / 2 * (1 + z / 3))
             z = z - (slope + z**4 / 24 - np.exp(meant)) / slope

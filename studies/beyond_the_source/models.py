@@ -63,8 +63,8 @@ class Workshop:
             self._delays(agitation),
             [one.run() for one in training],
             [one.run() for one in validation],
-            RATE_HZ,
-            TrainingSettings(n_epochs=self.n_epochs, seed=seed),
+            sampling_rate_hz=RATE_HZ,
+            settings=TrainingSettings(n_epochs=self.n_epochs, seed=seed),
             agitation=agitation,
         )
         model.facts.update(training=[one.name for one in training], validation_mse_n2=record.best.validation_mse)
@@ -90,8 +90,8 @@ class Workshop:
             self._delays(agitation),
             [one.run() for one in training],
             [one.run() for one in validation],
-            RATE_HZ,
-            TrainingSettings(n_epochs=self.n_epochs),
+            sampling_rate_hz=RATE_HZ,
+            settings=TrainingSettings(n_epochs=self.n_epochs),
             n_members=n_members,
             agitation=agitation,
         )

@@ -99,8 +99,8 @@ def ours() -> dict[str, float]:
 
     started = time.perf_counter()
     model, record = fit(
-        "normalised_rbf", {"n_neurons": N_NEURONS}, DELAYS, [training], [validation], rate_hz,
-        TrainingSettings(input_spread=SPREAD), told=told,
+        "normalised_rbf", {"n_neurons": N_NEURONS}, DELAYS, [training], [validation], sampling_rate_hz=rate_hz,
+        settings=TrainingSettings(input_spread=SPREAD), told=told,
     )  # fmt: skip
     training_s = time.perf_counter() - started
     n_parameters = model.network.n_parameters

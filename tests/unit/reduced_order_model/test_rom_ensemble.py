@@ -39,7 +39,14 @@ def noisy_run(n: int, seed: int, constant: float, slope: float) -> Run:
 def ensemble_of(training, validation, **more):
     settings = TrainingSettings(n_epochs=15, seed=1)
     return fit_ensemble(
-        "normalised_rbf", {"n_neurons": 8}, Delays((1,)), training, validation, RATE_HZ, settings, **more
+        "normalised_rbf",
+        {"n_neurons": 8},
+        Delays((1,)),
+        training,
+        validation,
+        sampling_rate_hz=RATE_HZ,
+        settings=settings,
+        **more,
     )
 
 
@@ -70,8 +77,8 @@ def test_members_disagree_as_the_mean_of_their_blocks_does():
     n, sigma = 600, 3.0
     runs = [Run(rng.normal(size=n), sigma * rng.normal(size=n)) for _ in range(2)]
     ensemble, _ = fit_ensemble(
-        "normalised_rbf", {"n_neurons": 1}, Delays((1,)), runs, runs[:1], RATE_HZ,
-        TrainingSettings(n_epochs=1), n_members=30, block_s=0.1,
+        "normalised_rbf", {"n_neurons": 1}, Delays((1,)), runs, runs[:1], sampling_rate_hz=RATE_HZ,
+        settings=TrainingSettings(n_epochs=1), n_members=30, block_s=0.1,
     )  # fmt: skip
     found = ensemble.predicted_range(runs[0].x)
     assert found.members_std[1:] == pytest.approx(sigma / np.sqrt(2 * n), rel=0.35)

@@ -86,7 +86,16 @@ def fitted(agitation, neurons=3, **settings):
     training = [remembering_run(1000, 1), remembering_run(600, 2)]
     network = {"n_neurons": neurons}
     validation = [remembering_run(500, 3)]
-    return fit("normalised_rbf", network, Delays((1,)), training, validation, RATE_HZ, chosen, agitation=agitation)
+    return fit(
+        "normalised_rbf",
+        network,
+        Delays((1,)),
+        training,
+        validation,
+        sampling_rate_hz=RATE_HZ,
+        settings=chosen,
+        agitation=agitation,
+    )
 
 
 def test_a_known_model_with_memory_is_recovered():

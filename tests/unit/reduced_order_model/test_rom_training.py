@@ -43,7 +43,16 @@ def feedback_run(n: int, seed: int) -> Run:
 
 def trained(training, validation, delays=Delays.tapped(2), neurons=3, told=None, **settings):
     chosen = TrainingSettings(**{"n_epochs": 60, "n_starts": 3, **settings})
-    return fit("normalised_rbf", {"n_neurons": neurons}, delays, training, validation, RATE_HZ, chosen, told=told)
+    return fit(
+        "normalised_rbf",
+        {"n_neurons": neurons},
+        delays,
+        training,
+        validation,
+        sampling_rate_hz=RATE_HZ,
+        settings=chosen,
+        told=told,
+    )
 
 
 def test_a_known_network_is_recovered():
@@ -80,8 +89,8 @@ def test_a_training_gives_the_same_model_whatever_the_library(delays, library):
             {"n_neurons": 4},
             delays,
             *runs,
-            RATE_HZ,
-            TrainingSettings(n_epochs=4),
+            sampling_rate_hz=RATE_HZ,
+            settings=TrainingSettings(n_epochs=4),
             backend=backend,
         )[0]
         for backend in (array_backend(), other)
@@ -226,7 +235,7 @@ def test_an_interrupt_keeps_the_best_model_so_far():
         Delays.tapped(2),
         [network_run(200, 1)],
         [network_run(100, 2)],
-        RATE_HZ,
+        sampling_rate_hz=RATE_HZ,
         told=stop,
     )
     assert record.interrupted
@@ -239,23 +248,25 @@ def test_free_run_sensitivities_are_difference_quotients(network):
     """Σ S e and the diagonal of Σ S Sᵀ against runs with one parameter moved."""
     rng = np.random.default_rng(5)
     theta, run = 0.5 * rng.normal(size=network.n_parameters), feedback_run(60, 6)
-    arguments = (np.array([1]), np.array([1, 2]))
-    kind = free_run.kind_of(network)
+    stretch, kind = free_run.Stretch(2, 60), free_run.kind_of(network)
+
+    def model_of(parameters):
+        return free_run.FeedbackModel(kind, parameters, 3, np.array([1]), np.array([1, 2]), 1e3)
 
     def outputs(parameters):
         y = run.y.copy()
-        assert free_run.run_free(kind, parameters, 3, run.x, y, 2, 60, *arguments, 1e3) == 60
+        assert free_run.run_free(model_of(parameters), run.x, y, stretch) == 60
         return y
 
-    matrix, gradient = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
-    squares = free_run.free_run_sums(kind, theta, 3, run.x, run.y, 2, 60, *arguments, 1e3, matrix, gradient)
+    sums = free_run.SensitivitySums(np.zeros((theta.size, theta.size)), np.zeros(theta.size))
+    squares = free_run.free_run_sums(model_of(theta), run.x, run.y, stretch, sums)
     steps = 1e-3 * np.eye(theta.size)
     near, far = ([outputs(theta + k * d) - outputs(theta - k * d) for d in steps] for k in (1, 2))
     slopes = (8 * np.array(near) - np.array(far)) / 12e-3  # of fourth order
     error = run.y - outputs(theta)
     assert squares == pytest.approx(error @ error)
-    assert gradient == pytest.approx(slopes @ error, rel=1e-6, abs=1e-8)
-    assert np.tril(matrix) == pytest.approx(np.tril(slopes @ slopes.T), rel=1e-6, abs=1e-8)
+    assert sums.gradient == pytest.approx(slopes @ error, rel=1e-6, abs=1e-8)
+    assert np.tril(sums.matrix) == pytest.approx(np.tril(slopes @ slopes.T), rel=1e-6, abs=1e-8)
 
 
 def test_simulation_without_feedback_is_prediction():
