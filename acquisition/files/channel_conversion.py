@@ -121,7 +121,7 @@ def _agreed_units(
     return stated
 
 
-def same_units(one: str, other: str) -> bool:
+def same_units(first: str, second: str) -> bool:
     """Whether two texts mean the same units.
 
     Examples
@@ -129,10 +129,10 @@ def same_units(one: str, other: str) -> bool:
     >>> same_units("m/s^2", "m s-2"), same_units("N", "kN"), same_units("N", "g")
     (True, False, False)
     """
-    if one == other:
+    if first == second:
         return True
     try:
-        return _converted(one, other, "units") == 1.0
+        return _converted(first, second, "units") == 1.0
     except UnitsError:
         return False
 

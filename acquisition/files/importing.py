@@ -79,16 +79,16 @@ def import_recording(sources: Sequence[Path], map_path: Path, *, rig: Path | Non
     time = common_time(selected, jitter)
     _check_memory(time, len(selected))
     converted = [
-        _converted_channel(one, with_declared(channel_map.channels[one.channel], one.column), first, time)
-        for one, first in zip(selected, time.first_points, strict=True)
+        _converted_channel(column, with_declared(channel_map.channels[column.channel], column.column), first, time)
+        for column, first in zip(selected, time.first_points, strict=True)
     ]
     quality = _quality(converted, tables, channel_map, time)
     recording = _recording(converted, quality, time, channel_map, paths, map_path, rig, tables)
     validate_recording(recording, name=f"map {map_path}")
     traps += [trap for named in tables for trap in named.table.traps]
-    traps += time_traps + list(time.traps) + [trap for one in converted for trap in one.traps]
+    traps += time_traps + list(time.traps) + [trap for channel in converted for trap in channel.traps]
     report = _report(converted, quality, time, tables, selected, traps, channel_map)
-    encoding = {one.name: one.encoding for one in converted if one.encoding}
+    encoding = {channel.name: channel.encoding for channel in converted if channel.encoding}
     return ImportResult(recording, report, encoding)
 
 
@@ -235,9 +235,9 @@ def _quality(
     converted: Sequence[_Channel], tables: Sequence[NamedTable], channel_map: ChannelMap, time: CommonTime
 ) -> NDArray[np.uint8]:
     quality = np.zeros(time.n_points, dtype=np.uint8)
-    for one in converted:
-        quality[np.isnan(one.values)] |= LOST
-        quality[one.clipped] |= CLIPPED
+    for channel in converted:
+        quality[np.isnan(channel.values)] |= LOST
+        quality[channel.clipped] |= CLIPPED
     reference = channel_map.source.quality
     if reference is None:
         return quality
@@ -266,7 +266,9 @@ def _recording(
     rig: Path | None,
     tables: Sequence[NamedTable],
 ) -> xr.Dataset:
-    variables: dict[str, Any] = {one.name: ("time", one.values, one.attributes) for one in converted}
+    variables: dict[str, Any] = {
+        channel.name: ("time", channel.values, channel.attributes) for channel in converted
+    }
     if quality.any():
         variables["quality"] = ("time", quality, quality_attributes())
     run = channel_map.run
@@ -321,7 +323,7 @@ def _report(
     traps: Sequence[str],
     channel_map: ChannelMap,
 ) -> ImportReport:
-    used = {(one.source, one.column.name) for one in selected}
+    used = {(column.source, column.column.name) for column in selected}
     left_out: list[str] = []
     for named in tables:
         prefix = f"{named.name}: " if len(tables) > 1 else ""
@@ -348,7 +350,7 @@ def _report(
     )
     return ImportReport(
         sources=sources,
-        mapped=tuple(one.mapped for one in converted),
+        mapped=tuple(channel.mapped for channel in converted),
         left_out=tuple(left_out),
         traps=tuple(dict.fromkeys([*truncated, *traps])),
         sampling_rate_hz=time.rate_hz,

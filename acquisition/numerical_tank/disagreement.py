@@ -126,8 +126,8 @@ def history_table(workers: int) -> Iterator[str]:
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         runs = list(pool.map(up_and_down, SEEDS))
     for at_level in zip(*runs, strict=True):
-        up = sum(one.up for one in at_level) / len(at_level)
-        down = sum(one.down for one in at_level) / len(at_level)
+        up = sum(level.up for level in at_level) / len(at_level)
+        down = sum(level.down for level in at_level) / len(at_level)
         yield f"| {at_level[0].acceleration_g:g} g | {up:.2f} | {down:.2f} |".replace("-", "−")
 
 

@@ -143,7 +143,7 @@ class Constants(NamedTuple):
         Number of fluid particles.
     n_slow : int
         Steps between two corrections of the arrangement.
-    one, half, two : floating
+    unity, half, two : floating
         So that the compiler does not widen the type.
     step : floating
         Time step [s].
@@ -185,7 +185,7 @@ class Constants(NamedTuple):
 
     n: int
     n_slow: int
-    one: float
+    unity: float
     half: float
     two: float
     step: float

@@ -89,7 +89,7 @@ class NumericalTank:
         n, particles = self.setup.n_particles, self._particles
         particles.x[:n], particles.z[:n], particles.s[:n] = particles_at_rest(self.setup)
         self._list()
-        none = self._constants.one - self._constants.one
+        none = self._constants.unity - self._constants.unity
         quiet = self._constants._replace(relaxation=none, spread=none)
         stepping.correct(
             particles, self._pairs, self._images, quiet, self._table, self._scale, np.zeros(len(energy.TERMS))

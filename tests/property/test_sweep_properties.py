@@ -92,7 +92,7 @@ def test_a_run_in_two_files_gives_the_same_cycles() -> None:
         piece = cycles_of(FORCE[part], MOTION.acceleration[part])
         start_s = piece.start_s + offset_s
         inside = np.flatnonzero(piece.usable & (start_s > start_s[6]) & (start_s < start_s[-7]))
-        partner = np.array([int(np.abs(whole.start_s - one).argmin()) for one in start_s[inside]])
+        partner = np.array([int(np.abs(whole.start_s - cycle_s).argmin()) for cycle_s in start_s[inside]])
         assert inside.size > 150
         np.testing.assert_allclose(start_s[inside], whole.start_s[partner], rtol=0, atol=2e-5)
         np.testing.assert_allclose(piece.work_j[inside], whole.work_j[partner], rtol=2e-3)
