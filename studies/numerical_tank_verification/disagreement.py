@@ -7,7 +7,7 @@ more than they can do.) What cannot be changed here, because the
 method does not have it, is surface tension, the third dimension and the gas. A fifth experiment asks whether
 work depends on where the tank comes from: the acceleration goes up and down again in steps.
 
-Run as ``python -m acquisition.numerical_tank.disagreement [--output FILE] [--workers N]``.
+Run as ``python -m studies.numerical_tank_verification.disagreement [--output FILE] [--workers N]``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
-from acquisition.numerical_tank.convergence import (
+from acquisition.numerical_tank.forced_motion import HarmonicMotion, moved
+from acquisition.numerical_tank.simulation import NumericalTank
+from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, filled_tank
+from studies.numerical_tank_verification.convergence import (
     FREQUENCY_HZ,
     SEEDS,
     TANK,
@@ -31,9 +34,6 @@ from acquisition.numerical_tank.convergence import (
     show,
     table,
 )
-from acquisition.numerical_tank.forced_motion import HarmonicMotion, moved
-from acquisition.numerical_tank.simulation import NumericalTank
-from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, filled_tank
 
 _WEAK_CYCLES = 200
 """A subharmonic wave needs twenty to sixty cycles to grow."""

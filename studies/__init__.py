@@ -1,0 +1,1 @@
+"""Studies that only make documentation: run from a checkout, not installed."""
