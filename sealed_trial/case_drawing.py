@@ -175,8 +175,8 @@ class CaseDrawing:
         if kind == "nothing":
             signals, nuisance, extra = _with_nuisance(signals, sensors, laboratory, hidden)
             accepted = accepted + extra
-        for one in described:
-            self._used[one["name"]] += 1
+        for description in described:
+            self._used[description["name"]] += 1
         truth = HiddenTruth(
             name, kind, described, accepted, {"plan": plan_name, "rig_factors": laboratory.rig.factors, **nuisance}
         )

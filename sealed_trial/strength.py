@@ -191,8 +191,8 @@ class NoiseFloor:
             self._baselines.append(self._linearised(laboratory, laboratory.signals(relative_tolerance=QUICK)))
             retuned = self._retuned(self._baselines[-1], target, damping_is_known)
             if following is None and retuned.strength > _WORTHWHILE * best.strength:
-                return min(best, retuned, key=lambda one: one.strength)
-            best, following = min(best, retuned, key=lambda one: one.strength), None
+                return min(best, retuned, key=lambda retuning: retuning.strength)
+            best, following = min(best, retuned, key=lambda retuning: retuning.strength), None
         return best
 
     def _nearest_frequencies(self, target: FloatArray) -> HiddenRig | None:
@@ -204,7 +204,7 @@ class NoiseFloor:
         rig = self._laboratory.rig
         if rig.kind == "shaker":
             return None
-        for name in (one for one in rig.tunable if one.startswith("frequency")):
+        for name in (factor for factor in rig.tunable if factor.startswith("frequency")):
             if name not in self._frequencies:
                 self._frequencies[name] = self._scanned(name)
             change, _ = min(self._frequencies[name], key=lambda known: float(np.sum((target - known[1]) ** 2)))
@@ -237,10 +237,10 @@ class NoiseFloor:
         remainder = difference - baseline.orthogonal @ (baseline.triangle @ fit.x)
         of_channels = remainder.reshape(len(self.floor), -1)
         rig, is_near = baseline.rig, True
-        for one, change in zip(baseline.directions, fit.x, strict=True):
-            if one.name in rig.tunable:
-                rig = rig.with_factor(one.name, 1 + change)
-                linear = _STAYS_LINEAR_IN_FREQUENCY if one.name.startswith("frequency") else _STAYS_LINEAR
+        for direction, change in zip(baseline.directions, fit.x, strict=True):
+            if direction.name in rig.tunable:
+                rig = rig.with_factor(direction.name, 1 + change)
+                linear = _STAYS_LINEAR_IN_FREQUENCY if direction.name.startswith("frequency") else _STAYS_LINEAR
                 is_near = is_near and abs(change) < linear
         return _Retuned(float(np.sqrt((of_channels**2).mean(axis=1)).max()), rig, is_near)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Final
 
 from acquisition.devices.device_clock import DeviceClock
-from acquisition.devices.endpoint import Endpoint
+from acquisition.devices.endpoint import Endpoint, StartRule
 from acquisition.devices.faults import OverrunFault
 from acquisition.devices.laboratory_time import LaboratoryTime
 from acquisition.devices.sender import LossyLine
@@ -79,14 +79,7 @@ class Appearance(ABC):
         """
 
     @abstractmethod
-    def endpoint(
-        self,
-        laboratory: LaboratoryTime,
-        describe: Callable[[], bytes],
-        *,
-        n_hosts: int = 1,
-        runs_freely: bool = False,
-    ) -> Endpoint:
+    def endpoint(self, laboratory: LaboratoryTime, describe: Callable[[], bytes], start: StartRule) -> Endpoint:
         """Make the place, not yet open.
 
         Parameters
@@ -95,10 +88,8 @@ class Appearance(ABC):
             For time stamps.
         describe : callable
             Gives the frame by which the device describes itself now, where that is bytes.
-        n_hosts : int
-            The device begins when so many hosts have asked for it, at most `most_hosts`.
-        runs_freely : bool
-            Nobody needs to ask.
+        start : StartRule
+            Of at most `most_hosts` hosts.
         """
 
     def line(self, fault: OverrunFault, wire: Wire, truth: Truth) -> LossyLine:

@@ -15,7 +15,7 @@ from acquisition.devices.can_text import slcan_text, socketcand_text
 from acquisition.devices.can_wire import CanWire
 from acquisition.devices.connection import MOST_CONNECTIONS, ListeningSocket, PseudoTerminal
 from acquisition.devices.device_clock import CLOCK_HZ, DeviceClock
-from acquisition.devices.endpoint import Endpoint, StreamEndpoint
+from acquisition.devices.endpoint import Endpoint, StartRule, StreamEndpoint
 from acquisition.devices.faults import OverrunFault
 from acquisition.devices.frames import FrameArray
 from acquisition.devices.laboratory_time import LaboratoryTime
@@ -125,14 +125,7 @@ class SocketcandAppearance(CanAppearance):
         """Host and port."""
         return port_text(self._host, self._port)
 
-    def endpoint(
-        self,
-        laboratory: LaboratoryTime,
-        describe: Callable[[], bytes],
-        *,
-        n_hosts: int = 1,
-        runs_freely: bool = False,
-    ) -> Endpoint:
+    def endpoint(self, laboratory: LaboratoryTime, describe: Callable[[], bytes], start: StartRule) -> Endpoint:
         """Several hosts at a TCP port."""
         host = "127.0.0.1" if self._host in ("0.0.0.0", "::") else self._host
         url = f"can:socketcand?host={host}&port={{at}}&channel={quote(self._bus)}&dbc={self._quoted_dbc}"
@@ -145,8 +138,8 @@ class SocketcandAppearance(CanAppearance):
             SocketcandConversation(self._bus),
             stamped,
             lambda at: url.format(at=at),
-            n_hosts=n_hosts,
-            runs_freely=runs_freely,
+            n_hosts=start.n_hosts,
+            runs_freely=start.runs_freely,
         )
 
 
@@ -156,14 +149,7 @@ class SlcanAppearance(CanAppearance):
     def _read(self, options: URLOptions, expose: str | None) -> None:
         self._path = self._channel(options)
 
-    def endpoint(
-        self,
-        laboratory: LaboratoryTime,
-        describe: Callable[[], bytes],
-        *,
-        n_hosts: int = 1,
-        runs_freely: bool = False,
-    ) -> Endpoint:
+    def endpoint(self, laboratory: LaboratoryTime, describe: Callable[[], bytes], start: StartRule) -> Endpoint:
         """One host at a pseudo-terminal."""
         url = f"can:slcan?channel={quote(self._path)}&dbc={self._quoted_dbc}{'&fd=yes' if self._fd else ''}"
         return StreamEndpoint(
@@ -171,8 +157,8 @@ class SlcanAppearance(CanAppearance):
             SlcanConversation(),
             lambda frames: slcan_text(frames, fd=self._fd),
             lambda at: url.format(at=at),
-            n_hosts=n_hosts,
-            runs_freely=runs_freely,
+            n_hosts=start.n_hosts,
+            runs_freely=start.runs_freely,
         )
 
 
@@ -193,20 +179,13 @@ class BusAppearance(CanAppearance):
             options.text(key)
         return others
 
-    def endpoint(
-        self,
-        laboratory: LaboratoryTime,
-        describe: Callable[[], bytes],
-        *,
-        n_hosts: int = 1,
-        runs_freely: bool = False,
-    ) -> Endpoint:
+    def endpoint(self, laboratory: LaboratoryTime, describe: Callable[[], bytes], start: StartRule) -> Endpoint:
         """A node that does not know who listens."""
         fd = "&fd=yes" if self._fd else ""
         others = "".join(f"&{key}={value}" for key, value in self._passed.items())
         url = f"can:{self.url.target}?channel={quote(self._bus)}&dbc={self._quoted_dbc}{fd}{others}"
         return BusEndpoint(
-            self._opened, url, fd=self._fd, runs_freely=runs_freely, frames_per_s=self._frames_per_s
+            self._opened, url, fd=self._fd, runs_freely=start.runs_freely, frames_per_s=self._frames_per_s
         )
 
     def _opened(self) -> Any:

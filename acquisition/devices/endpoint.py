@@ -29,6 +29,22 @@ class Awaited(NamedTuple):
     n_hosts: int
 
 
+@dataclass(frozen=True)
+class StartRule:
+    """When a device begins.
+
+    Attributes
+    ----------
+    n_hosts : int
+        When so many hosts have asked for it.
+    runs_freely : bool
+        Every host that is there listens; nobody needs to ask.
+    """
+
+    n_hosts: int = 1
+    runs_freely: bool = False
+
+
 class Endpoint(ABC):
     """Hosts come and go; the device asks who listens, and sends frames."""
 

@@ -192,7 +192,9 @@ def _stored(path: Path, name: str, variable: Any, attributes: Mapping[str, Any])
             raise RecordingError(f"{path}: {name}", got="no count free for missing readings", allowed="one")
     scale = float(attributes.get("scale_factor", 1.0))
     offset = float(attributes.get("add_offset", 0.0)) + scale * shift
-    return _Column(_channel(name, attributes, bits, scale, offset, missing), fill, missing or 0, shift)
+    return _Column(
+        _channel(name, attributes, bits, scale=scale, offset=offset, missing=missing), fill, missing or 0, shift
+    )
 
 
 def _width(stored_bits: int, lowest: int, highest: int) -> int | None:
@@ -213,7 +215,8 @@ def _quantised(path: Path, name: str, variable: Any, attributes: Mapping[str, An
     step = (largest or 1.0) / (2 ** (QUANTISED_BITS - 1) - 1)
     scale = step * float(attributes.get("scale_factor", 1.0))
     missing = -(1 << (QUANTISED_BITS - 1))
-    channel = _channel(name, attributes, QUANTISED_BITS, scale, float(attributes.get("add_offset", 0.0)), missing)
+    offset = float(attributes.get("add_offset", 0.0))
+    channel = _channel(name, attributes, QUANTISED_BITS, scale=scale, offset=offset, missing=missing)
     return _Column(channel, None, missing, step=step)
 
 
@@ -232,7 +235,7 @@ def _extremes(variable: Any, fill: Any) -> tuple[Any, Any]:
 
 
 def _channel(
-    name: str, attributes: Mapping[str, Any], bits: int, scale: float, offset: float, missing: int | None
+    name: str, attributes: Mapping[str, Any], bits: int, *, scale: float, offset: float, missing: int | None
 ) -> Channel:
     known = {key: attributes[key] for key in _OPTIONAL if key in attributes}
     for key in ("range_min", "range_max", "noise_std", "x_m"):

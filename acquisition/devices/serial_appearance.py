@@ -10,7 +10,7 @@ from acquisition.devices.appearance import Appearance, listening_host, port_text
 from acquisition.devices.connection import Door, ListeningSocket, PseudoTerminal
 from acquisition.devices.conversation import SerialConversation
 from acquisition.devices.device_clock import DeviceClock
-from acquisition.devices.endpoint import Endpoint, StreamEndpoint
+from acquisition.devices.endpoint import Endpoint, StartRule, StreamEndpoint
 from acquisition.devices.faults import OverrunFault
 from acquisition.devices.laboratory_time import LaboratoryTime
 from acquisition.devices.serial_wire import SerialWire
@@ -68,14 +68,7 @@ class SerialAppearance(Appearance):
         """A FIFO of bytes."""
         return Uart(fault, wire, truth)
 
-    def endpoint(
-        self,
-        laboratory: LaboratoryTime,
-        describe: Callable[[], bytes],
-        *,
-        n_hosts: int = 1,
-        runs_freely: bool = False,
-    ) -> Endpoint:
+    def endpoint(self, laboratory: LaboratoryTime, describe: Callable[[], bytes], start: StartRule) -> Endpoint:
         """One host at the end of a stream of bytes."""
         door: Door
         if self._is_socket:
@@ -87,8 +80,8 @@ class SerialAppearance(Appearance):
             SerialConversation(describe),
             lambda frames: b"".join(frames["bytes"]),
             lambda at: url.format(at=at),
-            n_hosts=n_hosts,
-            runs_freely=runs_freely,
+            n_hosts=start.n_hosts,
+            runs_freely=start.runs_freely,
         )
 
 

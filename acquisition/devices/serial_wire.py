@@ -66,7 +66,7 @@ class SerialWire(Wire):
         """Frames of consecutive samples."""
         ticks = self._clock.ticks(np.arange(first_counter, first_counter + len(counts)))
         frames = encode_samples(
-            stream, first_counter, ticks, counts, self._bytes_per_count, self.samples_per_frame
+            stream, first_counter, ticks, counts, self._bytes_per_count, samples_per_frame=self.samples_per_frame
         )
         made = np.zeros(len(frames), SERIAL_FRAME)
         starts = np.arange(len(frames)) * self.samples_per_frame

@@ -8,6 +8,7 @@ import numpy as np
 
 from acquisition.devices.appearance import Appearance
 from acquisition.devices.device_clock import ClockedSignal, DeviceClock
+from acquisition.devices.endpoint import StartRule
 from acquisition.devices.faults import Faults
 from acquisition.devices.faulty_frames import FrameFaults
 from acquisition.devices.laboratory_time import LaboratoryTime
@@ -64,8 +65,7 @@ def simulated_device(
     place = found.endpoint(
         laboratory,
         lambda: bytes(made[0].describe()["bytes"][0]),
-        n_hosts=n_hosts,
-        runs_freely=runs_freely,
+        StartRule(n_hosts, runs_freely),
     )
     line = None if faults.overrun is None else found.line(faults.overrun, wire, truth)
     sender = Sender(place, laboratory, truth, line, found.offers_bytes)

@@ -61,7 +61,7 @@ def dbc_text(layout: CanLayout) -> str:
         If the device describes itself impossibly, or with text that a DBC file cannot hold.
     """
     _require_possible(layout)
-    controls = [one for one in (layout.status, layout.command) if one is not None]
+    controls = [control for control in (layout.status, layout.command) if control is not None]
     parts = ['VERSION ""', "NS_ :", "BS_:", "BU_: device host"]
     parts += ["\n".join(_control_lines(control)) for control in controls]
     parts += ["\n".join(_message_lines(message, layout)) for message in layout.messages]
@@ -268,7 +268,7 @@ class _DatabaseReader:
     def _check_identifiers(self, layout: CanLayout) -> None:
         """A frame must not be taken apart by two descriptions."""
         messages: list[SampleMessage | ControlMessage] = list(layout.messages)
-        messages += [one for one in (layout.status, layout.command) if one is not None]
+        messages += [control for control in (layout.status, layout.command) if control is not None]
         names: dict[tuple[int, bool], str] = {}
         for message in messages:
             key = message.arbitration_id, message.extended
@@ -393,11 +393,14 @@ class _DatabaseReader:
     def _channel(self, place: str, name: str, found: dict[int, Any]) -> Channel:
         first = found[0]
         needed_bits = first.length + (0 if first.is_signed else 1)
-        if any(one.is_float or one.multiplexer_ids for one in found.values()) or needed_bits > 32:
+        if any(signal.is_float or signal.multiplexer_ids for signal in found.values()) or needed_bits > 32:
             self._refuse(
                 place, f"{first.length} bits, float or multiplexed", "integer of ≤ 32 bits in every frame"
             )
-        same = {(one.length, one.is_signed, one.scale, one.offset, one.unit) for one in found.values()}
+        same = {
+            (signal.length, signal.is_signed, signal.scale, signal.offset, signal.unit)
+            for signal in found.values()
+        }
         if len(same) > 1:
             self._refuse(place, "samples with different scaling", "one scaling")
         attributes = {
@@ -420,7 +423,7 @@ class _DatabaseReader:
 
     def _one_number(self, messages: Sequence[Any], attribute: str, *, needed: bool) -> float | None:
         found = [message.dbc.attributes.get(attribute) if message.dbc else None for message in messages]
-        values = {float(one.value) for one in found if one is not None}
+        values = {float(entry.value) for entry in found if entry is not None}
         if len(values) > 1 or (needed and (not values or None in found)):
             self._refuse(
                 f"attribute {attribute}",
@@ -474,4 +477,4 @@ def _field(signal: Any) -> BitField:
 
 
 def _selectors(signal: Any) -> tuple[int, ...]:
-    return tuple(int(one) for one in signal.multiplexer_ids or ())
+    return tuple(int(selector) for selector in signal.multiplexer_ids or ())

@@ -43,9 +43,9 @@ class DeviceLog:
     def __init__(self, path: Path, layout: CanLayout) -> None:
         self._path, self._layout = path, layout
         self._receiver = CanReceiver(layout)
-        controls = [one for one in (layout.status, layout.command) if one is not None]
+        controls = [control for control in (layout.status, layout.command) if control is not None]
         everything: list[SampleMessage | ControlMessage] = [*layout.messages, *controls]
-        self._keys = {(one.arbitration_id, one.extended) for one in everything}
+        self._keys = {(message.arbitration_id, message.extended) for message in everything}
         self._pending: list[Any] = []
         self._buses: set[Any] = set()
         self._blocks: dict[int, list[Block]] = {}

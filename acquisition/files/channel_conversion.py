@@ -49,8 +49,7 @@ def scaling_of(channel: str, section: ChannelSection, column: Column) -> Scaling
     place = f"channels.{channel}"
     traps: list[str] = []
     calibration = section.calibration
-    stated = section.units or (calibration.from_units if calibration else None)
-    units = _agreed_units(place, stated, column, section.units_override, quantity, calibration is not None, traps)
+    units = _agreed_units(place, section, column, quantity, traps)
     gain, zero, final_units = 1.0, 0.0, units
     if calibration is not None:
         gain = calibration.factor * _converted(units, calibration.from_units, f"{place}.calibration.from")
@@ -82,16 +81,10 @@ def with_declared(section: ChannelSection, column: Column) -> ChannelSection:
     return section.model_copy(update={**missing, "attributes": {**free, **section.attributes}})
 
 
-def _agreed_units(
-    place: str,
-    stated: str | None,
-    column: Column,
-    override: bool,
-    quantity: str,
-    calibrated: bool,
-    traps: list[str],
-) -> str:
-    in_file = column.units
+def _agreed_units(place: str, section: ChannelSection, column: Column, quantity: str, traps: list[str]) -> str:
+    """Units of the numbers in the file: what the map states, where it states any."""
+    calibration = section.calibration
+    stated, in_file = section.units or (calibration.from_units if calibration else None), column.units
     if stated is None and in_file is None:
         raise ChannelMapError(
             f"{place}.units",
@@ -107,8 +100,8 @@ def _agreed_units(
     if in_file == "g" and stated in _GRAVITY_NAMES and quantity == "acceleration":
         traps.append(f"{place}: the file writes 'g' (the gram in UDUNITS); read as gravity, as the map says")
         return stated
-    if not override:
-        calibrated_hint = " (units before calibration)" if calibrated else ""
+    if not section.units_override:
+        calibrated_hint = " (units before calibration)" if calibration is not None else ""
         raise ChannelMapError(
             f"{place}.units",
             got=f"{stated!r}{calibrated_hint}, but the file labels column {column.name!r} {in_file!r}",
@@ -121,7 +114,7 @@ def _agreed_units(
     return stated
 
 
-def same_units(one: str, other: str) -> bool:
+def same_units(first: str, second: str) -> bool:
     """Whether two texts mean the same units.
 
     Examples
@@ -129,10 +122,10 @@ def same_units(one: str, other: str) -> bool:
     >>> same_units("m/s^2", "m s-2"), same_units("N", "kN"), same_units("N", "g")
     (True, False, False)
     """
-    if one == other:
+    if first == second:
         return True
     try:
-        return _converted(one, other, "units") == 1.0
+        return _converted(first, second, "units") == 1.0
     except UnitsError:
         return False
 

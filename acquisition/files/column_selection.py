@@ -327,19 +327,19 @@ def _of_one_rate(
     rate = selected[0].grid.rate_hz
     jitter = settings.jitter_allowed_steps or max(named.table.jitter_allowed_steps for named in tables)
     aligned = []
-    for one in selected:
-        if abs(one.grid.rate_hz / rate - 1) * one.grid.n_points <= 1e-6:
-            aligned.append(one)
+    for column in selected:
+        if abs(column.grid.rate_hz / rate - 1) * column.grid.n_points <= 1e-6:
+            aligned.append(column)
             continue
-        grid = _refitted(one, rate, jitter)
+        grid = _refitted(column, rate, jitter)
         if grid is None:
             raise ChannelMapError(
-                f"channels.{one.channel}: sampling rate",
-                got=f"{one.grid.rate_hz:.9g} Hz beside {rate:.9g} Hz of {selected[0].channel}",
+                f"channels.{column.channel}: sampling rate",
+                got=f"{column.grid.rate_hz:.9g} Hz beside {rate:.9g} Hz of {selected[0].channel}",
                 allowed="one rate per recording",
                 remedy="map the channels of each rate in an import of their own, or resample before",
             )
-        aligned.append(replace(one, grid=grid))
+        aligned.append(replace(column, grid=grid))
     return aligned
 
 
@@ -383,26 +383,26 @@ def common_time(selected: Sequence[Selected], jitter_allowed_steps: float) -> Co
         If columns begin a fraction of a step apart.
     """
     rate = selected[0].grid.rate_hz
-    start = min(one.grid.start_s for one in selected)
+    start = min(column.grid.start_s for column in selected)
     first_points, offsets, traps = [], [], []
-    for one in selected:
-        steps = (one.grid.start_s - start) * rate
+    for column in selected:
+        steps = (column.grid.start_s - start) * rate
         whole = int(np.rint(steps))
         offset = (steps - whole) / rate
-        allowed = jitter_allowed_steps + one.grid.resolution_s * rate
+        allowed = jitter_allowed_steps + column.grid.resolution_s * rate
         if abs(steps - whole) > allowed:
             raise ChannelMapError(
-                f"channels.{one.channel}: time",
+                f"channels.{column.channel}: time",
                 got=f"a start {steps:.6g} steps after the first channel's",
                 allowed=f"whole steps of {1 / rate:.6g} s",
                 remedy="state delay_s, import it by itself, or resample before",
             )
         if abs(steps - whole) > 1e-6:
-            traps.append(f"{one.channel}: sampled {offset:.3g} s off the common grid; not compensated")
+            traps.append(f"{column.channel}: sampled {offset:.3g} s off the common grid; not compensated")
         first_points.append(whole)
         offsets.append(offset)
-    n_points = max(first + one.grid.n_points for first, one in zip(first_points, selected, strict=True))
-    n_given = max(one.column.values.size for one in selected)
+    n_points = max(first + column.grid.n_points for first, column in zip(first_points, selected, strict=True))
+    n_given = max(column.column.values.size for column in selected)
     if n_points > 4 * n_given + 16:
         raise ChannelMapError(
             "channels: time",

@@ -79,16 +79,18 @@ def import_recording(sources: Sequence[Path], map_path: Path, *, rig: Path | Non
     time = common_time(selected, jitter)
     _check_memory(time, len(selected))
     converted = [
-        _converted_channel(one, with_declared(channel_map.channels[one.channel], one.column), first, time)
-        for one, first in zip(selected, time.first_points, strict=True)
+        _converted_channel(column, with_declared(channel_map.channels[column.channel], column.column), first, time)
+        for column, first in zip(selected, time.first_points, strict=True)
     ]
     quality = _quality(converted, tables, channel_map, time)
-    recording = _recording(converted, quality, time, channel_map, paths, map_path, rig, tables)
+    origin = _Origin(channel_map, map_path, paths, tables, rig)
+    recording = _recording(converted, quality, time, origin)
     validate_recording(recording, name=f"map {map_path}")
     traps += [trap for named in tables for trap in named.table.traps]
-    traps += time_traps + list(time.traps) + [trap for one in converted for trap in one.traps]
-    report = _report(converted, quality, time, tables, selected, traps, channel_map)
-    encoding = {one.name: one.encoding for one in converted if one.encoding}
+    traps += time_traps + list(time.traps) + [trap for channel in converted for trap in channel.traps]
+    left_out = _left_out(tables, selected, channel_map)
+    report = _report(converted, quality, time, tables, left_out=left_out, traps=traps)
+    encoding = {channel.name: channel.encoding for channel in converted if channel.encoding}
     return ImportResult(recording, report, encoding)
 
 
@@ -235,9 +237,9 @@ def _quality(
     converted: Sequence[_Channel], tables: Sequence[NamedTable], channel_map: ChannelMap, time: CommonTime
 ) -> NDArray[np.uint8]:
     quality = np.zeros(time.n_points, dtype=np.uint8)
-    for one in converted:
-        quality[np.isnan(one.values)] |= LOST
-        quality[one.clipped] |= CLIPPED
+    for channel in converted:
+        quality[np.isnan(channel.values)] |= LOST
+        quality[channel.clipped] |= CLIPPED
     reference = channel_map.source.quality
     if reference is None:
         return quality
@@ -256,22 +258,28 @@ def _quality(
     return quality
 
 
+@dataclass(frozen=True)
+class _Origin:
+    """Where a recording comes from: the map and its file, the source files, what was read from them, the rig."""
+
+    channel_map: ChannelMap
+    map_path: Path
+    paths: Sequence[Path]
+    tables: Sequence[NamedTable]
+    rig: Path | None
+
+
 def _recording(
-    converted: Sequence[_Channel],
-    quality: NDArray[np.uint8],
-    time: CommonTime,
-    channel_map: ChannelMap,
-    paths: Sequence[Path],
-    map_path: Path,
-    rig: Path | None,
-    tables: Sequence[NamedTable],
+    converted: Sequence[_Channel], quality: NDArray[np.uint8], time: CommonTime, origin: _Origin
 ) -> xr.Dataset:
-    variables: dict[str, Any] = {one.name: ("time", one.values, one.attributes) for one in converted}
+    variables: dict[str, Any] = {
+        channel.name: ("time", channel.values, channel.attributes) for channel in converted
+    }
     if quality.any():
         variables["quality"] = ("time", quality, quality_attributes())
-    run = channel_map.run
+    run = origin.channel_map.run
     start_time = run.start_time_utc or next(
-        (t.table.start_time_utc for t in tables if t.table.start_time_utc), None
+        (t.table.start_time_utc for t in origin.tables if t.table.start_time_utc), None
     )
     if start_time is None:
         raise ChannelMapError(
@@ -282,10 +290,10 @@ def _recording(
         )
     attributes: dict[str, Any] = {
         "sloshlab_format": FORMAT,
-        "run_id": run.run_id or paths[0].stem,
+        "run_id": run.run_id or origin.paths[0].stem,
         "experiment": run.experiment,
         "configuration": run.configuration,
-        "rig": rig.name if rig is not None else run.rig or "",
+        "rig": origin.rig.name if origin.rig is not None else run.rig or "",
         "sampling_rate_hz": time.rate_hz,
         "start_time_utc": start_time,
     }
@@ -300,9 +308,9 @@ def _recording(
         if value is not None:
             attributes[key] = value
     attributes.update(run.attributes)
-    attributes["source_files"] = ", ".join(path.name for path in paths)
-    attributes["source_sha256"] = ", ".join(_sha256(path) for path in paths)
-    attributes["import_map"] = f"{map_path.name} {_sha256(map_path)}"
+    attributes["source_files"] = ", ".join(path.name for path in origin.paths)
+    attributes["source_sha256"] = ", ".join(_sha256(path) for path in origin.paths)
+    attributes["import_map"] = f"{origin.map_path.name} {_sha256(origin.map_path)}"
     coordinate = ("time", time.times(), {"units": "s", "long_name": "time from the trigger"})
     return xr.Dataset(variables, coords={"time": coordinate}, attrs=attributes)
 
@@ -312,16 +320,9 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _report(
-    converted: Sequence[_Channel],
-    quality: NDArray[np.uint8],
-    time: CommonTime,
-    tables: Sequence[NamedTable],
-    selected: Sequence[Selected],
-    traps: Sequence[str],
-    channel_map: ChannelMap,
-) -> ImportReport:
-    used = {(one.source, one.column.name) for one in selected}
+def _left_out(tables: Sequence[NamedTable], selected: Sequence[Selected], channel_map: ChannelMap) -> list[str]:
+    """Everything in the files that is in no channel."""
+    used = {(column.source, column.column.name) for column in selected}
     left_out: list[str] = []
     for named in tables:
         prefix = f"{named.name}: " if len(tables) > 1 else ""
@@ -336,6 +337,18 @@ def _report(
             for name, value in named.table.scalars.items()
             if name != channel_map.source.sampling_rate_variable
         ]
+    return left_out
+
+
+def _report(
+    converted: Sequence[_Channel],
+    quality: NDArray[np.uint8],
+    time: CommonTime,
+    tables: Sequence[NamedTable],
+    *,
+    left_out: Sequence[str],
+    traps: Sequence[str],
+) -> ImportReport:
     truncated = [f"{named.name}: {named.table.truncated}" for named in tables if named.table.truncated]
     sources = tuple(
         {
@@ -348,7 +361,7 @@ def _report(
     )
     return ImportReport(
         sources=sources,
-        mapped=tuple(one.mapped for one in converted),
+        mapped=tuple(channel.mapped for channel in converted),
         left_out=tuple(left_out),
         traps=tuple(dict.fromkeys([*truncated, *traps])),
         sampling_rate_hz=time.rate_hz,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from decimal import InvalidOperation
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,8 @@ def read(path: Path, settings: SourceSection) -> Table:
         with ReaderGuard(path, "LVM"):
             pieces = _split(part, layout, label, traps, missing)
             rounding = roundings[number - 1] if number <= len(roundings) else 0.0
-            segments += [_columns(part, piece, layout, rounding, unusable, traps) for piece in pieces]
+            record = _Record(part, layout, rounding)
+            segments += [_columns(record, piece, unusable, traps) for piece in pieces]
     columns, hint = _chosen(path, segments, settings.segment, traps)
     if not columns:
         raise FileFormatError(f"source {path}", got="no column of numbers", allowed="numeric channels")
@@ -121,14 +123,17 @@ def _declared_samples(part: Mapping[str, Any]) -> int:
     return int(max(numbers, default=0)) if max(numbers, default=0) < 1e12 else 0
 
 
-def _columns(
-    part: Mapping[str, Any],
-    rows: slice,
-    layout: str,
-    rounding: float,
-    unusable: dict[str, str],
-    traps: list[str],
-) -> list[Column]:
+@dataclass(frozen=True)
+class _Record:
+    """What stands under one header: its content, where X_Value stands, and half a unit of Delta_X's last digit."""
+
+    part: Mapping[str, Any]
+    layout: str
+    step_rounding_s: float
+
+
+def _columns(record: _Record, rows: slice, unusable: dict[str, str], traps: list[str]) -> list[Column]:
+    part, layout = record.part, record.layout
     data = np.atleast_2d(part["data"])[rows]
     raw_names = [str(name) for name in part["Channel names"]]
     columns: list[Column] = []
@@ -150,19 +155,13 @@ def _columns(
             clock = values
         else:
             at = position if layout == "No" else position - 1
-            columns.append(_column(part, name, values, at, clock, rounding, traps))
+            columns.append(_column(record, Column(name, values, time_s=clock), at, traps))
     return columns
 
 
-def _column(
-    part: Mapping[str, Any],
-    name: str,
-    values: np.ndarray,
-    at: int,
-    clock: np.ndarray | None,
-    rounding: float,
-    traps: list[str],
-) -> Column:
+def _column(record: _Record, bare: Column, at: int, traps: list[str]) -> Column:
+    """The column with its units, and the times of its samples where no clock stands beside it."""
+    part, clock = record.part, bare.time_s
     step = _entry(part, "Delta_X", at)
     start = _entry(part, "X0", at) or 0.0
     units_list = part.get("Y_Unit_Label") or []
@@ -170,15 +169,15 @@ def _column(
     if clock is not None and clock.size > 1:
         mean_step = float(clock[-1] - clock[0]) / (clock.size - 1)
         if step and abs(mean_step - step) > 0.01 * step:
-            traps.append(f"{name}: X_Value advances {mean_step:.6g} s per row, Delta_X says {step:.6g} s")
-        return Column(name, values, units=units or None, time_s=clock)
+            traps.append(f"{bare.name}: X_Value advances {mean_step:.6g} s per row, Delta_X says {step:.6g} s")
+        return replace(bare, units=units or None)
     return Column(
-        name,
-        values,
+        bare.name,
+        bare.values,
         units=units or None,
         start_s=start,
         step_s=step if step and step > 0 else None,
-        step_rounding_s=rounding,
+        step_rounding_s=record.step_rounding_s,
     )
 
 

@@ -210,10 +210,10 @@ def _checked_matrix(body: bytes, order: str, path: Path, depth: int, budget: _Bu
     elif kind == _CHAR:
         _check_numbers(path, name, size, parts[3:], 1, exact=False)
     elif kind == _CELL:
-        _check_members(path, name, size, parts[3:], order, depth, budget)
+        _check_members(path, name, size, parts[3:], order=order, depth=depth, budget=budget)
     elif kind == _STRUCT:
         n_fields = _n_fields(path, name, parts[3:5], order)
-        _check_members(path, name, size * n_fields, parts[5:], order, depth, budget)
+        _check_members(path, name, size * n_fields, parts[5:], order=order, depth=depth, budget=budget)
     else:
         return name, f"of unknown class {kind}"
     return name, ""
@@ -243,7 +243,14 @@ def _n_fields(path: Path, name: str, parts: list[tuple[int, bytes]], order: str)
 
 
 def _check_members(
-    path: Path, name: str, n_members: int, parts: list[tuple[int, bytes]], order: str, depth: int, budget: _Budget
+    path: Path,
+    name: str,
+    n_members: int,
+    parts: list[tuple[int, bytes]],
+    *,
+    order: str,
+    depth: int,
+    budget: _Budget,
 ) -> None:
     if n_members != len(parts) or any(element != _MATRIX for element, _ in parts):
         raise _damaged(path, f"variable {name[:40]!r} of {n_members} members of which {len(parts)} are there")

@@ -36,7 +36,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     found = Found()
     with ReaderGuard(path, "MAT v7.3") as guard, h5py.File(path, "r") as source:
         datasets: list[tuple[str, Any]] = []
-        _listed(h5py, source, "", datasets, found, 0)
+        _listed(h5py, source, datasets, found)
         total = 0
         for name, dataset in datasets:
             total += _decoded_bytes(dataset)
@@ -46,7 +46,9 @@ def read(path: Path, settings: SourceSection) -> Table:
     return table_of(path, "mat73", found, guard.traps)
 
 
-def _listed(h5py: Any, group: Any, prefix: str, datasets: list[tuple[str, Any]], found: Found, depth: int) -> None:
+def _listed(
+    h5py: Any, group: Any, datasets: list[tuple[str, Any]], found: Found, *, prefix: str = "", depth: int = 0
+) -> None:
     for key in group:
         if key.startswith("#") and not prefix:
             continue
@@ -58,7 +60,7 @@ def _listed(h5py: Any, group: Any, prefix: str, datasets: list[tuple[str, Any]],
         else:
             item = group[key]
             if isinstance(item, h5py.Group):
-                _listed(h5py, item, f"{name}.", datasets, found, depth + 1)
+                _listed(h5py, item, datasets, found, prefix=f"{name}.", depth=depth + 1)
             elif isinstance(item, h5py.Dataset):
                 datasets.append((name, item))
 

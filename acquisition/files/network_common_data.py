@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +39,11 @@ def read(path: Path, settings: SourceSection) -> Table:
     checked_size(path)
     require_sound_heaps(path, what=f"source {path}")
     columns: list[Column] = []
-    unusable: dict[str, str] = {}
-    scalars: dict[str, float] = {}
+    others = _Others()
     with ReaderGuard(path, "netCDF") as guard, netcdf4.Dataset(str(path), mode="r") as source:
         group = source[settings.group] if settings.group else source
         for name in source.groups if not settings.group else ():
-            unusable[name] = f"a group; state group = {name!r} to read it"
+            others.unusable[name] = f"a group; state group = {name!r} to read it"
         total = 0
         for variable in group.variables.values():
             total += 8 * int(np.prod([len(d) for d in variable.get_dims()], dtype=object))
@@ -51,14 +52,16 @@ def read(path: Path, settings: SourceSection) -> Table:
             name: _clock(variable) for name, variable in group.variables.items() if variable.dimensions == (name,)
         }
         for name, variable in group.variables.items():
-            _read_variable(name, variable, clocks, columns, unusable, scalars)
+            columns += _series(name, variable, clocks, others)
     if not columns:
         raise FileFormatError(
             f"source {path}",
-            got=f"no series of numbers ({', '.join([*scalars, *unusable][:8]) or 'no variables'})",
+            got=f"no series of numbers ({', '.join([*others.scalars, *others.unusable][:8]) or 'no variables'})",
             allowed="numeric variables over a time dimension",
         )
-    return Table("netcdf", tuple(columns), traps=tuple(guard.traps), unusable=unusable, scalars=scalars)
+    return Table(
+        "netcdf", tuple(columns), traps=tuple(guard.traps), unusable=others.unusable, scalars=others.scalars
+    )
 
 
 def _clock(variable: Any) -> np.ndarray | None:
@@ -70,34 +73,38 @@ def _clock(variable: Any) -> np.ndarray | None:
     return values if factor == 1.0 else values * factor
 
 
-def _read_variable(
-    name: str,
-    variable: Any,
-    clocks: dict[str, np.ndarray | None],
-    columns: list[Column],
-    unusable: dict[str, str],
-    scalars: dict[str, float],
-) -> None:
+@dataclass(frozen=True)
+class _Others:
+    """Variables that are no series: single numbers, and why the rest cannot be used."""
+
+    scalars: dict[str, float] = field(default_factory=dict)
+    unusable: dict[str, str] = field(default_factory=dict)
+
+
+def _series(
+    name: str, variable: Any, clocks: Mapping[str, np.ndarray | None], others: _Others
+) -> Iterator[Column]:
+    """The series of numbers in a variable; what it holds beside them is put with the others."""
     if variable.dtype is str or np.dtype(variable.dtype).kind not in "fiu":
-        unusable[name] = "text or a compound, not numbers"
+        others.unusable[name] = "text or a compound, not numbers"
         return
     size = int(np.prod(variable.shape, dtype=object))
     if size <= 1:
         if size == 1:
-            scalars[name] = float(as_float64(variable[...])[0])
+            others.scalars[name] = float(as_float64(variable[...])[0])
         else:
-            unusable[name] = "empty"
+            others.unusable[name] = "empty"
         return
     if clocks.get(name) is not None and variable.dimensions == (name,):
-        unusable[name] = "the time coordinate"
+        others.unusable[name] = "the time coordinate"
         return
     values = np.ma.filled(np.ma.asarray(variable[...]).astype(np.float64), np.nan)
     series = rows_of(name, values)
     if not series:
-        unusable[name] = f"shape {variable.shape}: no side is clearly time"
+        others.unusable[name] = f"shape {variable.shape}: no side is clearly time"
     units = str(getattr(variable, "units", "")).strip() or None
     longest = int(np.argmax(variable.shape))
     clock = clocks.get(variable.dimensions[longest])
     for label, row in series:
         usable = clock is not None and clock.size == row.size
-        columns.append(Column(label, as_float64(row), units=units, time_s=clock if usable else None))
+        yield Column(label, as_float64(row), units=units, time_s=clock if usable else None)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from acquisition.numerical_tank.structure_motion import (
     TERMS,
     Motion,
+    MovingStructure,
     StructureAccount,
     account_of,
     advance_structure,
@@ -85,9 +86,9 @@ class CarriedTank:
     def __init__(self, structure: Structure, step_s: float) -> None:
         _check_step(structure, step_s)
         self.structure, self.step_s = structure, step_s
-        self._system = system_of(structure, step_s)
         self._motion = Motion(np.zeros(structure.n_modes), np.zeros(structure.n_modes))
         self._energies = np.zeros(TERMS)
+        self._moving = MovingStructure(system_of(structure, step_s), self._motion, self._energies)
         self._start_j = 0.0
 
     @property
@@ -190,7 +191,7 @@ class FrozenTank(CarriedTank):
         """
         base = as_base(base_acceleration_m_per_s2)
         rows, forces = np.zeros((base.size, 3 * self.structure.n_modes)), np.zeros(base.size)
-        advance_structure(self._system, self._motion, self.mass_kg, base, rows, forces, self._energies)
+        advance_structure(self._moving, self.mass_kg, base, rows, forces)
         first, self._n_steps = self._n_steps, self._n_steps + base.size
         return self._history(base, rows, forces, first)
 

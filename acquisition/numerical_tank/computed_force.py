@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from acquisition.numerical_tank import checkpoint as checkpoints
 from acquisition.numerical_tank.forced_motion import averaged
 from acquisition.numerical_tank.instability import InstabilityError
-from acquisition.numerical_tank.interruption import told_to_stop
+from acquisition.numerical_tank.long_computation import LongComputation
 from acquisition.numerical_tank.sampling import HALF_LENGTH_SAMPLES, oversampling, sampled
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import TankSetup
@@ -109,20 +109,8 @@ def computed_force(
     path = None if checkpoint is None else Path(checkpoint)
     if path is not None and path.exists():
         run.restore(path)
-    stopped, saved_s = "", monotonic_s()
     try:
-        with told_to_stop() as stopping:
-            while run.n_left and not stopped:
-                start_s = monotonic_s()
-                stopped = run.advance()
-                run.computing_s += monotonic_s() - start_s
-                if stopping:
-                    raise KeyboardInterrupt
-                if progress is not None:
-                    progress(run.share)
-                if path is not None and not stopped and monotonic_s() - saved_s >= saved_every_s:
-                    run.save(path)
-                    saved_s = monotonic_s()
+        stopped = run.run(path, progress, saved_every_s=saved_every_s, monotonic_s=monotonic_s)
     except KeyboardInterrupt as interrupt:
         if path is None:
             raise
@@ -132,7 +120,7 @@ def computed_force(
     return ComputedForce(run.samples(n_samples), run.computing_s, stopped)
 
 
-class _Computation:
+class _Computation(LongComputation):
     """A tank, its motion and the mean forces so far."""
 
     def __init__(self, setup: TankSetup, motion: VerticalMotion, n_samples: int) -> None:

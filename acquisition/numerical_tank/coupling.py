@@ -13,7 +13,7 @@ what the liquid handed over and what the structure took differ by that, and both
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -21,9 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquisition.numerical_tank import stepping
 from acquisition.numerical_tank.carried_tank import CarriedTank, StructureHistory, as_base
-from acquisition.numerical_tank.neighbours import list_is_stale, list_neighbours
 from acquisition.numerical_tank.simulation import NumericalTank
-from acquisition.numerical_tank.stepping import FORCE_Z, NO_ROOM, RUNNING, begin_step, end_step
+from acquisition.numerical_tank.stepping import FORCE_Z, NO_ROOM, RUNNING, begin_step, end_step, pairs_are_listed
 from acquisition.numerical_tank.structure_motion import HANDED_OVER, step_structure
 from acquisition.numerical_tank.structures import Structure
 from acquisition.numerical_tank.tank import TankSetup
@@ -93,21 +92,9 @@ class CoupledTank(CarriedTank):
         setup = self.tank.setup
         per_particle = setup.particle_mass_kg_per_m * setup.box.depth_m
         weight = setup.liquid_mass_kg * setup.gravity_m_per_s2
-        return int(
-            _advance_coupled(
-                *self.tank.compiled_state,
-                self._system,
-                self._motion,
-                per_particle,
-                weight,
-                base,
-                rows,
-                forces,
-                self._carried,
-                self._energies,
-                *self.tank.compiled_sums,
-            )
-        )
+        interface = _Interface(per_particle, weight, self._carried)
+        course = _Course(base, rows, forces)
+        return int(_advance_coupled(self.tank.flow, self.tank.totals, self._moving, interface, course))
 
     def structure_arrays(self) -> dict[str, NDArray[Any]]:
         """Return copies of what a later step depends on beside the tank, for `coupled_checkpoint.save`."""
@@ -145,6 +132,32 @@ class CoupledTank(CarriedTank):
         return {"q": q, "p": p, "energies": self._energies, "carried": self._carried}
 
 
+class _Interface(NamedTuple):
+    """How the liquid acts on the structure.
+
+    Attributes
+    ----------
+    per_particle : float
+        Turns the sums of the walls into forces [N].
+    weight : float
+        Of the liquid [N].
+    carried : ndarray, shape (1,)
+        Force of impulses at the end of the last step [N]; changed.
+    """
+
+    per_particle: float
+    weight: float
+    carried: FloatArray
+
+
+class _Course(NamedTuple):
+    """What a number of steps is given, the acceleration of the base, and what it writes, one row for each step."""
+
+    base: FloatArray
+    rows: FloatArray
+    forces: FloatArray
+
+
 @njit(cache=True)
 def _mean_velocity(system, row):  # type: ignore[no-untyped-def]
     """Mean velocity of the tank during the step of a row."""
@@ -164,54 +177,20 @@ def _velocity(system, motion):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _advance_coupled(  # type: ignore[no-untyped-def]
-    particles,
-    pairs,
-    images,
-    constants,
-    table,
-    table_scale,
-    gravity,
-    system,
-    motion,
-    per_particle,
-    weight,
-    base,
-    rows,
-    forces,
-    carried,
-    energies,
-    sums,
-    counters,
-):
-    """Steps of liquid and structure; see `CoupledTank.advance` and `stepping.advance`.
-
-    `per_particle` turns the sums of the walls into forces [N], `weight` is that of the liquid, `carried` the
-    force of impulses at the end of the last step.
-    """
+def _advance_coupled(flow, totals, structure, interface, course):  # type: ignore[no-untyped-def]
+    """Steps of liquid and structure; see `CoupledTank.advance` and `stepping.advance`."""
+    system, motion, energies = structure.system, structure.motion, structure.energies
+    per_particle, weight, carried = interface.per_particle, interface.weight, interface.carried
+    base, rows, forces = course.base, course.rows, course.forces
     walls = np.zeros(4)
     for k in range(base.size):
-        if list_is_stale(particles, constants) and not list_neighbours(particles, pairs, images, constants):
+        if not pairs_are_listed(flow):
             return NO_ROOM
-        viscosity = begin_step(particles, pairs, images, constants, walls)
+        viscosity = begin_step(flow, walls)
         in_middle = per_particle * walls[FORCE_Z] + weight
         forces[k] = in_middle + carried[0]
-        tank_z = step_structure(system, motion, forces[k], base[k], rows[k], energies)
-        status = end_step(
-            particles,
-            pairs,
-            images,
-            constants,
-            table,
-            table_scale,
-            gravity,
-            0.0,
-            tank_z,
-            viscosity,
-            walls,
-            sums,
-            counters,
-        )
+        tank_z = step_structure(structure, forces[k], base[k], rows[k])
+        status = end_step(flow, (0.0, tank_z), viscosity, walls, totals)
         carried[0] = per_particle * walls[FORCE_Z] + weight - in_middle
         energies[HANDED_OVER] += system.step * in_middle * _mean_velocity(system, rows[k])
         energies[HANDED_OVER] += system.step * carried[0] * _velocity(system, motion)

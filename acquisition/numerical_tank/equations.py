@@ -24,26 +24,26 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from acquisition.numerical_tank.particles import Constants, Pairs, Particles
+from acquisition.numerical_tank.particles import Constants, Pairs, Particles, Partners
 
 FAST = {"contract", "arcp", "nsz"}
 """Freedoms given to the compiler. Not numbers (NaN) keep their meaning."""
 
 
 @njit(cache=True, fastmath=FAST)
-def _measure_range(particles, pairs, constants, i, first, last, near):  # type: ignore[no-untyped-def]
-    """Keep those of candidates first … last − 1 of particle i that are in reach; return the new number."""
-    one, gradient, viscous = constants.one, constants.gradient, constants.viscous
+def _measure_range(particles, pairs, constants, listed, near):  # type: ignore[no-untyped-def]
+    """Keep those of the listed partners of a particle that are in reach; return the new number."""
+    unity, gradient, viscous = constants.unity, constants.gradient, constants.viscous
     square = constants.support * constants.support
-    per_support = one / constants.support
+    per_support = unity / constants.support
     soft = constants.smoothing * constants.smoothing * constants.softening
-    x, z = particles.x[i], particles.z[i]
-    for k in range(first, last):
+    x, z = particles.x[listed.i], particles.z[listed.i]
+    for k in range(listed.first, listed.last):
         j = np.uintp(pairs.j[k])
         rx, rz = x - particles.x[j], z - particles.z[j]
         r2 = rx * rx + rz * rz
         if r2 < square:
-            t = one - np.sqrt(r2) * per_support
+            t = unity - np.sqrt(r2) * per_support
             factor = gradient * t * t * t
             pairs.near_j[near] = pairs.j[k]
             pairs.rx[near], pairs.rz[near], pairs.f[near] = rx, rz, factor
@@ -59,9 +59,9 @@ def measure_pairs(particles: Particles, pairs: Pairs, constants: Constants) -> N
     for i in range(constants.n):
         first, middle, last = np.uintp(pairs.start[i]), np.uintp(pairs.middle[i]), np.uintp(pairs.start[i + 1])
         pairs.near_start[i] = near
-        near = _measure_range(particles, pairs, constants, i, first, middle, near)
+        near = _measure_range(particles, pairs, constants, Partners(i, first, middle), near)
         pairs.near_middle[i] = near
-        near = _measure_range(particles, pairs, constants, i, middle, last, near)
+        near = _measure_range(particles, pairs, constants, Partners(i, middle, last), near)
     pairs.near_start[constants.n] = near
 
 
@@ -69,7 +69,7 @@ def measure_pairs(particles: Particles, pairs: Pairs, constants: Constants) -> N
 def rate_of_density(particles: Particles, pairs: Pairs, constants: Constants) -> None:
     """Set the rate of s by the motion (`ds`) for the present velocities and the pairs as measured."""
     vx, vz, ds = particles.vx, particles.vz, particles.ds
-    zero = constants.one - constants.one
+    zero = constants.unity - constants.unity
     for i in range(constants.n):
         ds[i] = zero
     for i in range(constants.n):
@@ -97,13 +97,14 @@ def _clear(particles, n_all, zero):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST)
-def _sum_over_partners(particles, pairs, constants, i, first, last):  # type: ignore[no-untyped-def]
-    """Add the terms of particle i with partners first … last; return Σ viscous·(v⃗·r⃗)² [m²/s³], at most zero."""
+def _sum_over_partners(particles, pairs, constants, partners):  # type: ignore[no-untyped-def]
+    """Add the terms of a particle with its partners; return Σ viscous·(v⃗·r⃗)² [m²/s³], at most zero."""
+    i = partners.i
     s, vx, vz, gx, gz = particles.s, particles.vx, particles.vz, particles.gx, particles.gz
-    zero = constants.one - constants.one
+    zero = constants.unity - constants.unity
     power, sum_ax, sum_az, sum_gx, sum_gz, sum_diffusion = zero, zero, zero, zero, zero, zero
     si, vxi, vzi, gxi, gzi = s[i], vx[i], vz[i], gx[i], gz[i]
-    for k in range(np.uintp(first), np.uintp(last)):
+    for k in range(np.uintp(partners.first), np.uintp(partners.last)):
         j = np.uintp(pairs.near_j[k])
         rx, rz, f = pairs.rx[k], pairs.rz[k], pairs.f[k]
         closing = (vxi - vx[j]) * rx + (vzi - vz[j]) * rz
@@ -141,13 +142,13 @@ def accelerate(particles: Particles, pairs: Pairs, constants: Constants, n_all: 
     float
         Power that viscosity takes from the liquid, per mass of one particle [m²/s³], not negative.
     """
-    _clear(particles, n_all, constants.one - constants.one)
+    _clear(particles, n_all, constants.unity - constants.unity)
     inside, at_walls = 0.0, 0.0
     for i in range(constants.n):
         first, middle, last = pairs.near_start[i], pairs.near_middle[i], pairs.near_start[i + 1]
-        inside += _sum_over_partners(particles, pairs, constants, i, first, middle)
+        inside += _sum_over_partners(particles, pairs, constants, Partners(i, first, middle))
         if last > middle:
-            at_walls += _sum_over_partners(particles, pairs, constants, i, middle, last)
+            at_walls += _sum_over_partners(particles, pairs, constants, Partners(i, middle, last))
     # a pair of particle and image belongs half to the liquid, half to its image
     return -(inside + 0.5 * at_walls)
 

@@ -48,7 +48,7 @@ def constants_of(setup: TankSetup) -> Constants:
     h, numerics = setup.smoothing_length_m, setup.numerics
     spacing, speed = math.sqrt(setup.particle_volume_m2), setup.liquid.speed_of_sound_m_per_s
     values = {
-        "one": 1.0,
+        "unity": 1.0,
         "half": 0.5,
         "two": 2.0,
         "step": setup.step_s,

@@ -7,19 +7,45 @@ in reach. Each pair appears once; pairs of two images never.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from acquisition.numerical_tank.particles import Constants, Images, Pairs, Particles
+from acquisition.numerical_tank.particles import Constants, Images, IndexArray, Pairs, Particles, Partners
 from acquisition.numerical_tank.walls import list_images, place_images
 
 
+class _Cells(NamedTuple):
+    """Square cells in columns and rows.
+
+    Attributes
+    ----------
+    side : floating
+        [m].
+    n_x, n_z : int
+        Columns and rows; the outermost ones lie outside the tank.
+    """
+
+    side: float
+    n_x: int
+    n_z: int
+
+
+class _Slots(NamedTuple):
+    """A list of particles in the order of cells, and the place up to which pairs are listed."""
+
+    order: IndexArray
+    count: int
+
+
 @njit(cache=True)
-def _sort_into_cells(particles, first, last, cell, n_x, n_z):  # type: ignore[no-untyped-def]
+def _sort_into_cells(particles, first, last, cells):  # type: ignore[no-untyped-def]
     """Return the first slot of every cell, particles first … last − 1 in the order of cells, and their cells.
 
     The cells of a column follow one another from below upwards, so that some of them are one range of slots.
     """
+    cell, n_x, n_z = cells.side, cells.n_x, cells.n_z
     cell_of = np.empty(last - first, np.int32)
     start = np.zeros(n_x * n_z + 1, np.int32)
     for i in range(first, last):
@@ -38,10 +64,11 @@ def _sort_into_cells(particles, first, last, cell, n_x, n_z):  # type: ignore[no
 
 
 @njit(cache=True)
-def _list_range(particles, pairs, order, first, last, i, square, count):  # type: ignore[no-untyped-def]
-    """List particle i with those in slots first … last − 1 that are close enough; return the new count."""
-    x, z = particles.x[i], particles.z[i]
-    for k in range(np.uintp(first), np.uintp(last)):
+def _list_range(particles, pairs, slots, partners, square):  # type: ignore[no-untyped-def]
+    """List a particle with those in the slots of its partners that are close enough; return the new count."""
+    order, count = slots.order, slots.count
+    x, z = particles.x[partners.i], particles.z[partners.i]
+    for k in range(np.uintp(partners.first), np.uintp(partners.last)):
         j = np.uintp(order[k])
         dx, dz = x - particles.x[j], z - particles.z[j]
         if dx * dx + dz * dz < square:
@@ -61,8 +88,9 @@ def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-
     reach = constants.support + constants.skin
     square = reach * reach
     n_x, n_z = int(constants.length / reach) + 3, int(constants.height / reach) + 3
-    start, order, cell_of = _sort_into_cells(particles, 0, n, reach, n_x, n_z)
-    image_start, image_order, _ = _sort_into_cells(particles, n, n_all, reach, n_x, n_z)
+    cells = _Cells(reach, n_x, n_z)
+    start, order, cell_of = _sort_into_cells(particles, 0, n, cells)
+    image_start, image_order, _ = _sort_into_cells(particles, n, n_all, cells)
     slot = np.empty(n, np.int32)
     for k in range(n):
         slot[order[k]] = k
@@ -73,14 +101,16 @@ def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-
             return False
         cell, row = cell_of[i], cell_of[i] % n_z
         low, high = min(row, 1), min(n_z - row, 2)
-        count = _list_range(particles, pairs, order, slot[i] + 1, start[cell + high], i, square, count)
+        count = _list_range(
+            particles, pairs, _Slots(order, count), Partners(i, slot[i] + 1, start[cell + high]), square
+        )
         if cell + n_z < n_x * n_z:
             first, last = start[cell + n_z - low], start[cell + n_z + high]
-            count = _list_range(particles, pairs, order, first, last, i, square, count)
+            count = _list_range(particles, pairs, _Slots(order, count), Partners(i, first, last), square)
         pairs.middle[i] = count
         for beside in range(max(cell - n_z, row), min(cell + n_z + 1, n_x * n_z), n_z):
             first, last = image_start[beside - low], image_start[beside + high]
-            count = _list_range(particles, pairs, image_order, first, last, i, square, count)
+            count = _list_range(particles, pairs, _Slots(image_order, count), Partners(i, first, last), square)
     pairs.start[n] = count
     return True
 

@@ -143,7 +143,7 @@ class Constants(NamedTuple):
         Number of fluid particles.
     n_slow : int
         Steps between two corrections of the arrangement.
-    one, half, two : floating
+    unity, half, two : floating
         So that the compiler does not widen the type.
     step : floating
         Time step [s].
@@ -185,7 +185,7 @@ class Constants(NamedTuple):
 
     n: int
     n_slow: int
-    one: float
+    unity: float
     half: float
     two: float
     step: float
@@ -209,3 +209,61 @@ class Constants(NamedTuple):
     relaxation: float
     quiet_speed: float
     largest_speed: float
+
+
+class Partners(NamedTuple):
+    """A particle and the range of places in a list where its possible partners stand.
+
+    Attributes
+    ----------
+    i : int
+        The particle.
+    first, last : int
+        Places of the partners, `last` exclusive.
+    """
+
+    i: int
+    first: int
+    last: int
+
+
+class Flow(NamedTuple):
+    """A liquid as the compiled loops take it: the state itself, which they change, and the numbers of the run.
+
+    Attributes
+    ----------
+    particles : Particles
+    pairs : Pairs
+    images : Images
+    constants : Constants
+    table : ndarray
+        From `coverage_table`.
+    table_scale : floating
+        Entries of the table per unit of h |Σ V ∇W|.
+    gravity : float
+        g, downward [m/s²].
+    """
+
+    particles: Particles
+    pairs: Pairs
+    images: Images
+    constants: Constants
+    table: AnyFloatArray
+    table_scale: float
+    gravity: float
+
+
+class Totals(NamedTuple):
+    """What the compiled loops add to.
+
+    Attributes
+    ----------
+    sums : ndarray, shape (5,)
+        Energies divided by the mass of a particle, in the order of `energy.TERMS`; elastic ones also
+        divided by c₀², potential ones by g, powers by the time step.
+    counters : ndarray of int64, shape (3,)
+        Steps done, crossings of walls, and the particle that became too fast.
+    """
+
+    sums: NDArray[np.float64]
+    counters: NDArray[np.int64]

@@ -47,7 +47,7 @@ NEAR_SURFACE = (0.08, 0.2)
 
 @njit(cache=True, fastmath=FAST)
 def _clear(particles, constants, n_all):  # type: ignore[no-untyped-def]
-    zero = constants.one - constants.one
+    zero = constants.unity - constants.unity
     for i in range(n_all):
         particles.packing[i] = constants.peak
         particles.nx[i] = zero
@@ -65,14 +65,14 @@ def sum_arrangement(particles: Particles, pairs: Pairs, constants: Constants, n_
     _clear(particles, constants, n_all)
     packing, nx, nz, qx, qz = particles.packing, particles.nx, particles.nz, particles.qx, particles.qz
     bxx, bxz, bzz = particles.bxx, particles.bxz, particles.bzz
-    one, two = constants.one, constants.two
+    unity, two = constants.unity, constants.two
     for i in range(constants.n):
         for k in range(np.uintp(pairs.near_start[i]), np.uintp(pairs.near_start[i + 1])):
             j = np.uintp(pairs.near_j[k])
             rx, rz, f = pairs.rx[k], pairs.rz[k], pairs.f[k]
             q = np.sqrt(rx * rx + rz * rz) / constants.smoothing
-            t = one - constants.half * q
-            weight = constants.peak * t * t * t * t * (two * q + one)
+            t = unity - constants.half * q
+            weight = constants.peak * t * t * t * t * (two * q + unity)
             pairs.viscous[k] = weight
             packing[i] += weight
             packing[j] += weight
@@ -83,7 +83,7 @@ def sum_arrangement(particles: Particles, pairs: Pairs, constants: Constants, n_
             nz[j] -= gz
             crowd = weight / constants.spacing_kernel
             crowd = crowd * crowd
-            crowd = one + constants.crowding * crowd * crowd
+            crowd = unity + constants.crowding * crowd * crowd
             qx[i] += crowd * gx
             qz[i] += crowd * gz
             qx[j] -= crowd * gx
@@ -101,7 +101,7 @@ def _invert(particles, i, constants):  # type: ignore[no-untyped-def]
     """Invert the gradient correction of a particle in place; none where too few neighbours define it."""
     xx, xz, zz = particles.bxx[i], particles.bxz[i], particles.bzz[i]
     determinant = xx * zz - xz * xz
-    zero = constants.one - constants.one
+    zero = constants.unity - constants.unity
     if determinant < constants.smallest_determinant:
         particles.bxx[i], particles.bxz[i], particles.bzz[i] = zero, zero, zero
         return

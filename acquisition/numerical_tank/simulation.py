@@ -20,7 +20,7 @@ from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.numerical_tank.kernel import coverage_table, surface_gradient
 from acquisition.numerical_tank.liquid_state import LiquidState
 from acquisition.numerical_tank.neighbours import list_neighbours
-from acquisition.numerical_tank.particles import Constants, Images, Pairs, Particles
+from acquisition.numerical_tank.particles import Flow, Images, Pairs, Particles, Totals
 from acquisition.numerical_tank.tank import TankSetup
 from sloshlab.errors import InputError
 
@@ -89,11 +89,9 @@ class NumericalTank:
         n, particles = self.setup.n_particles, self._particles
         particles.x[:n], particles.z[:n], particles.s[:n] = particles_at_rest(self.setup)
         self._list()
-        none = self._constants.one - self._constants.one
+        none = self._constants.unity - self._constants.unity
         quiet = self._constants._replace(relaxation=none, spread=none)
-        stepping.correct(
-            particles, self._pairs, self._images, quiet, self._table, self._scale, np.zeros(len(energy.TERMS))
-        )
+        stepping.correct(self.flow._replace(constants=quiet), np.zeros(len(energy.TERMS)))
 
     def _list(self) -> None:
         if not list_neighbours(self._particles, self._pairs, self._images, self._constants):
@@ -175,18 +173,18 @@ class NumericalTank:
         return float(forces.vertical_n[0]), float(forces.horizontal_n[0])
 
     @property
-    def compiled_state(self) -> tuple[Particles, Pairs, Images, Constants, NDArray[Any], Any, float]:
-        """What the compiled loops take first: the state itself, no copy, and the constants of the run."""
+    def flow(self) -> Flow:
+        """The liquid as the compiled loops take it: the state itself, no copy."""
         gravity = self.setup.gravity_m_per_s2
-        return self._particles, self._pairs, self._images, self._constants, self._table, self._scale, gravity
+        return Flow(self._particles, self._pairs, self._images, self._constants, self._table, self._scale, gravity)
 
     @property
-    def compiled_sums(self) -> tuple[FloatArray, NDArray[np.int64]]:
-        """What they take last and add to: sums of energies, and counters."""
-        return self._sums, self._counters
+    def totals(self) -> Totals:
+        """What the compiled loops add to."""
+        return Totals(self._sums, self._counters)
 
     def _advance(self, motion: FloatArray, forces: FloatArray) -> int:
-        return int(stepping.advance(*self.compiled_state, motion, forces, *self.compiled_sums))
+        return int(stepping.advance(self.flow, motion, forces, self.totals))
 
     def _as_forces(self, forces: FloatArray) -> WallForces:
         scaled = forces * (self.setup.particle_mass_kg_per_m * self.setup.box.depth_m)

@@ -35,7 +35,7 @@ from acquisition.numerical_tank.equations import (
     rate_of_density,
 )
 from acquisition.numerical_tank.neighbours import list_is_stale, list_neighbours
-from acquisition.numerical_tank.particles import AnyFloatArray, Constants, Images, Pairs, Particles
+from acquisition.numerical_tank.particles import Flow, Totals
 from acquisition.numerical_tank.shifting import (
     characteristic_speeds,
     correct_density,
@@ -118,33 +118,36 @@ def _force_on_walls(particles, images, constants, force):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def correct(
-    particles: Particles,
-    pairs: Pairs,
-    images: Images,
-    constants: Constants,
-    table: AnyFloatArray,
-    scale: float,
-    sums: NDArray[np.float64],
-) -> None:
+def correct(flow: Flow, sums: NDArray[np.float64]) -> None:
     """Make the slow corrections of density and arrangement, at the end of a step; see `advance`."""
+    particles, pairs, images, constants = flow.particles, flow.pairs, flow.images, flow.constants
     n_all = constants.n + images.number[0]
     place_images(particles, images, constants.n)
     measure_pairs(particles, pairs, constants)
     sum_arrangement(particles, pairs, constants, n_all)
     speed, shift_speed = characteristic_speeds(particles, constants)
-    find_packing_errors(particles, constants, table, scale)
+    find_packing_errors(particles, constants, flow.table, flow.table_scale)
     mirror_packing_errors(particles, images, constants.n)
     sums[PACKING] += correct_density(particles, pairs, constants, speed)
     sums[SHIFT] -= shift(particles, constants, shift_speed)
 
 
 @njit(cache=True)
-def begin_step(particles, pairs, images, constants, force):  # type: ignore[no-untyped-def]
+def pairs_are_listed(flow: Flow) -> bool:
+    """List the pairs anew where they have moved too far; False when there is no room for them."""
+    if not list_is_stale(flow.particles, flow.constants):
+        return True
+    fits: bool = list_neighbours(flow.particles, flow.pairs, flow.images, flow.constants)
+    return fits
+
+
+@njit(cache=True)
+def begin_step(flow, force):  # type: ignore[no-untyped-def]
     """Go to the middle of a step, where all forces are known; returns the rate of viscous losses.
 
     `force` is written: the force of the liquid on the tank, divided by the mass of a particle [m/s²].
     """
+    particles, pairs, images, constants = flow.particles, flow.pairs, flow.images, flow.constants
     n = constants.n
     n_all = n + images.number[0]
     half = constants.half * constants.step
@@ -162,8 +165,9 @@ def begin_step(particles, pairs, images, constants, force):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _finish_motion(particles, pairs, images, constants, body_x, body_z, sums):  # type: ignore[no-untyped-def]
+def _finish_motion(flow, body_x, body_z, sums):  # type: ignore[no-untyped-def]
     """From the kick on; returns Σ of the mean velocities, the largest speed squared and whose it is."""
+    particles, pairs, images, constants = flow.particles, flow.pairs, flow.images, flow.constants
     n = constants.n
     half = constants.half * constants.step
     sum_x, sum_z, largest, fastest = _kick(particles, constants, body_x, body_z)
@@ -176,33 +180,19 @@ def _finish_motion(particles, pairs, images, constants, body_x, body_z, sums):  
 
 
 @njit(cache=True)
-def end_step(  # type: ignore[no-untyped-def]
-    particles,
-    pairs,
-    images,
-    constants,
-    table,
-    table_scale,
-    gravity,
-    tank_x,
-    tank_z,
-    viscosity,
-    force,
-    sums,
-    counters,
-):
+def end_step(flow, tank, viscosity, force, totals):  # type: ignore[no-untyped-def]
     """Kick the liquid and complete the step; returns RUNNING or TOO_FAST.
 
-    Parameters are those of `advance`; `tank_x` and `tank_z` are the acceleration of the tank in this step,
-    `viscosity` and `force` come from `begin_step`. To `force` the impulses of particles that cross a wall
+    Parameters are those of `advance`; `tank` is the horizontal and vertical acceleration of the tank in this
+    step, `viscosity` and `force` come from `begin_step`. To `force` the impulses of particles that cross a wall
     at the end of the step are added.
     """
-    sum_x, sum_z, largest, fastest = _finish_motion(
-        particles, pairs, images, constants, -tank_x, -tank_z - gravity, sums
-    )
+    tank_x, tank_z = tank
+    sums, counters, constants = totals.sums, totals.counters, flow.constants
+    sum_x, sum_z, largest, fastest = _finish_motion(flow, -tank_x, -tank_z - flow.gravity, sums)
     sums[VISCOSITY] += viscosity
     sums[TANK_WORK] -= tank_x * sum_x + tank_z * sum_z
-    impulse_x, impulse_z, crossings = exchange_with_images(particles, constants)
+    impulse_x, impulse_z, crossings = exchange_with_images(flow.particles, constants)
     force[FORCE_X] -= impulse_x / constants.step
     force[FORCE_Z] -= impulse_z / constants.step
     counters[CROSSINGS] += crossings
@@ -211,70 +201,39 @@ def end_step(  # type: ignore[no-untyped-def]
         return TOO_FAST
     counters[STEPS_DONE] += 1
     if counters[STEPS_DONE] % constants.n_slow == 0:
-        correct(particles, pairs, images, constants, table, table_scale, sums)
+        correct(flow, sums)
     return RUNNING
 
 
 @njit(cache=True)
 def advance(
-    particles: Particles,
-    pairs: Pairs,
-    images: Images,
-    constants: Constants,
-    table: AnyFloatArray,
-    table_scale: float,
-    gravity_m_per_s2: float,
-    acceleration_m_per_s2: NDArray[np.float64],
-    forces: NDArray[np.float64],
-    sums: NDArray[np.float64],
-    counters: NDArray[np.int64],
+    flow: Flow, acceleration_m_per_s2: NDArray[np.float64], forces: NDArray[np.float64], totals: Totals
 ) -> int:
     """Take one step for each row of accelerations of the tank.
 
     Parameters
     ----------
-    particles, pairs, images, constants
-        The state; changed.
-    table, table_scale
-        From `coverage_table`, and entries per unit of h |Σ V ∇W|.
-    gravity_m_per_s2 : float
-        g, downward.
+    flow : Flow
+        Its state is changed.
     acceleration_m_per_s2 : ndarray, shape (n_steps, 2)
         Horizontal and vertical acceleration of the tank in the middle of every step, upward positive.
     forces : ndarray, shape (n_steps, 4)
         Written: force of the liquid on the tank, divided by the mass of a particle [m/s²]; horizontal,
         vertical, of which on floor and roof.
-    sums : ndarray, shape (5,)
-        Energies divided by the mass of a particle, in the order of `energy.TERMS`; elastic ones
-        also divided by c₀², potential ones by g, powers by the time step. Added to.
-    counters : ndarray of int64, shape (3,)
-        Steps done, crossings of walls, and the particle that became too fast. Added to.
+    totals : Totals
+        Added to.
 
     Returns
     -------
     int
-        RUNNING, NO_ROOM or TOO_FAST; after the last two, `counters` says after how many steps.
+        RUNNING, NO_ROOM or TOO_FAST; after the last two, the counters say after how many steps.
     """
     for k in range(acceleration_m_per_s2.shape[0]):
         tank_x, tank_z = acceleration_m_per_s2[k, 0], acceleration_m_per_s2[k, 1]
-        if list_is_stale(particles, constants) and not list_neighbours(particles, pairs, images, constants):
+        if not pairs_are_listed(flow):
             return NO_ROOM
-        viscosity = begin_step(particles, pairs, images, constants, forces[k])
-        status = end_step(
-            particles,
-            pairs,
-            images,
-            constants,
-            table,
-            table_scale,
-            gravity_m_per_s2,
-            tank_x,
-            tank_z,
-            viscosity,
-            forces[k],
-            sums,
-            counters,
-        )
+        viscosity = begin_step(flow, forces[k])
+        status = end_step(flow, (tank_x, tank_z), viscosity, forces[k], totals)
         if status != RUNNING:
             return int(status)
     return RUNNING

@@ -69,6 +69,23 @@ class Motion(NamedTuple):
     p: FloatArray
 
 
+class MovingStructure(NamedTuple):
+    """A structure as the compiled loops take it.
+
+    Attributes
+    ----------
+    system : System
+    motion : Motion
+        Changed.
+    energies : ndarray, shape (5,)
+        Added to.
+    """
+
+    system: System
+    motion: Motion
+    energies: FloatArray
+
+
 def system_of(structure: Structure, step_s: float) -> System:
     """Return what the compiled loop needs to know of a structure.
 
@@ -96,24 +113,20 @@ def system_of(structure: Structure, step_s: float) -> System:
 
 
 @njit(cache=True)
-def step_structure(
-    system: System, motion: Motion, force: float, base: float, row: FloatArray, energies: FloatArray
-) -> float:
+def step_structure(structure: MovingStructure, force: float, base: float, row: FloatArray) -> float:
     """Take one step; return the absolute acceleration of the tank during it.
 
     Parameters
     ----------
-    system, motion
-        The structure; `motion` is changed.
+    structure : MovingStructure
     force : float
         Of the liquid on the tank, without static weight, upward [N].
     base : float
         Acceleration of the base [m/s²].
     row : ndarray, shape (3 n,)
         Written: q in the middle, mean velocity and acceleration of the step.
-    energies : ndarray, shape (5,)
-        Added to.
     """
+    system, motion, energies = structure.system, structure.motion, structure.energies
     n, half = system.shape.size, 0.5 * system.step
     q, p = motion.q, motion.p
     for i in range(n):
@@ -147,27 +160,22 @@ def step_structure(
 
 @njit(cache=True)
 def advance_structure(
-    system: System,
-    motion: Motion,
-    rigid_mass_kg: float,
-    base: FloatArray,
-    rows: FloatArray,
-    forces: FloatArray,
-    energies: FloatArray,
+    structure: MovingStructure, rigid_mass_kg: float, base: FloatArray, rows: FloatArray, forces: FloatArray
 ) -> None:
     """Take one step for each acceleration of the base, without liquid.
 
     Parameters
     ----------
-    system, motion, base, rows, energies
-        As in `step_structure`; one row for each step.
+    structure : MovingStructure
     rigid_mass_kg : float
-        A mass at the tank that the system contains; its force on the tank is told.
+        A mass at the tank that the structure contains; its force on the tank is told.
+    base, rows : ndarray, shape (n_steps,) and (n_steps, 3 n)
+        As in `step_structure`, one row for each step.
     forces : ndarray, shape (n_steps,)
         Written: −m ü.
     """
     for k in range(base.size):
-        forces[k] = -rigid_mass_kg * step_structure(system, motion, 0.0, base[k], rows[k], energies)
+        forces[k] = -rigid_mass_kg * step_structure(structure, 0.0, base[k], rows[k])
 
 
 @dataclass(frozen=True)

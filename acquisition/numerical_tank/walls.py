@@ -25,7 +25,7 @@ def list_images(particles: Particles, images: Images, constants: Constants) -> b
     """List the images of all particles near walls; False when there is no room for them."""
     n = constants.n
     reach = constants.support + constants.skin
-    zero = constants.one - constants.one
+    zero = constants.unity - constants.unity
     capacity = images.parent.size
     count = 0
     for i in range(n):
@@ -45,8 +45,8 @@ def list_images(particles: Particles, images: Images, constants: Constants) -> b
                 if count == capacity:
                     return False
                 images.parent[count] = i
-                images.bx[count] = constants.one if across_x == 0 else -constants.one
-                images.bz[count] = constants.one if across_z == 0 else -constants.one
+                images.bx[count] = constants.unity if across_x == 0 else -constants.unity
+                images.bz[count] = constants.unity if across_z == 0 else -constants.unity
                 images.ax[count] = constants.two * constants.length if across_x == 2 else zero
                 images.az[count] = constants.two * constants.height if across_z == 2 else zero
                 count += 1

@@ -78,10 +78,10 @@ def _chain(weight: IntArray, rank: IntArray, n_before: IntArray) -> NDArray[np.b
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _better(one: int, other: int, total: IntArray, rank: IntArray) -> int:
+def _better(first: int, second: int, total: IntArray, rank: IntArray) -> int:
     """The block whose chain is heavier; where they are equal, the one further ahead, then the earlier."""
-    if one < 0 or other < 0:
-        return max(one, other)
-    if total[one] != total[other]:
-        return one if total[one] > total[other] else other
-    return other if rank[other] > rank[one] else one
+    if first < 0 or second < 0:
+        return max(first, second)
+    if total[first] != total[second]:
+        return first if total[first] > total[second] else second
+    return second if rank[second] > rank[first] else first

@@ -77,7 +77,7 @@ def acquisition_record(journal: Journal, parts: Sequence[Part], losses: Sequence
         "alignment": {part.label: part.alignment.to_dict() for part in parts},
         "losses": {
             "columns": ["source", "group", "first_counter", "n_samples", "index"],
-            "rows": [[one.source, one.group, one.counter, one.n_samples, one.index] for one in named],
+            "rows": [[loss.source, loss.group, loss.counter, loss.n_samples, loss.index] for loss in named],
             "n_gaps": len(losses),
             "n_samples": sum(loss.n_samples for loss in losses),
         },

@@ -147,7 +147,7 @@ def source_from(content: Mapping[str, Any]) -> SourceInfo:
         described = fields.pop("channels")
         if not isinstance(described, list) or not 1 <= len(described) <= MOST_CHANNELS:
             raise MalformedBlockError(f"a source without 1 … {MOST_CHANNELS} channels")
-        channels = tuple(_checked(Channel(**one)) for one in described)
+        channels = tuple(_checked(Channel(**description)) for description in described)
         groups = tuple(tuple(int(number) for number in group) for group in fields.pop("groups"))
         if sorted(number for group in groups for number in group) != list(range(len(channels))):
             raise MalformedBlockError("groups that do not hold every channel once")

@@ -112,7 +112,8 @@ class PlacedSamples:
             else:
                 if repeats is not None:
                     counter = int(group.entries.counter[k]) + low - place
-                    _count_repeats(repeats, number, counter, counts[here][known], new[known], known)
+                    counted = counts[here][known], new[known]
+                    _count_repeats(repeats, (number, counter), *counted, known)
                 counts[here][~known] = new[~known]
                 is_late[here][~known] |= bool(group.is_late[k])
             known[:] = True
@@ -148,8 +149,10 @@ class _Ordered:
 
 
 def _count_repeats(
-    repeats: Repeats, group: int, counter: int, kept: CountArray, new: CountArray, known: NDArray[np.bool_]
+    repeats: Repeats, first: tuple[int, int], kept: CountArray, new: CountArray, known: NDArray[np.bool_]
 ) -> None:
+    """Note samples that came again; `first` is group and counter of the first sample that `known` speaks of."""
+    group, counter = first
     repeats.n_samples += len(new)
     differs = (kept != new).any(axis=1)
     if not differs.any():

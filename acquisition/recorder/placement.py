@@ -242,8 +242,8 @@ def _stream(
         n_samples=last - first,
         first_index=0,
         clock=clock,
-        n_before=sum(max(0, first - one) for one in firsts),
-        n_after=sum(max(0, one - last) for one in lasts),
+        n_before=sum(max(0, first - group_first) for group_first in firsts),
+        n_after=sum(max(0, group_last - last) for group_last in lasts),
         n_missing_tail_not_shown=not_shown,
         place_error_s=0.0,
     )
@@ -279,7 +279,7 @@ def _following(before: Stream, here: Stream, rate_hz: float) -> Stream:
     host_s = origins_s + here.clock.host_s(here.first_counter)
     period_s = before.clock.period_s if before.clock.status is ClockStatus.FITTED else 1.0 / rate_hz
     samples = (host_s - before.clock.host_s(before.first_counter)) / period_s
-    error_s = sum(_place_error_s(one.clock) for one in (before, here)) + 0.5 / rate_hz
+    error_s = sum(_place_error_s(stream.clock) for stream in (before, here)) + 0.5 / rate_hz
     index = before.first_index + round(samples)
     if index + error_s * rate_hz < end:
         # more samples than there was time for: the device was not read, or did not sample, in real time

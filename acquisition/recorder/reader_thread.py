@@ -45,6 +45,7 @@ class ReaderThread:
         queue: DeliveryQueue,
         start_together: threading.Barrier,
         failed: Callable[[int, str], None],
+        *,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self.number, self._source, self._queue = number, source, queue

@@ -48,7 +48,7 @@ def write_samples(
         quality = np.zeros(stop - start, np.uint8)
         for part in parts:
             write = _put_counts if part.alignment.is_on_base else _put_values
-            quality |= write(file, part, start, stop, rate_hz, lost)
+            quality |= write(file, part, (start, stop), rate_hz, lost)
         file.put("quality", start, quality)
         advance(stop - start)
     for part in parts:
@@ -58,8 +58,10 @@ def write_samples(
 
 
 def _put_counts(
-    file: RecordingFile, part: Part, start: int, stop: int, rate_hz: float, lost: dict[str, int]
+    file: RecordingFile, part: Part, places: tuple[int, int], rate_hz: float, lost: dict[str, int]
 ) -> FlagArray:
+    """Counts on the time base, and the flags of the samples."""
+    start, stop = places
     stretch = part.samples.read(start - part.shift, stop - part.shift)
     read = has_reading(stretch, part.placement.info)
     for column, name in enumerate(part.names):
@@ -85,21 +87,22 @@ def _filled(part: Part, stretch: Stretch, read: NDArray[np.bool_], column: int) 
 
 
 def _put_values(
-    file: RecordingFile, part: Part, start: int, stop: int, rate_hz: float, lost: dict[str, int]
+    file: RecordingFile, part: Part, places: tuple[int, int], rate_hz: float, lost: dict[str, int]
 ) -> FlagArray:
     """Values of another clock on the time base, and the flags of the samples next to each instant."""
-    places = (np.arange(start, stop) / rate_hz - part.alignment.start_s) / part.alignment.step_s
+    start, stop = places
+    own_places = (np.arange(start, stop) / rate_hz - part.alignment.start_s) / part.alignment.step_s
     rate_ratio = part.alignment.step_s * rate_hz
     reach = half_width(rate_ratio) + 2
-    first = max(0, int(np.floor(places[0])) - reach)
-    last = min(part.placement.n_samples, int(np.ceil(places[-1])) + reach)
+    first = max(0, int(np.floor(own_places[0])) - reach)
+    last = min(part.placement.n_samples, int(np.ceil(own_places[-1])) + reach)
     stretch = part.samples.read(first, max(first, last))
     read = has_reading(stretch, part.placement.info)
-    quality = _flags_at(_flags(part, stretch, read), places - first)
+    quality = _flags_at(_flags(part, stretch, read), own_places - first)
     for column, (name, channel) in enumerate(zip(part.names, part.channels, strict=True)):
         samples = stretch.counts[:, column] * channel.scale_factor + channel.add_offset
         samples[~read[:, column]] = np.nan
-        values = resampled(samples, places - first, rate_ratio=rate_ratio).astype(np.float32)
+        values = resampled(samples, own_places - first, rate_ratio=rate_ratio).astype(np.float32)
         is_lost = np.isnan(values)
         quality[is_lost] |= LOST
         lost[name] = lost.get(name, 0) + int(np.count_nonzero(is_lost))

@@ -220,7 +220,7 @@ def common_motion_pairs(
     base: SourcePlacement, other: SourcePlacement, chosen: Sequence[tuple[str, str]], experiment: str
 ) -> list[tuple[str, str]]:
     """Pairs of channels with the same motion: those that were named, or the accelerometers of a rigid tank."""
-    own, others = ({channel.name for channel in one.info.channels} for one in (base, other))
+    own, others = ({channel.name for channel in placement.info.channels} for placement in (base, other))
     named = [pair for pair in (*chosen, *((b, a) for a, b in chosen)) if pair[0] in own and pair[1] in others]
     if named or not experiment.startswith("shaker_"):
         return named
@@ -234,10 +234,10 @@ def _rigid_accelerometers(placement: SourcePlacement) -> list[str]:
 
 def _by_arrival(base: SourcePlacement, other: SourcePlacement) -> tuple[SourceAlignment, float, float]:
     """Alignment by host times, and how far it may be off: delay [s] and drift [ppm]."""
-    clocks = [one.main_stream.clock for one in (base, other)]
+    clocks = [placement.main_stream.clock for placement in (base, other)]
     if any(clock.status is ClockStatus.NOT_REAL_TIME for clock in clocks):
         together = SourceAlignment(AlignmentMethod.NONE, 0.0, 1.0 / other.info.sampling_rate_hz, None)
-        shortest_s = min(one.n_samples / one.info.sampling_rate_hz for one in (base, other))
+        shortest_s = min(placement.n_samples / placement.info.sampling_rate_hz for placement in (base, other))
         return together, min(UNKNOWN_START_S, 0.5 * shortest_s), UNKNOWN_DRIFT_PPM
     base_start, base_step = _host_time(base, clocks[0].host_origin_ns)
     start, step = _host_time(other, clocks[0].host_origin_ns)

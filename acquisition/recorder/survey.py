@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -190,14 +190,14 @@ class _Tracker:
         self._totals = np.zeros((n_channels, _N_TOTALS), np.int64)
         self._sums = np.zeros((n_channels, 3))
         self._run = np.zeros((n_channels, 3), np.int64)
+        self._findings = _Findings(self._extremes, self._totals, self._sums, self._run, self._cells)
+        self._measures = _Measures(self._limits, self._shortest, self._cell)
         self._runs: list[list[tuple[int, int, int]]] = [[] for _ in info.channels]
         self._n_seen = 0
 
     def see(self, stretch: Stretch, read: NDArray[np.bool_]) -> None:
-        found = _scan(
-            stretch.counts, stretch.arrived, read, stretch.start, self._shortest, self._cell, self._limits,
-            self._extremes, self._totals, self._sums, self._run, self._cells,
-        )  # fmt: skip
+        scanned = _Scanned(stretch.counts, stretch.arrived, read, stretch.start)
+        found = _scan(scanned, self._measures, self._findings)
         for k, start, stop, value in found:
             self._keep(int(k), int(start), int(stop), int(value))
         self._n_seen = stretch.start + len(stretch.counts)
@@ -260,11 +260,62 @@ class _Tracker:
 _N_READ, _N_MISSING, _N_CLIPPED, _N_LOWEST_16, _N_LOWEST_32, _N_TOTALS = 0, 1, 2, 3, 4, 5
 
 
+class _Scanned(NamedTuple):
+    """A stretch: counts, which arrived and which are readings, each of shape (n, n_channels); its first place."""
+
+    counts: NDArray[np.int32]
+    arrived: NDArray[np.bool_]
+    read: NDArray[np.bool_]
+    first_place: int
+
+
+class _Measures(NamedTuple):
+    """What is looked for.
+
+    Attributes
+    ----------
+    limits : ndarray, shape (n_channels, 2)
+        See `clipping_counts`.
+    shortest : int
+        Constant runs of fewer samples are no sign of anything.
+    cell : int
+        Samples of a cell, of which smallest and largest count are kept.
+    """
+
+    limits: FloatArray
+    shortest: int
+    cell: int
+
+
+class _Findings(NamedTuple):
+    """What a pass adds to.
+
+    Attributes
+    ----------
+    extremes : ndarray, shape (n_channels, 2)
+        Smallest and largest count.
+    totals : ndarray, shape (n_channels, _N_TOTALS)
+    sums : ndarray, shape (n_channels, 3)
+        First count; sum and sum of squares of the distances from it.
+    run : ndarray, shape (n_channels, 3)
+        Count of the constant run that goes on, its first and its last place.
+    cells : ndarray, shape (2, n_channels, n_cells)
+        Smallest and largest count of each cell.
+    """
+
+    extremes: NDArray[np.int64]
+    totals: NDArray[np.int64]
+    sums: FloatArray
+    run: NDArray[np.int64]
+    cells: NDArray[np.int32]
+
+
 @njit(cache=True, nogil=True)
-def _scan(  # type: ignore[no-untyped-def]
-    counts, arrived, read, first_place, shortest, cell, limits, extremes, totals, sums, run, cells
-):
+def _scan(scanned, measures, findings):  # type: ignore[no-untyped-def]
     """One pass over a stretch; returns (channel, start, stop, count) of the long constant runs that ended."""
+    counts, arrived, read, first_place = scanned
+    limits, shortest, cell = measures
+    extremes, totals, sums, run, cells = findings
     found = np.empty((counts.size // shortest + counts.shape[1] + 1, 4), np.int64)
     n_found = 0
     for k in range(counts.shape[1]):

@@ -161,6 +161,7 @@ def fitted_to(
     length_m: float,
     width_m: float,
     thickness_m: float,
+    *,
     youngs_modulus_pa: float = YOUNGS_MODULUS_OF_ALUMINIUM_PA,
     density_kg_per_m3: float = DENSITY_OF_ALUMINIUM_KG_PER_M3,
 ) -> Cantilever:

@@ -26,7 +26,7 @@ from acquisition.numerical_tank.computed_force import SAVED_EVERY_S, Computation
 from acquisition.numerical_tank.coupling import CoupledTank
 from acquisition.numerical_tank.forced_motion import averaged
 from acquisition.numerical_tank.instability import InstabilityError
-from acquisition.numerical_tank.interruption import told_to_stop
+from acquisition.numerical_tank.long_computation import LongComputation
 from acquisition.numerical_tank.sampling import HALF_LENGTH_SAMPLES, oversampling, sampled
 from acquisition.numerical_tank.structures import Structure
 from acquisition.numerical_tank.tank import TankSetup
@@ -163,20 +163,8 @@ def computed_structure(
     path = Path(checkpoint) if checkpoint is not None and task.configuration == "sloshing" else None
     if path is not None and path.exists():
         run.restore(path)
-    stopped, saved_s = "", monotonic_s()
     try:
-        with told_to_stop() as stopping:
-            while run.n_left and not stopped:
-                start_s = monotonic_s()
-                stopped = run.advance()
-                run.computing_s += monotonic_s() - start_s
-                if stopping:
-                    raise KeyboardInterrupt
-                if progress is not None:
-                    progress(run.share)
-                if path is not None and not stopped and monotonic_s() - saved_s >= saved_every_s:
-                    run.save(path)
-                    saved_s = monotonic_s()
+        stopped = run.run(path, progress, saved_every_s=saved_every_s, monotonic_s=monotonic_s)
     except KeyboardInterrupt as interrupt:
         if path is None:
             raise
@@ -184,7 +172,7 @@ def computed_structure(
     return run.result(stopped)
 
 
-class _Computation:
+class _Computation(LongComputation):
     """A tank on its structure, and the means so far."""
 
     def __init__(self, task: StructureTask) -> None:

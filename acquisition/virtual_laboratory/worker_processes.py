@@ -114,23 +114,23 @@ def _listen(
     finished: Callable[[int, Outcome], None],
 ) -> None:
     """Take one message; at the end of the pipe the process is over."""
-    one = running[connection]
+    worker = running[connection]
     try:
         kind, content = connection.recv()
     except (EOFError, OSError):
         del running[connection]
         connection.close()
-        one.process.join()
-        if one.outcome is None:
-            one.outcome = Outcome(error=f"its process ended with code {one.process.exitcode}")
-        if one.outcome.error != _STOPPED:
-            finished(one.number, one.outcome)
-        one.process.close()
+        worker.process.join()
+        if worker.outcome is None:
+            worker.outcome = Outcome(error=f"its process ended with code {worker.process.exitcode}")
+        if worker.outcome.error != _STOPPED:
+            finished(worker.number, worker.outcome)
+        worker.process.close()
         return
     if kind == _SHARE:
-        progressed(one.number, content)
+        progressed(worker.number, content)
     else:
-        one.outcome = Outcome(result=content) if kind == _DONE else Outcome(error=content or _STOPPED)
+        worker.outcome = Outcome(result=content) if kind == _DONE else Outcome(error=content or _STOPPED)
 
 
 def _stop(
@@ -139,13 +139,13 @@ def _stop(
     finished: Callable[[int, Outcome], None],
 ) -> None:
     """Ask all to stop, hear what they still have to say, and leave none behind."""
-    for one in running.values():
-        one.outcome = one.outcome or Outcome(error=_STOPPED)
-        one.process.terminate()
+    for worker in running.values():
+        worker.outcome = worker.outcome or Outcome(error=_STOPPED)
+        worker.process.terminate()
     while running:
         ready = wait(list(running), timeout=_PATIENCE_S)
-        for one in [] if ready else list(running.values()):
-            one.process.kill()
+        for worker in [] if ready else list(running.values()):
+            worker.process.kill()
         for connection in ready:
             _listen(running, connection, progressed, finished)  # type: ignore[arg-type]
 

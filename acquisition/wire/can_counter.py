@@ -386,9 +386,9 @@ def _smallest_from(bound: int, value: int, known: int) -> int:
         return bound
     bit: int = _highest_bit(wrong)
     while bit < 62:
-        one = 1 << bit
-        if bound & one == 0 and (known & one == 0 or value & one != 0):
-            return ((bound >> bit) << bit) | one | (value & (one - 1))
+        weight = 1 << bit
+        if bound & weight == 0 and (known & weight == 0 or value & weight != 0):
+            return ((bound >> bit) << bit) | weight | (value & (weight - 1))
         bit += 1
     return 1 << 62
 
@@ -403,10 +403,10 @@ def _largest_to(bound: int, value: int, known: int) -> int:
         return bound
     bit: int = _highest_bit(wrong)
     while bit < 62:
-        one = 1 << bit
-        if bound & one != 0 and (known & one == 0 or value & one == 0):
+        weight = 1 << bit
+        if bound & weight != 0 and (known & weight == 0 or value & weight == 0):
             above = (bound >> (bit + 1)) << (bit + 1)
-            return above | ((value & known) & (one - 1)) | (~known & (one - 1))
+            return above | ((value & known) & (weight - 1)) | (~known & (weight - 1))
         bit += 1
     return -1
 

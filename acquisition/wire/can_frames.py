@@ -241,7 +241,14 @@ def encode_samples(
     return [
         FramesOfMessage(
             message.arbitration_id,
-            _encoded(message, first_counter, ticks, counts[:, message.channels], latched_ticks, device_flags),
+            _encoded(
+                message,
+                first_counter,
+                ticks,
+                counts[:, message.channels],
+                latched_ticks=latched_ticks,
+                device_flags=device_flags,
+            ),
         )
         for message in layout.messages
     ]
@@ -252,6 +259,7 @@ def _encoded(
     first_counter: int,
     ticks: IntArray | None,
     counts: NDArray[np.integer],
+    *,
     latched_ticks: int | None,
     device_flags: int,
 ) -> FrameBytes:

@@ -286,7 +286,7 @@ def encode_frame(frame: Frame) -> bytes:
             ticks,
             frame.counts,
             frame.bytes_per_count,
-            max(1, len(frame.counts)),
+            samples_per_frame=max(1, len(frame.counts)),
             overrun=frame.overrun,
         )
         return encoded
@@ -320,8 +320,8 @@ def encode_samples(
     clock_ticks: ArrayLike,
     counts: NDArray[np.integer],
     bytes_per_count: int,
-    samples_per_frame: int,
     *,
+    samples_per_frame: int,
     overrun: bool = False,
 ) -> list[bytes]:
     """Frames for many samples at once, each with the zero that ends it.
@@ -348,7 +348,7 @@ def encode_samples(
 
     Examples
     --------
-    >>> [len(f) for f in encode_samples(7, 0, [0, 0, 0], np.array([[1], [2], [3]]), 2, 2)]
+    >>> [len(f) for f in encode_samples(7, 0, [0, 0, 0], np.array([[1], [2], [3]]), 2, samples_per_frame=2)]
     [34, 32]
     """
     ticks = np.asarray(clock_ticks, np.uint64)

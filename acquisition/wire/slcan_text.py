@@ -99,10 +99,10 @@ def _frames(letters: _ByteArray, start: IntArray, size: IntArray) -> tuple[Frame
     identifier = np.zeros(len(start), np.int64)
     data = np.zeros((len(start), 64 if (length[allowed] > 8).any() else 8), np.uint8)
     shape = size << 16 | length << 8 | n_id
-    for one in np.unique(shape[allowed]).tolist():
-        these = np.flatnonzero(allowed & (shape == one))
-        digits = _DIGIT[letters[start[these, np.newaxis] + np.arange(1, one >> 16)]]
-        n_letters, n_bytes = one & 0xFF, one >> 8 & 0xFF
+    for frame_shape in np.unique(shape[allowed]).tolist():
+        these = np.flatnonzero(allowed & (shape == frame_shape))
+        digits = _DIGIT[letters[start[these, np.newaxis] + np.arange(1, frame_shape >> 16)]]
+        n_letters, n_bytes = frame_shape & 0xFF, frame_shape >> 8 & 0xFF
         identifier[these] = _number(digits[:, :n_letters])
         pairs = digits[:, n_letters + 1 : n_letters + 1 + 2 * n_bytes]
         data[these, :n_bytes] = pairs[:, ::2] << 4 | pairs[:, 1::2] & 15

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from acquisition.wire.can_batch import FrameBatch
 from acquisition.wire.can_bits import FrameBytes, IntArray
@@ -134,25 +135,32 @@ def _usual_frames(text: bytes) -> tuple[FrameBatch, int]:
     Text like this comes without end, and the regular expressions need a core for a few full buses.
     """
     most = len(text) // _SHORTEST_FRAME_BYTES + 1
-    identifiers = np.empty(most, np.int64)
-    extended = np.empty(most, np.bool_)
-    length = np.empty(most, np.int64)
-    data = np.zeros((most, _MOST_BYTES), np.uint8)
-    n, n_taken = _take_usual(np.frombuffer(text, np.uint8), _HEX_DIGITS, identifiers, extended, length, data)
+    room = _Room(
+        np.empty(most, np.int64),
+        np.empty(most, np.bool_),
+        np.empty(most, np.int64),
+        np.zeros((most, _MOST_BYTES), np.uint8),
+    )
+    n, n_taken = _take_usual(np.frombuffer(text, np.uint8), _HEX_DIGITS, room)
     never = np.zeros(n, np.bool_)
-    return FrameBatch(identifiers[:n], extended[:n], never, never, length[:n], data[:n]), n_taken
+    return FrameBatch(
+        room.identifiers[:n], room.extended[:n], never, never, room.length[:n], room.data[:n]
+    ), n_taken
+
+
+class _Room(NamedTuple):
+    """Room for frames, one row each."""
+
+    identifiers: IntArray
+    extended: NDArray[np.bool_]
+    length: IntArray
+    data: FrameBytes
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _take_usual(
-    text: FrameBytes,
-    digits: IntArray,
-    identifiers: IntArray,
-    extended: FrameBytes,
-    length: IntArray,
-    data: FrameBytes,
-) -> tuple[int, int]:
+def _take_usual(text: FrameBytes, digits: IntArray, room: _Room) -> tuple[int, int]:
     """``< frame ID SECONDS DATA >`` with single spaces and no others inside DATA; how many, and their bytes."""
+    identifiers, extended, length, data = room
     at, n = 0, 0
     while True:
         k = _past_word(text, at)

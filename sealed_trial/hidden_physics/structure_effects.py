@@ -20,8 +20,8 @@ def _effect(name: str, change: Callable[[float], Change], least: float = 1e-4, m
     return DrawnEffect(name, "structure", change, least=least, most=most)
 
 
-def _one(
-    name: str, parameter: str, place: int, unit: float, least: float = 1e-4, most: float = 1e3
+def _proportional(
+    name: str, parameter: str, place: int, unit: float, *, least: float = 1e-4, most: float = 1e3
 ) -> DrawnEffect:
     """An effect of one parameter, proportional to the magnitude."""
     return _effect(name, lambda m: Change({parameter: m * unit}, {place: m * unit}), least, most)
@@ -33,7 +33,9 @@ def _sign(generator: np.random.Generator) -> float:
 
 def viscous(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Far more viscous damping than the laboratory's uncertainty."""
-    return _one("viscous_damping", "damping_n_s_per_m", at.STRUCTURE_VISCOUS, scales.damping_n_s_per_m, 0.3, 6.0)
+    return _proportional(
+        "viscous_damping", "damping_n_s_per_m", at.STRUCTURE_VISCOUS, scales.damping_n_s_per_m, least=0.3, most=6.0
+    )
 
 
 def coulomb(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
@@ -83,7 +85,7 @@ def stribeck(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
 def drag(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Damping force with the square of the velocity."""
     unit = scales.damping_n_s_per_m / scales.velocity_m_per_s
-    return _one("quadratic_drag", "drag_n_s2_per_m2", at.STRUCTURE_DRAG, unit)
+    return _proportional("quadratic_drag", "drag_n_s2_per_m2", at.STRUCTURE_DRAG, unit)
 
 
 def structural(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
@@ -121,19 +123,19 @@ def hysteresis(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
 def cubic(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Hardening or softening spring."""
     unit = 0.03 * _sign(generator) * scales.stiffness_n_per_m / scales.displacement_m**2
-    return _one("cubic_stiffness", "stiffness_n_per_m3", at.STIFFNESS_CUBIC, unit, most=12.0)
+    return _proportional("cubic_stiffness", "stiffness_n_per_m3", at.STIFFNESS_CUBIC, unit, most=12.0)
 
 
 def quadratic(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Spring that differs between pull and push."""
     unit = 0.03 * _sign(generator) * scales.stiffness_n_per_m / scales.displacement_m
-    return _one("quadratic_stiffness", "stiffness_n_per_m2", at.STIFFNESS_QUADRATIC, unit, most=12.0)
+    return _proportional("quadratic_stiffness", "stiffness_n_per_m2", at.STIFFNESS_QUADRATIC, unit, most=12.0)
 
 
 def stiffness(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Spring beyond the laboratory's uncertainty."""
     unit = 0.1 * _sign(generator) * scales.stiffness_n_per_m
-    return _one("stiffness_change", "stiffness_n_per_m", at.STIFFNESS_CHANGE, unit, 0.1, 4.0)
+    return _proportional("stiffness_change", "stiffness_n_per_m", at.STIFFNESS_CHANGE, unit, least=0.1, most=4.0)
 
 
 def clearance(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
@@ -163,12 +165,14 @@ def missing_mode(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
 def mass(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Moving mass that is not in the tank."""
     unit = 0.1 * _sign(generator) * scales.mass_kg
-    return _one("mass_error", "mass_kg", at.STRUCTURE_MASS, unit, 0.1, 3.0)
+    return _proportional("mass_error", "mass_kg", at.STRUCTURE_MASS, unit, least=0.1, most=3.0)
 
 
 def constant(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """A force that never changes."""
-    return _one("constant_force", "force_n", at.CONSTANT, 0.01 * _sign(generator) * scales.force_n, most=40.0)
+    return _proportional(
+        "constant_force", "force_n", at.CONSTANT, 0.01 * _sign(generator) * scales.force_n, most=40.0
+    )
 
 
 def rocking(scales: Scales, generator: np.random.Generator) -> DrawnEffect:

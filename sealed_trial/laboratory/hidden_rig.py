@@ -137,9 +137,14 @@ class HiddenRig:
             # the frequency that is off, not the stiffness: mass and stiffness are believed separately
             stiffness = self.stiffness_n_per_m * self.factor("frequency_1") ** 2
             damping = self.damping_kg_per_s * self.factor("damping_1")
-            one = np.ones((1, 1))
+            unity = np.ones((1, 1))
             return System(
-                mass * one, damping * one, stiffness * one, np.array([mass]), np.ones(1), self.base_parameters()
+                mass * unity,
+                damping * unity,
+                stiffness * unity,
+                np.array([mass]),
+                np.ones(1),
+                self.base_parameters(),
             )
         return self._beam_system(compliance_rad_per_n_m)
 

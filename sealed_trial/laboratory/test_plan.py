@@ -122,8 +122,10 @@ def drawn_plan(name: str, rig: HiddenRig, generator: np.random.Generator) -> Tes
     elif name == "sdof_mixed" or name == "beam_mixed":
         runs = [free[0], _again(free[0], 2), free[2], random[0], _again(random[0], 2), stepped]
     elif name == "sdof_one_frequency":
-        one = RunPlan("stepped", 30, float(f"{3 * level:.2g}"), 1, (float(f"{0.9 * first_hz:.3g}"),), (1.0,), 10.0)
-        runs = [one, _again(one, 2), _again(one, 3)]
+        stepped = RunPlan(
+            "stepped", 30, float(f"{3 * level:.2g}"), 1, (float(f"{0.9 * first_hz:.3g}"),), (1.0,), 10.0
+        )
+        runs = [stepped, _again(stepped, 2), _again(stepped, 3)]
     elif name == "shaker_sweeps":
         sweeps = [
             RunPlan("swept", 40 + k, float(f"{level * s:.2g}"), 1, (5.0, 18.0), (), 10.0)
@@ -138,9 +140,9 @@ def drawn_plan(name: str, rig: HiddenRig, generator: np.random.Generator) -> Tes
         runs = [both, _again(both, 2), lower, _again(lower, 2), wander]
     else:
         frequency = float(f"{uniform(8.0, 13.0):.3g}")
-        one = RunPlan("stepped", 70, level, 1, (frequency,), (1.0,), 8.0)
-        lower = replace(one, test=71, level=float(f"{0.4 * level:.2g}"))
-        runs = [one, _again(one, 2), lower, _again(lower, 2)]
+        stepped = RunPlan("stepped", 70, level, 1, (frequency,), (1.0,), 8.0)
+        lower = replace(stepped, test=71, level=float(f"{0.4 * level:.2g}"))
+        runs = [stepped, _again(stepped, 2), lower, _again(lower, 2)]
     return TestPlan(name, kind, rate, tuple(runs))
 
 

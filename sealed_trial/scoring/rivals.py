@@ -47,7 +47,7 @@ def _collect(tree: Mapping[str, Any], place: str, features: dict[str, float]) ->
         if isinstance(value, dict):
             _collect(value, name, features)
         elif isinstance(value, list | np.ndarray):
-            _collect({str(k): one for k, one in enumerate(np.asarray(value).tolist())}, name, features)
+            _collect({str(k): item for k, item in enumerate(np.asarray(value).tolist())}, name, features)
         elif isinstance(value, bool | int | float | np.number):
             features[name] = float(value)
         else:

@@ -106,16 +106,16 @@ class Score:
     def to_document(self) -> dict[str, Any]:
         """Everything as JSON can hold it; NaN as None."""
         document = asdict(self)
-        for name, one in self.rates.items():
-            document["rates"][name]["value"] = one.value
+        for name, its_rate in self.rates.items():
+            document["rates"][name]["value"] = its_rate.value
         return _without_nan(document)  # type: ignore[no-any-return]
 
 
 def _without_nan(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _without_nan(one) for key, one in value.items()}
+        return {key: _without_nan(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_without_nan(one) for one in value]
+        return [_without_nan(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -142,8 +142,10 @@ def scored(
     marks = tuple(marked(truths[case], given[case]) for case in truths)
     labelled = [(given[mark.case], _labels(truths[mark.case])) for mark in marks if mark.kind != "pair"]
     labelled = [(answer, labels) for answer, labels in labelled if answer.probabilities]
-    held = tuple(one for mark in marks if mark.right for one in _held(truths[mark.case], given[mark.case]))
-    gains = tuple(one for mark in marks if (one := _gain(mark, given[mark.case])) is not None)
+    held = tuple(
+        interval for mark in marks if mark.right for interval in _held(truths[mark.case], given[mark.case])
+    )
+    gains = tuple(gain for mark in marks if (gain := _gain(mark, given[mark.case])) is not None)
     right = {mark.case for mark in marks if mark.column == "right name"}
     ratios = [gain.after / gain.ceiling for gain in gains if gain.case in right and gain.ceiling > 0]
     visible = [mark for mark in marks if mark.kind in ("single", "masked", "look_alike", "outside")]
@@ -195,7 +197,7 @@ def _rates(marks: Sequence[Mark], held: Sequence[Held]) -> dict[str, Rate]:
         "masked effects named or left alone": of(kind("masked"), "right"),
         "wrong names anywhere": of(list(marks), "wrong_name"),
         "no answer": rate(sum(mark.column == "no answer" for mark in marks), len(marks)),
-        "intervals that hold the truth": rate(sum(one.inside for one in held), len(held)),
+        "intervals that hold the truth": rate(sum(interval.inside for interval in held), len(held)),
     }
 
 

@@ -38,8 +38,8 @@ def rate(successes: int, n: int, level: float = 0.95) -> Rate:
 
     Examples
     --------
-    >>> one = rate(1, 20)
-    >>> round(one.low, 4), round(one.high, 4)
+    >>> detected = rate(1, 20)
+    >>> round(detected.low, 4), round(detected.high, 4)
     (0.0013, 0.2487)
     """
     outside = (1 - level) / 2

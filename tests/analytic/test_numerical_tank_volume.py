@@ -2,7 +2,7 @@
 
 import pytest
 
-from acquisition.numerical_tank.verification_cases import shaken_volume
+from studies.numerical_tank_verification.verification_cases import shaken_volume
 
 
 @pytest.mark.slow

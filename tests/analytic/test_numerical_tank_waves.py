@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import Box, Liquid, Numerics, filled_tank
-from acquisition.numerical_tank.verification_cases import hydrostatic_rest, modal_history
+from studies.numerical_tank_verification.verification_cases import hydrostatic_rest, modal_history
 
 g = 9.81
 

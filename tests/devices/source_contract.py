@@ -151,14 +151,14 @@ class SourceContract:
 
     def test_two_sources_do_not_disturb_each_other(self, devices):
         first, second = devices(1), devices(2)
-        with open_source(first.url) as one, open_source(second.url) as other:
-            one.start()
-            other.start()
-            collecting = [Collector(first, one), Collector(second, other)]
+        with open_source(first.url) as first_source, open_source(second.url) as second_source:
+            first_source.start()
+            second_source.start()
+            collecting = [Collector(first, first_source), Collector(second, second_source)]
             deadline = time.monotonic() + PATIENCE_S
             while not all(collector.is_finished for collector in collecting):
                 assert time.monotonic() < deadline, "no end"
-                for collector, source in zip(collecting, (one, other), strict=True):
+                for collector, source in zip(collecting, (first_source, second_source), strict=True):
                     collector.take(source.read(0.0 if collector.is_finished else 0.02))
         assert_complete(collecting[0].delivered, first)
         assert_complete(collecting[1].delivered, second)

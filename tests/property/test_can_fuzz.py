@@ -215,7 +215,7 @@ class TestSlcan:
         first = parse_slcan(text[:cut])
         second = parse_slcan(first.rest + text[cut:])
         assert len(first.rest) <= LONGEST_LINE_BYTES + 1
-        contents = [rows(one.batch) for one in (whole, first, second)]
+        contents = [rows(parsed.batch) for parsed in (whole, first, second)]
         assert contents[0] == contents[1] + contents[2]
         assert second.rest == whole.rest
         assert whole.n_bells == first.n_bells + second.n_bells

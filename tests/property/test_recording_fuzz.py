@@ -258,20 +258,20 @@ def test_round_trip(stated, n, rate_hz, start_s, lost, extra, tmp_path: Path) ->
     )
     run["quality"] = ("time", flags)
     expected, encoding, ranges = {}, {}, {}
-    for number, one in enumerate(stated):
-        quantity, units, factor = one["quantity_and_units"]
+    for number, channel in enumerate(stated):
+        quantity, units, factor = channel["quantity_and_units"]
         name = f"{quantity}_place_{number}"
-        counts = np.random.default_rng(one["seed"]).integers(0, 30_000, n)
+        counts = np.random.default_rng(channel["seed"]).integers(0, 30_000, n)
         attributes = {"units": units, "quantity": quantity}
-        if one["range_max"] is not None:
-            attributes["range_max"] = one["range_max"]
-            ranges[name] = one["range_max"] * factor
-        values = counts * one["step"]
-        if one["storage"] in ("i2", "i4", "u2"):
-            fill = np.dtype(one["storage"]).type(65535 if one["storage"] == "u2" else -32768)
-            encoding[name] = {"dtype": one["storage"], "scale_factor": one["step"], "_FillValue": fill}
+        if channel["range_max"] is not None:
+            attributes["range_max"] = channel["range_max"]
+            ranges[name] = channel["range_max"] * factor
+        values = counts * channel["step"]
+        if channel["storage"] in ("i2", "i4", "u2"):
+            fill = np.dtype(channel["storage"]).type(65535 if channel["storage"] == "u2" else -32768)
+            encoding[name] = {"dtype": channel["storage"], "scale_factor": channel["step"], "_FillValue": fill}
         else:
-            values = values.astype(one["storage"])
+            values = values.astype(channel["storage"])
         expected[name] = np.where(flags > 0, np.nan, values.astype(float) * factor)
         run[name] = ("time", np.where(flags > 0, np.nan, values).astype(values.dtype), attributes)
     path = tmp_path / "run.nc"

@@ -269,7 +269,7 @@ def test_a_counter_that_runs_away_cannot_make_a_recording_long() -> None:
     first = n_arrived = 0
     latest = 0
     while decoder.failure is None:
-        (frame,) = encode_samples(1, first, [0], np.zeros((1, 2), np.int32), 2, 1)
+        (frame,) = encode_samples(1, first, [0], np.zeros((1, 2), np.int32), 2, samples_per_frame=1)
         for delivery in decoder.feed(frame, HostTime(0, 0)):
             assert isinstance(delivery, Block)
             latest, n_arrived = delivery.counter, n_arrived + 1

@@ -1,6 +1,6 @@
 """Dam break of Lobovský et al. (2014), J. Fluids Struct. 48, 407: column H × 2H, wall at 5.366 H."""
 
-from acquisition.numerical_tank.verification_cases import dam_break
+from studies.numerical_tank_verification.verification_cases import dam_break
 
 
 def test_front_reaches_the_wall_when_published() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-PACKAGES = ("sloshlab", "acquisition", "pipelines")
+PACKAGES = ("sloshlab", "acquisition", "pipelines", "studies")
 
 
 def module_names() -> list[str]:

@@ -19,19 +19,19 @@ def effect(name: str, block: str = "structure", strength: float = 10.0, **parame
 
 def truth(case: str, kind: str, *effects: dict[str, Any], accepted: list[list[str]] | None = None) -> HiddenTruth:
     """A truth; its own names are accepted if nothing else is said."""
-    names = [[one["name"] for one in effects]] if accepted is None else accepted
+    names = [[effect["name"] for effect in effects]] if accepted is None else accepted
     return HiddenTruth(case, kind, list(effects), names)
 
 
 def written_trial(folder: Path, truths: list[HiddenTruth], key: bytes | None) -> Commitments:
     """A sealed (or, without a key, a development) trial whose recordings are text."""
-    for one in truths:
-        place = folder / "cases" / one.case
+    for its_truth in truths:
+        place = folder / "cases" / its_truth.case
         (place / "recordings").mkdir(parents=True)
         (place / "rig.toml").write_text("[tank]\n")
-        (place / "recordings" / "run_01.nc").write_text(f"samples of {one.case}")
+        (place / "recordings" / "run_01.nc").write_text(f"samples of {its_truth.case}")
     purpose = "development" if key is None else "sealed"
-    return _written(folder, purpose, 1, key, b"secret", {one.case: one for one in truths})
+    return _written(folder, purpose, 1, key, b"secret", {its_truth.case: its_truth for its_truth in truths})
 
 
 DIAGNOSIS = """

@@ -19,8 +19,10 @@ def oscillator(damping: float = 0.0, **parameters: float) -> System:
     for place in (at.HYSTERESIS_YIELD, at.FRICTION_STRIBECK, at.SLOSHING_THRESHOLD, at.EFFECTIVE_MASS_FADE):
         values[place] = 1.0
     values[at.CARRIED_MASS], values[at.LIQUID_MASS] = MASS_KG, 0.2
-    one = np.ones((1, 1))
-    plain = System(MASS_KG * one, damping * one, STIFFNESS_N_PER_M * one, np.array([MASS_KG]), np.ones(1), values)
+    unity = np.ones((1, 1))
+    plain = System(
+        MASS_KG * unity, damping * unity, STIFFNESS_N_PER_M * unity, np.array([MASS_KG]), np.ones(1), values
+    )
     return plain.with_parameters({getattr(at, name): value for name, value in parameters.items()})
 
 

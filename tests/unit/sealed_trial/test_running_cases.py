@@ -28,13 +28,13 @@ def test_every_end_of_a_case_is_an_outcome_and_nothing_is_done_twice(tmp_path) -
     assert outcomes[1].exit_code == 1
     assert outcomes[1].last_words == "no way through"
     assert outcomes[2].exit_code == -9
-    assert sorted(outcome.case for outcome in told) == [one.case for one in FOUR]
+    assert sorted(outcome.case for outcome in told) == [its_truth.case for its_truth in FOUR]
     (trial / DIAGNOSES / "case_004" / OUTCOME).unlink()  # as if it had been stopped before its end
     told.clear()
     again = run_trial(trial, n_workers=1, time_limit_s=20.0, command=command, finished=told.append)
     assert [outcome.case for outcome in told] == ["case_004"]
     assert again[:3] == outcomes[:3]
-    calls = [(trial / DIAGNOSES / one.case / "calls.txt").read_text().count("called") for one in FOUR]
+    calls = [(trial / DIAGNOSES / its_truth.case / "calls.txt").read_text().count("called") for its_truth in FOUR]
     assert calls == [1, 1, 1, 2]
 
 

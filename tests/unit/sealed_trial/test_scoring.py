@@ -157,12 +157,12 @@ def test_all_scores_of_a_trial_of_six_are_those_counted_by_hand() -> None:
     outcomes = {case: outcome(case, "timed_out" if case == "e" else "done") for case in truths}
     score = scored(
         "sealed",
-        {case: asdict(one) for case, one in truths.items()},
-        {case: answer_of(one) for case, one in said.items()},
+        {case: asdict(its_truth) for case, its_truth in truths.items()},
+        {case: answer_of(answer) for case, answer in said.items()},
         outcomes,
         {},
     )
-    counts = {name: (one.successes, one.n) for name, one in score.rates.items()}
+    counts = {name: (its_rate.successes, its_rate.n) for name, its_rate in score.rates.items()}
     assert counts["false alarms where nothing is missing"] == (1, 2)
     assert counts["clear single effects named in the right block"] == (2, 3)
     assert counts["outside the vocabulary, unknown with the right block"] == (1, 1)
@@ -212,6 +212,6 @@ def test_the_rival_without_signals_finds_a_leak_and_nothing_where_there_is_none(
     classes = [["nothing", "single", "outside"][k] for k in generator.integers(3, size=120)]
     blind = [{"a": generator.random(), "b": generator.random()} for _ in classes]
     assert metadata_classifier(blind, classes).low < 1 / 3
-    leaking = [{**one, f"note = {name}": 1.0} for one, name in zip(blind, classes, strict=True)]
+    leaking = [{**metadata, f"note = {name}": 1.0} for metadata, name in zip(blind, classes, strict=True)]
     assert metadata_classifier(leaking, classes).value > 0.9
     assert commonest(["a", "b", "a"]).value == pytest.approx(2 / 3)

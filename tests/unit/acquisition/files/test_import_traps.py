@@ -102,8 +102,8 @@ class TestUff:
 
     def test_cut_in_the_last_set(self, tmp_path: Path) -> None:
         path = tmp_path / "run.uff"
-        one = _uff_set(FORCE_KN, "F", "kN", binary=False)
-        path.write_bytes(one + one[: len(one) // 2])
+        whole = _uff_set(FORCE_KN, "F", "kN", binary=False)
+        path.write_bytes(whole + whole[: len(whole) // 2])
         with pytest.raises(FileFormatError, match="cut short"):
             import_recording([path], map_file(tmp_path, ""))
 

@@ -146,10 +146,10 @@ def test_instability_keeps_what_is_valid() -> None:
 
 
 def test_blocks_are_the_same_as_one_go() -> None:
-    one, many = CoupledTank(SETUP, BEAM), CoupledTank(SETUP, BEAM)
+    uninterrupted, in_blocks = CoupledTank(SETUP, BEAM), CoupledTank(SETUP, BEAM)
     base = 20 * np.cos(0.01 * np.arange(120))
-    whole = one.advance(base)
-    parts = [many.advance(block) for block in np.split(base, [1, 50])]
+    whole = uninterrupted.advance(base)
+    parts = [in_blocks.advance(block) for block in np.split(base, [1, 50])]
     assert np.concatenate([p.liquid_force_n for p in parts]).tobytes() == whole.liquid_force_n.tobytes()
     assert np.concatenate([p.time_s for p in parts]).tobytes() == whole.time_s.tobytes()
 

@@ -27,9 +27,9 @@ def test_particles_at_rest_carry_hydrostatic_pressure() -> None:
 
 
 def test_seed_decides_the_disturbance() -> None:
-    one, same, other = (particles_at_rest(filled_tank(BOX, 0.5, 16, seed=seed))[0] for seed in (3, 3, 4))
-    assert np.array_equal(one, same)
-    assert not np.array_equal(one, other)
+    first, same, other = (particles_at_rest(filled_tank(BOX, 0.5, 16, seed=seed))[0] for seed in (3, 3, 4))
+    assert np.array_equal(first, same)
+    assert not np.array_equal(first, other)
 
 
 @pytest.mark.parametrize("rate_hz", [1000.0, 2048.0, 51200.0])

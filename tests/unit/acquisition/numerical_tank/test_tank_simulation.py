@@ -77,11 +77,11 @@ def test_a_step_runs_backwards() -> None:
 
 
 def test_same_seed_same_bytes_other_seed_other_liquid() -> None:
-    one, same = shaken().state(), shaken().state()
-    assert one.x_m.tobytes() == same.x_m.tobytes()
-    assert one.pressure_pa.tobytes() == same.pressure_pa.tobytes()
+    first, same = shaken().state(), shaken().state()
+    assert first.x_m.tobytes() == same.x_m.tobytes()
+    assert first.pressure_pa.tobytes() == same.pressure_pa.tobytes()
     other = shaken(filled_tank(Box(0.06, 0.03, 0.05), 0.5, 12, seed=3)).state()
-    assert not np.array_equal(one.x_m, other.x_m)
+    assert not np.array_equal(first.x_m, other.x_m)
 
 
 def test_single_steps_are_the_same_as_many() -> None:

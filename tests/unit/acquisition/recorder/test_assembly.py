@@ -437,7 +437,7 @@ def test_a_failed_assembly_leaves_the_old_recording(tmp_path: Path) -> None:
 @pytest.fixture
 def cut_short(tmp_path: Path) -> Path:
     info: SourceInfo = device()
-    write(tmp_path / "run.journal", [info], [(0, one) for one in blocks(320)], is_closed=False)
+    write(tmp_path / "run.journal", [info], [(0, block) for block in blocks(320)], is_closed=False)
     with (tmp_path / "run.journal").open("ab") as file:
         file.write(b"half a block")
     return tmp_path / "run.journal"
@@ -458,7 +458,7 @@ def test_recovery_keeps_everything_and_says_what_was_left_out(cut_short: Path, t
 
 
 def test_recovery_of_a_closed_journal_has_no_flag(tmp_path: Path) -> None:
-    write(tmp_path / "run.journal", [device()], [(0, one) for one in ended(blocks(320), 320)])
+    write(tmp_path / "run.journal", [device()], [(0, delivery) for delivery in ended(blocks(320), 320)])
     summary = recover(tmp_path / "run.journal", tmp_path / "run.nc", overwrite=False)
     assert summary["flags"] == []
     assert "closed by the recorder" in summary["lines"][0]
@@ -479,14 +479,14 @@ def two_devices_that_were_to_have_one_trigger(folder: Path) -> Path:
     sent: list[tuple[int, Delivery]] = []
     for source, rate_hz in enumerate((RATE_HZ, 640.0)):
         counts = np.round(8000 * np.sin(2 * np.pi * 0.5 * np.arange(0, 20, 1 / rate_hz) ** 2))[:, None]
-        sent += [(source, one) for _, one in second(counts, rate_hz=rate_hz)]
+        sent += [(source, delivery) for _, delivery in second(counts, rate_hz=rate_hz)]
     journal = JournalWriter(
         folder / "two.journal",
         {"attributes": ATTRIBUTES, "align": "counter"},
         [device(ACCELERATION), device(roof, name="can", rate_hz=640.0)],
     )
-    for source, one in sent:
-        journal.append(source, one)
+    for source, delivery in sent:
+        journal.append(source, delivery)
     journal.close()
     return folder / "two.journal"
 
@@ -543,7 +543,7 @@ def test_memory_does_not_grow_with_the_stretches(tmp_path: Path, monkeypatch: py
 
 
 def test_the_journal_is_only_read(tmp_path: Path) -> None:
-    write(tmp_path / "run.journal", [device()], [(0, one) for one in ended(blocks(320), 320)])
+    write(tmp_path / "run.journal", [device()], [(0, delivery) for delivery in ended(blocks(320), 320)])
     (tmp_path / "run.journal").chmod(0o444)
     with read_journal(tmp_path / "run.journal") as journal:
         assert assemble(journal, tmp_path / "deep" / "run.nc").n_samples == 320

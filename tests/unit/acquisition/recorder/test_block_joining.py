@@ -13,7 +13,7 @@ class Written:
         self.order: list[tuple] = []
 
     def append_blocks(self, source: int, blocks: list[Block], /) -> None:
-        self.order.append((source, blocks[0].group, [one.counter for one in blocks]))
+        self.order.append((source, blocks[0].group, [block.counter for block in blocks]))
 
     def append(self, source: int, delivery, /) -> None:
         self.order.append((source, delivery))

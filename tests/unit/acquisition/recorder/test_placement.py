@@ -149,7 +149,7 @@ def test_a_sample_that_all_messages_lost_is_one_lost_sample(tmp_path: Path) -> N
     sent = [group for k in range(0, 320, 16) for group in both_groups(k, k + 16)]
     # both of 64 … 79, and the second of 128 … 143
     lost = [sent.pop(17), sent.pop(9), sent.pop(8)]
-    assert [(one.group, one.counter) for one in lost] == [(1, 128), (1, 64), (0, 64)]
+    assert [(block.group, block.counter) for block in lost] == [(1, 128), (1, 64), (0, 64)]
     result = made(tmp_path, ended(sent, 320), TWO_GROUPS)
     assert result.summary.flags == (
         "daq: 32 samples lost in 2 gaps, the longest 16 samples from counter 64 (0.125 s); "
@@ -216,10 +216,10 @@ def test_a_restart_is_placed_by_host_time_behind_a_flagged_gap(tmp_path: Path) -
 def test_a_restart_without_real_time_is_never_joined_silently(tmp_path: Path) -> None:
     sent = []
     for stream in (STREAM, STREAM + 1):
-        for one in blocks(5120, stream=stream):
-            assert isinstance(one, Block)
-            ns = one.host_monotonic_ns // 50 + (stream - STREAM) * 10**10
-            sent.append(Block(0, stream, one.counter, one.counts, None, ns, ns))
+        for sent_block in blocks(5120, stream=stream):
+            assert isinstance(sent_block, Block)
+            ns = sent_block.host_monotonic_ns // 50 + (stream - STREAM) * 10**10
+            sent.append(Block(0, stream, sent_block.counter, sent_block.counts, None, ns, ns))
     result = made(tmp_path, sent)
     np.testing.assert_array_equal(np.flatnonzero(result.quality == LOST), [5120])
     assert "how long the gap was is unknown" in result.flags

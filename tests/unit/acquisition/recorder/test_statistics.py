@@ -178,11 +178,11 @@ def test_a_source_with_several_groups() -> None:
     meters = SourceMeters(SourceInfo("d", "x:", 100.0, channels, ((0, 2), (1,))))
     for k in range(3):
         for group, n_channels in ((0, 2), (1, 1)):
-            one = Block(
+            block = Block(
                 group, 1, 100 * k, np.full((100 - 20 * group, n_channels), 3, np.int32), None, k * SECOND_NS, 0
             )
-            meters.arrived(one)
-            meters.update_levels([one])
+            meters.arrived(block)
+            meters.update_levels([block])
     assert [level.name for level in meters.levels()] == ["f_0", "f_1", "f_2"]
     assert [level.rms for level in meters.levels()] == [3.0, 30.0, 300.0]
     # the group furthest behind has 80 of every 100

@@ -82,17 +82,24 @@ def test_the_runs_are_those_that_were_asked_for() -> None:
         assert sum(run.is_computed for run in named) == 5
         assert len(named) == 7
     beam = [run.settings for run in runs if run.rig.startswith("beam")]
-    decays = [one["configuration"] for one in beam if one["experiment"] == "beam_free"]
+    decays = [settings["configuration"] for settings in beam if settings["experiment"] == "beam_free"]
     assert sorted(decays) == ["frozen", "sloshing", "sloshing", "sloshing"]
-    assert {abs(one["initial_displacement_m"]) for one in beam if one["experiment"] == "beam_free"} == {0.0146}
-    random = [(one["rms_g"], one["duration_s"]) for one in beam if one["experiment"] == "beam_random"]
+    assert {
+        abs(settings["initial_displacement_m"]) for settings in beam if settings["experiment"] == "beam_free"
+    } == {0.0146}
+    random = [
+        (settings["rms_g"], settings["duration_s"]) for settings in beam if settings["experiment"] == "beam_random"
+    ]
     assert random == [(0.1, 90), (0.2, 90), (0.4, 90)]
     sdof = [run.settings for run in runs if run.rig.startswith("sdof")]
-    assert {one["initial_displacement_m"] for one in sdof} == {0.064}
+    assert {settings["initial_displacement_m"] for settings in sdof} == {0.064}
     long_stroke = [run.settings for run in runs if run.name.startswith("long_stroke")]
-    assert sorted(one["acceleration_g"] for one in long_stroke) == [3, 3, 3, 4, 5, 6, 7, 8, 8]
-    for one in long_stroke:  # within the stroke at the lowest frequency
-        assert one["acceleration_g"] * 9.81 / (2 * math.pi * one["start_hz"]) ** 2 < one["stroke_limit_m"]
+    assert sorted(settings["acceleration_g"] for settings in long_stroke) == [3, 3, 3, 4, 5, 6, 7, 8, 8]
+    for settings in long_stroke:  # within the stroke at the lowest frequency
+        assert (
+            settings["acceleration_g"] * 9.81 / (2 * math.pi * settings["start_hz"]) ** 2
+            < settings["stroke_limit_m"]
+        )
     transients = [run.settings for run in runs if run.name.startswith("transients")]
     kinds = [transient["experiment"] for transient in transients]
     assert {kind: kinds.count(kind) for kind in kinds} == {
@@ -100,7 +107,7 @@ def test_the_runs_are_those_that_were_asked_for() -> None:
         "beam_free": 6,
     }
     sudden = [transient for transient in transients if transient["experiment"] == "sudden_start"]
-    starts = [(one["start_hz"], one["acceleration_g"]) for one in sudden]
+    starts = [(settings["start_hz"], settings["acceleration_g"]) for settings in sudden]
     assert len(set(starts)) == 20
     assert sum(frequency_hz % 1 == 0.5 for frequency_hz, _ in starts) == 12  # for validation, between the others
 
@@ -131,13 +138,13 @@ def test_every_rig_is_one() -> None:
 def test_the_manifest_tells_what_each_file_is(campaign) -> None:
     folder, finished, _ = campaign
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    assert {name: one["sha256"] for name, one in manifest["files"].items()} == contents(folder)
-    assert all((folder / name).stat().st_size == one["bytes"] for name, one in manifest["files"].items())
+    assert {name: entry["sha256"] for name, entry in manifest["files"].items()} == contents(folder)
+    assert all((folder / name).stat().st_size == entry["bytes"] for name, entry in manifest["files"].items())
     assert (manifest["seed"], manifest["layers_per_height"]) == (2, 8)
     assert manifest["command"].endswith("--layers 8 --seed 2")
     for run in finished:
         assert manifest["runs"][run.name]["computing_s"] == round(run.computing_s, 1)
-    assert len({one["seed"] for one in manifest["runs"].values()}) == 3
+    assert len({entry["seed"] for entry in manifest["runs"].values()}) == 3
     assert manifest["runs"]["shaker/fast"]["settings"]["acceleration_g"] == 3.0
     assert manifest["runs"]["shaker/fast"]["layers_per_height"] == 8
     assert "layers_per_height" not in manifest["runs"]["shaker/frozen"]

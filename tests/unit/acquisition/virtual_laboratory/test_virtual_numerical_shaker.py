@@ -128,10 +128,10 @@ def test_no_liquid_and_no_gas_are_refused(fill_level):
 def test_the_harmonics_of_the_shaker_know_nothing_of_the_liquid():
     """The law's rig ties them to the phase of its blows, ±0.6 rad; here they are anywhere."""
     drawn = [Imperfections.drawn(np.random.default_rng(seed), impact_phase_rad=None) for seed in range(60)]
-    angles = np.array([[angle for _, _, angle in one.harmonics] for one in drawn])
+    angles = np.array([[angle for _, _, angle in imperfections.harmonics] for imperfections in drawn])
     assert np.abs(np.exp(1j * angles).mean(axis=0)).max() < 0.35
     tied = [Imperfections.drawn(np.random.default_rng(seed)) for seed in range(60)]
-    tied_angles = np.array([[angle for _, _, angle in one.harmonics] for one in tied])
+    tied_angles = np.array([[angle for _, _, angle in imperfections.harmonics] for imperfections in tied])
     assert np.abs(np.exp(1j * tied_angles).mean(axis=0)).min() > 0.8
 
 

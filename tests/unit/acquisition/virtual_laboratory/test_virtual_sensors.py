@@ -81,10 +81,10 @@ def test_the_two_cells_carry_the_whole_force():
 
 def test_a_laboratory_is_within_one_percent_and_repeats():
     drawn = [Laboratory.drawn(seed) for seed in range(30)]
-    gains = np.array([[one.gain[channel] for channel in CHANNELS] for one in drawn])
+    gains = np.array([[laboratory.gain[channel] for channel in CHANNELS] for laboratory in drawn])
     assert np.abs(gains - 1).max() <= 0.01
     assert 0.002 < gains.std() < 0.006
-    assert all(abs(one.dry_mass_factor - 1) <= 0.01 for one in drawn)
+    assert all(abs(laboratory.dry_mass_factor - 1) <= 0.01 for laboratory in drawn)
     assert Laboratory.drawn(3) == drawn[3]
     assert drawn[3] != drawn[4]
     truth = json.loads(drawn[3].to_json())

@@ -63,11 +63,11 @@ def test_two_tones_are_two_of_the_same_acceleration():
 
 def test_seeds_differ_and_repeat():
     time_s = np.linspace(0, 5, 1000)
-    one, again, other = (
+    first, again, other = (
         random_motion(1.0, 8.0, 20.0, 5.0, seed=seed).at(time_s).acceleration for seed in (1, 1, 2)
     )
-    assert np.array_equal(one, again)
-    assert abs(np.corrcoef(one, other)[0, 1]) < 0.3
+    assert np.array_equal(first, again)
+    assert abs(np.corrcoef(first, other)[0, 1]) < 0.3
 
 
 def test_what_the_shaker_cannot_do_is_refused(rig):

@@ -261,8 +261,8 @@ class TestEncoding:
         whole = encode_samples(layout(), 40, ticks, counts)
         first = encode_samples(layout(), 40, ticks[:13], counts[:13])
         second = encode_samples(layout(), 53, ticks[13:], counts[13:], latched_ticks=int(ticks[8]))
-        for one, a, b in zip(whole, first, second, strict=True):
-            np.testing.assert_array_equal(one.data, np.concatenate([a.data, b.data]))
+        for whole_message, a, b in zip(whole, first, second, strict=True):
+            np.testing.assert_array_equal(whole_message.data, np.concatenate([a.data, b.data]))
 
     def test_missing_latched_clock_is_asked_for(self) -> None:
         with pytest.raises(InputError, match="latched_ticks"):

@@ -40,8 +40,10 @@ def stream_of(described: CanLayout, start: int, n: int, stream: int = 7, salt: i
     ticks = (start + np.arange(n)) * TICKS
     per_message = encode_samples(described, start, ticks, counts_of(n, salt))
     frames: Frames = [status(1, start, stream)]
-    for k in range(max(len(one.data) for one in per_message)):
-        frames += [(one.arbitration_id, one.data[k].tobytes()) for one in per_message if k < len(one.data)]
+    for k in range(max(len(message.data) for message in per_message)):
+        frames += [
+            (message.arbitration_id, message.data[k].tobytes()) for message in per_message if k < len(message.data)
+        ]
     return frames + [status(2, start + n, stream)] * 3
 
 
@@ -51,7 +53,9 @@ def batch_of(frames: Frames) -> FrameBatch:
     for row, (_, content) in zip(data, frames, strict=True):
         row[: len(content)] = np.frombuffer(content, np.uint8)
     lengths = np.array([len(content) for _, content in frames], np.int64)
-    return FrameBatch(np.array([one for one, _ in frames], np.int64), never, never, never, lengths, data)
+    return FrameBatch(
+        np.array([arbitration_id for arbitration_id, _ in frames], np.int64), never, never, never, lengths, data
+    )
 
 
 def received(described: CanLayout, frames: Frames, per_call: int = 37) -> list[Delivery]:
@@ -77,7 +81,7 @@ def samples(described: CanLayout, found: list[Delivery], start: int, n: int, str
 
 
 def kinds(found: list[Delivery]) -> list[TroubleKind]:
-    return [one.kind for one in found if isinstance(one, Trouble)]
+    return [delivery.kind for delivery in found if isinstance(delivery, Trouble)]
 
 
 @pytest.mark.parametrize("fd", [False, True])
@@ -87,14 +91,18 @@ def test_whole_stream(fd: bool, per_call: int, start: int) -> None:
     described, n = layout(fd), 301 if per_call == 1 else 1001
     found = received(described, stream_of(described, start, n), per_call)
     np.testing.assert_array_equal(samples(described, found, start, n), counts_of(n))
-    assert [one for one in found if not isinstance(one, Block)] == [End(7, start + n)]
+    assert [delivery for delivery in found if not isinstance(delivery, Block)] == [End(7, start + n)]
 
 
 @pytest.mark.parametrize("fd", [False, True])
 def test_every_block_knows_its_clock_beyond_its_wrap(fd: bool) -> None:
     """1000 ticks per sample wrap the 32 bits after 4 294 967 samples."""
     described, start = layout(fd), 4_294_400
-    blocks = [one for one in received(described, stream_of(described, start, 1200)) if isinstance(one, Block)]
+    blocks = [
+        delivery
+        for delivery in received(described, stream_of(described, start, 1200))
+        if isinstance(delivery, Block)
+    ]
     assert len(blocks) >= 4
     first = start * TICKS
     assert {(block.clock_ticks or 0) - block.counter * TICKS for block in blocks} == {0}
@@ -151,7 +159,7 @@ def test_troubles_are_counted_by_kind() -> None:
     frames[23] = (frames[23][0], frames[23][1][:7])
     frames.insert(50, (STATUS_ID, bytes(8)))
     found = received(described, frames)
-    counted = {one.kind: one.count for one in found if isinstance(one, Trouble)}
+    counted = {delivery.kind: delivery.count for delivery in found if isinstance(delivery, Trouble)}
     assert counted[TroubleKind.MALFORMED_FRAME] == 1
     assert kinds(found).count(TroubleKind.CORRUPT_FRAME) == 2
     counts = samples(described, found, 0, 100)
@@ -161,7 +169,7 @@ def test_troubles_are_counted_by_kind() -> None:
 @pytest.mark.parametrize("n", [5, 300])
 def test_frames_that_come_twice_are_counted_to_the_last(n: int) -> None:
     described = layout()
-    frames = [one for one in stream_of(described, 0, n) for _ in range(1 + (one[0] != STATUS_ID))]
+    frames = [frame for frame in stream_of(described, 0, n) for _ in range(1 + (frame[0] != STATUS_ID))]
     receiver = CanReceiver(described)
     found = receiver.take(batch_of(frames), 0, 0) + receiver.finish(1)
     np.testing.assert_array_equal(samples(described, found, 0, n), counts_of(n))
@@ -171,7 +179,9 @@ def test_frames_that_come_twice_are_counted_to_the_last(n: int) -> None:
 def test_device_that_lost_data_says_so() -> None:
     described = layout()
     lossy = encode_samples(described, 0, np.arange(16), counts_of(16), device_flags=1)
-    frames = [status(1, 0)] + [(one.arbitration_id, row.tobytes()) for one in lossy for row in one.data]
+    frames = [status(1, 0)] + [
+        (message.arbitration_id, row.tobytes()) for message in lossy for row in message.data
+    ]
     assert kinds(received(described, [*frames, status(2, 16)])) == [TroubleKind.OVERRUN] * 2
 
 
@@ -181,7 +191,7 @@ def test_end_waits_for_the_tail_and_not_for_ever() -> None:
     *samples_only, last = frames[:-3]
     receiver = CanReceiver(described)
     found = receiver.take(batch_of([*samples_only, frames[-1]]), 0, 0)
-    assert not any(isinstance(one, End) for one in found)
+    assert not any(isinstance(delivery, End) for delivery in found)
     found += receiver.take(batch_of([last]), 1000, 1000)
     np.testing.assert_array_equal(samples(described, found, 0, 100), counts_of(100))
     assert receiver.take(batch_of([]), 10**9, 0) == [End(7, 100)]
@@ -246,9 +256,9 @@ def test_samples_between_two_breaks_that_nobody_can_place_are_given_up() -> None
     frames = stream_of(described, 0, 300)[:-3]
     receiver = CanReceiver(described)
     found = fed(receiver, frames[:201], 0) + receiver.break_off(1) + fed(receiver, frames[301:401], 2)
-    assert [(one.kind, one.count) for one in receiver.break_off(3) if isinstance(one, Trouble)] == [
-        (TroubleKind.UNCERTAIN_COUNTER, 100)
-    ]
+    assert [
+        (delivery.kind, delivery.count) for delivery in receiver.break_off(3) if isinstance(delivery, Trouble)
+    ] == [(TroubleKind.UNCERTAIN_COUNTER, 100)]
     found += fed(receiver, [*stream_of(described, 0, 100, stream=8, salt=5)], 4)
     assert (samples(described, found, 0, 300)[100:] == -1).all()
     np.testing.assert_array_equal(samples(described, found, 0, 100, stream=8 + 256), counts_of(100, salt=5))
@@ -262,7 +272,11 @@ def test_samples_from_before_an_announced_start_are_not_taken_for_the_new_stream
     found += fed(receiver, stream_of(described, 0, 100, stream=8, salt=5), 3)
     np.testing.assert_array_equal(samples(described, found, 0, 100, stream=8 + 256), counts_of(100, salt=5))
     assert (samples(described, found, 0, 300)[100:] == -1).all()
-    uncertain = [one.count for one in found if isinstance(one, Trouble) and "stream that cannot" in one.detail]
+    uncertain = [
+        delivery.count
+        for delivery in found
+        if isinstance(delivery, Trouble) and "stream that cannot" in delivery.detail
+    ]
     assert uncertain == [100]
 
 

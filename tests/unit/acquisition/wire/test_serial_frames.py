@@ -67,7 +67,7 @@ def test_extreme_counts_of_every_width(width: int) -> None:
     rows = [[-limit, limit - 1], [0, -1], [1, 2]]
     data = by_hand.samples(rows, width, stream=5, counter=7, ticks=9)
     assert as_samples(only(data)).counts.tolist() == rows
-    (made,) = encode_samples(5, 7, [9, 9, 9], np.array(rows), width, 3)
+    (made,) = encode_samples(5, 7, [9, 9, 9], np.array(rows), width, samples_per_frame=3)
     assert made == data
 
 
@@ -88,7 +88,9 @@ def test_frames_without_samples_by_hand() -> None:
 
 def test_many_samples_are_cut_into_frames() -> None:
     counts = np.arange(14).reshape(7, 2) - 5
-    frames = encode_samples(1, 2**32 + 2**32 - 3, np.arange(100, 107), counts, 2, 3, overrun=True)
+    frames = encode_samples(
+        1, 2**32 + 2**32 - 3, np.arange(100, 107), counts, 2, samples_per_frame=3, overrun=True
+    )
     rows = counts.tolist()
     assert frames == [
         by_hand.samples(rows[:3], stream=1, counter=2**32 - 3, ticks=100, status=1),
@@ -99,7 +101,7 @@ def test_many_samples_are_cut_into_frames() -> None:
 
 def test_counts_need_not_be_contiguous_nor_of_32_bits() -> None:
     counts = np.arange(24, dtype=np.int64).reshape(4, 6)[::2, ::3]
-    (frame,) = encode_samples(0, 0, [0, 0], counts, 3, 2)
+    (frame,) = encode_samples(0, 0, [0, 0], counts, 3, samples_per_frame=2)
     assert frame == by_hand.samples([[0, 3], [12, 15]], 3)
 
 
@@ -189,7 +191,7 @@ def test_a_long_run_that_ends_like_a_frame_is_no_frame() -> None:
 def test_what_cannot_be_expressed_is_refused() -> None:
     def refused(match: str, counts: list[list[int]], width: int = 2, per_frame: int = 1) -> None:
         with pytest.raises(InputError, match=match):
-            encode_samples(0, 0, np.zeros(len(counts)), np.array(counts), width, per_frame)
+            encode_samples(0, 0, np.zeros(len(counts)), np.array(counts), width, samples_per_frame=per_frame)
 
     refused("-32769 … 0; allowed: 2 bytes", [[0, -32769]])
     refused("0 … 8388608; allowed: 3 bytes", [[0, 2**23]], 3)

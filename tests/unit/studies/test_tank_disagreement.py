@@ -2,8 +2,8 @@
 
 import pytest
 
-from acquisition.numerical_tank.convergence import ConvergenceCase, harmonic_result
-from acquisition.numerical_tank.disagreement import up_and_down
+from studies.numerical_tank_verification.convergence import ConvergenceCase, harmonic_result
+from studies.numerical_tank_verification.disagreement import up_and_down
 
 
 def test_way_up_begins_quietly_and_the_top_is_the_same_on_both_ways() -> None:

@@ -1,4 +1,4 @@
-"""Run the verification cases, tabulate their findings: ``python -m acquisition.numerical_tank.verification``."""
+"""Run the verification cases and tabulate: ``python -m studies.numerical_tank_verification.verification``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from acquisition.numerical_tank.verification_cases import (
+from sloshlab.atomic_file import write_bytes
+from studies.numerical_tank_verification.verification_cases import (
     Finding,
     dam_break,
     hanging_surface,
@@ -17,7 +18,6 @@ from acquisition.numerical_tank.verification_cases import (
     shaken_volume,
     standing_wave,
 )
-from sloshlab.atomic_file import write_bytes
 
 Case = Callable[[], list[Finding]]
 

@@ -7,7 +7,7 @@ more than they can do.) What cannot be changed here, because the
 method does not have it, is surface tension, the third dimension and the gas. A fifth experiment asks whether
 work depends on where the tank comes from: the acceleration goes up and down again in steps.
 
-Run as ``python -m acquisition.numerical_tank.disagreement [--output FILE] [--workers N]``.
+Run as ``python -m studies.numerical_tank_verification.disagreement [--output FILE] [--workers N]``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
-from acquisition.numerical_tank.convergence import (
+from acquisition.numerical_tank.forced_motion import HarmonicMotion, moved
+from acquisition.numerical_tank.simulation import NumericalTank
+from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, filled_tank
+from studies.numerical_tank_verification.convergence import (
     FREQUENCY_HZ,
     SEEDS,
     TANK,
@@ -31,9 +34,6 @@ from acquisition.numerical_tank.convergence import (
     show,
     table,
 )
-from acquisition.numerical_tank.forced_motion import HarmonicMotion, moved
-from acquisition.numerical_tank.simulation import NumericalTank
-from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, filled_tank
 
 _WEAK_CYCLES = 200
 """A subharmonic wave needs twenty to sixty cycles to grow."""
@@ -126,8 +126,8 @@ def history_table(workers: int) -> Iterator[str]:
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         runs = list(pool.map(up_and_down, SEEDS))
     for at_level in zip(*runs, strict=True):
-        up = sum(one.up for one in at_level) / len(at_level)
-        down = sum(one.down for one in at_level) / len(at_level)
+        up = sum(level.up for level in at_level) / len(at_level)
+        down = sum(level.down for level in at_level) / len(at_level)
         yield f"| {at_level[0].acceleration_g:g} g | {up:.2f} | {down:.2f} |".replace("-", "−")
 
 

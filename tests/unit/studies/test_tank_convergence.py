@@ -2,7 +2,7 @@
 
 import pytest
 
-from acquisition.numerical_tank.convergence import ConvergenceCase, HarmonicResult, harmonic_result, row
+from studies.numerical_tank_verification.convergence import ConvergenceCase, HarmonicResult, harmonic_result, row
 
 
 def test_work_is_what_the_account_of_energy_says() -> None:

@@ -4,7 +4,7 @@ The half-filled tank of the shaker at 11.4 Hz: three spacings at four accelerati
 sound, the time step, the density diffusion and the packing correction, each with several seeds. Nothing here
 decides anything; it says how much a number of the numerical tank is worth.
 
-Run as ``python -m acquisition.numerical_tank.convergence [--output FILE] [--workers N]``.
+Run as ``python -m studies.numerical_tank_verification.convergence [--output FILE] [--workers N]``.
 """
 
 from __future__ import annotations
