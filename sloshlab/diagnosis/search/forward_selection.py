@@ -1,4 +1,4 @@
-"""One more effect beside a fit: candidates are screened, begun, and the promising ones finished."""
+"""Forward selection: one more effect beside a fit, in three stages: screening, coarse fits, fits to the end."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sloshlab.diagnosis.search.substitution import Substitution
 _MOST_SIZE_SCANS: Final = 1
 _ALWAYS_REFINED: Final = 3
 _LEAST_SHARE_OF_GAIN: Final = 0.3
-"""Of the best candidate's gain after the first stages; the others do not go on."""
+"""Of the best candidate's gain after the coarse fits, below which a candidate is dropped."""
 
 
 class ForwardSelection:
@@ -46,9 +46,9 @@ class ForwardSelection:
     def fitted(
         self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
-        """Fit each of some candidates beside what is in `base` already; the promising ones to the end.
+        """Fit each of some candidates beside what is in `base` already; the best ones to the end.
 
-        They are looked at and begun on one repeat of every test, and finished on all.
+        They are screened and coarsely fitted on one repeat of every test, and fitted to the end on all.
         """
         stages = stages_for(self.fits.problem_of(base), base)
         is_near = stages != INFLATION_STAGES and not self.fits.rests_on_baseline_bounds(base)
@@ -71,7 +71,7 @@ class ForwardSelection:
         what: str,
         stages: Sequence[float],
     ) -> list[tuple[CoarseFit, ScreenedCandidate]]:
-        """Candidates after their first stages; what did not run is remembered as failed."""
+        """Candidates after their coarse fits; what did not run is noted as failed."""
 
         def first_stages(i: int, screened: ScreenedCandidate) -> tuple[FreeRunFit, float]:
             self.fits.progress(f"{what}: {screened.candidate.key}", i, 2 * len(chosen))
@@ -97,7 +97,7 @@ class ForwardSelection:
         stages: Sequence[float],
         more: float,
     ) -> list[CoarseFit]:
-        """Those that gained most, the best first; the others are remembered with what they promised."""
+        """Those that gained most, the best first; the others are noted with their gains."""
         lowest = min((coarse_fit.cost for coarse_fit, _ in coarse_fits), default=0.0)
         best_force_match = min(
             (screened for _, screened in coarse_fits),
@@ -122,7 +122,7 @@ class ForwardSelection:
         what: str,
         stages: Sequence[float],
     ) -> list[FreeRunFit]:
-        """Fits to the end on all runs; far from the recordings, of the best one from other sizes, too."""
+        """Fits to the end on all runs; far from the recordings the best one is refitted from other sizes, too."""
 
         def to_the_end(i: int, coarse_fit: CoarseFit) -> FreeRunFit:
             n = len(selected)
@@ -140,7 +140,7 @@ class ForwardSelection:
         return done
 
     def _size_scanned(self, fit: FreeRunFit, stages: Sequence[float]) -> FreeRunFit:
-        """The best of a fit and of fits from other sizes of its effect, where anything is left to be found."""
+        """The best of a fit and of fits from other sizes of its effect; itself where it is down to noise."""
         problem, last = self.fits.problem_of(fit), fit.candidates[-1]
         if problem.is_down_to_noise(fit):
             return fit

@@ -1,4 +1,8 @@
-"""From a case to fitted explanations, each judged on runs that chose nothing."""
+"""The search from a case to fitted explanations, each validated on held-out runs.
+
+Retuning, forward selection of one effect, restarts, forward selection of a second one, nested and nesting models,
+backward elimination, and the ceiling.
+"""
 
 from __future__ import annotations
 
@@ -29,19 +33,19 @@ from sloshlab.errors import InputError
 assert effects.__all__  # importing the vocabulary makes it known
 
 _LEAST_STRENGTH_FOR_PAIRS: Final = 0.5
-"""Noise floors that single effects remove at most where pairs are not tried: below what a verdict speaks of."""
+"""Noise floors that a single effect must remove before pairs are tried: below it a verdict names nothing."""
 _SHARE_LEFT_BY_A_PAIR: Final = 0.8
-"""Of what its first effect leaves; a second one that gains less does not tell that the first one is wrong."""
+"""Of the cost with its first effect alone; a second one that gains less does not show that the first is wrong."""
 _LOOK_ALIKES_AFTER_RESTART: Final = 6
-"""Fitted where the best effect has left its side valley: what is nearest at first may be in that of another."""
+"""Fitted where the best effect has left its local minimum: look-alikes may be in others."""
 _SHARE_OF_A_NESTED_MODEL: Final = 0.5
-"""Of what the general form gains; what gains less has little of it."""
+"""Of the gain of the nesting model, from which second effects are tried beside the nested one, too."""
 
 
 def findings_of(
     case: Case, progress: Progress = lambda what, done, of: None, model: DiagnosedModel | None = None
 ) -> Findings:
-    """Retune, fit every candidate, add greedily, and find the ceiling.
+    """Retune, select effects greedily, refine them, and find the ceiling.
 
     Parameters
     ----------
@@ -65,6 +69,7 @@ def findings_of(
     fits = Fits(model, fitting, held_out, progress, case.names_by_test())
     problem = fits.problem()
     believed_values = problem.values(problem.theta_of(model.believed))
+    # the cost of what is believed has no prior term: there is no deviation from it
     at_believed = huber_cost(problem.residual(problem.theta_of(believed_values)))
     believed = fits.validated(FreeRunFit((), believed_values, at_believed, at_believed))
     retuned_fit, jacobian = fitted_baseline(problem)
@@ -82,6 +87,8 @@ def findings_of(
         found += Substitution(fits).nested_models(best, found, pool)
         best = best_fitting(found)
         is_complete = best is not None and fits.is_complete(best)
+    # Second effects and the ceiling cost most of the time. Where the residual is not repeatable nothing more can
+    # be found: of 54 known cases no case with two effects was complete with one.
     if is_complete:
         found += refinement.rivals_restarted_from_prior(found)
     else:
@@ -117,9 +124,9 @@ def findings_of(
 def _restarted_from_other_sizes(
     fits: Fits, retuned: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
 ) -> list[Explanation]:
-    """Effects of one number from other sizes, and what looks like them from where the best is one of these.
+    """Effects of one parameter refitted from other sizes, and look-alikes of the best where it is one of them.
 
-    Look-alikes that were fitted before may be in the side valley that it has left.
+    Look-alikes that were fitted before may be in the local minimum that it has left.
     """
     found = Refinement(fits).from_other_sizes(retuned, known)
     best = best_fitting([*known, *found])
@@ -136,11 +143,12 @@ def _second_effects(
     at: Surroundings,
     pool: Sequence[Candidate],
 ) -> list[Explanation]:
-    """Pairs of the best first effect and another, and what is left of the best pair without either.
+    """Pairs of the best first effect and another, and each effect of the best pair alone.
 
-    None where no effect removes anything to speak of and repeats have next to nothing in common: what other runs
-    leave is noise then. Where pairs leave too much, others are tried beside the special case of the best effect,
-    whose other numbers stood for a second one, and beside the second of the best pair: the first was best alone.
+    None where no effect removes anything worth naming and the residual of repeats is not repeatable: what other
+    runs leave is noise then. Where pairs leave too much, candidates are tried beside the model nested in the best
+    effect, whose other parameters may have stood for a second effect, and beside the second effect of the best
+    pair, since the first was only the best alone.
     """
     best = best_fitting(known)
     if best is None or retuned.fit.cost - best.fit.cost < LEAST_COST_DECREASE:
@@ -177,7 +185,7 @@ def _second_effects(
 
 
 def _nested_model_of(best: Explanation, known: Sequence[Explanation], retuned: Explanation) -> Explanation | None:
-    """The best explanation by a special case of an effect that gains a good share of what that does."""
+    """The best explanation by a model nested in an effect, if it gains a good share of what that gains."""
     least = _SHARE_OF_A_NESTED_MODEL * (retuned.fit.cost - best.fit.cost)
     general = best.fit.candidates[-1]
     specials = [explanation for explanation in known if is_nested_in(explanation.fit.candidates[-1], general)]
@@ -185,7 +193,7 @@ def _nested_model_of(best: Explanation, known: Sequence[Explanation], retuned: E
 
 
 def _candidates_beside(best: Explanation, at: Surroundings, pool: Sequence[Candidate]) -> list[Candidate]:
-    """Effects that act on forces which only the best effect has brought, such as on the damping of a liquid."""
+    """Effects that act on forces which only the best effect has added, such as on the damping of a liquid."""
     forces = extension_of(best.fit.candidates, best.fit.values).terms
     if not forces:
         return []

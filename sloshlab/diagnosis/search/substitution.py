@@ -1,4 +1,8 @@
-"""Effects in the place of one that was found: look-alikes, the general form of it, and its special cases."""
+"""Effects in the place of one that was found: look-alikes, nesting models, and nested models.
+
+A model is nested in another where it is that one with parameters held fixed: Coulomb friction in Stribeck
+friction.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +21,15 @@ from sloshlab.diagnosis.search.fits import Fits, best_fitting
 from sloshlab.diagnosis.search.start_values import starts_from_nested, starts_from_nesting, starts_of_many_sizes
 
 LEAST_COST_DECREASE: Final = 24.0
-"""Decrease of the cost by one effect, below which nobody looks for its look-alikes or a second one."""
+"""Decrease of the cost by one effect, below which neither its look-alikes nor a second effect are tried."""
 _AS_GOOD: Final = 2.0
-"""Of the cost: a general form that is worse than its special case has ended in a side valley."""
+"""Of the cost: a nesting model cannot be worse than its nested one; if it is, its fit ended in a local minimum."""
 _COARSE_STAGE: Final = INFLATION_STAGES[-3]
 _MOST_LOOK_ALIKES: Final = 4
 _MOST_SINGLE: Final = 2
 _ABANDON_COST_RATIO: Final = 2.0
-"""Cost, channels known to a share of their RMS only, over that of what an effect is tried in place of."""
+"""Cost with inflated noise, over that of what an effect is tried in place of, beyond which its fit is
+abandoned."""
 Limits = Mapping[str, tuple[float, float]]
 
 
@@ -117,15 +122,15 @@ class Substitution:
     def replaced_by_single(
         self, wider: FreeRunFit, base: FreeRunFit, pool: Sequence[Candidate]
     ) -> list[Explanation]:
-        """One effect of several numbers in place of everything that a fit has beyond the baseline, from there.
+        """A single effect of several parameters in place of all effects of a fit, from its baseline parameters.
 
-        Two effects that are simple may be what one of more numbers looks like, such as a softer spring and a loss
-        what is hysteresis; and what the baseline is beside them is nearer than what it is without any.
+        Two simple effects may stand for one with more parameters, such as a softer spring and a loss for
+        hysteresis; the baseline beside them is nearer to that effect than the retuned baseline alone.
 
         Parameters
         ----------
         wider : FreeRunFit
-            With effects, or with any force.
+            With effects, or with a force surface.
         base : FreeRunFit
             Without; an effect must lie nearer to `wider` than this before it is fitted.
         pool : sequence of Candidate
@@ -153,7 +158,7 @@ class Substitution:
     def nesting_models(
         self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
-        """Effects of which the best one is a special case, from there: they cannot be worse."""
+        """Effects in which the best one is nested, fitted from its optimum: they cannot be worse."""
         best = best_fitting(kept)
         if best is None:
             return []
@@ -187,7 +192,7 @@ class Substitution:
         pieces: list[Callable[[], FreeRunFit]] = []
         for candidate in sorted(
             pool, key=lambda candidate: -len(candidate.effect.parameters)
-        ):  # what takes longest first
+        ):  # the longest fits first: two processes then end together
             if not is_nested_in(special, candidate):
                 continue
             self.fits.progress(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
@@ -205,7 +210,7 @@ class Substitution:
     def _distinct_from_nested(
         self, problem: FreeRunProblem, candidate: Candidate, special: Candidate, fit: FreeRunFit
     ) -> list[Callable[[], FreeRunFit]]:
-        """Fits of a general effect where it clearly is not its special case."""
+        """Fits of a nesting effect within bounds where it clearly differs from its nested model."""
         if len(special.effect.parameters) > 1:
             return []
         size = fit.values[f"{special.key}.{special.effect.parameters[0].name}"]
@@ -220,7 +225,9 @@ class Substitution:
     def nested_models(
         self, wider: Explanation, known: Sequence[Explanation], pool: Sequence[Candidate]
     ) -> list[Explanation]:
-        """Special cases in place of the effects of an explanation, unless they are known from a better place."""
+        """Nested models in place of the effects of an explanation, unless a fit of them with a lower cost is
+        known.
+        """
         tried: dict[frozenset[str], float] = {}
         for explanation in known:
             keys = frozenset(explanation.keys)
@@ -242,7 +249,7 @@ class Substitution:
 
 
 def _fitted_closely(problem: FreeRunProblem, start: Mapping[str, float]) -> FreeRunFit:
-    """A fit from what is nearly it."""
+    """A fit from a start close to its optimum: the last two stages are enough."""
     return fitted(problem, start, n_iterations=6, stages=INFLATION_STAGES[-2:])[0]
 
 
@@ -254,7 +261,7 @@ def _fitted_within(
 
 
 def _fitted_unless_abandoned(problem: FreeRunProblem, start: Mapping[str, float], reached: float) -> FreeRunFit:
-    """A fit from nearby, left where it is after its first stage if its cost there is far beyond that reached."""
+    """A fit from nearby, abandoned after its first stage if its cost there is far beyond that reached."""
     first, jacobian = fitted(problem, start, n_iterations=6, stages=(_COARSE_STAGE,), is_last=False)
     if first.trouble or inflated_cost(problem, first, _COARSE_STAGE) > _ABANDON_COST_RATIO * reached:
         return first
@@ -266,7 +273,7 @@ def _constant_limits(limits: Limits) -> Callable[[Surroundings], Limits]:
 
 
 def is_nested_in(special: Candidate, general: Candidate) -> bool:
-    """Whether an effect is another one with fewer numbers, in the same block."""
+    """Whether an effect is nested in another one of the same block."""
     return general.effect.block == special.effect.block and special.effect.known_as in general.effect.includes
 
 
