@@ -61,8 +61,7 @@ def answered(found: Findings, progress: Progress = lambda what, done, of: None) 
 
 
 def _without_significant_size(found: Findings, pair: Explanation) -> list[str]:
-    """Which of two effects are not significant: by their intervals, or by the likelihood with their size set to
-    zero.
+    """Which of two effects are not significant: by their intervals, or by the likelihood without them.
 
     An effect on one of several sensors that drive together leaves the drive to the others, and may gain by that
     whatever its size is: then setting the size to zero loses nothing. Where parameters are correlated with each

@@ -183,8 +183,6 @@ def explained_extension(explanation: Explanation) -> Extension:
 
 
 def largest_strength(before: Mapping[_Place, float], after: Mapping[_Place, float]) -> float:
-    """Effect size: √(before/after − 1) of the place with the largest decrease, no mean square below the noise
-    floor.
-    """
+    """Effect size: √(before/after − 1) of the place that shows most, neither below the noise floor."""
     removed = [max(before[place], 1.0) / max(left, 1.0) - 1.0 for place, left in after.items() if place in before]
     return float(np.sqrt(max([0.0, *removed])))

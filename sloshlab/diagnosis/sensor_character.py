@@ -1,4 +1,4 @@
-"""Questions to a sensor that contradicts the others: what is its error a function of."""
+"""Character of the error of a sensor that contradicts the others: gain, rate, trend, mains, clock, clipping, …"""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ class SensorAnswer:
 def sensor_character(
     runs: Sequence[Sequence[Observation]], found: Sequence[RunForces], channel: str, seed: int = 0
 ) -> tuple[SensorAnswer, ...]:
-    """Ask what the error of a channel is a function of.
+    """Regress the error of a channel on the forms that faults of sensors have.
 
     Parameters
     ----------
     runs : sequence of sequences of Observation
         Per run.
     found : sequence of RunForces
-        Of the same runs, the channel not believed.
+        Of the same runs, the channel left out.
     channel : str
     seed : int
         Of the draws for intervals.
@@ -98,7 +98,7 @@ def decided_terms(answers: Sequence[SensorAnswer]) -> dict[str, bool]:
 
 
 def _forms(observation: Observation, error: FloatArray) -> Mapping[str, FloatArray]:
-    """Columns that the error may be a sum of, shape (n, k) each."""
+    """Features of each form, shape (n, k) each."""
     recording = observation.run.recording
     rate = observation.run.attributes.sampling_rate_hz
     reading = np.nan_to_num(np.asarray(recording[observation.channel].values, np.float64))

@@ -77,9 +77,7 @@ class LikelihoodScale:
 
 
 def gains_beyond_chance(more: Explanation, less: Explanation, scale: LikelihoodScale) -> bool:
-    """Whether the log-likelihood ratio over another explanation is beyond chance, on fitted and on held-out
-    runs.
-    """
+    """Whether the log-likelihood ratio over another explanation is beyond chance, on both kinds of runs."""
     return (
         scale.held_out_gain(less, more) > LEAST_LOG_LIKELIHOOD_RATIO
         and scale.fit_gain(less, more) > LEAST_LOG_LIKELIHOOD_RATIO
@@ -122,9 +120,7 @@ def is_unmistakable(less: Explanation, more: Explanation) -> bool:
 
 
 def with_least_residuals(found: Findings, explanation: Explanation) -> Explanation:
-    """With the least residual of each run over all fits of the same effects: dry friction gives many local
-    minima.
-    """
+    """With the least residual of each run over all fits of the same effects, of which friction makes many."""
     alike = [explanation, *(other for other in found.explanations if set(other.keys) == set(explanation.keys))]
     by_run = {
         place: min(other.by_run.get(place, left) for other in alike) for place, left in explanation.by_run.items()

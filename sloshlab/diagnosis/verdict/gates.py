@@ -149,9 +149,7 @@ def _held_out_repeatable(found: Findings, explanation: Explanation) -> float:
 
 
 def _needing_all_effects(found: Findings, scale: LikelihoodScale) -> list[Explanation]:
-    """What improves on each of its parts: one effect may bring the likelihood ratio, another one the effect
-    size.
-    """
+    """What improves on each of its parts: one effect may bring the likelihood, another the size."""
     described = [*found.explanations, *found.ceilings]
     parts = [(frozenset(explanation.keys), explanation) for explanation in found.explanations]
     return [
