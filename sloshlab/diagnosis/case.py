@@ -144,7 +144,7 @@ def _name_of_test(run: CaseRun) -> str:
 
 
 def level(run: CaseRun) -> float:
-    """How violent a run is: RMS of its mean acceleration signal [m/s²], or of what it has instead.
+    """Level of a run: RMS of its mean acceleration signal [m/s²], or of what it has instead.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The words in which tests speak of a missing force or a sensor, and what they say for and against an effect.
+"""Terms of tests on a latent force or a sensor, and the evidence that they are for and against an effect.
 
 An effect lists the terms that hold where it is what is missing (`Effect.spoken_for_by`). A test says that a term
 holds, that it does not, or nothing.

@@ -1,4 +1,4 @@
-"""Where and how, before what: the cut at measured interfaces, the maps of the residual, the physical questions."""
+"""Localisation and character of what is missing: interface cut, residual maps, questions to the latent force."""
 
 from __future__ import annotations
 
@@ -256,13 +256,13 @@ def examination_facts(examination: Examination, found: Findings) -> dict[str, An
 
 
 def _answer(answer: Answer) -> dict[str, Any]:
-    told = {
+    facts = {
         "question": answer.question,
         "finding": answer.finding,
         "quantity": answer.quantity,
         "units": answer.units,
     }
-    return {**told, **(_estimate(answer.value, answer.low, answer.high) or {}), "remark": answer.remark}
+    return {**facts, **(_estimate(answer.value, answer.low, answer.high) or {}), "remark": answer.remark}
 
 
 def _estimate(value: float, low: float, high: float) -> dict[str, float] | None:
@@ -281,12 +281,12 @@ def _evidence(examination: Examination, found: Findings) -> dict[str, Any]:
         for explanation in found.explanations
         for candidate in explanation.fit.candidates
     }
-    told = {}
+    facts = {}
     for candidate in effects.values():
         on = examination.evidence_on(candidate.effect)
-        told[f"{candidate.effect.block}.{candidate.effect.known_as}"] = {
+        facts[f"{candidate.effect.block}.{candidate.effect.known_as}"] = {
             "for": list(on.speaks_for),
             "against": list(on.speaks_against),
             "open": list(on.still_open),
         }
-    return told
+    return facts

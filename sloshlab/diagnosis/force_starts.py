@@ -41,7 +41,7 @@ _FIRST_PLACES: Final = 100
 _PROMISING: Final = 0.9
 """Share of the latent force that the best of the first places may leave if the others are to be evaluated.
 
-Where no impact is near, the search of a driven beam takes 1 s instead of 2 s with it.
+Where no impact is near, 2 s of a search on a driven beam become 1 s.
 """
 _LONG_STEP, _SHORT_STEP = 0.7, 0.15
 """Initial simplex, in the logarithm of a parameter; the minima of multimodal forces are narrow."""

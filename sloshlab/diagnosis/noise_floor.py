@@ -130,7 +130,7 @@ def _noise_of_drives(
         for kept in driving:
             recording = run.recording.drop_vars([name for name in driving if name != kept])
             kept_alone, spectrum = replace(run, recording=recording), spectrum_of[kept]
-            for place, noise in _propagated_noise(case, kept_alone, kept, spectrum, plain, fit).items():
+            for place, noise in _propagated_noise(case, kept_alone, kept, spectrum, plain=plain, fit=fit).items():
                 found[place] = np.maximum(found.get(place, 0.0), _over_bands_of_a_resonance(noise))
     return found
 
@@ -227,6 +227,7 @@ def _propagated_noise(
     run: CaseRun,
     driving: str,
     spectrum: _NoiseSpectrum,
+    *,
     plain: dict[str, list[Observation]],
     fit: FreeRunFit,
 ) -> dict[tuple[str, str], FloatArray]:

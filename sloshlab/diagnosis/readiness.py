@@ -1,4 +1,4 @@
-"""Whether a case can be diagnosed at all: before hours are spent, and in words that say what to correct.
+"""Checks before a search: whether a case can be diagnosed at all, in words that say what to correct.
 
 A twin that does not run, or reads something else than what was recorded by orders of magnitude, has no missing
 physics: the rig, the units or the folder is another one.

@@ -1,4 +1,4 @@
-"""Which runs choose a model, and which ones judge it."""
+"""Split into runs that are fitted and runs that are held out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sloshlab.diagnosis.case import Case, CaseRun, level
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Runs that are fitted, and runs that choose nothing.
+    """Runs that are fitted, and held-out runs.
 
     Attributes
     ----------

@@ -10,7 +10,7 @@ from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.terms import ForceKind
 
 MOST_DAMPING_OF_A_MODE: Final = 0.2
-"""Ratio to the critical one; what is damped more is no resonance but relaxes, and is no mode."""
+"""Ratio to the critical one; a coordinate with more damping has no resonance and is no mode."""
 
 
 def has_structure(surroundings: Surroundings) -> bool:
@@ -60,7 +60,7 @@ def force_effect(
     bounds : mapping, optional
         Narrower ones than those of the kind.
     may_rest : tuple of str
-        Names of numbers that may be at a bound in earnest.
+        Names of parameters for which a bound is a value like any other.
     look_alikes, separated_by, needs, spoken_for_by, includes, differs, variant_of, size
         As of `Effect`.
 

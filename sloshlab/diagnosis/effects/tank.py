@@ -23,7 +23,10 @@ _LOWEST_PLACE, _HIGHEST_PLACE = np.log((0.25, 20.0, 0.05)), np.log((1.3, 200.0, 
 _PLACES_OF_AN_IMPACT: Final = np.exp(
     qmc.scale(qmc.Halton(3, scramble=False).random(301)[1:], _LOWEST_PLACE, _HIGHEST_PLACE)
 )
-"""Share of the room, frequency [Hz] and damping ratio of a contact: 2 % of the gap make another later bounce."""
+"""Share of the room, frequency [Hz] and damping ratio of a contact, spread evenly in logarithms (Halton).
+
+An impact needs many starts: with a gap that differs by 2 % every later bounce is another one.
+"""
 _LEVELS = "decays or sweeps at accelerations below and above the threshold"
 
 
@@ -194,7 +197,7 @@ SLOSHING = register(
 
 _DAMPERS: Final = ("viscous_damping", "liquid_damping", VISCOUS_MAP.name)
 _OF_MOVING_LIQUID: Final = (*_DAMPERS, "effective_mass_map")
-"""Forces of the baseline that stand for moving liquid: liquid that has not broken up yet has none of them."""
+"""Forces of the baseline for moving liquid; liquid that has not broken up yet has none of them."""
 
 
 def _changed_liquid(
@@ -333,7 +336,7 @@ GRADUAL_SATURATION = register(
 def _impact_numbers(
     at: Surroundings, room: float, contact_hz: float, damping_ratio: float, share: float = 0.05
 ) -> dict[str, float]:
-    """A share of the liquid that flies through so much of the room above it."""
+    """Parameters of an impact by the share of the room above the liquid and by its contact."""
     rate, mass_kg = 2 * pi * contact_hz, share * at.rig.liquid_mass_kg
     return {
         "gap_m": room * (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
@@ -355,7 +358,7 @@ def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         beta=1.0 - numbers["share"],
         liquid_mass_kg=at.rig.liquid_mass_kg,
         height_m=height,
-        contact_pulls=0.0,
+        contact_pulls=0.0,  # a liquid pushes and never pulls; a contact that pulls made every bounce too slow
     )
     return Extension(terms=(ball,))
 

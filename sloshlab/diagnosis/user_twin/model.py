@@ -1,4 +1,4 @@
-"""A user's twin as a search sees it."""
+"""A user's twin as a model to be retuned and extended."""
 
 from __future__ import annotations
 
