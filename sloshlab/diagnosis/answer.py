@@ -73,6 +73,7 @@ def _without_significant_size(found: Findings, pair: Explanation) -> list[str]:
     for candidate in pair.fit.candidates:
         without = {**pair.fit.values, **{f"{candidate.key}.{name}": 0.0 for name in candidate.sizes}}
         residual = problem.residual(problem.theta_of(without))
+        # A size that can be set to zero at no loss is no size, whatever its interval is.
         lost = (huber_cost(residual) - pair.fit.misfit) / scale.fitting if np.isfinite(residual).all() else np.inf
         if lost < LEAST_LOG_LIKELIHOOD_RATIO or not (
             interval_excludes_zero(pair, candidate) or _is_clear_beside_other(found, pair, candidate, scale)

@@ -14,6 +14,7 @@ from sloshlab.errors import InputError
 from sloshlab.recording import RunAttributes, read_recording, run_attributes
 from sloshlab.rig import Rig
 
+# Sizes are checked before memory is allocated for all runs.
 MOST_RUNS: Final = 200
 _SAME_TEST: Final = (
     "experiment",

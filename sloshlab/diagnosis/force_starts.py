@@ -122,6 +122,7 @@ class _Place:
         for latent in sorted(forces, key=lambda latent: -latent.power_n2):
             if latent.power_n2 <= 0.0 or (pieces and n + latent.force_n.size > _MOST_SAMPLES):
                 break
+            # Lengths with small prime factors: the filter is a Fourier transform per evaluation.
             kept = slice(0, prev_fast_len(min(latent.force_n.size, _MOST_SAMPLES), real=True))
             force, motion, rate = latent.force_n[kept], latent.motion[kept], latent.run.attributes.sampling_rate_hz
             own_motion = motion[:, _MOTIONS_OF_BASELINE[latent.place]]
@@ -325,6 +326,7 @@ def _descended_from_many(
             return np.inf, numbers
         return at.unexplained_share(found * factor), np.where(proportional, numbers * factor, numbers)
 
+    # Two hundred further places only where the first hundred show that the effect may be there.
     sized_starts = [sized(numbers) for numbers in places[:_FIRST_PLACES]]
     if min(share for share, _ in sized_starts) > _PROMISING:
         return []

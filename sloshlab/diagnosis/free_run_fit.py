@@ -117,6 +117,7 @@ class _LevenbergMarquardt:
     def stage(self, inflation: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:
         """Descend with inflated noise."""
         inflation_weights, damping, is_fresh = self.problem.inflation_weights(inflation), 1e-3, False
+        # The Jacobian of an earlier stage, or a warm start, serves until a step shows that it is wrong.
         is_wanted = not self.jacobian.blocks
         for iteration in range(n_iterations if inflation > 0 else 2 * n_iterations):
             if is_wanted:
@@ -152,9 +153,12 @@ class _LevenbergMarquardt:
 
         before = cost(theta, residual)
         while damping < _LARGEST_DAMPING:
+            # Marquardt's scaling, by the diagonal of the Hessian: parameters differ by orders of magnitude in
+            # sensitivity.
             lift = np.diag(damping * np.maximum(np.diag(self.hessian), 1e-12))
             tried = _step_within_bounds(self.problem, theta, self.hessian + lift, gradient)
             step = tried - theta
+            # Decrease by the undamped model, so that it can be compared with the actual one.
             predicted = -float(2 * gradient @ step + step @ self.hessian @ step)
             if not predicted > least * before:
                 break

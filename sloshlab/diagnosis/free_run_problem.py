@@ -261,6 +261,7 @@ class FreeRunProblem:
                 step *= _TOLERANCES_OF_DAMPING
             moved = theta.copy()
             physical = self.centres[column] + (theta[column] + step) * self.scales[column]
+            # Away from the bound, where the values would be clipped and the difference zero.
             moved[column] += step if physical <= self.high[column] else -step
             places.append(moved)
 
@@ -271,6 +272,7 @@ class FreeRunProblem:
             for block, moved in found.items():
                 moved -= at[self._rows[block]]
                 moved /= place[column] - theta[column]
+            # A parameter whose simulation fails has no derivative, and the step does not use it.
             return found if all(np.isfinite(moved).all() for moved in found.values()) else {}
 
         found = list((map if is_single_threaded() else _POOL.map)(derivative, places, columns))
@@ -422,6 +424,8 @@ def repeatable_mean_squares(
             )
     found = {}
     for test in tests:
+        # Products of different repeats have no noise in their mean, so that it may be negative where nothing
+        # repeats.
         for channel in dict.fromkeys(of for run, of in parts if run in test):
             total, n = 0.0, 0
             for name, other in combinations([run for run in test if (run, channel) in parts], 2):

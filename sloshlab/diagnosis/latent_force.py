@@ -271,6 +271,8 @@ def _on_structure(
         inertia * inverted.spectrum - in_frequency(missed_force - of_release) - in_frequency(_padded(in_tank, n))
     )
     noise = np.abs(inertia) ** 2 * inverted.noise + np.interp(frequency, *force_noise)
+    # The division between structure and liquid is regularised once more: a difference of two large forces is
+    # noisy.
     kept_share = wiener_gain(np.abs(liquid) ** 2, noise, frequency, rate)
     in_liquid = in_time(kept_share * liquid, n)[:sampled]
     of_structure = force - in_tank - in_liquid - on_structure

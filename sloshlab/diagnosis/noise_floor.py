@@ -61,12 +61,14 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
         Per run.
     """
     plain = {run.name: observations(run, model.compared(run), model.driving(run)) for run in case.runs}
+    # A first fit only shows where the simulation is; its weights must not depend on the noise that is sought here.
     fit, _ = fitted(
         FreeRunProblem(model, [_with_inflated_variance(plain[run.name]) for run in case.runs]),
         model.believed,
         n_iterations=5,
     )
     raw = {name: _raw_residual(model, observed, fit) for name, observed in plain.items()}
+    # From here on the noise of drives is added explicitly, so that slow displacements keep their information.
     if isinstance(model, RigModel):
         plain = {
             run.name: observations(run, model.compared(run), model.driving(run), knows_noise_of_drive=True)
@@ -128,6 +130,7 @@ def _noise_of_drives(
         if run.is_free or not plain[run.name]:
             continue
         for kept in driving:
+            # An effect on a sensor leaves the drive to the others, against whose noise its gain must count.
             recording = run.recording.drop_vars([name for name in driving if name != kept])
             kept_alone, spectrum = replace(run, recording=recording), spectrum_of[kept]
             for place, noise in _propagated_noise(case, kept_alone, kept, spectrum, plain=plain, fit=fit).items():
@@ -203,6 +206,7 @@ def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
             std = max(noise_of_sensor(first, name), noise_of_sensor(other, name))
             if a.size != b.size or rate != other.attributes.sampling_rate_hz or not std > 0:
                 continue
+            # The signal of repeats cancels; the noise of two independent readings adds.
             difference = (a - b) / np.sqrt(2)
             if not np.isfinite(difference).all() or difference.std() > _MOST_OF_STATED * std:
                 continue
@@ -239,6 +243,7 @@ def _propagated_noise(
     found: dict[tuple[str, str], FloatArray] = {}
     with suppress(SloshlabError):
         noise_free = _readings(case, run, fit)
+        # Fixed seeds: the same case gives the same answer.
         for seed in range(_N_NOISE_DRAWS):
             white = std * np.random.default_rng(seed).standard_normal(values.size)
             noise = spectrum.coloured(white, run.attributes.sampling_rate_hz)

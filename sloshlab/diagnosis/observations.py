@@ -135,6 +135,7 @@ def observations(
         variable = run.recording[name]
         values = np.asarray(variable.values, np.float64)
         known = np.isfinite(values) & ~clipped_samples(variable)
+        # Less than two blocks have no spectrum to compare.
         if known.sum() < 2 * n_bands:
             continue
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
@@ -146,6 +147,7 @@ def observations(
         lost = slow_displacements(observation, driving)
         if lost.any():
             times = observation.times_s
+            # The filter that removes drift has no past at the beginning and no future at the end.
             at_ends = (times - times[0] < _FILTER_SETTLING_S) | (times[-1] - times < _FILTER_SETTLING_S)
             everywhere = IGNORED_VARIANCE * (spectra[lost] ** 2).mean()
             variance[lost & (at_ends[:, None] | (not knows_noise_of_drive))] += everywhere

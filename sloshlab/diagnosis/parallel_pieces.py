@@ -48,6 +48,7 @@ def in_parallel(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Ca
     if len(pieces) < 2 or not CAN_FORK or is_single_threaded():
         return [piece() for piece in pieces]
     known = {id(candidate): candidate for candidate in candidates}
+    # A shared counter, not halves: pieces differ in length, and one process would wait for the other.
     taken = multiprocessing.get_context("fork").Value("i", 0)
     fork, line = forked(_work_off_queue, pieces, taken, known)
     try:

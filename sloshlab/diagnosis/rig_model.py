@@ -223,11 +223,13 @@ class RigModel:
         return readings
 
     def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> _TrueReadings:
+        # Gains, offsets and shapes change readings only: a simulation serves for all of their values.
         physical = tuple(
             values.get(parameter.name, parameter.believed)
             for parameter in self.parameters
             if not parameter.is_reading and self._belongs(parameter.name, run)
         )
+        # A fault of a driving channel changes the motion, so that it is part of the key; others only read it.
         undone = tuple(fault for fault in extension.faults if fault.channel in self.driving(run))
         others = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
         key = (run.name, physical, tuple(others), tuple(fault.key for fault in undone))
@@ -264,6 +266,9 @@ class RigModel:
         gains = [values.get(f"gain of {name}", 1.0) for name in trusted]
         excitation = drive.excitation
         if gains:
+            # The drive is the mean of several accelerometers, weighted by the inverse of their stated noise
+            # variance: gains are retuned, so that only noise decides. A plain mean had half of the loudest
+            # sensor's noise.
             excitation = excitation.scaled(1.0 / float(np.dot(weights_by_noise(run.recording, trusted), gains)))
         rate = drive.excitation.sampling_rate_hz
         start = values.get(f"{RELEASE}{run.name}", drive.initial_displacement_m)
@@ -272,6 +277,8 @@ class RigModel:
             per_period *= _FINER_FOR_EVENTS
         n_substeps = steps_per_sample(twin, rate, per_period)
         if twin.structure is not None:
+            # Stiffness and damping for which the integrator's step moves each mode exactly: with them half as many
+            # steps are enough.
             twin = replace(twin, structure=twin.structure.for_steps_of(1.0 / (rate * n_substeps)))
         return twin.simulate(excitation, initial_displacement_m=start, n_substeps=n_substeps).require_done()
 
@@ -311,6 +318,7 @@ class RigModel:
         configuration = run.attributes.configuration
         if configuration != "sloshing":
             liquid = ()
+        # Rig files state the mass with liquid.
         if configuration == "empty":
             liquid = (MASS_ERROR(place="tank", mass_kg=-self.rig.liquid_mass_kg),)
         carried = twin.carried_mass_kg * values.get("carried mass", 1.0)
@@ -325,6 +333,7 @@ class RigModel:
         drive = drive_of(corrected(run, undone, driving), self.twin, by_noise=True)
         drive = replace(drive, excitation=with_cached_inputs(drive.excitation))
         with self._lock:
+            # Drives with faults are as many as a fit has trial values; those of the recordings are kept.
             if len(self._drives) > 20 * max(1, len(self.runs)):
                 self._drives = {known: self._drives[known] for known in self._drives if len(known) == 1}
             self._drives[key] = drive
@@ -345,6 +354,7 @@ class RigModel:
             found += _structure_parameters(self.twin.structure, moves=any(not run.is_free for run in self.runs))
         for term in self.twin.terms:
             for name, value in term.values.items():
+                # A force that is zero in the rig file is absent, and a tolerance of 20 % of zero would be none.
                 if name in _TUNED_NUMBERS and value:
                     number = f"{term.name}.{name}"
                     found.append(
@@ -493,6 +503,7 @@ def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str
     """
     recording = run.recording
     for fault in undone:
+        # A redundant sensor with a fault is left out: the others drive, and its own reading tests the fault.
         redundant = [name for name in driving if name != fault.channel and name in recording.data_vars]
         if redundant and fault.channel in recording.data_vars:
             recording = recording.drop_vars(fault.channel)

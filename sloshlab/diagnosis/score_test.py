@@ -41,6 +41,7 @@ class ScoreTest:
         inflation: float,
     ) -> None:
         inflation_weights = problem.inflation_weights(inflation)
+        # A wide Huber limit: far from the optimum large residuals are what an effect has to explain.
         self._weights = inflation_weights * robust_weights(inflation_weights * residual, 10.0)
         self._weighted, self._left = jacobian.weighted(self._weights), self._weights * residual
         self._can_move = np.flatnonzero(~problem.at_bounds(theta))
@@ -53,6 +54,7 @@ class ScoreTest:
         """Decrease of the cost by the best multiple of a change of the residuals, and that multiple."""
         direction = self._weights * change
         touched = self._weighted.transposed_times(direction)[self._can_move]
+        # What the parameters of the fit can follow is no gain of the effect (projection onto their complement).
         followed = self._inverse @ touched
         size = float(direction @ direction - followed @ touched)
         along = float(direction @ self._left - followed @ self._gradient)

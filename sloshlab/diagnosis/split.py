@@ -48,6 +48,8 @@ def split(case: Case) -> Split:
     held: list[CaseRun] = []
     for group in by_experiment.values():
         ordered = sorted(group, key=lambda test: level(test[0]))
+        # Interpolation between levels is validated, not extrapolation: the smallest and the largest level are
+        # fitted.
         if len(ordered) >= 3:
             for test in ordered[1:-1:2]:
                 held += test

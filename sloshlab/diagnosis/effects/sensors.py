@@ -163,6 +163,7 @@ def _high_passed(numbers: Numbers) -> Reading:
         """The charge at the first sample is free in every run, by least squares."""
         del others
         two = 2 * numbers["time_constant_s"] * rate
+        # Bilinear transform: exact at zero frequency, and stable for every time constant.
         a, b = (two - 1) / (two + 1), two / (two + 1)
         passed = np.asarray(lfilter([b, -b], [1.0, -a], values))
         leaking = a ** np.arange(values.size)
@@ -255,6 +256,7 @@ def _line(values: FloatArray, rate: float, line_hz: float) -> FloatArray:
     if not n:
         return np.zeros(values.size)
     power = np.abs(zoom_fft(values, within, n, fs=rate, endpoint=True))
+    # A parabola through the peak: the grid of the zoomed transform is coarser than the frequency must be known.
     k = min(max(int(np.argmax(power)), 1), n - 2)
     before, at, after = power[k - 1 : k + 2]
     curvature = before - 2 * at + after
@@ -334,6 +336,7 @@ def _pairs(at: Surroundings) -> list[str]:
         or (source.endswith("_root") and to in at.incoherent_with_base)
         if not (is_shaker and _read_same_quantity(to, source))
     ]
+    # Leaks within one quantity share cables and amplifiers; they come first where the list is cut.
     pairs.sort(key=lambda pair: not _read_same_quantity(*pair))
     return [f"{to}<{source}" for to, source in pairs[:_MOST_PAIRS]]
 

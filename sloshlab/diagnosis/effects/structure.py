@@ -140,6 +140,8 @@ STRUCTURAL = force_effect(
     separated_by="the same amplitude at two frequencies",
     spoken_for_by=("takes energy", "odd in velocity", "rate-independent", "work ∝ amplitude²", "no onset"),
 )
+# Reid's law above is nonlinear; relaxing springs have a nearly constant loss factor over some decades and are
+# linear.
 LINEAR_STRUCTURAL = force_effect(
     LINEAR_STRUCTURAL_DAMPING,
     "structure",
@@ -186,6 +188,7 @@ def _is_of_a_user(at: Surroundings) -> bool:
     return at.rig is None
 
 
+# For twins of a user's own only: machines have play, rigs of tanks have none.
 BEHIND_PLAY = force_effect(
     FRICTION_BEHIND_PLAY,
     "structure",
@@ -240,6 +243,7 @@ GAP = force_effect(
     includes=("stiffness_change",),
     size=("stiffness_n_per_m",),
 )
+# Far from its frequency a mode acts as a mass or as a spring, which are nested in it.
 MODE = force_effect(
     MISSING_MODE,
     "structure",

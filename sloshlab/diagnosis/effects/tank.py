@@ -135,6 +135,8 @@ def _sweeps(at: Surroundings) -> bool:
     return at.twin.structure is None and not at.has_one_frequency
 
 
+# On a shaker the liquid follows less at high frequencies and more at high levels: no constant effective mass
+# explains that, a quadratic in octaves and doublings does.
 VARYING = force_effect(
     VARYING_MASS,
     "tank",
@@ -232,6 +234,8 @@ def _damps(at: Surroundings) -> bool:
     return any(term.place == "tank" and term.name in _DAMPERS for term in at.twin.terms)
 
 
+# A liquid that has broken up stays so: with a state that fell back as soon as the motion calmed down, a liquid
+# that is broken up for good could not be described.
 _NEVER_CALM_S: Final = 1e9
 DELAY = register(
     Effect(
@@ -301,6 +305,7 @@ def _knows_work(at: Surroundings) -> bool:
     return any(term.place == "tank" and term.name == VISCOUS_MAP.name for term in at.twin.terms)
 
 
+# Work per cycle may go on growing, less than with the square of the level.
 GRADUAL_SATURATION = register(
     Effect(
         "gradual_saturation",
@@ -349,6 +354,7 @@ def _impact_numbers(
 def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     del channel
     height = at.rig.tank.height_m
+    # A ball needs a radius: a gap as high as the tank leaves none.
     gap = min(numbers["gap_m"], 0.98 * height)
     ball = BOUNCING_BALL(
         radius_m=0.5 * (height - gap),

@@ -162,6 +162,7 @@ class Fits:
         """A fit with its held-out error; only releases and offsets of the held-out runs are fitted to them."""
         shared = {name: value for name, value in fit.values.items() if not run_of(name, self.model)}
         problem = _ProblemWithFixedEffects(self.model, self.held_out, fit.candidates, shared)
+        # Held-out runs must not choose anything: only what belongs to the single run is fitted to it.
         own: dict[str, float] = {}
         for run in self.held_out:
             own |= self._run_parameters(run, fit, shared)
@@ -169,6 +170,8 @@ class Fits:
         if not np.isfinite(residual).all():
             return Explanation(fit, np.inf, np.inf)
         observed = [observation for run in problem.runs for observation in run]
+        # Errors are reported where the recording stands out of the noise; elsewhere they are one whatever is
+        # simulated.
         informative = np.concatenate([observation.informative.ravel() for observation in observed])
         chosen = residual[informative] if informative.any() else residual
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))

@@ -50,6 +50,8 @@ class ForwardSelection:
 
         They are screened and coarsely fitted on one repeat of every test, and fitted to the end on all.
         """
+        # Near the recordings, soft stages would hide what is missing, and the Jacobian of the base is a warm
+        # start.
         stages = stages_for(self.fits.problem_of(base), base)
         is_near = stages != INFLATION_STAGES and not self.fits.rests_on_baseline_bounds(base)
         base_jacobian = self.subset.jacobian_of_part(jacobian, base, self.fits)
@@ -77,6 +79,7 @@ class ForwardSelection:
             self.fits.progress(f"{what}: {screened.candidate.key}", i, 2 * len(chosen))
             problem = self.subset.problem((*base.candidates, screened.candidate))
             coarse_fit = coarsely_fitted(problem, screened.starts, stages, near=base_jacobian)
+            # Jacobians are not sent between processes, which would each hold a copy; it is computed anew.
             return coarse_fit.fit, coarse_fit.cost
 
         pieces = [partial(first_stages, i, screened) for i, screened in enumerate(chosen)]
@@ -108,6 +111,8 @@ class ForwardSelection:
         found = []
         for i, (coarse_fit, screened) in enumerate(sorted(coarse_fits, key=lambda each: each[0].cost)):
             is_out = i >= _ALWAYS_REFINED and at_base - coarse_fit.cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest)
+            # The candidate whose force is most like the latent force may gain late: its coarse fit may still be
+            # far off.
             if is_out and not (screened is best_force_match and screened.matches_latent_force):
                 self.fits.screened[screened.candidate.key] = max(more * (at_base - coarse_fit.cost), 0.0)
             else:

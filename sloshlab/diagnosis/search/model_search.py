@@ -77,19 +77,26 @@ def findings_of(
     surroundings = surroundings_of(problem, retuned_fit, case.rig)
     pool = candidates(surroundings)
     fits.share_with_second_process(pool)
+    # First effect: all candidates beside the retuned baseline.
     found = ForwardSelection(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
     refinement, best = Refinement(fits), best_fitting(found)
     if not fits.is_complete(retuned):
+        # With dry friction every fit stays in the local minimum in which it begins, and effects of more parameters
+        # leave theirs more easily: without these restarts they would be named in place of a simple effect.
         found += _restarted_from_other_sizes(fits, retuned_fit, found, pool)
         best = best_fitting(found)
     is_complete = fits.is_complete(best or retuned)
     if not is_complete and best is not None:
+        # Before the restarts, since a nested model that is enough makes them superfluous: a trapped air of next to
+        # no stiffness was a mass that the tank lacks.
         found += Substitution(fits).nested_models(best, found, pool)
         best = best_fitting(found)
         is_complete = best is not None and fits.is_complete(best)
     # Second effects and the ceiling cost most of the time. Where the residual is not repeatable nothing more can
     # be found: of 54 known cases no case with two effects was complete with one.
     if is_complete:
+        # Where nothing is left only the choice among rivals is open: at its bounds the baseline has taken a part
+        # of the effect, and a mass and a stiffness look the same from there.
         found += refinement.rivals_restarted_from_prior(found)
     else:
         found += refinement.restarted_from_prior(retuned_fit, found)
@@ -100,10 +107,13 @@ def findings_of(
         pairs = _second_effects(fits, found, retuned, surroundings, pool)
         found += [*pairs, *multi_start_refined(fits, [pair for pair in pairs if len(pair.keys) > 1])]
     found += refinement.converged(retuned_fit, found, pool)
+    # Last, since an effect without size would otherwise gain what is only a better optimum of the baseline.
     retuned = refinement.retuned_from(found, retuned)
     ceiling = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
     best, highest = best_fitting(found), best_fitting(ceiling)
     if best is not None and highest is not None and best.fit.cost - highest.fit.cost > LEAST_COST_DECREASE:
+        # A force surface that is far better than every name: from its baseline an effect may be found, such as
+        # hysteresis, that fits from the retuned baseline do not reach.
         found += Substitution(fits).replaced_by_single(highest.fit, retuned_fit, pool)
     return Findings(
         case,
@@ -153,6 +163,7 @@ def _second_effects(
     best = best_fitting(known)
     if best is None or retuned.fit.cost - best.fit.cost < LEAST_COST_DECREASE:
         return []
+    # Pairs cost most of the search, and with nothing missing they would be tried only because channels are noisy.
     largest = max(largest_strength(retuned.by_run, explanation.by_run) for explanation in known)
     if largest < _LEAST_STRENGTH_FOR_PAIRS and fits.has_little_repeatable(retuned):
         return []
@@ -170,6 +181,7 @@ def _second_effects(
         pair = best_fitting(pairs)
     if pair is not None and best.fit.cost - pair.fit.cost > LEAST_COST_DECREASE:
         alone += more.substitution.replaced_by_single(pair.fit, retuned.fit, pool)
+    # The first effect was chosen without the second one and need not be one of the two.
     alone += Refinement(fits).backward_eliminated([pair for pair in pairs if pair.keys[:-1] == best.keys])
     cost = min((explanation.fit.cost for explanation in alone), default=best.fit.cost)
     if cost < best.fit.cost:

@@ -88,6 +88,7 @@ def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explan
         if not _is_better(other, fit):
             n_in_vain += further is None
             further = None
+            # After a scan in vain the releases are at their best for this fit until it moves.
             if not may_scan_releases:
                 continue
             other = _with_releases_scanned(problem, fit)
@@ -95,6 +96,7 @@ def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explan
             if not may_scan_releases:
                 continue
         may_scan_releases = True
+        # A fit that is better by little is kept, but counts as in vain.
         n_in_vain = 0 if _gain(other, fit) > _LEAST_RELATIVE_GAIN else n_in_vain + 1
         further = {name: value + (value - fit.values[name]) for name, value in other.values.items()}
         fit = other

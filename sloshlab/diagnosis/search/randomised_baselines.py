@@ -61,6 +61,7 @@ def with_randomised_baselines(
         fits.progress("fitting about other baselines", i, _N_DRAWN)
         expected = plain.values(np.where(is_baseline, draw, 0.0))
         far = (i + 1) / _N_DRAWN
+        # Starts reach further from draw to draw, so that near and far local minima are both found.
         start = np.where(is_baseline, at_best + far * draw, at_best * np.exp(far * _START_DEVIATION * draw))
         problem = FreeRunProblem(found.model, found.fitting, candidates, expected=expected)
         fit, jacobian = fitted(

@@ -176,6 +176,8 @@ class Refinement:
         pool : sequence of Candidate
         """
         found: list[Explanation] = []
+        # Pairs first: their eliminations give single effects, of which the best is then fitted to convergence,
+        # too.
         for n in (2, 1):
             best = best_fitting([explanation for explanation in (*known, *found) if len(explanation.keys) == n])
             if best is None:
@@ -190,6 +192,7 @@ class Refinement:
             found += self.substitution.nested_models(best, [*known, *found], pool)
             if n > 1:
                 single = best_fitting([explanation for explanation in known if len(explanation.keys) == 1])
+                # Look-alikes can only matter where the second effect gains something.
                 if single is None or single.fit.cost - best.fit.cost > LEAST_COST_DECREASE:
                     found += self.substitution.exchanged(best, base, [*known, *found], pool)
                 found += self.backward_eliminated([best])

@@ -115,10 +115,13 @@ class Screening:
         theta = problem.theta_of(base.values)
         residual = problem.residual(theta)
         forces = self._force_starts(base)
+        # With inflated noise a candidate shows that is far from its optimum, without it one that is near.
         score_tests = [
             ScoreTest(problem, theta, residual, jacobian, inflation)
             for inflation in dict.fromkeys((stages[min(1, len(stages) - 1)], stages[-1]))
         ]
+        # A mode has a narrow minimum: it is tested at five frequencies across each of the bands with the largest
+        # residuals beside what is there already, not only beside the baseline.
         missed_hz = residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND)
 
         def screened_candidate(i: int, candidate: Candidate) -> ScreenedCandidate | None:
@@ -148,6 +151,7 @@ class Screening:
             )
             return ScreenedCandidate(candidate, gains_of, scored_starts, force_start, distant_start)
 
+        # An effect twice is the same effect with another size.
         others = [candidate for candidate in pool if candidate.key not in {known.key for known in base.candidates}]
         pieces = [partial(screened_candidate, i, candidate) for i, candidate in enumerate(others)]
         results = self.fits.in_parallel(pieces, pool)
@@ -156,6 +160,7 @@ class Screening:
                 self.fits.failed[candidate.key] = "does not run from any start"
         all_screened = [screened for screened in results if screened is not None]
         return [
+            # Starts cost four to six simulations of all runs: only those of chosen candidates are computed.
             replace(screened, starts=self._starts(base, screened, stages[0], is_near=is_near))
             for screened in self._most_promising(all_screened, _MOST_BESIDE if base.candidates else _MOST_FITTED)
         ]
@@ -178,6 +183,7 @@ class Screening:
         """Where a candidate is fitted from."""
         extended = self.fits.problem((*base.candidates, screened.candidate))
         matched = self._force_matched_start(base, extended, screened)
+        # Close to the optimum the linearised step is right, and all parameters of the base fit are kept.
         if is_near:
             sets = [
                 *([matched] if matched else []),
@@ -204,6 +210,7 @@ class Screening:
     ) -> list[Start]:
         """A start with the baseline as believed and one with its parameters in a fit, each the best of several."""
         scored_starts = screened.scored_starts
+        # The retuned baseline hides a part of the effect, so that one start has the baseline as believed.
         believed = base.values if base.candidates else self.fits.model.believed
         larger = [screened.distant_start] if screened.distant_start else []
         far = [

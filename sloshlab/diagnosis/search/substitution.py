@@ -94,6 +94,7 @@ class Substitution:
         pool : sequence of Candidate
         """
         most, reached = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (base, pair.fit))
+        # Order does not matter: a pair is a set of effects.
         tried = {frozenset(explanation.keys) for explanation in known}
         nearest_starts: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
         for replaced in pair.fit.candidates:
@@ -198,6 +199,8 @@ class Substitution:
             self.fits.progress(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
             problem = self.fits.problem((*base.candidates, candidate))
             pieces += self._distinct_from_nested(problem, candidate, special, best.fit)
+            # A nesting model of an effect that is down to noise can gain nothing; only its distinct forms are
+            # rivals.
             if is_done or candidate.key in known:
                 continue
             starts = [

@@ -58,10 +58,12 @@ def alternatives_of(found: Findings, best: Explanation, scale: LikelihoodScale) 
             or not np.isfinite(explanation.held_out)
         ):
             continue
+        # A nesting model describes the same force and is no rival, unless its parameters make it another one.
         if explanation.has_effect_at_bound or (
             nests(explanation, best) and not _is_distinct_from_nested(explanation, best)
         ):
             continue
+        # An effect that explains less than half of what the best one does is no answer to the same question.
         if scale.held_out_gain(found.retuned, explanation) < _LEAST_SHARE * scale.held_out_gain(
             found.retuned, best
         ):
@@ -107,6 +109,8 @@ def _are_indistinguishable_at_one_frequency(found: Findings, explanation: Explan
     this, other = explanation.fit.candidates[0].effect, best.fit.candidates[0].effect
     if this.name not in other.look_alikes and other.name not in this.look_alikes:
         return False
+    # Nothing but beginnings and ends of runs separates effects whose work grows with the same power of the
+    # amplitude.
     powers = [{term for term in effect.spoken_for_by if term.startswith("work")} for effect in (this, other)]
     little = _LITTLE_OF_ONE_POWER if powers[0] and powers[0] == powers[1] else _LITTLE_OF_EXPLAINED
     return all(
@@ -157,6 +161,7 @@ def equivalents_of(best: Explanation) -> list[tuple[str, ...]]:
             if set(this) <= set(in_structure):
                 others = [name for name in best.names if name not in this]
                 found.append(tuple(sorted((*others, *other))))
+    # A mass of the tank and an effective mass are the same force where the share of the liquid is constant.
     for mass in best.fit.candidates:
         if mass.effect.block == "tank" and (mass.effect.name in _EQUIVALENT_MASSES or _never_fades(best, mass)):
             others = [each.effect.known_as for each in best.fit.candidates if each is not mass]

@@ -55,6 +55,7 @@ class LikelihoodScale:
     @classmethod
     def of(cls, found: Findings) -> LikelihoodScale:
         """The scale of what one search has found."""
+        # The best description estimates the variance: where none is good, all differences are less certain.
         described = [*found.explanations, *found.ceilings, found.retuned]
         fitting = min(description.fit.misfit for description in described) / max(found.n_fitting, 1)
         held_out = min(description.held_out for description in described) / max(found.n_held_out, 1)

@@ -95,6 +95,7 @@ def verdict_of(found: Findings) -> Verdict:
     is_complete = not (
         leaves_repeatable_residual(found, found.retuned) or _exceeds_stated_noise(found, found.retuned)
     )
+    # Gates in order: is anything missing at all, is there a name that passes, and does the name itself matter?
     if is_complete and not is_more:
         certain = _weighted_by_decision(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
@@ -103,6 +104,7 @@ def verdict_of(found: Findings) -> Verdict:
     if named is None or not is_answer:
         certain = _weighted_by_decision(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, unknown_statement(found, named), "", certain)
+    # A residual within the scatter of repeats needs no name, even if the ceiling was better by a size.
     if is_complete and not improves_relevantly(with_least_residuals(found, named), found.retuned, scale):
         certain = _weighted_by_decision(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
@@ -194,6 +196,7 @@ def _passes_gates(
 ) -> bool:
     """Whether an explanation passes the gates on held-out runs."""
     return (
+        # One run alone leaves no run to validate a name on.
         found.split.has_held_out
         and scale.held_out_gain(found.retuned, named) >= LEAST_GAIN
         and not leaves_repeatable_residual(found, named)
@@ -285,6 +288,8 @@ def _probabilities(found: Findings, scale: LikelihoodScale) -> dict[str, float]:
     for ceiling in found.ceilings:
         if np.isfinite(ceiling.held_out):
             beside = sum(len(each.effect.parameters) for each in ceiling.fit.candidates if each.key in named)
+            # Effects beside the surface are penalised as named ones, or the name would seem less probable beside
+            # it.
             score = -ceiling.held_out / scale.held_out - scale.penalty_per_number * (_NUMBERS_OF_UNKNOWN + beside)
             scores["unknown"] = max(scores.get("unknown", -np.inf), score)
     top = max(scores.values())

@@ -61,12 +61,14 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
     scatter = _ERRORS_OVER_STANDARD_ERRORS * of_noise * max(1.0, best.held_out_rms)
     scatter = max(scatter, best.scatter.get(name, 0.0))
     is_between = _named(candidate, parameter).is_between_readings
+    # A rate per second ends like a time but scales with the reading.
     is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s") and not is_between
     power = next(
         (power for ending, power in _POWER_OF_LENGTH.items() if parameter.endswith(ending)), int(is_between)
     )
     of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(best.fit.values[name])
     elsewhere = max(best.spread.get(name, 0.0), of_belief, of_gain)
+    # Noise and baseline are independent; gains are part of the baseline and must not count twice.
     return _NORMAL_90 * float(np.hypot(scatter, elsewhere))
 
 
