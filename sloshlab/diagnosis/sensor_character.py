@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.evidence import (
     CLOCK_DRIFT,
-    CROSS_TALK,
+    FOLLOWS_OTHER_CHANNEL,
     MAINS_LINE,
     PROPORTIONAL_TO_INTEGRAL,
     PROPORTIONAL_TO_RATE,
@@ -128,7 +128,7 @@ def _forms(observation: Observation, error: FloatArray) -> Mapping[str, FloatArr
         and recording[name].attrs.get("quantity") != recording[observation.channel].attrs["quantity"]
     ]
     if others:
-        forms[CROSS_TALK] = np.stack([other - other.mean() for other in others], axis=1)
+        forms[FOLLOWS_OTHER_CHANNEL] = np.stack([other - other.mean() for other in others], axis=1)
     return forms
 
 

@@ -19,6 +19,17 @@ from sloshlab.diagnosis.candidate import (
     joined_channels,
     register,
 )
+from sloshlab.diagnosis.evidence import (
+    CLOCK_DRIFT,
+    FOLLOWS_OTHER_CHANNEL,
+    MAINS_LINE,
+    PROPORTIONAL_TO_INTEGRAL,
+    PROPORTIONAL_TO_RATE,
+    PROPORTIONAL_TO_READING,
+    SATURATING,
+    SINGLE_CHANNEL,
+    TREND,
+)
 from sloshlab.diagnosis.extension import Extension, Reading, SensorFault
 
 FloatArray = NDArray[np.float64]
@@ -100,7 +111,7 @@ GAIN = _sensor_effect(
     _scaled(lambda numbers: 1 + numbers["ratio"]),
     undone=_scaled(lambda numbers: 1 / (1 + numbers["ratio"])),
     look_alikes=("mass_error",),
-    spoken_for_by=("one channel alone", "proportional to the reading"),
+    spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_READING),
     places=_channels_and_devices,
 )
 
@@ -153,7 +164,7 @@ DELAY = _sensor_effect(
     _delayed,
     undone=_advanced,
     look_alikes=("viscous_damping", "sensor_high_pass"),
-    spoken_for_by=("one channel alone", "follows its rate"),
+    spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_RATE),
     places=_channels_and_devices,
 )
 
@@ -191,7 +202,7 @@ HIGH_PASS = _sensor_effect(
     _high_passed,
     undone=_high_pass_undone,
     look_alikes=("sensor_delay",),
-    spoken_for_by=("one channel alone", "follows its integral"),
+    spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_INTEGRAL),
     places=_channels_and_devices,
 )
 
@@ -211,7 +222,7 @@ CLIPPING = _sensor_effect(
     lambda at: [{"limit": share * at.peaks.get(at.channel, 2.0 * at.reading)} for share in (1.0, 0.97, 0.8)],
     _clipped,
     undone=None,
-    spoken_for_by=("one channel alone", "at the largest readings"),
+    spoken_for_by=(SINGLE_CHANNEL, SATURATING),
 )
 
 
@@ -232,7 +243,7 @@ DRIFT = _sensor_effect(
     _drifted,
     undone=None,
     look_alikes=("liquid_loss",),
-    spoken_for_by=("one channel alone", "slow trend"),
+    spoken_for_by=(SINGLE_CHANNEL, TREND),
 )
 
 
@@ -276,7 +287,7 @@ HUM = [
         _with_hum(line, 1.0),
         undone=_with_hum(line, -1.0),
         separated_by="the channel with nothing moving",
-        spoken_for_by=("one channel alone", "a line of the mains"),
+        spoken_for_by=(SINGLE_CHANNEL, MAINS_LINE),
         variant_of=variant_of,
     )
     for name, line, variant_of in (("mains_hum", 50.0, ""), ("mains_hum_60", 60.0, "mains_hum"))
@@ -315,7 +326,7 @@ CLOCK = _sensor_effect(
     _with_clock_skew(1.0),
     undone=_with_clock_skew(-1.0),
     look_alikes=("sensor_delay",),
-    spoken_for_by=("one channel alone", "rate growing along the run"),
+    spoken_for_by=(SINGLE_CHANNEL, CLOCK_DRIFT),
     places=_channels_and_devices,
 )
 
@@ -394,6 +405,6 @@ CROSS_TALK = register(
         "the second channel disconnected",
         places=_pairs,
         limits=_largest_leaks,
-        spoken_for_by=("one channel alone", "another channel"),
+        spoken_for_by=(SINGLE_CHANNEL, FOLLOWS_OTHER_CHANNEL),
     )
 )

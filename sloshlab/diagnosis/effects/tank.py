@@ -11,7 +11,27 @@ from scipy.stats import qmc
 
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
-from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, force_effect, rocks
+from sloshlab.diagnosis.effects.force_effect import (
+    COULOMB_CHARACTER,
+    DRAG_CHARACTER,
+    INERTIAL_CHARACTER,
+    MOST_DAMPING_OF_A_MODE,
+    VISCOUS_CHARACTER,
+    force_effect,
+    rocks,
+)
+from sloshlab.diagnosis.evidence import (
+    CONSERVATIVE,
+    DISSIPATIVE,
+    HALF_ORDER,
+    IMPULSIVE,
+    MEMORY,
+    ODD_IN_DISPLACEMENT,
+    ODD_IN_VELOCITY,
+    ONSET,
+    STATE_FUNCTION,
+    TIME_VARYING,
+)
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.liquid_effects import AIR_CUSHION, FARADAY_WAVE, LATERAL_MODE, LIQUID_DAMPING, LIQUID_LOSS
 from sloshlab.twin.structure_forces import COULOMB_FRICTION, MASS_ERROR, QUADRATIC_DRAG, VISCOUS_DAMPING
@@ -45,14 +65,7 @@ VISCOUS = force_effect(
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
     look_alikes=("quadratic_drag", "coulomb_friction", "sensor_delay"),
     separated_by="two or more amplitudes and frequencies",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "grows with rate",
-        "work ∝ amplitude²",
-        "no onset",
-    ),
+    spoken_for_by=VISCOUS_CHARACTER,
 )
 COULOMB = force_effect(
     COULOMB_FRICTION,
@@ -60,15 +73,7 @@ COULOMB = force_effect(
     lambda at: [{"force_n": 0.1 * _liquid_force(at)}],
     look_alikes=("viscous_damping",),
     separated_by="two or more amplitudes",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "rate-independent",
-        "work ∝ amplitude",
-        "no onset",
-        "third order",
-    ),
+    spoken_for_by=COULOMB_CHARACTER,
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,
@@ -76,13 +81,7 @@ DRAG = force_effect(
     lambda at: [{"drag_n_s2_per_m2": 0.2 * _liquid_force(at) / at.velocity_m_per_s**2}],
     look_alikes=("viscous_damping", "liquid_sloshing"),
     separated_by="two or more amplitudes",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "grows with rate",
-        "work ∝ amplitude³",
-    ),
+    spoken_for_by=DRAG_CHARACTER,
 )
 MASS = force_effect(
     MASS_ERROR,
@@ -91,7 +90,7 @@ MASS = force_effect(
     bounds={"mass_kg": (-10.0, 10.0)},
     look_alikes=("effective_mass", "sensor_gain", "stiffness_change"),
     separated_by="a known mass added to the tank, and a run with frozen liquid",
-    spoken_for_by=("does no work", "odd in displacement", "function of the state", "no onset"),
+    spoken_for_by=INERTIAL_CHARACTER,
 )
 EFFECTIVE = force_effect(
     EFFECTIVE_MASS,
@@ -101,7 +100,7 @@ EFFECTIVE = force_effect(
     fitted=("beta",),
     look_alikes=("mass_error",),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
-    spoken_for_by=("does no work", "odd in displacement", "function of the state"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION),
 )
 FADING = force_effect(
     FADING_MASS,
@@ -116,7 +115,7 @@ FADING = force_effect(
     may_rest=("averaging_s",),
     look_alikes=("cubic_stiffness", "hysteresis", "clearance"),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
-    spoken_for_by=("does no work", "odd in displacement"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
     includes=("mass_error",),
     variant_of="effective_mass",
 )
@@ -154,7 +153,7 @@ VARYING = force_effect(
     fitted=("beta", *(f"beta_{name}" for name in _VARIES)),
     needs=_sweeps,
     separated_by="runs with frozen and moving liquid, at several amplitudes",
-    spoken_for_by=("does no work", "odd in displacement"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
     includes=("mass_error",),
     variant_of="effective_mass",
 )
@@ -191,7 +190,7 @@ SLOSHING = register(
         _damping,
         ("viscous_damping", "quadratic_drag"),
         _LEVELS,
-        spoken_for_by=("takes energy", "odd in velocity", "onset"),
+        spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, ONSET),
         size=("peak_w_bar",),
     )
 )
@@ -269,7 +268,7 @@ DELAY = register(
         ("high_g_saturation",),
         "a sudden start at constant amplitude",
         _damps,
-        spoken_for_by=("memory", "odd in velocity"),
+        spoken_for_by=(MEMORY, ODD_IN_VELOCITY),
         size=("time_constant_s",),
     )
 )
@@ -295,7 +294,7 @@ SATURATION = register(
         ("breakup_delay", "liquid_sloshing"),
         _LEVELS,
         _damps,
-        spoken_for_by=("odd in velocity", "onset"),
+        spoken_for_by=(ODD_IN_VELOCITY, ONSET),
     )
 )
 
@@ -331,7 +330,7 @@ GRADUAL_SATURATION = register(
         ("breakup_delay", "liquid_sloshing"),
         _LEVELS,
         _knows_work,
-        spoken_for_by=("odd in velocity", "onset"),
+        spoken_for_by=(ODD_IN_VELOCITY, ONSET),
         includes=("high_g_saturation",),
         variant_of="high_g_saturation",
     )
@@ -386,7 +385,7 @@ IMPACT = register(
         _impact,
         ("liquid_sloshing", "clearance"),
         "accelerations below and above 1 g, forces sampled fast",
-        spoken_for_by=("takes energy", "impulsive", "onset", "memory"),
+        spoken_for_by=(DISSIPATIVE, IMPULSIVE, ONSET, MEMORY),
         size=("stiffness_n_per_m", "damping_kg_per_s", "share"),
         sought_at=lambda at: [_impact_numbers(at, *place) for place in _PLACES_OF_AN_IMPACT],
     )
@@ -402,7 +401,7 @@ LATERAL = force_effect(
     look_alikes=("missing_mode",),
     separated_by="a slow sweep over its frequency at small amplitude",
     needs=rocks,
-    spoken_for_by=("memory",),
+    spoken_for_by=(MEMORY,),
     includes=("mass_error", "effective_mass"),
     size=("mass_kg",),
 )
@@ -420,7 +419,7 @@ FARADAY = force_effect(
     ],
     bounds={"growth": (1e-3, 100.0), "damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     separated_by="spectra at half the frequency below and above the threshold",
-    spoken_for_by=("half order", "memory", "onset"),
+    spoken_for_by=(HALF_ORDER, MEMORY, ONSET),
     size=("force_n",),
 )
 LOSS = force_effect(
@@ -429,7 +428,7 @@ LOSS = force_effect(
     lambda at: [{"rate_kg_per_s": 0.1 * at.rig.liquid_mass_kg / at.longest_run_s}],
     look_alikes=("mass_error", "sensor_drift"),
     separated_by="the same test at the beginning and at the end of the day",
-    spoken_for_by=("changes along the run", "odd in displacement"),
+    spoken_for_by=(TIME_VARYING, ODD_IN_DISPLACEMENT),
 )
 CUSHION = force_effect(
     AIR_CUSHION,
@@ -446,7 +445,7 @@ CUSHION = force_effect(
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("effective_mass", "lateral_mode"),
     separated_by="two pressures of the gas",
-    spoken_for_by=("does no work", "odd in displacement"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
     includes=("mass_error", "effective_mass", "lateral_mode"),
     size=("stiffness_n_per_m", "mass_kg"),
 )
