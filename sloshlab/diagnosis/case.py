@@ -27,6 +27,7 @@ _SAME_TEST: Final = (
 _NAME_OF_TEST: Final = "test"
 """Optional attribute: runs that differ in it are different tests, for example realisations of a random signal."""
 _LEVELS_AGREE: Final = 0.1
+"""Difference of the logarithms of the levels of two runs, up to which they are repeats."""
 _LARGEST_CASE_BYTES: Final = 2 * 2**30
 
 

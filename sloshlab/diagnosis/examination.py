@@ -22,8 +22,10 @@ from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.sensor_character import SensorAnswer, decided_terms, sensor_character
 
 FloatArray = NDArray[np.float64]
-_CLEARLY = 1.5
-_MOST = 0.8
+_LEAST_RATIO_WITHIN_CYCLE = 1.5
+"""Of the mean squares in the parts of a cycle, from which one of them is told."""
+_SHARE_OF_AN_OWNER = 0.8
+"""Of the mismatch, from which a block owns it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,7 @@ def owning_block(examination: Examination) -> str:
     """The block that surely owns most of the mismatch; empty where the cut cannot tell."""
     if examination.cut is None:
         return ""
-    sure = [cut.block for cut in examination.cut.blocks if cut.share > _MOST and cut.low > 0.5]
+    sure = [cut.block for cut in examination.cut.blocks if cut.share > _SHARE_OF_AN_OWNER and cut.low > 0.5]
     return sure[0] if len(sure) == 1 and sure[0] != EITHER else ""
 
 
@@ -184,7 +186,7 @@ def _in_the_cycle(phase: FloatArray, excess: FloatArray) -> str:
         other = min(sizes["about the lowest point"], sizes["about the highest point"])
         if sizes[best] < 2 * other:
             best = "at velocity reversals"
-    return best if sizes[best] > _CLEARLY * min(sizes.values()) and sizes[best] > 1.1 else ""
+    return best if sizes[best] > _LEAST_RATIO_WITHIN_CYCLE * min(sizes.values()) and sizes[best] > 1.1 else ""
 
 
 def _levels(examination: Examination, worst: str) -> str:

@@ -59,9 +59,13 @@ FloatArray = NDArray[np.float64]
 LEVEL: Final = 0.90
 _N_DRAWS: Final = 120
 _NORMAL_90: Final = 1.6449
+"""Half width of a 90 % interval in standard deviations."""
 _RESOLVED: Final = 0.25
+"""Excess of the mean square over that of the noise, from which a force is there."""
 _OF_STATE: Final = 0.6
+"""Explained share from which a force is a function of the state."""
 _IMPULSIVE_KURTOSIS: Final = 5.0
+"""Kurtosis from which a force is impulsive; 1.5 for a sine."""
 _SMALL_SHARE: Final = 0.08
 """Share of the variance below which a part is absent; it is present above twice of it."""
 

@@ -27,7 +27,9 @@ ComplexArray = NDArray[np.complex128]
 ORDERS: Final = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _TANK_PLACES: Final = ("tank", "tip", "roof", "mean")
 _SMOOTHING_HZ: Final = 0.6
+"""Width of the neighbourhood from which the power of the force is estimated."""
 _LARGEST_SHARE_OF_RATE: Final = 0.4
+"""Of the sampling rate, beyond which the gain is zero."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,15 @@ from sloshlab.diagnosis.latent_force import STRUCTURE, LatentForce
 
 FloatArray = NDArray[np.float64]
 DEGREE: Final = 5
+"""Of the Chebyshev polynomials, in both motions together."""
 _SHARP: Final = (0.05, 0.008)
+"""Widths of the steps at velocity reversal, over the largest velocity."""
 _N_STRETCHES: Final = 24
+"""Of each run."""
 _PLAY_RADII: Final = (0.1, 0.3)
+"""Over the largest displacement."""
 _FORGETTING_CYCLES: Final = 4.0
+"""Time constant of the level that is remembered."""
 
 
 @dataclass(frozen=True, eq=False)

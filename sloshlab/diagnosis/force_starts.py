@@ -31,14 +31,17 @@ from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
 _MOST_SAMPLES: Final = 12_000
+"""Of all runs of a place: each evaluation filters all of them."""
 _FEWEST_NUMBERS: Final = 2
 """The size of an effect of one parameter comes from its score test."""
 _MOST_TRIED: Final = 2
+"""Starts from which descents begin, the best at their best size."""
 _N_EVALUATIONS: Final = 15, 40
 """Per parameter: for each start that is tried, and then for the best."""
 _MOST_DESCENTS: Final = 6
+"""Of many places, those from which descents begin."""
 _FIRST_PLACES: Final = 100
-_PROMISING: Final = 0.9
+_LARGEST_SHARE_LEFT: Final = 0.9
 """Share of the latent force that the best of the first places may leave if the others are to be evaluated.
 
 Where no impact is near, 2 s of a search on a driven beam become 1 s.
@@ -51,17 +54,24 @@ _MOTIONS_OF_BASELINE: Final = {STRUCTURE: [0, 1], EITHER: [0, 1], TANK: [2, 1]}
 Not all three: in a free motion any force is a combination of those.
 """
 _N_PROBED: Final = 400
+"""Samples of the fastest part of a run, on which contacts are tested to be resolved."""
 _RESONANT_NUMBER: Final = "frequency_hz"
 """A parameter to which a force is so sensitive that it is scanned on a grid first."""
-_BEYOND: Final = 2.0
+_GRID_MARGIN: Final = 2.0
+"""Factor of the grid of frequencies below and above those of the starts."""
 _N_FREQUENCIES: Final = 40
-_IN_PROPORTION: Final = 1e-3
+_PROPORTIONALITY_TOLERANCE: Final = 1e-3
+"""Relative error of the doubled force, up to which a force is proportional to a parameter."""
 _LEAST_FACTOR: Final = 1e-3
-_FARTHEST: Final = 4.0
+"""Of a size: forces of the wrong sign are not turned round."""
+_LARGEST_LOG_CHANGE: Final = 4.0
 """Bound of the logarithm of a parameter over its start."""
 _ABOVE_NOISE: Final = 1.0
+"""Mean square of a latent force over that of its noise, from which starts are sought."""
 _LEAST_EXPLAINED: Final = 0.03
+"""Share of the mean square of the latent force, below which a start is none."""
 _POWER_KEPT: Final = 0.98
+"""Share of the power of the latent force within its band."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +287,7 @@ def _frequencies_about(starts: Sequence[FloatArray], place: int) -> list[float]:
     known = [float(start[place]) for start in starts]
     return [
         float(frequency_hz)
-        for frequency_hz in np.geomspace(min(known) / _BEYOND, max(known) * _BEYOND, _N_FREQUENCIES)
+        for frequency_hz in np.geomspace(min(known) / _GRID_MARGIN, max(known) * _GRID_MARGIN, _N_FREQUENCIES)
     ]
 
 
@@ -301,7 +311,10 @@ def _at_best_size(
     size = float(found @ found)
     for k in range(start.size):
         doubled = force(_with_number(start, k, 2.0 * start[k]))
-        if doubled is not None and float(((doubled - 2.0 * found) ** 2).sum()) < _IN_PROPORTION**2 * size:
+        if (
+            doubled is not None
+            and float(((doubled - 2.0 * found) ** 2).sum()) < _PROPORTIONALITY_TOLERANCE**2 * size
+        ):
             return place.unexplained_share(found * factor), _with_number(start, k, start[k] * factor)
     return place.unexplained_share(found), start
 
@@ -328,7 +341,7 @@ def _descended_from_many(
 
     # Two hundred further places only where the first hundred show that the effect may be there.
     sized_starts = [sized(numbers) for numbers in places[:_FIRST_PLACES]]
-    if min(share for share, _ in sized_starts) > _PROMISING:
+    if min(share for share, _ in sized_starts) > _LARGEST_SHARE_LEFT:
         return []
     sized_starts += [sized(numbers) for numbers in places[_FIRST_PLACES:]]
     best = sorted(sized_starts, key=lambda reached: reached[0])
@@ -348,7 +361,7 @@ def _simplex_descent(
     scale = np.where(start == 0, 1.0, start)
 
     def numbers(at: FloatArray) -> FloatArray:
-        return np.asarray(scale * np.exp(np.clip(at, -_FARTHEST, _FARTHEST)))
+        return np.asarray(scale * np.exp(np.clip(at, -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)))
 
     def cost(at: FloatArray) -> float:
         value = left(numbers(at))

@@ -22,7 +22,9 @@ from sloshlab.diagnosis.free_run_problem import HUBER_LIMIT, FreeRunFit, FreeRun
 
 FloatArray = NDArray[np.float64]
 _LARGEST_DAMPING: Final = 1e8
+"""Beyond it a step is gradient descent of no size."""
 _LEAST_GAIN_RATIO: Final = 0.3
+"""Actual over predicted decrease, below which the Jacobian is computed anew."""
 _LAST_STAGE_FACTOR: Final = 0.03
 """Over the tolerance: small steps along a valley add up to more than the gates of a verdict."""
 _LEAST_PREDICTED_SHARE: Final = 0.1
@@ -31,10 +33,12 @@ _LEAST_PREDICTED_SHARE: Final = 0.1
 Half of all simulations were of refused steps that damping made ever smaller.
 """
 _N_DRAWN: Final = 32
+"""Starts drawn from the prior."""
 _N_REFINED: Final = 2
+"""Of these, the best ones that are fitted."""
 _ABANDON_COST_RATIO: Final = 1.02
 """Cost after the first stages, over the best one so far, beyond which another start is abandoned."""
-_SHOWN: Final = 1.5
+_LARGEST_INFLATION_RATIO: Final = 1.5
 """Noise inflation over the largest relative residual, from which a stage would hide all that is to be fitted."""
 _LEAST_ROOM: Final = 1e-12
 """Added to the bounds of a step, in scaled values: the solver refuses bounds that coincide."""
@@ -43,7 +47,9 @@ _SAME_MINIMUM: Final = 0.02
 _MOST_ITERATIONS: Final = 15
 """Steps of a stage: where an effect and the baseline are correlated, the fit follows a narrow valley."""
 INFLATION_STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
+"""Share of the RMS of every channel that is added to its noise."""
 SCANNED_SIZE_FACTORS: Final = (0.75, 0.9, 1.1, 1.3)
+"""Over the size that was found: other starts of a fit far from the recordings."""
 
 
 def _limit(residual: FloatArray) -> float:
@@ -202,7 +208,8 @@ def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
         left = float(np.mean(own**2 * observation.variance)) / max(float(np.mean(observation.spectra**2)), 1e-300)
         largest = max(largest, float(np.sqrt(left)))
     return (
-        tuple(inflation for inflation in INFLATION_STAGES if inflation < _SHOWN * largest) or INFLATION_STAGES[-1:]
+        tuple(inflation for inflation in INFLATION_STAGES if inflation < _LARGEST_INFLATION_RATIO * largest)
+        or INFLATION_STAGES[-1:]
     )
 
 

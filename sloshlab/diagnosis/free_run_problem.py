@@ -26,11 +26,15 @@ _Label = TypeVar("_Label")
 _STEP: Final = 0.005
 """Of a finite difference, in tolerances: a frequency must not move by much of a cycle over a run."""
 _COARSE_STEP: Final = 0.03
+"""The same in stages with inflated noise, past the small-scale roughness that friction and contacts cause."""
 _TOLERANCES_OF_DAMPING: Final = 3.0
+"""Factor of the coarse step of dampings of the baseline."""
 HUBER_LIMIT: Final = 4.0
 """Standard deviations beyond which Huber's loss is linear: bursts of noise and lost blocks are outliers."""
 _FEWEST_IN_A_RUN: Final = 50
+"""Coefficients, below which a mean square is too uncertain to be used."""
 _QUIETER_SHARE: Final = 0.75
+"""Of the times of a channel, without the bursts in the others."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel up to which nothing but noise is left."""
 _POOL: Final = ThreadPoolExecutor(N_WORKERS)

@@ -31,12 +31,14 @@ from sloshlab.errors import SloshlabError
 FloatArray = NDArray[np.float64]
 SENSOR: Final = "sensor"
 _N_PARTS: Final = 6
+"""Stretches of a run that are resampled as wholes (block bootstrap)."""
 _N_DRAWS: Final = 400
 _CONSISTENT: Final = 1.4
 """RMS over noise up to which channels of one motion agree."""
 _EXPLAINED: Final = 0.35
 """Share of a disagreement that may remain once the channel that causes it is left out."""
 _RUNNER_UP: Final = 1.5
+"""Ratio of what the second best choice leaves, from which the best one is certain."""
 _RESOLVED: Final = 0.25
 """Mean square beyond noise, over that of the noise, from which a force is there."""
 _FEWER_FORCES: Final = 4.0

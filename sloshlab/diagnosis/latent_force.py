@@ -41,6 +41,7 @@ FloatArray = NDArray[np.float64]
 Found = tuple[tuple["LatentForce", ...], dict[str, FloatArray]]
 STRUCTURE, TANK, EITHER = "structure", "tank", "structure or tank"
 _END_SHARE: Final = 0.04
+"""Of a run: length of the tapers."""
 _SLOW_HZ: Final = 1.5
 """Below it offsets and drift of accelerometers hide the motion."""
 

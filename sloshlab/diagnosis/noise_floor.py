@@ -34,7 +34,9 @@ from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
 _N_NOISE_DRAWS: Final = 4
+"""Simulations with other noise, over which squares are averaged."""
 _N_BLOCKS: Final = 9
+"""Over which squares are averaged: noise through a resonance is steady."""
 _DOMINANT_NOISE_RATIO: Final = 1.0
 """Variance by the noise of drives over that of the sensor itself, from which the former dominates."""
 _SLOW_DISPLACEMENT_ERROR: Final = 3.0

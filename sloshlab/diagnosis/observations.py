@@ -19,15 +19,19 @@ from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times
 
 FloatArray = NDArray[np.float64]
 BLOCK_S: Final = 0.5
+"""Length of a block of the lapped transform."""
 ZERO_IS_KNOWN: Final = "zero_is_known"
 """Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
+"""Power over variance, from which a coefficient stands out of the noise."""
 _SLOWEST_INTEGRATED_HZ: Final = 5 * DRIFT_CORNER_HZ
+"""Below it displacements from integrated accelerometers are not valid."""
 _FILTER_SETTLING_S: Final = 1.0 / DRIFT_CORNER_HZ
 """Beginnings and ends that the filter which removes drift disturbs."""
 IGNORED_VARIANCE: Final = 100.0
 """Factor of a variance with which a coefficient counts for next to nothing."""
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
+"""Of the blocks, in which a band must be informative to be kept."""
 _LEAST_SHARE: Final = 1e-4
 """Of the RMS of a channel: least standard deviation of a coefficient, for quantisation and rounding."""
 

@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 LARGEST_RATIO: Final = 30.0
 """Recorded over simulated RMS of a channel; beyond, its units or its rig are others. g for m/s² is 9.8."""
 _MASSES_AGREE: Final = 0.05
+"""Relative difference, up to which two statements of a mass agree."""
 _FEWEST_SAMPLES: Final = 64
 
 

@@ -43,12 +43,14 @@ of three beams.
 _FINER_FOR_EVENTS: Final = 2.0
 """Factor where there are events: within longer steps friction may stop twice, and a contact open and close."""
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
+"""Of the lowest mode: forces with memory need them."""
 _LEAST_STEPS_PER_S: Final = 500.0
 """Of a tank that follows its measured motion: forces with a running mean need some tens of steps per cycle.
 
 At 64 Hz the memory of the liquid's damping was integrated in steps of a seventh of a cycle and diverged.
 """
 _MOST_KEPT_BYTES: Final = 5e7
+"""Of simulated channels in each process; answers do not depend on it."""
 _MOST_READINGS_TO_FORK: Final = 350_000
 """Of all channels and runs: with a third more, the processes together were seen to hold three gigabytes."""
 RELEASE: Final = "release of "

@@ -26,9 +26,12 @@ from sloshlab.recording import channels
 
 FloatArray = NDArray[np.float64]
 _N_PARTS: Final = 8
+"""Stretches of a run that are resampled as wholes (block bootstrap)."""
 _N_DRAWS: Final = 120
-_MUCH: Final = 0.3
-_CLOSE: Final = 0.1
+_LEAST_SHARE: Final = 0.3
+"""Of the variance of the error that a form must explain to hold."""
+_SHARE_MARGIN: Final = 0.1
+"""Below the best form, within which a form may hold, too."""
 _MAINS_HZ: Final = (50.0, 60.0)
 
 
@@ -84,9 +87,9 @@ def sensor_character(
     answers = [SensorAnswer(SINGLE_CHANNEL, 1.0, 1.0, 1.0, True)]
     for term, (share, low, high) in sorted(shares.items(), key=lambda item: -item[1][0]):
         holds = None
-        if low > _MUCH and share > top - _CLOSE:
+        if low > _LEAST_SHARE and share > top - _SHARE_MARGIN:
             holds = True
-        elif high < top - _CLOSE or high < _CLOSE:
+        elif high < top - _SHARE_MARGIN or high < _SHARE_MARGIN:
             holds = False
         answers.append(SensorAnswer(term, share, low, high, holds))
     return tuple(answers)

@@ -21,6 +21,7 @@ _BASE: Final = "acceleration_root"
 _LARGEST_COHERENCE: Final = 0.9
 """Squared coherence of a channel with the base from which both read one motion, with a gain and a delay."""
 _MOST_PEAKS: Final = 3
+"""Bands in which modes are sought."""
 ACROSS_A_BAND: Final = (0.0, -0.4, 0.4, -0.8, 0.8)
 """Places in a band, in halves of its width from its middle: a resonance may be narrower than the band."""
 _ONE_FREQUENCY: Final = 1.1

@@ -35,7 +35,9 @@ from sloshlab.diagnosis.extension import Extension, Reading, SensorFault
 FloatArray = NDArray[np.float64]
 Others = Mapping[str, FloatArray]
 _MAINS_HZ: Final = 0.2
+"""By which the frequency of the mains may be off."""
 _MOST_PAIRS: Final = 20
+"""Of channel and source."""
 _SPLINE_DEGREE: Final = 5
 _LARGEST_LEAK: Final = 0.1
 """Of a channel's reading; more than that is another connection or gain."""

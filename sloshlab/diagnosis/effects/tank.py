@@ -39,6 +39,7 @@ from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS
 from sloshlab.twin.terms import Term
 
 _CONTACT_HZ: Final = 50.0
+"""Of the first starts of an impact."""
 _LOWEST_PLACE, _HIGHEST_PLACE = np.log((0.25, 20.0, 0.05)), np.log((1.3, 200.0, 0.9))
 _PLACES_OF_AN_IMPACT: Final = np.exp(
     qmc.scale(qmc.Halton(3, scramble=False).random(301)[1:], _LOWEST_PLACE, _HIGHEST_PLACE)

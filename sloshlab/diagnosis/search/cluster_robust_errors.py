@@ -13,7 +13,9 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, robu
 
 FloatArray = NDArray[np.float64]
 _PARTS_OF_A_RUN: Final = (1, 4)
+"""Clusters per run."""
 _QUANTILE: Final = 0.95
+"""Of Student's t over the normal distribution: intervals are two-sided at 90 %."""
 
 
 def cluster_robust_errors(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJacobian) -> dict[str, float]:

@@ -31,6 +31,7 @@ from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.second_process import second_process
 
 _LEAST_MISFIT_RATIO: Final = 1.2
+"""Misfit of a held-out run over that of the fitted ones, from which other releases are tried."""
 _RELEASE_OFFSETS: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
 """Of a held-out run, tried as starts: with dry friction the cost over the release has local minima."""
 _LITTLE_REPEATABLE: Final = 0.25

@@ -26,7 +26,9 @@ from sloshlab.diagnosis.search.screening import ScreenedCandidate, Screening
 from sloshlab.diagnosis.search.substitution import Substitution
 
 _MOST_SIZE_SCANS: Final = 1
+"""Best candidates whose sizes are scanned."""
 _ALWAYS_REFINED: Final = 3
+"""Best candidates that are fitted to the end in any case."""
 _LEAST_SHARE_OF_GAIN: Final = 0.3
 """Of the best candidate's gain after the coarse fits, below which a candidate is dropped."""
 

@@ -21,6 +21,7 @@ from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.search.fits import Fits, best_fitting
 
 _N_PERTURBED_STARTS: Final = 48
+"""Of each restart, of which the best is fitted."""
 _LEAST_RELATIVE_GAIN: Final = 0.01
 """Of the cost: a restart that gains less counts as in vain."""
 _ABANDON_COST_RATIO: Final = 1.1

@@ -18,7 +18,9 @@ from sloshlab.diagnosis.search.fits import Fits, Progress
 
 FloatArray = NDArray[np.float64]
 _N_DRAWN: Final = 6
+"""Baselines."""
 _MOST_TOLERANCES: Final = 1.25
+"""Of a drawn prior mean: the bound of most baseline parameters."""
 _START_DEVIATION: Final = 0.3
 """Standard deviation of the logarithm of an effect's parameters at the starts of the fits."""
 _AS_GOOD: Final = 0.1

@@ -17,7 +17,9 @@ from sloshlab.diagnosis.search.fits import Fits, best_fitting
 from sloshlab.diagnosis.search.substitution import LEAST_COST_DECREASE, Substitution
 
 _MOST_RESTARTED: Final = 3
+"""Effects that are refitted."""
 _MOST_RIVALS: Final = 5
+"""Rivals that are refitted with the best effect."""
 _LEAST_SHARE_OF_GAIN: Final = 0.5
 """Of the gain of the best, from which an effect is worth a restart."""
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)

@@ -23,12 +23,16 @@ from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
 
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
+"""Decrease of the cost, below which a candidate is not fitted."""
 _MOST_FITTED: Final = 9
 _MOST_BESIDE: Final = 6
 """Candidates that are fitted by their score tests, as a first effect and as a second one."""
 _MOST_STARTS: Final = 2
+"""Starts of a candidate by its score tests."""
 _LEAST_SHARE_OF_PREDICTED_GAIN: Final = 0.02
+"""Of the largest predicted gain, below which a candidate is not fitted."""
 _MOST_BY_FORCE: Final = 2
+"""Candidates that are fitted since their force is most like the latent force."""
 _SIZES_OF_MULTIMODAL: Final = (1.0, 0.75, 1.25, 1.5, 2.0)
 """Over those with which the force of a multimodal effect matches the latent force: the baseline hides a part of
 it."""

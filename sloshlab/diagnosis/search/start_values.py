@@ -11,6 +11,7 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.units import named_and_units
 
 _SIZE_FACTORS: Final = (0.03, 0.1, 0.3, 1.0, 3.0)
+"""Over a start: effects in the place of another one are of any size."""
 _DOES_NO_WORK: Final = "does no work"
 _GROWING_FACTORS: Final = tuple(1.5**i for i in range(1, 12))
 """An effect that moves a resonance by more than its width is missed by every step from a small start."""

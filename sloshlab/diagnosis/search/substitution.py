@@ -25,8 +25,11 @@ LEAST_COST_DECREASE: Final = 24.0
 _AS_GOOD: Final = 2.0
 """Of the cost: a nesting model cannot be worse than its nested one; if it is, its fit ended in a local minimum."""
 _COARSE_STAGE: Final = INFLATION_STAGES[-3]
+"""Noise inflation at which effects are compared before they are fitted."""
 _MOST_LOOK_ALIKES: Final = 4
+"""Of each effect, that are fitted in its place."""
 _MOST_SINGLE: Final = 2
+"""Single effects that are fitted in place of a pair or a force surface."""
 _ABANDON_COST_RATIO: Final = 2.0
 """Cost with inflated noise, over that of what an effect is tried in place of, beyond which its fit is
 abandoned."""

@@ -14,6 +14,7 @@ _NORMAL_90: Final = 1.6449
 _ERRORS_OVER_STANDARD_ERRORS: Final = 1.25
 """RMS of errors over standard errors, on cases whose truth was known and where nothing but noise counts."""
 _CALIBRATION: Final = 0.01
+"""Relative standard error of gains and masses."""
 _POWER_OF_LENGTH: Final = {"_n_per_m3": 3, "_n_per_m2": 2, "_n_s2_per_m2": 2, "_n_per_m": 1, "_n_s_per_m": 1}
 """Power of a length, or of one per time, by which a force of the unit is divided: its gain counts as often."""
 _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta")
