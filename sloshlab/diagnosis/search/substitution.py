@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from operator import attrgetter
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,14 @@ _ABANDON_COST_RATIO: Final = 2.0
 """Cost with inflated noise, over that of what an effect is tried in place of, beyond which its fit is
 abandoned."""
 Limits = Mapping[str, tuple[float, float]]
+
+
+class _NearStart(NamedTuple):
+    """The best start of an effect in the place of others, with its cost at the coarse stage."""
+
+    cost: float
+    problem: FreeRunProblem
+    values: Mapping[str, float]
 
 
 class Substitution:
@@ -61,7 +70,7 @@ class Substitution:
             return []
         before, after = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (base, best.fit))
         special, fitted_already = best.fit.candidates[-1], {explanation.keys[-1] for explanation in kept}
-        nearest_of: dict[str, tuple[float, FreeRunProblem, dict[str, float]]] = {}
+        nearest_of: dict[str, _NearStart] = {}
         for candidate in pool:
             if candidate.key in fitted_already or not _are_look_alikes(candidate, special):
                 continue
@@ -73,10 +82,13 @@ class Substitution:
             ]
             costs = costs_at(problem, starts, _COARSE_STAGE)
             name = f"{candidate.effect.block}.{candidate.effect.name}"
-            if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
-                nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
-        best_of = sorted(nearest_of.values(), key=lambda start: start[0])[:most]
-        pieces = [partial(_fitted_unless_abandoned, problem, start, after) for _, problem, start in best_of]
+            # One place per effect: on several channels the same effect must not crowd out others.
+            if min(costs) < min(
+                before + (before - after), nearest_of[name].cost if name in nearest_of else np.inf
+            ):
+                nearest_of[name] = _NearStart(min(costs), problem, starts[int(np.argmin(costs))])
+        best_of = sorted(nearest_of.values(), key=attrgetter("cost"))[:most]
+        pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, after) for near in best_of]
         return self.fits.all_fitted(pieces, pool)
 
     def exchanged(
@@ -99,10 +111,10 @@ class Substitution:
         most, reached = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (base, pair.fit))
         # Order does not matter: a pair is a set of effects.
         tried = {frozenset(explanation.keys) for explanation in known}
-        nearest_starts: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
+        nearest_starts: list[_NearStart] = []
         for replaced in pair.fit.candidates:
             others = tuple(candidate for candidate in pair.fit.candidates if candidate is not replaced)
-            near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
+            of_replaced: list[_NearStart] = []
             for candidate in pool:
                 keys = frozenset((candidate.key, *(other.key for other in others)))
                 if keys in tried or len(keys) < len(pair.keys) or not _are_look_alikes(candidate, replaced):
@@ -111,16 +123,11 @@ class Substitution:
                 problem = self.fits.problem((*others, candidate))
                 sizes = starts_of_many_sizes(candidate)
                 places = [pair.fit.values, {**pair.fit.values, **self.fits.model.believed}]
-                start = best_start(problem, [{**at, **size} for at in places for size in sizes], _COARSE_STAGE)
-                cost = huber_cost(
-                    problem.inflation_weights(_COARSE_STAGE) * problem.residual(problem.theta_of(start))
-                )
-                if cost < most:
-                    near.append((cost, problem, start))
-            nearest_starts += sorted(near, key=lambda start: start[0])[:_MOST_LOOK_ALIKES]
-        pieces = [
-            partial(_fitted_unless_abandoned, problem, start, reached) for _, problem, start in nearest_starts
-        ]
+                near = _near_start(problem, [{**at, **size} for at in places for size in sizes])
+                if near.cost < most:
+                    of_replaced.append(near)
+            nearest_starts += sorted(of_replaced, key=attrgetter("cost"))[:_MOST_LOOK_ALIKES]
+        pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, reached) for near in nearest_starts]
         return self.fits.all_fitted(pieces, [*pair.fit.candidates, *pool])
 
     def replaced_by_single(
@@ -141,7 +148,7 @@ class Substitution:
         """
         reached, before = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (wider, base))
         most = 0.5 * (reached + before)
-        near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
+        found: list[_NearStart] = []
         chosen = [
             candidate
             for candidate in pool
@@ -150,13 +157,11 @@ class Substitution:
         for i, candidate in enumerate(chosen):
             self.fits.progress(f"one effect in place of all: {candidate.key}", i, len(chosen))
             problem = self.fits.problem((candidate,))
-            sizes = starts_of_many_sizes(candidate)
-            start = best_start(problem, [{**wider.values, **size} for size in sizes], _COARSE_STAGE)
-            cost = huber_cost(problem.inflation_weights(_COARSE_STAGE) * problem.residual(problem.theta_of(start)))
-            if cost < most:
-                near.append((cost, problem, start))
-        best_of = sorted(near, key=lambda start: start[0])[:_MOST_SINGLE]
-        pieces = [partial(_fitted_unless_abandoned, problem, start, most) for _, problem, start in best_of]
+            near = _near_start(problem, [{**wider.values, **size} for size in starts_of_many_sizes(candidate)])
+            if near.cost < most:
+                found.append(near)
+        best_of = sorted(found, key=attrgetter("cost"))[:_MOST_SINGLE]
+        pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, most) for near in best_of]
         return self.fits.all_fitted(pieces, pool)
 
     def nesting_models(
@@ -252,6 +257,13 @@ class Substitution:
                 if at_start < tried.get(frozenset((special.key, *(other.key for other in others))), np.inf):
                     pieces.append(partial(_fitted_closely, problem, start))
         return self.fits.all_fitted(pieces, [*wider.fit.candidates, *pool])
+
+
+def _near_start(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]]) -> _NearStart:
+    """The best of several starts."""
+    values = best_start(problem, starts, _COARSE_STAGE)
+    residual = problem.residual(problem.theta_of(values))
+    return _NearStart(huber_cost(problem.inflation_weights(_COARSE_STAGE) * residual), problem, values)
 
 
 def _fitted_closely(problem: FreeRunProblem, start: Mapping[str, float]) -> FreeRunFit:
