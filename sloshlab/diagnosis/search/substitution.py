@@ -82,7 +82,7 @@ class Substitution:
             ]
             costs = costs_at(problem, starts, _COARSE_STAGE)
             name = f"{candidate.effect.block}.{candidate.effect.name}"
-            # One place per effect: on several channels the same effect must not crowd out others.
+            # One start per effect, on the channel where it is nearest.
             if min(costs) < min(
                 before + (before - after), nearest_of[name].cost if name in nearest_of else np.inf
             ):
