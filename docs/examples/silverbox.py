@@ -27,7 +27,7 @@ def signals(path):
     return content["V1"].ravel().astype(float), content["V2"].ravel().astype(float)
 
 
-def trained(x, y, neurons=20, delays=2, spread=1.0, epochs=150):
+def trained(x, y, *, neurons=20, delays=2, spread=1.0, epochs=150):
     """Train on four realisations of the multisine, validate with the seventh and what follows before the test."""
     x, y = x[MULTISINE], y[MULTISINE]
     end = int(SHARE_FOR_TRAINING * x.size)

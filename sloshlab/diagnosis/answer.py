@@ -1,4 +1,4 @@
-"""From findings to the answer: intervals of what was named, and no name for what is not told from nothing."""
+"""From findings to the answer: intervals of what is named, and no pair of which one effect may be zero."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from sloshlab.diagnosis.verdict.comparison import (
 from sloshlab.diagnosis.verdict.interval import interval_excludes_zero
 
 _MOST_ROUNDS: Final = 5
-"""Each fits one explanation about other baselines, or gives one up."""
+"""Each refits one explanation about drawn baselines, or rejects the pairs."""
 
 
 def answered(found: Findings, progress: Progress = lambda what, done, of: None) -> tuple[Findings, Verdict]:
-    """Judge findings, until what is named has numbers with intervals and each of two effects has a size.
+    """Judge findings, until what is named has intervals and each of two effects has a significant size.
 
-    One effect alone is held against nothing by the gates. Of two, the other one may have the gain: where fits
-    about other baselines find one of them as large as nothing, two are too many.
+    The gates test one effect against the retuned baseline. Of two, one may have all of the gain: where the
+    interval of the other one holds zero, the pair is rejected.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def answered(found: Findings, progress: Progress = lambda what, done, of: None) 
     Returns
     -------
     found : Findings
-        With the spread of the numbers of what is named, without pairs where these were given up.
+        With the spread of the parameters of what is named, without pairs where these were rejected.
     verdict : Verdict
     """
     verdict = verdict_of(found)
@@ -61,17 +61,19 @@ def answered(found: Findings, progress: Progress = lambda what, done, of: None) 
 
 
 def _without_significant_size(found: Findings, pair: Explanation) -> list[str]:
-    """Which of two effects have no size: by their intervals, or as nothing changes where it is taken to be zero.
+    """Which of two effects are not significant: by their intervals, or by the likelihood without them.
 
     An effect on one of several sensors that drive together leaves the drive to the others, and may gain by that
-    whatever its size is. Where numbers trade against each other or against the baseline, an interval may hold zero
-    although nothing describes the recordings without the effect; what is clear beside the other one is there.
+    whatever its size is: then setting the size to zero loses nothing. Where parameters are correlated with each
+    other or with the baseline, an interval may hold zero although no fit without the effect describes the
+    recordings; an effect that is clear beside the other one is kept.
     """
     problem, scale = FreeRunProblem(found.model, found.fitting, pair.fit.candidates), LikelihoodScale.of(found)
     insignificant = []
     for candidate in pair.fit.candidates:
         without = {**pair.fit.values, **{f"{candidate.key}.{name}": 0.0 for name in candidate.sizes}}
         residual = problem.residual(problem.theta_of(without))
+        # A size that can be set to zero at no loss is no size, whatever its interval is.
         lost = (huber_cost(residual) - pair.fit.misfit) / scale.fitting if np.isfinite(residual).all() else np.inf
         if lost < LEAST_LOG_LIKELIHOOD_RATIO or not (
             interval_excludes_zero(pair, candidate) or _is_clear_beside_other(found, pair, candidate, scale)
@@ -81,7 +83,7 @@ def _without_significant_size(found: Findings, pair: Explanation) -> list[str]:
 
 
 def _is_clear_beside_other(found: Findings, pair: Explanation, effect: Candidate, scale: LikelihoodScale) -> bool:
-    """Whether one of two effects removes what is clear, or half, of what the other one leaves, fitted alone."""
+    """Whether one of two effects removes a clear part, or half, of what the other one leaves when fitted alone."""
     rest = {key for key in pair.keys if key != effect.key}
     alone = [
         with_least_residuals(found, explanation)
@@ -94,10 +96,10 @@ def _is_clear_beside_other(found: Findings, pair: Explanation, effect: Candidate
 
 
 def _without_pairs(found: Findings, pair: Explanation, insignificant: Sequence[str]) -> Findings:
-    """Findings in which two effects are no answer, as one of the best two is not told from nothing.
+    """Findings in which no pair may be named, as one effect of the best pair is not significant.
 
-    The others are not tried one after another: what is worse may only hide the same better. What they describe is
-    still what one effect alone is held against.
+    All pairs are rejected at once: a worse pair may only hide the same better. They become ceilings, which a
+    single effect is still compared with.
     """
     why = f"fitted, but the size of {' and of '.join(insignificant)} is not told from nothing"
     return replace(

@@ -1,4 +1,4 @@
-"""A number of the baseline that retuning may change."""
+"""A parameter of the baseline with its prior."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class BaselineParameter:
-    """One number of the baseline that a laboratory knows only so well.
+    """One parameter of the baseline that a laboratory knows within a tolerance.
 
     Attributes
     ----------
     name : str
     believed : float
+        Mean of its Gaussian prior.
     tolerance : float
-        Standard deviation of what it may be, in its own unit.
+        Standard deviation of the prior, in its own unit.
     units : str
     is_reading : bool
         Whether it changes only what a channel reads, not the motion.
     most_tolerances : float
-        How far it may be from what is believed of it; beyond, something else is the matter.
+        Bound of its deviation in tolerances; beyond it something else is wrong.
     channel : str
         The only one whose reading it changes; empty where it may change several.
     """

@@ -1,6 +1,6 @@
-"""Derivatives of residuals, in blocks of one channel of one run: most numbers touch only a few of them.
+"""Block-sparse Jacobian of residuals, one block per channel and run: most parameters change only a few of them.
 
-A gain is seen by its own channel, a release by its own run; what a block does not see is neither kept nor
+A gain changes its own channel, a release its own run; columns that are zero in a block are neither kept nor
 multiplied.
 """
 
@@ -111,7 +111,7 @@ class BlockJacobian:
         )
 
     def normal_equations(self, weights: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Jᵀ W² J and Jᵀ W² r, block by block, as a block fits where the whole does not: into the cache.
+        """Jᵀ W² J and Jᵀ W² r, block by block, as one block fits into the cache of the processor.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class BlockJacobian:
         return np.concatenate([block.values @ vector[block.columns] for block in self.blocks] or [np.zeros(0)])
 
     def correct(self, step: FloatArray, change: FloatArray) -> None:
-        """The least change after which the matrix says of a step what was seen, zeros kept; in place.
+        """Broyden update: the least change with which the matrix reproduces a step, zeros kept; in place.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Effects that may be missing, and a candidate: one effect at one place, with sizes to start from."""
+"""Effects that may be missing, and candidates: one effect at one place, with start values and bounds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BLOCKS: Final = ("excitation", "structure", "tank", "sensor")
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What an effect may know to choose sizes that matter.
+    """What an effect may know of rig and motion to choose start values.
 
     Attributes
     ----------
@@ -46,11 +46,11 @@ class Surroundings:
     has_one_frequency : bool
         Whether the tank moves at one frequency, the same in all runs.
     missed_hz : tuple of float
-        Frequencies about which the retuned baseline misses the recordings most: there a mode may be missing.
+        Frequencies of the largest residuals of the retuned baseline: there a mode may be missing.
     n_modes : int
         Of the structure.
     incoherent_with_base : frozenset of str
-        Channels that do not read the base's motion times a gain, with a delay.
+        Channels that are not coherent with the base: not its motion times a gain, with a delay.
     """
 
     rig: Rig
@@ -98,9 +98,9 @@ class EffectParameter:
         With its unit, as in the vocabulary.
     low, high : float
     may_rest : bool
-        Whether it may be as small or as large as that in earnest; other effects at a bound are no answer.
+        Whether a bound is a value like any other; effects at other bounds are no answer.
     is_between_readings : bool
-        Whether it is a share of what another channel reads: the gains of both are in it.
+        Whether it is a ratio to the reading of another channel, so that the gains of both count.
     """
 
     name: str
@@ -156,13 +156,13 @@ def _no_other_limits(surroundings: Surroundings) -> Mapping[str, tuple[float, fl
 
 
 def _no_further_starts(surroundings: Surroundings) -> Sequence[Numbers]:
-    """Is looked at where it starts alone."""
+    """Has a smooth force: its starts are enough."""
     del surroundings
     return []
 
 
 def never_distinct(size: float) -> Sequence[Mapping[str, tuple[float, float]]]:
-    """Is worth no look where it differs from its special case."""
+    """Has no range in which it is fitted apart from its nested models."""
     del size
     return []
 
@@ -188,21 +188,21 @@ class Effect:
     places : callable
         (surroundings) → channels on which it may act; one empty name where it acts on none.
     includes : tuple of str
-        Effects that are special cases of it, in the same block; it cannot but describe what they do.
+        Effects that are nested in it, in the same block.
     limits : callable
         (surroundings) → bounds of parameters that depend on the place, in place of their own.
     spoken_for_by : tuple of str
-        What tests on the missing force or the sensor say where it is missing: terms of `evidence.TERMS`.
+        Terms of `evidence.TERMS` that hold for the latent force, or the sensor, where it is missing.
     differs : callable
-        (number of a special case that was found) → bounds of its own numbers, in which it clearly is not that
-        case; where it describes as much there, the two cannot be told apart.
+        (parameter of a nested model that was found) → bounds of its own parameters, in which it clearly differs
+        from that; where it describes as much there, the two are indistinguishable.
     variant_of : str
         Name of the effect of which this is another form; answers have that name.
     size : tuple of str
         Numbers that grow with it and without which it is nothing; if none, the first and all of its unit.
     sought_at : callable
-        (surroundings) → more sets of numbers, held against the missing force along the measured motion: many, for
-        an effect that other numbers make another one in jumps.
+        (surroundings) → more sets of start values, matched to the latent force along the measured motion: many,
+        for a multimodal effect.
     """
 
     name: str
@@ -255,12 +255,12 @@ class Candidate:
         return self._named(self.effect.starts)
 
     def sought_at(self) -> list[dict[str, float]]:
-        """More sets of numbers, named as in a fit, to hold against the missing force."""
+        """More sets of numbers, named as in a fit, to match to the latent force."""
         return self._named(self.effect.sought_at)
 
     @property
     def is_multimodal(self) -> bool:
-        """Whether small changes of its numbers make it another one, so that it is sought at many places."""
+        """Whether its cost has many local minima, so that its force is matched from many places."""
         return self.effect.sought_at is not _no_further_starts
 
     def _named(self, sets: Callable[[Surroundings], Iterable[Numbers]]) -> list[dict[str, float]]:
@@ -287,7 +287,7 @@ class Candidate:
         return limits.get(parameter.name, (parameter.low, parameter.high))
 
     def scale(self, parameter: str) -> float:
-        """Size of a parameter, to count its steps in."""
+        """Scale of a parameter, for its steps in a fit."""
         sizes = [abs(start[f"{self.key}.{parameter}"]) for start in self.starts()]
         return max(max(sizes, default=1.0), 1e-12)
 

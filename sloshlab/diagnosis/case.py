@@ -15,6 +15,7 @@ from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import RunAttributes, read_recording, run_attributes
 from sloshlab.rig import Rig
 
+# Sizes are checked before memory is allocated for all runs.
 MOST_RUNS: Final = 200
 _SAME_TEST: Final = (
     "experiment",
@@ -27,6 +28,7 @@ _SAME_TEST: Final = (
 _NAME_OF_TEST: Final = "test"
 """Optional attribute: runs that differ in it are different tests, for example realisations of a random signal."""
 _LEVELS_AGREE: Final = 0.1
+"""Difference of the logarithms of the levels of two runs, up to which they are repeats."""
 _LARGEST_CASE_BYTES: Final = 2 * 2**30
 
 
@@ -145,7 +147,7 @@ def _name_of_test(run: CaseRun) -> str:
 
 
 def level(run: CaseRun) -> float:
-    """How violent a run is: RMS of its mean acceleration signal [m/s²], or of what it has instead.
+    """Level of a run: RMS of its mean acceleration signal [m/s²], or of what it has instead.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The words in which tests speak of a missing force or a sensor, and what they say for and against an effect.
+"""Terms of tests on a latent force or a sensor, and the evidence that they are for and against an effect.
 
 An effect lists the terms that hold where it is what is missing (`Effect.spoken_for_by`). A test says that a term
 holds, that it does not, or nothing.
@@ -55,7 +55,7 @@ PROPORTIONAL_TO_READING, PROPORTIONAL_TO_RATE, PROPORTIONAL_TO_INTEGRAL, TREND =
     "follows its integral",
     "slow trend",
 )
-MAINS_LINE, CLOCK_DRIFT, SATURATING, CROSS_TALK = (
+MAINS_LINE, CLOCK_DRIFT, SATURATING, FOLLOWS_OTHER_CHANNEL = (
     "a line of the mains",
     "rate growing along the run",
     "at the largest readings",
@@ -71,7 +71,7 @@ SENSOR_TERMS: Final = {
     MAINS_LINE: "what it reads wrong is a line at 50 or 60 Hz",
     CLOCK_DRIFT: "what it reads wrong follows its rate, ever more along the run",
     SATURATING: "it reads wrong where it reads most",
-    CROSS_TALK: "what it reads wrong is what another channel reads",
+    FOLLOWS_OTHER_CHANNEL: "what it reads wrong is what another channel reads",
 }
 TERMS: Final = {**FORCE_TERMS, **SENSOR_TERMS}
 

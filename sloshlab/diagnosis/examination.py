@@ -1,4 +1,4 @@
-"""Where and how, before what: the cut at measured interfaces, the maps of the residual, the physical questions."""
+"""Localisation and character of what is missing: interface cut, residual maps, questions to the latent force."""
 
 from __future__ import annotations
 
@@ -22,8 +22,10 @@ from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.sensor_character import SensorAnswer, decided_terms, sensor_character
 
 FloatArray = NDArray[np.float64]
-_CLEARLY = 1.5
-_MOST = 0.8
+_LEAST_RATIO_WITHIN_CYCLE = 1.5
+"""Of the mean squares in the parts of a cycle, from which one of them is told."""
+_SHARE_OF_AN_OWNER = 0.8
+"""Of the mismatch, from which a block owns it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,7 @@ def owning_block(examination: Examination) -> str:
     """The block that surely owns most of the mismatch; empty where the cut cannot tell."""
     if examination.cut is None:
         return ""
-    sure = [cut.block for cut in examination.cut.blocks if cut.share > _MOST and cut.low > 0.5]
+    sure = [cut.block for cut in examination.cut.blocks if cut.share > _SHARE_OF_AN_OWNER and cut.low > 0.5]
     return sure[0] if len(sure) == 1 and sure[0] != EITHER else ""
 
 
@@ -184,7 +186,7 @@ def _in_the_cycle(phase: FloatArray, excess: FloatArray) -> str:
         other = min(sizes["about the lowest point"], sizes["about the highest point"])
         if sizes[best] < 2 * other:
             best = "at velocity reversals"
-    return best if sizes[best] > _CLEARLY * min(sizes.values()) and sizes[best] > 1.1 else ""
+    return best if sizes[best] > _LEAST_RATIO_WITHIN_CYCLE * min(sizes.values()) and sizes[best] > 1.1 else ""
 
 
 def _levels(examination: Examination, worst: str) -> str:
@@ -256,13 +258,13 @@ def examination_facts(examination: Examination, found: Findings) -> dict[str, An
 
 
 def _answer(answer: Answer) -> dict[str, Any]:
-    told = {
+    facts = {
         "question": answer.question,
         "finding": answer.finding,
         "quantity": answer.quantity,
         "units": answer.units,
     }
-    return {**told, **(_estimate(answer.value, answer.low, answer.high) or {}), "remark": answer.remark}
+    return {**facts, **(_estimate(answer.value, answer.low, answer.high) or {}), "remark": answer.remark}
 
 
 def _estimate(value: float, low: float, high: float) -> dict[str, float] | None:
@@ -281,12 +283,12 @@ def _evidence(examination: Examination, found: Findings) -> dict[str, Any]:
         for explanation in found.explanations
         for candidate in explanation.fit.candidates
     }
-    told = {}
+    facts = {}
     for candidate in effects.values():
         on = examination.evidence_on(candidate.effect)
-        told[f"{candidate.effect.block}.{candidate.effect.known_as}"] = {
+        facts[f"{candidate.effect.block}.{candidate.effect.known_as}"] = {
             "for": list(on.speaks_for),
             "against": list(on.speaks_against),
             "open": list(on.still_open),
         }
-    return told
+    return facts

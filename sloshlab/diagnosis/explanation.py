@@ -31,22 +31,22 @@ class Explanation:
     ----------
     fit : FreeRunFit
     held_out : float
-        Sum of squares of the weighted residuals of the held-out runs, large ones counted less.
+        Huber cost of the weighted residuals of the held-out runs.
     held_out_rms : float
         Root mean square of the weighted residuals where the recording stands out of the noise.
     by_channel : dict
-        Mean square of the same per channel, large residuals counted less.
+        Mean Huber cost of the same per channel.
     by_run : dict
         The same per run and channel, of fitted and held-out runs.
     rms_without_bursts : float
         As `held_out_rms`, of the quieter three quarters of the times of every channel and run.
     repeatable : dict
-        Mean square of what repeats of a test have in common of their residuals, per name of the test's first run
-        and channel.
+        Repeatable mean square: what repeats of a test have in common of their residuals, per name of the test's
+        first run and channel.
     spread : dict
-        Of the effects' numbers over fits about other baselines that could be believed; empty where none were made.
+        Of the effects' parameters over fits with randomised baselines; empty where none were made.
     scatter : dict
-        Standard errors of the same from how much runs and parts of runs disagree; empty where that is not known.
+        Cluster-robust standard errors of the same; empty where they are not known.
     """
 
     fit: FreeRunFit
@@ -96,7 +96,7 @@ class Explanation:
 
     @property
     def has_effect_at_bound(self) -> bool:
-        """Whether a number is as large or as small as its effect allows: then it is something else."""
+        """Whether a parameter rests at a bound of its effect: then something else is missing."""
         return any(
             bound != 0
             and not parameter.may_rest
@@ -127,11 +127,11 @@ class Findings:
     explanations : list of Explanation
         With one effect or more, in the order in which they were tried.
     ceilings : list of Explanation
-        What a name is held against: any force, and two effects of which one is not told from nothing.
+        What a name is compared with: force surfaces, and rejected pairs.
     failed : dict
         Candidates that could not be fitted, and why.
     screened : dict
-        Candidates whose first step in free-running simulation promised too little, and how much.
+        Candidates whose score test predicts too little, and the gain that it predicts.
     """
 
     case: Case
@@ -183,6 +183,6 @@ def explained_extension(explanation: Explanation) -> Extension:
 
 
 def largest_strength(before: Mapping[_Place, float], after: Mapping[_Place, float]) -> float:
-    """Square root of the largest decrease of a mean square over what is left, both not below the noise floor."""
+    """Effect size: √(before/after − 1) of the place that shows most, neither below the noise floor."""
     removed = [max(before[place], 1.0) / max(left, 1.0) - 1.0 for place, left in after.items() if place in before]
     return float(np.sqrt(max([0.0, *removed])))

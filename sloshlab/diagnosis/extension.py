@@ -29,7 +29,7 @@ class SensorFault:
     undone : callable or None
         From what is recorded to the truth, for channels that drive the simulation; None where that is impossible.
     key : tuple
-        Tells two faults apart.
+        Identifies the fault, for caches.
     """
 
     channel: str
@@ -50,7 +50,7 @@ class Extension:
         Changes the baseline's forces of the liquid.
     faults : tuple of SensorFault
     key : tuple
-        Tells two extensions apart; names and numbers of all effects.
+        Identifies the extension, for caches: names and numbers of all effects.
     structure : callable or None
         Changes the baseline's structure, after its own numbers were retuned.
     """

@@ -1,8 +1,8 @@
-"""Physical questions to a latent force: energy, symmetry, state or history, rate, onset.
+"""Character of a latent force: energy, symmetry, state or memory, rate dependence, onset.
 
-Every answer is a number with a 90 % interval, by drawing stretches of the runs with replacement, and "cannot tell"
-where the interval leaves it open. What the block's own stiffness, damping and mass may be off within their
-tolerances is taken off, or makes the interval wider.
+Every answer is a number with a 90 % interval by block bootstrap over stretches of the runs, and "cannot tell"
+where the interval leaves it open. What errors of the block's own stiffness, damping and mass within their
+tolerances explain is subtracted, or widens the interval.
 """
 
 from __future__ import annotations
@@ -59,11 +59,15 @@ FloatArray = NDArray[np.float64]
 LEVEL: Final = 0.90
 _N_DRAWS: Final = 120
 _NORMAL_90: Final = 1.6449
+"""Half width of a 90 % interval in standard deviations."""
 _RESOLVED: Final = 0.25
+"""Excess of the mean square over that of the noise, from which a force is there."""
 _OF_STATE: Final = 0.6
+"""Explained share from which a force is a function of the state."""
 _IMPULSIVE_KURTOSIS: Final = 5.0
+"""Kurtosis from which a force is impulsive; 1.5 for a sine."""
 _SMALL_SHARE: Final = 0.08
-"""Share of the variance below which a part counts for nothing, and twice which makes it count."""
+"""Share of the variance below which a part is absent; it is present above twice of it."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +189,7 @@ def _with_damping(latent_force: LatentForce, shift: float) -> LatentForce:
 
 
 class _Regression:
-    """Regressions of the force on its own parameters, the state, its history and time, with draws."""
+    """Regressions of the force on the block's own parameters, the state, memory and time, with a bootstrap."""
 
     def __init__(self, parts: Sequence[Stretch], own: FloatArray, generator: np.random.Generator) -> None:
         self.parts, self.generator = parts, generator
@@ -241,7 +245,7 @@ class _Regression:
         return np.asarray(powers / max(float(powers.sum()), 1e-300), np.float64)
 
     def explained_shares(self, noise_n: float, n_draws: int) -> dict[str, FloatArray]:
-        """Shares explained of stretches that were not fitted, every second one in turn; draws after the first.
+        """Cross-validated explained shares, every second stretch in turn; bootstrap draws after the first.
 
         Shape (1 + n_draws,) per set of features.
         """
@@ -271,7 +275,7 @@ def _quantiles(draws: Sequence[float] | FloatArray) -> tuple[float, float]:
 
 
 def _energy(found: Windows, own_damping: float, generator: np.random.Generator) -> Answer:
-    """Dissipated work per cycle over force times path: −1 gives all, 1 takes all."""
+    """Dissipated work over force times path, by RMS values: 1 dissipates all, −1 feeds all in."""
     scale = found.force_rms_n * found.velocity_m_per_s
     dissipated = -found.power_w
     doubt = own_damping * found.velocity_m_per_s**2
@@ -444,7 +448,7 @@ def _constant(fit: _Regression, generator: np.random.Generator) -> Answer:
 
 
 def _impulsiveness(fit: _Regression, noise_n: float) -> Answer:
-    """Kurtosis within some cycles: 1.5 for a sine; blows are rare and large."""
+    """Kurtosis within some cycles: 1.5 for a sine, large for rare impulses."""
     found = []
     for force in fit.beyond_own_of_parts:
         size = float(np.sqrt(np.mean(force**2)))

@@ -1,6 +1,6 @@
-"""From what motion channels miss to the force that is missing: a regularised inverse in the frequency domain.
+"""The latent force from the residuals of motion channels: a Wiener-regularised inverse in the frequency domain.
 
-The modes are linear, so that what channel c misses is H_c F + noise, and the force is
+The modes are linear, so that the residual of channel c is H_c F + noise, and the force is
 
     F̂(ω) = Σ_c H̄_c W_c ΔY_c / (Σ_c |H_c|² W_c + 1/S(ω))
 
@@ -27,12 +27,14 @@ ComplexArray = NDArray[np.complex128]
 ORDERS: Final = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _TANK_PLACES: Final = ("tank", "tip", "roof", "mean")
 _SMOOTHING_HZ: Final = 0.6
+"""Width of the neighbourhood from which the power of the force is estimated."""
 _LARGEST_SHARE_OF_RATE: Final = 0.4
+"""Of the sampling rate, beyond which the gain is zero."""
 
 
 @dataclass(frozen=True, eq=False)
 class InvertedForce:
-    """The force at the tank's place that motions ask for.
+    """The force at the tank's place by inversion of the motion channels.
 
     Attributes
     ----------
@@ -117,7 +119,7 @@ def modal_weights(structure: Structure, rig: Rig, name: str, along_m: float | No
 
 
 def wiener_gain(power: FloatArray, noise: FloatArray, frequency_hz: FloatArray, rate_hz: float) -> FloatArray:
-    """Share of a spectrum that is no noise, by the power in the neighbourhood of each frequency: 0 … 1.
+    """Wiener gain of a spectrum, by the power in the neighbourhood of each frequency: 0 … 1.
 
     Parameters
     ----------
@@ -125,7 +127,7 @@ def wiener_gain(power: FloatArray, noise: FloatArray, frequency_hz: FloatArray, 
         What is there, and what is expected of noise alone.
     frequency_hz : ndarray, shape (n,)
     rate_hz : float
-        Nothing is believed beyond 0.4 of it.
+        The gain is zero beyond 0.4 of it.
     """
     width = max(3, round(_SMOOTHING_HZ / (frequency_hz[1] - frequency_hz[0])))
     own = np.maximum(uniform_filter1d(power - noise, width, mode="nearest"), 0.0)
@@ -140,17 +142,17 @@ def inverted_force(
     rate_hz: float,
     released: Mapping[str, ComplexArray] | None = None,
 ) -> tuple[InvertedForce, float]:
-    """The force that channels ask for together.
+    """The force at the tank that explains the residuals of several channels together.
 
     Parameters
     ----------
     seen : mapping of channel to (receptance, power of its noise)
     missed : mapping of channel to ndarray
-        Spectra of what the simulation misses.
+        Spectra of the residuals.
     frequency_hz : ndarray, shape (n,)
     rate_hz : float
     released : mapping of channel to ndarray, optional
-        Spectra after a release from one metre: an error of the release would look like a blow at the start.
+        Spectra after a release from one metre: an error of the release would look like an impulse at the start.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A latent force over the level of the motion: work per cycle, onset, orders of the excitation."""
+"""Amplitude dependence of a latent force: work per cycle, onset, orders of the excitation."""
 
 from __future__ import annotations
 
@@ -16,19 +16,26 @@ from sloshlab.diagnosis.latent_force import LatentForce
 
 FloatArray = NDArray[np.float64]
 _CYCLES: Final = 3
+"""Of a window."""
 _FEWEST_SAMPLES: Final = 8
-"""In a window; what turns faster is not sampled."""
+"""In a window: shorter ones do not sample a cycle."""
 _N_DRAWS: Final = 120
 _LEAST_SPAN: Final = 1.6
+"""Ratio of the amplitudes of the middle 80 %, from which their exponent is told."""
 _LEAST_FREQUENCY_SPAN: Final = 1.25
+"""The same of the frequencies."""
 _SIGNIFICANT: Final = 2.0
+"""Work over its doubt by the tolerance of the damping, from which its sign is certain."""
 _N_LEVELS: Final = 6
+"""Classes of equal population, in which an onset is sought."""
 _NOISE_ONLY: Final = 1.35
-"""RMS over noise up to which there is nothing."""
+"""RMS over noise up to which nothing but noise is there."""
 _AT_REST: Final = 0.03
 """Share of the largest level below which a place counts as at rest."""
 _NARROW: Final = 0.6
+"""Share of the power about one frequency, from which a motion has a single one."""
 ORDERS: Final = (0.5, 1.0, 1.5, 2.0, 3.0)
+"""Frequencies over that of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +124,7 @@ class WorkExponents:
 
 
 def work_exponents(found: Windows, generator: np.random.Generator) -> WorkExponents:
-    """Exponents of amplitude and frequency in the dissipated work per cycle.
+    """Exponents of amplitude and frequency in the dissipated work per cycle, by weighted regression of logarithms.
 
     Parameters
     ----------
@@ -198,7 +205,7 @@ def onset(
     edges = np.quantile(level[moves], np.linspace(0, 1, _N_LEVELS + 1))
 
     def reached(rows: NDArray[np.int64]) -> int:
-        """How many of the lowest classes hold nothing."""
+        """How many of the lowest classes hold noise only."""
         count = 0
         for upper in range(1, _N_LEVELS + 1):
             inside = rows[moves[rows] & (level[rows] <= edges[upper])]

@@ -1,4 +1,7 @@
-"""Of what a force is a function: linear regressions on its motion, judged on stretches that were not fitted."""
+"""Ridge regressions of a latent force on its motion, cross-validated on stretches of runs.
+
+Features are a restoring force surface (Chebyshev polynomials of displacement and velocity), memory, and time.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,15 @@ from sloshlab.diagnosis.latent_force import STRUCTURE, LatentForce
 
 FloatArray = NDArray[np.float64]
 DEGREE: Final = 5
+"""Of the Chebyshev polynomials, in both motions together."""
 _SHARP: Final = (0.05, 0.008)
+"""Widths of the steps at velocity reversal, over the largest velocity."""
 _N_STRETCHES: Final = 24
+"""Of each run."""
 _PLAY_RADII: Final = (0.1, 0.3)
+"""Over the largest displacement."""
 _FORGETTING_CYCLES: Final = 4.0
+"""Time constant of the level that is remembered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +43,7 @@ class Stretch:
     level_g, omega : ndarray, shape (n,)
         Amplitude of the acceleration and frequency [rad/s] over the cycle about each sample.
     play : ndarray, shape (n, n_plays)
-        Of x, by play operators: what a force without rate but with memory follows.
+        Of x, by play operators: features of rate-independent memory.
     recent_level : ndarray, shape (n,)
         Mean square of the acceleration over the last cycles, over that of now.
     """
@@ -59,7 +67,7 @@ class Stretch:
 
 
 def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
-    """Cut runs into parts that are drawn as one for intervals.
+    """Cut runs into parts that are resampled as wholes for intervals (block bootstrap).
 
     Parameters
     ----------
@@ -74,7 +82,7 @@ def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
         omega = float(a.std() / max(v.std(), 1e-300))
         cycle = max(4, round(min(2 * np.pi / max(omega, 1e-300) * rate, x.size)))  # a run may not move at all
         running = (uniform_filter1d(part**2, cycle, mode="nearest") for part in (a, v))
-        # sums that run round below zero after a motion has stopped
+        # running sums fall below zero by rounding after a motion has stopped
         power_a, power_v = (np.maximum(power, 0.0) for power in running)
         level = np.sqrt(2 * power_a) / GRAVITY_M_PER_S2
         local = np.sqrt(power_a / np.maximum(power_v, 1e-300))
@@ -88,7 +96,7 @@ def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
 
 
 def _play_operator(x: FloatArray, radius: float) -> FloatArray:
-    """x less what a play of this radius keeps: bounded by the radius, it remembers the last reversal."""
+    """Stop operator, x less its play of this radius: bounded by the radius, it remembers the last reversal."""
     out, place = np.empty_like(x), x[0]
     low, high = x - radius, x + radius
     for i in range(x.size):
@@ -107,7 +115,7 @@ def _recent_level(power: FloatArray, samples: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Scales:
-    """Largest values that make a regression free of units."""
+    """Largest values, to make features dimensionless."""
 
     first: float
     velocity: float
@@ -154,7 +162,7 @@ def _chebyshev(values: FloatArray) -> list[FloatArray]:
 
 
 def memory_features(stretch: Stretch, scales: Scales) -> FloatArray:
-    """Plays of x, and friction and damping that follow how violent the last cycles were."""
+    """Play operators of x, and friction and damping that depend on the level of the last cycles."""
     q = stretch.v / scales.velocity
     sharp = np.tanh(q / _SHARP[0])
     plays = stretch.play / np.maximum(np.abs(stretch.play).max(axis=0), 1e-300)
@@ -163,7 +171,7 @@ def memory_features(stretch: Stretch, scales: Scales) -> FloatArray:
 
 
 def time_features(stretch: Stretch, scales: Scales) -> FloatArray:
-    """The linear ones, growing along the run."""
+    """Linear features, growing along the run."""
     t = stretch.time_s / scales.time_s
     linear = np.stack([stretch.first / scales.first, stretch.v / scales.velocity, np.ones_like(t)], axis=1)
     return np.asarray(t[:, None] * linear)
@@ -171,7 +179,7 @@ def time_features(stretch: Stretch, scales: Scales) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class NormalSums:
-    """What a regression needs of a stretch: sums of products."""
+    """Normal equations of one stretch: sums of products."""
 
     xx: FloatArray
     xy: FloatArray
@@ -207,7 +215,7 @@ def ridge_regression(
 
 
 def residual_sum_of_squares(parts: Sequence[NormalSums], numbers: FloatArray) -> float:
-    """Sum of squares that a regression leaves."""
+    """Residual sum of squares of a regression."""
     total = 0.0
     for part in parts:
         total += part.yy - 2 * float(numbers @ part.xy) + float(numbers @ part.xx @ numbers)

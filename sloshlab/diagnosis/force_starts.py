@@ -1,9 +1,10 @@
-"""Where the numbers of an effect may start: its force along the motion beside the force that is missing.
+"""Start values of effects from equation error: their force along the measured motion is matched to the latent
+force.
 
-A simulation that runs freely has side valleys, where its phase slips or a contact comes a cycle late. A force on
-the motion that was measured has fewer, and costs no motion to compute: of every effect that is one more force, or
-another damper of the liquid, the numbers are sought there first. What springs, dampers and masses of the baseline
-can follow does not count, nor does what sensors cannot tell from noise.
+The cost of free-running simulations has local minima, where the phase slips or a contact comes a cycle late. The
+force along the measured motion has fewer, and needs no simulation of the motion: the parameters of every effect
+that is one more force, or another damper of the liquid, are sought there first. The part of a force that springs,
+dampers and masses of the baseline can follow is projected out, and bands in which noise dominates are left out.
 """
 
 from __future__ import annotations
@@ -30,45 +31,63 @@ from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
 _MOST_SAMPLES: Final = 12_000
+"""Of all runs of a place: each evaluation filters all of them."""
 _FEWEST_NUMBERS: Final = 2
-"""The size of an effect of one number comes from a first look."""
+"""The size of an effect of one parameter comes from its score test."""
 _MOST_TRIED: Final = 2
+"""Starts from which descents begin, the best at their best size."""
 _N_EVALUATIONS: Final = 15, 40
-"""Per number: of every start that is tried, and then of the best."""
+"""Per parameter: for each start that is tried, and then for the best."""
 _MOST_DESCENTS: Final = 6
+"""Of many places, those from which descents begin."""
 _FIRST_PLACES: Final = 100
-_PROMISING: Final = 0.9
-"""Of the missing force, that the best of the first places may leave if the others are to be looked at."""
+_LARGEST_SHARE_LEFT: Final = 0.9
+"""Share of the latent force that the best of the first places may leave if the others are to be evaluated.
+
+Where no impact is near, 2 s of a search on a driven beam become 1 s.
+"""
 _LONG_STEP, _SHORT_STEP = 0.7, 0.15
-"""First steps of a descent, of the logarithm of a number: where a force comes in jumps its valleys are narrow."""
+"""Initial simplex, in the logarithm of a parameter; the minima of multimodal forces are narrow."""
 _MOTIONS_OF_BASELINE: Final = {STRUCTURE: [0, 1], EITHER: [0, 1], TANK: [2, 1]}
-"""Motions of a place whose multiples the baseline follows; with all three any force of a free motion is one."""
+"""Motions of a place whose multiples the baseline follows.
+
+Not all three: in a free motion any force is a combination of those.
+"""
 _N_PROBED: Final = 400
+"""Samples of the fastest part of a run, on which contacts are tested to be resolved."""
 _RESONANT_NUMBER: Final = "frequency_hz"
-"""A number to which a force is so sensitive that it is sought everywhere before."""
-_BEYOND: Final = 2.0
+"""A parameter to which a force is so sensitive that it is scanned on a grid first."""
+_GRID_MARGIN: Final = 2.0
+"""Factor of the grid of frequencies below and above those of the starts."""
 _N_FREQUENCIES: Final = 40
-_IN_PROPORTION: Final = 1e-3
+_PROPORTIONALITY_TOLERANCE: Final = 1e-3
+"""Relative error of the doubled force, up to which a force is proportional to a parameter."""
 _LEAST_FACTOR: Final = 1e-3
-_FARTHEST: Final = 4.0
-"""Of the logarithm of a number from its start."""
+"""Of a size: forces of the wrong sign are not turned round."""
+_LARGEST_LOG_CHANGE: Final = 4.0
+"""Bound of the logarithm of a parameter over its start."""
 _ABOVE_NOISE: Final = 1.0
+"""Mean square of a latent force over that of its noise, from which starts are sought."""
 _LEAST_EXPLAINED: Final = 0.03
+"""Share of the mean square of the latent force, below which a start is none."""
 _POWER_KEPT: Final = 0.98
+"""Share of the power of the latent force within its band."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """The motion of a place in one run, a short part of it where it is fastest, and where its force is heard."""
+    """The motion of a place in one run, a short part of it where it is fastest, and the band of its latent
+    force.
+    """
 
     drive: Excitation
     fastest: Excitation
-    heard: NDArray[np.bool_]
+    passband: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """The missing force of a place in some runs, without what the baseline can follow of it.
+    """The latent force of a place in some runs, without what the baseline can follow of it.
 
     Attributes
     ----------
@@ -83,18 +102,18 @@ class _Place:
     force_n: FloatArray
     baseline_motions: FloatArray
 
-    def heard(self, added: Sequence[FloatArray]) -> FloatArray:
-        """Forces of the same runs, one after another, as far as they are heard and not followed."""
-        heard = [_band(force, piece.heard) for force, piece in zip(added, self.pieces, strict=True)]
-        return self._beyond_baseline(np.concatenate(heard))
+    def comparable(self, added: Sequence[FloatArray]) -> FloatArray:
+        """Forces of the same runs, concatenated, within the band of the latent force and beyond the baseline."""
+        filtered = [_band(force, piece.passband) for force, piece in zip(added, self.pieces, strict=True)]
+        return self._beyond_baseline(np.concatenate(filtered))
 
     def unexplained_share(self, force: FloatArray) -> float:
-        """Share of the missing force that stays beside another."""
+        """Share of the mean square of the latent force that a force leaves unexplained."""
         left = self.force_n - force
         return float(left @ left) / max(float(self.force_n @ self.force_n), 1e-300)
 
     def factor(self, force: FloatArray) -> float:
-        """By which a force is most like the missing one; zero of none."""
+        """Least-squares factor of a force to the latent force; zero of no force."""
         size = float(force @ force)
         return max(float(force @ self.force_n) / size, _LEAST_FACTOR) if size else 0.0
 
@@ -103,7 +122,9 @@ class _Place:
 
     @classmethod
     def of(cls, forces: Sequence[LatentForce]) -> _Place | None:
-        """The runs that miss most, until there is enough of them; None where none misses anything."""
+        """The runs with the largest latent forces, up to a number of samples; None where no latent force is
+        there.
+        """
         pieces: list[_Piece] = []
         series: list[FloatArray] = []
         motions: list[FloatArray] = []
@@ -111,6 +132,7 @@ class _Place:
         for latent in sorted(forces, key=lambda latent: -latent.power_n2):
             if latent.power_n2 <= 0.0 or (pieces and n + latent.force_n.size > _MOST_SAMPLES):
                 break
+            # Lengths with small prime factors: the filter is a Fourier transform per evaluation.
             kept = slice(0, prev_fast_len(min(latent.force_n.size, _MOST_SAMPLES), real=True))
             force, motion, rate = latent.force_n[kept], latent.motion[kept], latent.run.attributes.sampling_rate_hz
             own_motion = motion[:, _MOTIONS_OF_BASELINE[latent.place]]
@@ -121,8 +143,8 @@ class _Place:
                 _driven(rate, motion), _driven(rate, about), _band_of_most_power(force - own_motion @ own)
             )
             pieces.append(piece)
-            series.append(_band(force, piece.heard))
-            motions.append(np.stack([_band(column, piece.heard) for column in own_motion.T], axis=1))
+            series.append(_band(force, piece.passband))
+            motions.append(np.stack([_band(column, piece.passband) for column in own_motion.T], axis=1))
             n, of_noise = n + force.size, of_noise + force.size * latent.standard_error_n**2
         if not pieces:
             return None
@@ -134,16 +156,16 @@ class _Place:
 
 @dataclass(frozen=True)
 class ForceStart:
-    """Numbers of an effect whose force is like the missing one.
+    """Parameters of an effect whose force is like the latent force.
 
     Attributes
     ----------
     numbers : dict
         Named as in a fit.
     unexplained_share : float
-        Of the mean square of the missing force, beyond what the baseline can follow.
+        Of the mean square of the latent force, beyond what the baseline can follow.
     others : tuple of dict
-        Numbers at which other descents ended, of what is sought at many places.
+        Parameters at which other descents ended, of multimodal effects.
     """
 
     numbers: dict[str, float]
@@ -152,7 +174,7 @@ class ForceStart:
 
 
 class ForceStarts:
-    """The forces that a fit of a rig's twin lacks, and numbers of effects that make such forces.
+    """The latent forces beside a fit of a rig's twin, and parameters of effects that make such forces.
 
     Parameters
     ----------
@@ -179,7 +201,7 @@ class ForceStarts:
         self._places: dict[str, _Place | None] = {}
 
     def of(self, candidate: Candidate) -> ForceStart | None:
-        """The best numbers for a candidate; None where its force explains next to nothing.
+        """The best parameters for a candidate; None where its force explains next to nothing.
 
         Parameters
         ----------
@@ -236,7 +258,9 @@ class ForceStarts:
         return self._places[block]
 
     def _force(self, candidate: Candidate, numbers: Mapping[str, float], place: _Place) -> FloatArray | None:
-        """Of an effect on the motion of its place, as far as it is heard; None where it is none or cannot be."""
+        """Force of an effect along the motion of its place, filtered; None where it is no force or does not
+        run.
+        """
         try:
             extension = candidate.extension(numbers)
             if not all(_is_resolved(extension.terms, piece.fastest) for piece in place.pieces):
@@ -245,10 +269,10 @@ class ForceStarts:
         except SloshlabError:
             return None
         known = [force for force in added if force is not None and np.isfinite(force).all()]
-        return place.heard(known) if len(known) == len(added) else None
+        return place.comparable(known) if len(known) == len(added) else None
 
     def _added(self, extension: Extension, drive: Excitation) -> FloatArray | None:
-        """What an extension adds to the force along a motion; None where it is no force."""
+        """The force that an extension adds along a motion; None where it adds something else."""
         if extension.faults or extension.structure is not None:
             return None
         force = _force_along(extension.terms, drive)
@@ -259,11 +283,11 @@ class ForceStarts:
 
 
 def _frequencies_about(starts: Sequence[FloatArray], place: int) -> list[float]:
-    """Values of one number from well below to well above those of all starts."""
+    """Values of one parameter from well below to well above those of all starts."""
     known = [float(start[place]) for start in starts]
     return [
         float(frequency_hz)
-        for frequency_hz in np.geomspace(min(known) / _BEYOND, max(known) * _BEYOND, _N_FREQUENCIES)
+        for frequency_hz in np.geomspace(min(known) / _GRID_MARGIN, max(known) * _GRID_MARGIN, _N_FREQUENCIES)
     ]
 
 
@@ -276,9 +300,9 @@ def _with_number(start: FloatArray, place: int, value: float) -> FloatArray:
 def _at_best_size(
     force: Callable[[FloatArray], FloatArray | None], start: FloatArray, place: _Place
 ) -> tuple[float, FloatArray]:
-    """Share of the missing force that a start leaves at its best size, and the start with that size.
+    """Share of the latent force that a start leaves at its best size, and the start with that size.
 
-    The size is in the number, if there is one, with which the force grows in proportion.
+    The size is the parameter, if there is one, to which the force is proportional.
     """
     found = force(start)
     factor = 0.0 if found is None else place.factor(found)
@@ -287,7 +311,10 @@ def _at_best_size(
     size = float(found @ found)
     for k in range(start.size):
         doubled = force(_with_number(start, k, 2.0 * start[k]))
-        if doubled is not None and float(((doubled - 2.0 * found) ** 2).sum()) < _IN_PROPORTION**2 * size:
+        if (
+            doubled is not None
+            and float(((doubled - 2.0 * found) ** 2).sum()) < _PROPORTIONALITY_TOLERANCE**2 * size
+        ):
             return place.unexplained_share(found * factor), _with_number(start, k, start[k] * factor)
     return place.unexplained_share(found), start
 
@@ -299,7 +326,7 @@ def _descended_from_many(
     proportional: NDArray[np.bool_],
     n_evaluations: int,
 ) -> list[tuple[float, FloatArray]]:
-    """Shares left and numbers from the best of many places, at the size that suits the missing force best.
+    """Unexplained shares and parameters after descents from the best of many places, each at its best size.
 
     The force grows in proportion to the numbers that are `proportional`. An effect that leaves nearly all of the
     force at each of the first places is not what is missing; nothing is returned then.
@@ -312,8 +339,9 @@ def _descended_from_many(
             return np.inf, numbers
         return at.unexplained_share(found * factor), np.where(proportional, numbers * factor, numbers)
 
+    # Two hundred further places only where the first hundred show that the effect may be there.
     sized_starts = [sized(numbers) for numbers in places[:_FIRST_PLACES]]
-    if min(share for share, _ in sized_starts) > _PROMISING:
+    if min(share for share, _ in sized_starts) > _LARGEST_SHARE_LEFT:
         return []
     sized_starts += [sized(numbers) for numbers in places[_FIRST_PLACES:]]
     best = sorted(sized_starts, key=lambda reached: reached[0])
@@ -327,11 +355,13 @@ def _descended_from_many(
 def _simplex_descent(
     left: Callable[[FloatArray], float], start: FloatArray, n_evaluations: int, step: float = _LONG_STEP
 ) -> tuple[float, FloatArray]:
-    """Simplex (Nelder and Mead 1965, doi:10.1093/comjnl/7.4.308) in logarithms of numbers of one sign each."""
+    """Simplex (Nelder and Mead 1965, doi:10.1093/comjnl/7.4.308) in logarithms of parameters that keep their
+    sign.
+    """
     scale = np.where(start == 0, 1.0, start)
 
     def numbers(at: FloatArray) -> FloatArray:
-        return np.asarray(scale * np.exp(np.clip(at, -_FARTHEST, _FARTHEST)))
+        return np.asarray(scale * np.exp(np.clip(at, -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)))
 
     def cost(at: FloatArray) -> float:
         value = left(numbers(at))
@@ -357,7 +387,7 @@ def _force_along(terms: Sequence[Term], drive: Excitation) -> FloatArray:
 
 
 def _is_resolved(terms: Sequence[Term], drive: Excitation) -> bool:
-    """Whether a force does not turn more often than it is sampled, as a spring too stiff for its steps does."""
+    """Whether a force has fewer events than samples; a contact too stiff for its steps has more."""
     if not any(term.kind.events is not None for term in terms):
         return True
     alone = Twin(None, tuple(replace(term, place="tank") for term in terms))
@@ -365,7 +395,7 @@ def _is_resolved(terms: Sequence[Term], drive: Excitation) -> bool:
 
 
 def _band_of_most_power(force: FloatArray) -> NDArray[np.bool_]:
-    """Frequencies up to which nearly all of a force lies."""
+    """Frequencies up to that below which nearly all power of a force lies."""
     power = np.cumsum(np.abs(rfft(force)) ** 2)
     return np.arange(power.size) <= int(np.searchsorted(power, _POWER_KEPT * power[-1]))
 

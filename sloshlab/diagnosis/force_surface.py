@@ -1,9 +1,10 @@
-"""The best correction without a name: any force of two motions of a place and of what they were before.
+"""Restoring force surface with memory: the correction without a name, of two motions of a place.
 
 A sum of Chebyshev polynomials of the motions, a part that changes sign with the velocity, and three dampers behind
-springs, slower than the motion, as fast, and faster, which remember.
+springs (relaxation), slower than the motion, as fast, and faster.
 
-It is the ceiling that a named effect is compared with, and the model of what has no name.
+It is the ceiling that a named effect is compared with, and the model of what has no name (Masri and Caughey 1979,
+doi:10.1115/1.3424568).
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ NAMES = ("sharp", *(f"remembered_{k + 1}" for k in range(_N_REMEMBERED)), *_POLY
 
 
 def _kind(block: str) -> ForceKind:
-    """Of the motions that a block's forces depend on: a law of the acceleration is solved for in every step."""
+    """The surface of one block; in the tank it depends on the acceleration, which is solved for in every step."""
     in_tank = block == "tank"
     return register(
         ForceKind(

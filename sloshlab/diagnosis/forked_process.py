@@ -1,4 +1,4 @@
-"""A copy of this process (fork) that works beside it: runs, effects and compiled laws need not be sent."""
+"""A fork of this process that works beside it: runs, effects and compiled laws need not be sent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import Any, Final
 N_WORKERS = 2
 """Threads or processes that work at once."""
 CAN_FORK: Final = sys.platform == "linux"
-"""Elsewhere there are no copies (Windows), or none that system libraries bear (macOS)."""
+"""Windows has no fork, and system libraries of macOS do not bear it."""
 
 
 _PR_SET_PDEATHSIG: Final = 1
@@ -31,20 +31,20 @@ class _ThisProcess:
 
 
 def is_fork() -> bool:
-    """Whether this process is a copy: nobody reads what it says."""
+    """Whether this process is a fork, whose progress nobody reads."""
     return _ThisProcess.is_fork
 
 
 def forked(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Connection]:
-    """A copy that does some work, and our end of a line to it.
+    """A fork that does some work, and our end of a pipe to it.
 
-    It ends with its work, with this process, or where the work ends as the line does. To be called while no other
-    thread works, as a lock that one of them holds would be held in the copy for ever.
+    It ends with its work, with this process, or where the work ends as the pipe closes. To be called while no
+    other thread works, as a lock that one of them holds would be held in the fork for ever.
 
     Parameters
     ----------
     work : callable
-        Takes its end of the line, then the arguments.
+        Takes its end of the pipe, then the arguments.
     arguments : object
         Whatever there is; nothing of them is sent.
     """
@@ -59,7 +59,7 @@ def forked(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Con
 
 
 def terminate(process: ForkProcess, line: Connection) -> None:
-    """See to it that a copy has ended; nothing happens where it has."""
+    """Kill a fork and wait for its end; nothing happens where it has ended."""
     line.close()
     process.kill()
     process.join()
@@ -69,11 +69,11 @@ def _in_fork(
     first: int, ours: Connection, theirs: Connection, work: Callable[..., None], arguments: tuple[Any, ...]
 ) -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != first:  # it had ended before it was said that this one shall end with it
+    if os.getppid() != first:  # the parent ended before prctl: its death would not be signalled any more
         return
-    ours.close()  # or the line would never end
+    ours.close()  # an open copy of this end would keep the pipe from closing
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process, which ends this one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    gc.freeze()  # what was there already is not looked through, which would copy it
+    gc.freeze()  # the collector would write to inherited pages, and so copy them
     _ThisProcess.is_fork = True
     work(theirs, *arguments)

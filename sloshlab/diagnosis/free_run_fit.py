@@ -1,4 +1,9 @@
-"""Parameters from free-running simulations: all runs together, what a laboratory knows kept in mind."""
+"""Maximum a posteriori fits of free-running simulations: Levenberg–Marquardt with Huber loss, all runs together.
+
+A fit goes through stages of noise inflation (a continuation): first every channel is taken to be known to 30 % of
+its RMS only, last to its noise. Details that jump with the parameters, such as where friction stops a decay, are
+then within the inflated noise while the coarse motion is fitted.
+"""
 
 from __future__ import annotations
 
@@ -17,29 +22,38 @@ from sloshlab.diagnosis.free_run_problem import HUBER_LIMIT, FreeRunFit, FreeRun
 
 FloatArray = NDArray[np.float64]
 _LARGEST_DAMPING: Final = 1e8
+"""Beyond it a step is gradient descent of no size."""
 _LEAST_GAIN_RATIO: Final = 0.3
+"""Actual over predicted decrease, below which the Jacobian is computed anew."""
 _LAST_STAGE_FACTOR: Final = 0.03
-"""Of the tolerance: small steps along a valley add up to more than the gates of a verdict."""
+"""Over the tolerance: small steps along a valley add up to more than the gates of a verdict."""
 _LEAST_PREDICTED_SHARE: Final = 0.1
-"""Of the decrease at which a stage ends: what promises less is not simulated."""
+"""Of the decrease at which a stage ends: a step that predicts less is not simulated.
+
+Half of all simulations were of refused steps that damping made ever smaller.
+"""
 _N_DRAWN: Final = 32
+"""Starts drawn from the prior."""
 _N_REFINED: Final = 2
+"""Of these, the best ones that are fitted."""
 _ABANDON_COST_RATIO: Final = 1.02
-"""Cost after the first stages, over the best one so far, beyond which another start is given up."""
-_SHOWN: Final = 1.5
-"""How much softer than the largest relative residual a stage may be to be of use."""
+"""Cost after the first stages, over the best one so far, beyond which another start is abandoned."""
+_LARGEST_INFLATION_RATIO: Final = 1.5
+"""Noise inflation over the largest relative residual, from which a stage would hide all that is to be fitted."""
 _LEAST_ROOM: Final = 1e-12
-"""Between a lower and an upper bound of a step, in scaled values; bounds that coincide leave none."""
+"""Added to the bounds of a step, in scaled values: the solver refuses bounds that coincide."""
 _SAME_MINIMUM: Final = 0.02
-"""Of a number, within which a fit from elsewhere has found the same place."""
+"""Of a parameter, within which a fit from elsewhere has found the same minimum."""
 _MOST_ITERATIONS: Final = 15
-"""Steps of a stage at most: where an effect and the baseline share a motion, the way leads along a valley."""
+"""Steps of a stage: where an effect and the baseline are correlated, the fit follows a narrow valley."""
 INFLATION_STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
+"""Share of the RMS of every channel that is added to its noise."""
 SCANNED_SIZE_FACTORS: Final = (0.75, 0.9, 1.1, 1.3)
+"""Over the size that was found: other starts of a fit far from the recordings."""
 
 
 def _limit(residual: FloatArray) -> float:
-    """Far from the optimum residuals are large everywhere and none of them is a burst."""
+    """Huber's limit: far from the optimum residuals are large everywhere, and none of them is an outlier."""
     return max(HUBER_LIMIT, 3.0 * float(np.sqrt(np.mean(residual**2))))
 
 
@@ -53,7 +67,7 @@ def fitted(
     known: BlockJacobian | None = None,
     is_last: bool = True,
 ) -> tuple[FreeRunFit, BlockJacobian]:
-    """Levenberg–Marquardt; deviations of the baseline count against what is believed of it.
+    """Levenberg–Marquardt from one start; the baseline has Gaussian priors.
 
     Parameters
     ----------
@@ -64,12 +78,11 @@ def fitted(
     tolerance : float
         Of the relative decrease of the cost at which a stage ends; a thirtieth of it in the last one.
     stages : sequence of float
-        Stages. In each, every channel is believed to this share of its RMS only, so that details which jump with
-        the parameters, such as where friction stops a decay, do not hide the way; zero is the last one.
+        Noise inflation of each stage: every channel is known only to this share of its RMS; zero is the last one.
     known : BlockJacobian, optional
-        From nearby, to begin with; it is changed.
+        From nearby, to begin with (warm start); it is changed.
     is_last : bool
-        Whether the fit may end only with a Jacobian that was made where it ends.
+        Whether the fit may end only with a Jacobian that was computed where it ends.
 
     Returns
     -------
@@ -79,9 +92,9 @@ def fitted(
 
     Notes
     -----
-    A Jacobian costs as many simulations as there are parameters. It is made once, corrected after
-    every step by what the step has shown (`BlockJacobian.correct`), and made anew where a step gains less than it
-    promised, and before the last stage may end.
+    A Jacobian costs as many simulations as there are parameters. It is computed once, updated by Broyden's formula
+    after every step (`BlockJacobian.correct`), and computed anew where the gain ratio of a step (actual over
+    predicted decrease) is low, and before the last stage may end.
     """
     theta = problem.theta_of(start)
     residual = problem.residual(theta)
@@ -97,7 +110,7 @@ def fitted(
 
 
 class _LevenbergMarquardt:
-    """Where a fit stands."""
+    """State of a fit."""
 
     def __init__(
         self, problem: FreeRunProblem, theta: FloatArray, residual: FloatArray, known: BlockJacobian | None
@@ -108,8 +121,9 @@ class _LevenbergMarquardt:
         self.jacobian, self.hessian = known or BlockJacobian(n, ()), np.eye(n)
 
     def stage(self, inflation: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:
-        """Descend with every channel believed to a share of its RMS."""
+        """Descend with inflated noise."""
         inflation_weights, damping, is_fresh = self.problem.inflation_weights(inflation), 1e-3, False
+        # The Jacobian of an earlier stage, or a warm start, serves until a step shows that it is wrong.
         is_wanted = not self.jacobian.blocks
         for iteration in range(n_iterations if inflation > 0 else 2 * n_iterations):
             if is_wanted:
@@ -126,9 +140,9 @@ class _LevenbergMarquardt:
             is_fresh = is_fresh and gain <= 0
 
     def _step(self, inflation_weights: FloatArray, damping: float, least: float) -> tuple[float, float, float]:
-        """One step; relative decrease of the cost, what the Jacobian promised, and the next damping.
+        """One step; relative decrease of the cost, the decrease that the Jacobian predicts, and the next damping.
 
-        None is made where so small a one that it could succeed promises less than the least decrease.
+        No step is made where the steps small enough to succeed predict less than the least decrease.
         """
         theta, residual, prior = self.theta, self.residual, self.prior
         limit = _limit(inflation_weights * residual)
@@ -145,9 +159,12 @@ class _LevenbergMarquardt:
 
         before = cost(theta, residual)
         while damping < _LARGEST_DAMPING:
+            # Marquardt's scaling, by the diagonal of the Hessian: parameters differ by orders of magnitude in
+            # sensitivity.
             lift = np.diag(damping * np.maximum(np.diag(self.hessian), 1e-12))
             tried = _step_within_bounds(self.problem, theta, self.hessian + lift, gradient)
             step = tried - theta
+            # Decrease by the undamped model, so that it can be compared with the actual one.
             predicted = -float(2 * gradient @ step + step @ self.hessian @ step)
             if not predicted > least * before:
                 break
@@ -176,7 +193,7 @@ class _LevenbergMarquardt:
 
 
 def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
-    """The stages in which what a fit leaves shows; in softer ones it would be within what is believed anyway.
+    """The stages in which the residual of a fit exceeds the inflated noise; the others would have nothing to fit.
 
     Parameters
     ----------
@@ -191,22 +208,23 @@ def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
         left = float(np.mean(own**2 * observation.variance)) / max(float(np.mean(observation.spectra**2)), 1e-300)
         largest = max(largest, float(np.sqrt(left)))
     return (
-        tuple(inflation for inflation in INFLATION_STAGES if inflation < _SHOWN * largest) or INFLATION_STAGES[-1:]
+        tuple(inflation for inflation in INFLATION_STAGES if inflation < _LARGEST_INFLATION_RATIO * largest)
+        or INFLATION_STAGES[-1:]
     )
 
 
 @dataclass(frozen=True, eq=False)
 class CoarseFit:
-    """A fit after its first two stages.
+    """A fit after its first two stages of noise inflation.
 
     Attributes
     ----------
     problem : FreeRunProblem
     fit : FreeRunFit
     jacobian : BlockJacobian
-        Where it stands, nearly.
+        Near its optimum.
     cost : float
-        With the channels known only to the share of the second stage.
+        With the noise of the second stage.
     """
 
     problem: FreeRunProblem
@@ -217,13 +235,13 @@ class CoarseFit:
 
 @dataclass(frozen=True)
 class Start:
-    """Numbers from which a fit begins.
+    """Parameters from which a fit begins.
 
     Attributes
     ----------
     values : mapping
     is_near : bool
-        Whether the baseline's numbers are those of a fit whose Jacobian is known.
+        Whether the baseline's parameters are those of a fit whose Jacobian is known.
     """
 
     values: Mapping[str, float]
@@ -276,7 +294,7 @@ def coarsely_fitted(
 def extended_to_all_runs(
     coarse_fit: CoarseFit, problem: FreeRunProblem, others: Mapping[str, float], near: BlockJacobian
 ) -> CoarseFit:
-    """A fit that was begun on some of the runs, to be finished on all of them.
+    """A coarse fit to some of the runs, to be refined on all of them.
 
     Parameters
     ----------
@@ -284,7 +302,7 @@ def extended_to_all_runs(
     problem : FreeRunProblem
         Of all runs.
     others : mapping
-        What belongs to the runs that were left out.
+        Parameters of the runs that were left out.
     near : BlockJacobian
         Of all runs, without the last candidate.
     """
@@ -296,7 +314,7 @@ def extended_to_all_runs(
 def best_start(
     problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inflation: float
 ) -> Mapping[str, float]:
-    """The start with the lowest cost before anything is fitted, channels known only to a share of their RMS.
+    """The start with the lowest cost before anything is fitted, with inflated noise.
 
     Parameters
     ----------
@@ -310,7 +328,7 @@ def best_start(
 
 
 def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inflation: float) -> list[float]:
-    """Costs before anything is fitted, channels known only to a share of their RMS; infinite of what does not run.
+    """Costs before anything is fitted, with inflated noise; infinite of what does not run.
 
     Parameters
     ----------
@@ -328,7 +346,7 @@ def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inf
 def refined(
     coarse_fit: CoarseFit, stages: Sequence[float] = INFLATION_STAGES, *, n_iterations: int = _MOST_ITERATIONS
 ) -> FreeRunFit:
-    """The remaining stages of a fit that was begun; the last one in any case."""
+    """The remaining stages of a coarse fit; the last one in any case."""
     rest = stages[2:] or stages[-1:]
     values, known = coarse_fit.fit.values, coarse_fit.jacobian
     return fitted(coarse_fit.problem, values, n_iterations=n_iterations, stages=rest, known=known)[0]
@@ -337,7 +355,7 @@ def refined(
 def fitted_from(
     problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], *, n_iterations: int = 6
 ) -> FreeRunFit:
-    """The fit from the best of several starts, judged after its first stage.
+    """The fit from the best of several starts, chosen after its first stage.
 
     Parameters
     ----------
@@ -353,7 +371,7 @@ def fitted_from(
 def _extended_jacobian(
     problem: FreeRunProblem, start: Mapping[str, float], near: BlockJacobian
 ) -> BlockJacobian | None:
-    """A Jacobian from nearby with the columns of the parameters that it has not, made where a fit starts."""
+    """A Jacobian from nearby with columns for the parameters that it lacks, computed where a fit starts."""
     theta = problem.theta_of(start)
     at = problem.residual(theta)
     if not np.isfinite(at).all():
@@ -362,15 +380,15 @@ def _extended_jacobian(
 
 
 def inflated_cost(problem: FreeRunProblem, fit: FreeRunFit, inflation: float) -> float:
-    """Cost of a fit if all channels were known only to a share of their RMS."""
+    """Cost of a fit with inflated noise, its prior included."""
     residual = problem.residual(problem.theta_of(fit.values))
     return huber_cost(problem.inflation_weights(inflation) * residual) + fit.cost - fit.misfit
 
 
 def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple[FreeRunFit, BlockJacobian]:
-    """The best fit of the baseline's own parameters from several places that a laboratory would believe.
+    """Multi-start fit of the baseline's own parameters, from starts drawn from their priors.
 
-    Dry friction and stops give the cost side valleys, in which a retuned baseline would look worse than it is.
+    Dry friction and stops give the cost local minima, in which a retuned baseline would look worse than it is.
 
     Parameters
     ----------
@@ -389,6 +407,7 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
         return best
     inflation = INFLATION_STAGES[1]
     inflation_weights, reached = problem.inflation_weights(inflation), inflated_cost(problem, best[0], inflation)
+    # parameters that change only readings are linear and have no local minima: they are not drawn
     draws = norm.ppf(qmc.Halton(problem.n_baseline, seed=0).random(_N_DRAWN))
     draws = np.clip(draws, -2.0, 2.0) * problem.changes_motion
     costs = [
@@ -413,16 +432,16 @@ def fitted_from_scaled(
     *,
     n_iterations: int = 5,
 ) -> FreeRunFit:
-    """A fit from another size of one of its numbers, to leave a side valley.
+    """A fit from another value of one of its parameters, to leave a local minimum.
 
     Parameters
     ----------
     problem : FreeRunProblem
     fit : FreeRunFit
     name : str
-        Of the number.
+        Of the parameter.
     factor : float
-        Over its size.
+        Over its value.
     stages : sequence of float
         Stages; the first is left out.
     n_iterations : int
@@ -431,7 +450,7 @@ def fitted_from_scaled(
     Returns
     -------
     FreeRunFit
-        With its trouble where it was given up, as it was left behind or led back.
+        With its trouble where it was abandoned, as it was left behind or led back.
     """
     start, inflation = {**fit.values, name: fit.values[name] * factor}, stages[1]
     other, _ = fitted(problem, start, n_iterations=n_iterations, stages=(inflation,))
@@ -447,10 +466,10 @@ def fitted_from_scaled(
 def _step_within_bounds(
     problem: FreeRunProblem, theta: FloatArray, hessian: FloatArray, gradient: FloatArray
 ) -> FloatArray:
-    """Where the quadratic model is least within the bounds.
+    """Minimum of the quadratic model within the parameter bounds.
 
-    A step cut off at a bound would point elsewhere than down, where parameters trade against each other. It is cut
-    off nevertheless where the model is none: not finite, or flat to rounding.
+    A step clipped at a bound need not be a descent direction where parameters are correlated. It is clipped
+    nevertheless where the model is not finite, or singular to rounding.
     """
     low = (problem.low - problem.centres) / problem.scales
     high = (problem.high - problem.centres) / problem.scales

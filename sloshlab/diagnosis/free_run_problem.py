@@ -1,4 +1,4 @@
-"""What free-running simulations miss of recordings, weighted, as a function of parameters."""
+"""Weighted residuals of free-running simulations as a function of scaled parameters, and their derivatives."""
 
 from __future__ import annotations
 
@@ -24,15 +24,19 @@ from sloshlab.errors import SloshlabError
 FloatArray = NDArray[np.float64]
 _Label = TypeVar("_Label")
 _STEP: Final = 0.005
-"""Of a difference, in tolerances; a frequency must not move by much of a cycle."""
+"""Of a finite difference, in tolerances: a frequency must not move by much of a cycle over a run."""
 _COARSE_STEP: Final = 0.03
+"""The same in stages with inflated noise, past the small-scale roughness that friction and contacts cause."""
 _TOLERANCES_OF_DAMPING: Final = 3.0
+"""Factor of the coarse step of dampings of the baseline."""
 HUBER_LIMIT: Final = 4.0
-"""Standard deviations from which a residual counts with its size, not with its square."""
+"""Standard deviations beyond which Huber's loss is linear: bursts of noise and lost blocks are outliers."""
 _FEWEST_IN_A_RUN: Final = 50
+"""Coefficients, below which a mean square is too uncertain to be used."""
 _QUIETER_SHARE: Final = 0.75
+"""Of the times of a channel, without the bursts in the others."""
 DOWN_TO_NOISE: Final = 1.15
-"""Mean square of the weighted residuals of a channel in which nothing more is to be found."""
+"""Mean square of the weighted residuals of a channel up to which nothing but noise is left."""
 _POOL: Final = ThreadPoolExecutor(N_WORKERS)
 
 
@@ -47,9 +51,9 @@ class FreeRunFit:
     values : dict
         Baseline parameters by name, and ``key.parameter`` of every candidate.
     cost : float
-        Sum of squares of weighted residuals (large ones counted less) and of deviations from what is believed.
+        Huber loss of the weighted residuals plus squares of the deviations from the prior means, in tolerances.
     misfit : float
-        The part of the residuals.
+        The part of the cost that the residuals have.
     covariance : ndarray, shape (n, n)
         Of the free parameters in scaled values, in the order of `names`.
     names : tuple of str
@@ -74,9 +78,9 @@ class FreeRunFit:
         return float(np.hypot(*self.standard_errors(name)))
 
     def standard_errors(self, name: str) -> tuple[float, float]:
-        """Standard errors of a parameter in its own unit: by noise, and by what is not known of the baseline.
+        """Standard errors of a parameter in its own unit: by noise, and by the prior of the baseline.
 
-        The covariance C = (JᵀJ + P)⁻¹, P one for each number of the baseline, is C JᵀJ C + C P C.
+        The covariance C = (JᵀJ + P)⁻¹, with P one for each baseline parameter, is C JᵀJ C + C P C.
         """
         i = self.names.index(name)
         n_baseline = len(self.names) - sum(len(candidate.effect.parameters) for candidate in self.candidates)
@@ -97,7 +101,7 @@ class FreeRunProblem:
     fixed : mapping, optional
         Baseline parameters that are not free.
     expected : mapping, optional
-        What is believed of baseline parameters, where it is not what the model believes.
+        Prior means of baseline parameters, where they differ from what the model believes.
     """
 
     def __init__(
@@ -170,7 +174,7 @@ class FreeRunProblem:
 
     @property
     def prior(self) -> FloatArray:
-        """Weights of the squares of scaled parameters: one where something is believed of them, else zero."""
+        """Weights of the squares of scaled parameters: one with a prior, zero without."""
         return np.array([1.0] * self.n_baseline + [0.0] * (len(self.names) - self.n_baseline))
 
     @property
@@ -208,7 +212,7 @@ class FreeRunProblem:
         return np.concatenate(list(_POOL.map(lambda run: self._of_runs([run], values, beside), self.runs)))
 
     def residuals(self, thetas: Sequence[FloatArray]) -> list[FloatArray]:
-        """Residuals of several sets of parameters, of as many at a time as there are threads."""
+        """Residuals of several sets of parameters, as many at a time as there are workers."""
         if is_single_threaded() or len(thetas) == 1:
             return [self.residual(theta) for theta in thetas]
         beside = self._second_process()
@@ -229,7 +233,10 @@ class FreeRunProblem:
         return residuals_of_runs(self.model, runs, values, self.candidates) if found is None else found
 
     def inflation_weights(self, inflation: float) -> FloatArray:
-        """Factors of the residuals as if all channels were known only to a share of their RMS."""
+        """Factors of the residuals with inflated noise: every channel known only to a share of its RMS.
+
+        √(σ²/(σ² + share² ⟨y²⟩)) for the variance σ² of a coefficient of the channel y.
+        """
         return np.concatenate(
             [
                 np.sqrt(
@@ -244,9 +251,9 @@ class FreeRunProblem:
     def jacobian(
         self, theta: FloatArray, at: FloatArray, columns: Sequence[int], *, coarse: bool = False
     ) -> BlockJacobian:
-        """Derivatives of the residuals by some scaled parameters, by differences of simulations.
+        """Derivatives of the residuals by some scaled parameters, by finite differences.
 
-        Coarse ones look further, past the jags that dry friction and contacts give a residual.
+        Coarse differences are wider: the residual is rough on a small scale with dry friction and contacts.
         """
         places = []
         for column in columns:
@@ -258,6 +265,7 @@ class FreeRunProblem:
                 step *= _TOLERANCES_OF_DAMPING
             moved = theta.copy()
             physical = self.centres[column] + (theta[column] + step) * self.scales[column]
+            # Away from the bound, where the values would be clipped and the difference zero.
             moved[column] += step if physical <= self.high[column] else -step
             places.append(moved)
 
@@ -268,6 +276,7 @@ class FreeRunProblem:
             for block, moved in found.items():
                 moved -= at[self._rows[block]]
                 moved /= place[column] - theta[column]
+            # A parameter whose simulation fails has no derivative, and the step does not use it.
             return found if all(np.isfinite(moved).all() for moved in found.values()) else {}
 
         found = list((map if is_single_threaded() else _POOL.map)(derivative, places, columns))
@@ -336,7 +345,7 @@ def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str,
 
 
 def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:
-    """What the candidates add, with their numbers taken from the values."""
+    """What the candidates add, with their parameters taken from the values."""
     total = NOTHING
     for candidate in candidates:
         numbers = {
@@ -348,7 +357,7 @@ def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -
 
 
 def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[str, float]:
-    """Mean square of the informative residuals of each channel over all runs, large ones counted less.
+    """Mean Huber loss of the informative residuals of each channel over all runs.
 
     Parameters
     ----------
@@ -388,10 +397,10 @@ def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) ->
 def repeatable_mean_squares(
     tests: Sequence[Sequence[str]], observed: Sequence[Observation], residual: FloatArray
 ) -> dict[tuple[str, str], float]:
-    """Mean square of what the informative residuals of repeats of one test have in common.
+    """Repeatable mean square: what the informative residuals of repeats of one test have in common.
 
-    What physics is missing is missing in each repeat alike, noise and a liquid's chaos are not: products of the
-    residuals of two repeats have the square of the common part as their mean. Large residuals are cut off.
+    Missing physics is missing in each repeat alike, noise and a liquid's chaos are not: the mean product of the
+    residuals of two repeats is the mean square of their common part. Large residuals are clipped.
 
     Parameters
     ----------
@@ -419,6 +428,8 @@ def repeatable_mean_squares(
             )
     found = {}
     for test in tests:
+        # Products of different repeats have no noise in their mean, so that it may be negative where nothing
+        # repeats.
         for channel in dict.fromkeys(of for run, of in parts if run in test):
             total, n = 0.0, 0
             for name, other in combinations([run for run in test if (run, channel) in parts], 2):
@@ -461,13 +472,13 @@ def _means(
 
 
 def robust_weights(residual: FloatArray, limit: float = HUBER_LIMIT) -> FloatArray:
-    """Square roots of Huber's weights: a burst or a lost block counts with its size, not with its square."""
+    """Square roots of Huber's weights, for iteratively reweighted least squares."""
     size = np.abs(residual)
     return np.asarray(np.where(size > limit, np.sqrt(limit / np.maximum(size, 1e-300)), 1.0))
 
 
 def huber_cost(residual: FloatArray, limit: float = HUBER_LIMIT) -> float:
-    """Sum of squares, of which those beyond some standard deviations, four by default, grow only linearly."""
+    """Huber loss: a sum of squares that grows linearly beyond some standard deviations, four by default."""
     size = np.abs(residual)
     within = np.minimum(size, limit)
     return float((within * (2 * size - within)).sum())

@@ -1,9 +1,9 @@
-"""The system cut open at its measured interfaces: each block on its measured input, its output compared alone.
+"""Decoupling at measured interfaces: each block is driven by its measured input, its output compared alone.
 
 excitation → structure → tank → sensors. The structure is fed the measured motion of its base and the measured
-force between it and the tank, the tank its measured acceleration; what each would need beyond the retuned
-baseline is a `latent_force`. Sensors are compared with what the other sensors of the same motion say. What a
-block's own parameters could still explain within their tolerances counts for no block.
+force between it and the tank, the tank its measured acceleration; what each lacks beyond the retuned baseline is a
+`latent_force`. Sensors are compared with the other sensors of the same motion. What a block's own parameters could
+still explain within their tolerances is charged to no block.
 """
 
 from __future__ import annotations
@@ -31,16 +31,18 @@ from sloshlab.errors import SloshlabError
 FloatArray = NDArray[np.float64]
 SENSOR: Final = "sensor"
 _N_PARTS: Final = 6
+"""Stretches of a run that are resampled as wholes (block bootstrap)."""
 _N_DRAWS: Final = 400
 _CONSISTENT: Final = 1.4
 """RMS over noise up to which channels of one motion agree."""
 _EXPLAINED: Final = 0.35
-"""Part of a disagreement that may be left when the channel that causes it is not believed."""
+"""Share of a disagreement that may remain once the channel that causes it is left out."""
 _RUNNER_UP: Final = 1.5
+"""Ratio of what the second best choice leaves, from which the best one is certain."""
 _RESOLVED: Final = 0.25
 """Mean square beyond noise, over that of the noise, from which a force is there."""
 _FEWER_FORCES: Final = 4.0
-"""By how much less force a channel's absence must ask for than another's, to be doubted of two."""
+"""Of two channels, ratio of the latent forces that remain without each, from which one of them is suspect."""
 _LARGEST_RATIO: Final = 1e3
 
 
@@ -82,7 +84,7 @@ class SensorCheck:
     ratio : float
         RMS of the difference over noise.
     disagreement_without : float
-        RMS over noise of the other channels when this one is not believed.
+        RMS over noise of the other channels when this one is left out.
     missing_force_without_n2 : float
         Mean square of the forces that the blocks then lack beyond noise and their own parameters [N²].
     """
@@ -169,7 +171,7 @@ def _weighted(observation: Observation, series: FloatArray, values: Mapping[str,
 def _disagreements(
     runs: Sequence[Sequence[Observation]], found: Sequence[RunForces], values: Mapping[str, float]
 ) -> dict[str, float]:
-    """RMS over noise per channel of what channels of one motion say beyond each other, where they can be heard."""
+    """RMS over noise, per channel, of the disagreement of channels of one motion, in the bands of the motion."""
     sums: dict[str, list[float]] = {}
     for observed, forces in zip(runs, found, strict=True):
         for observation in observed:
@@ -205,7 +207,7 @@ def _sensor_checks(
 
 
 def _suspect_channel(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
-    """The channel whose absence lets the others agree, or why none can be named."""
+    """The channel without which the others agree, or why none can be named."""
     groups = [
         [sensor for sensor in sensors if sensor.channel.startswith("force") is of_force]
         for of_force in (False, True)

@@ -1,6 +1,7 @@
-"""Short-time spectra that lose and repeat nothing: the modified discrete cosine transform with a sine window.
+"""Short-time spectra by an orthonormal lapped transform: the modified discrete cosine transform with a sine
+window.
 
-It is orthonormal: a sum of squares of coefficients is the sum of squares of samples, and white noise stays white
+A sum of squares of coefficients is the sum of squares of samples, and white noise stays white
 and independent. A residual can be weighted per time and frequency and is still a least-squares residual.
 """
 

@@ -1,8 +1,8 @@
-"""The force that would make a simulation follow its recording, at structure and tank.
+"""Latent forces: those that would make a simulation follow its recording, at structure and tank.
 
-What every motion channel misses is the response to one force at the tank's place (`force_inversion`), whatever
-made it. A force measured between structure and tank tells how much of it is the liquid's: Δf = M ü − F. What is
-left acts on the structure. Without that force the place stays open.
+The residuals of all motion channels are the response to one force at the tank's place (`force_inversion`),
+whatever made it. A force measured between structure and tank separates the liquid's part: Δf = M ü − F. The rest
+acts on the structure. Without a measured force the place stays undetermined.
 """
 
 from __future__ import annotations
@@ -42,8 +42,9 @@ FloatArray = NDArray[np.float64]
 Found = tuple[tuple["LatentForce", ...], dict[str, FloatArray]]
 STRUCTURE, TANK, EITHER = "structure", "tank", "structure or tank"
 _END_SHARE: Final = 0.04
+"""Of a run: length of the tapers."""
 _SLOW_HZ: Final = 1.5
-"""Below, offsets and drift of accelerometers hide the motion."""
+"""Below it offsets and drift of accelerometers hide the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +79,17 @@ class LatentForce:
 
 @dataclass(frozen=True, eq=False)
 class RunForces:
-    """Everything that one run says about forces and sensors.
+    """Latent forces of one run, and the residuals that they were computed from.
 
     Attributes
     ----------
     forces : tuple of LatentForce
         At structure and tank, or at either of them; at the tank alone on a shaker.
     missed : dict of str to ndarray, shape (n,)
-        What the simulation misses each channel by, in true units, faded out at the ends.
+        Residual of each channel in true units, tapered at the ends.
     left : dict of str to ndarray, shape (n,)
-        What each motion channel shows beyond the motion that all believed ones agree on, in true units; of
-        force cells the difference from an equal share of their sum.
+        What each motion channel shows beyond the response to the latent force, in true units; of force cells the
+        difference from an equal share of their sum.
     structure : Structure or None
         As retuned.
     carried_mass_kg : float
@@ -122,7 +123,7 @@ def run_forces(
     values : mapping
         Of the baseline's parameters.
     without : collection of str
-        Channels that are not to be believed.
+        Channels that are left out of the inversion.
     extension : Extension, optional
         Effects that the simulation has beyond the baseline.
 
@@ -193,7 +194,7 @@ def channel_responses(
 def _missed(
     observation: Observation, reading: FloatArray, values: Mapping[str, float], is_free: bool
 ) -> FloatArray:
-    """Recorded minus simulated in true units, zero where lost, faded out at the ends."""
+    """Recorded minus simulated in true units, zero where lost, tapered at the ends."""
     recorded_ = np.asarray(observation.run.recording[observation.channel].values, np.float64)
     n = min(recorded_.size, reading.size)
     difference = np.zeros(recorded_.size)
@@ -207,7 +208,7 @@ def _missed(
 
 
 def _taper(n: int, is_free: bool) -> FloatArray:
-    """Ones with a smooth way to zero at the end, and at the start of a run that was not released."""
+    """Cosine taper at the end, and at the start of a run that was not released."""
     m = max(2, int(_END_SHARE * n))
     ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(m) + 0.5) / m)
     window = np.ones(n)
@@ -225,7 +226,7 @@ def _untapered(n: int, is_free: bool) -> slice:
 def _noise_power(observation: Observation, frequency_hz: FloatArray) -> FloatArray:
     """E|FFT|² of the noise of a channel, by its variance per coefficient.
 
-    Slow motion is no accelerometer's, and that of a base is known by its accelerometer alone.
+    It grows below 1.5 Hz: accelerometers drift, and displacements of a base are integrated from accelerometers.
     """
     variance = np.interp(frequency_hz, observation.frequencies_hz, np.median(observation.variance, axis=0))
     if _order(observation.channel) == 2 or (_order(observation.channel) == 0 and not observation.run.is_free):
@@ -272,6 +273,8 @@ def _on_structure(
         inertia * inverted.spectrum - in_frequency(missed_force - of_release) - in_frequency(_padded(in_tank, n))
     )
     noise = np.abs(inertia) ** 2 * inverted.noise + np.interp(frequency, *force_noise)
+    # The division between structure and liquid is regularised once more: a difference of two large forces is
+    # noisy.
     kept_share = wiener_gain(np.abs(liquid) ** 2, noise, frequency, rate)
     in_liquid = in_time(kept_share * liquid, n)[:sampled]
     of_structure = force - in_tank - in_liquid - on_structure
@@ -288,8 +291,8 @@ def _inverted_force_at_tank(
     believed: Sequence[Observation],
     missed: Mapping[str, FloatArray],
 ) -> tuple[InvertedForce, float, dict[str, FloatArray]]:
-    """The force at the tank's place that believed motion channels ask for, how far the release was off, and what
-    every channel has left.
+    """The force at the tank by inversion of the trusted motion channels, the error of the release, and what every
+    channel has left.
     """
     run, structure = observed[0].run, simulation.twin.structure
     assert structure is not None
@@ -377,7 +380,7 @@ def _order(name: str) -> int:
 def _measured(
     observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]] | None:
-    """What the force of the structure on the tank is missed by, and the power of its noise over frequency."""
+    """Residual of the force of the structure on the tank, and the power of its noise over frequency."""
     forces = [force for force in believed if force.channel.startswith("force")]
     cells = [force for force in forces if force.channel.startswith("force_cell")]
     chosen = cells or forces[:1]
@@ -409,7 +412,7 @@ def _cell_disagreements(
 def _change_of_baseline_force(
     simulation: Simulation, twin: Blocks, place: str, motion: FloatArray, rate_hz: float
 ) -> FloatArray:
-    """Baseline forces of a place on the motion that was measured, less those of the simulation."""
+    """Baseline forces of a place along the measured motion, less those of the simulation."""
     chosen = [i for i, term in enumerate(twin.terms) if term.place == place]
     if not chosen:
         return np.zeros(motion.shape[0])

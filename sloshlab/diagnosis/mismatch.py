@@ -13,8 +13,10 @@ from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.observations import Observation
 
 FloatArray = NDArray[np.float64]
-_SHARE: Final = 0.8
+_CENTRAL_SHARE: Final = 0.8
+"""Of the misfit within the intervals that are told."""
 _CHANNEL_SHARE: Final = 0.2
+"""Of the misfit, from which a channel is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +106,9 @@ def _middle(values: FloatArray, weights: FloatArray) -> list[float]:
     cumulative = np.cumsum(weights[order])
     if not cumulative.size or cumulative[-1] <= 0:
         return []
-    edges = np.searchsorted(cumulative, np.array([0.5 - 0.5 * _SHARE, 0.5 + 0.5 * _SHARE]) * cumulative[-1])
+    edges = np.searchsorted(
+        cumulative, np.array([0.5 - 0.5 * _CENTRAL_SHARE, 0.5 + 0.5 * _CENTRAL_SHARE]) * cumulative[-1]
+    )
     low, high = values[order][np.minimum(edges, values.size - 1)]
     return [round(float(low), 4), round(float(high), 4)]
 

@@ -1,4 +1,5 @@
-"""How well the channels of a case repeat: the noise floor that a description is measured against."""
+"""The noise floor: variance of each coefficient by sensors, by the noise of drives, and by the scatter of
+repeats."""
 
 from __future__ import annotations
 
@@ -33,15 +34,17 @@ from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
 _N_NOISE_DRAWS: Final = 4
+"""Simulations with other noise, over which squares are averaged."""
 _N_BLOCKS: Final = 9
+"""Over which squares are averaged: noise through a resonance is steady."""
 _DOMINANT_NOISE_RATIO: Final = 1.0
-"""Mean square by the noise of drives over that by the sensor's own, from which it is most of what is there."""
+"""Variance by the noise of drives over that of the sensor itself, from which the former dominates."""
 _SLOW_DISPLACEMENT_ERROR: Final = 3.0
-"""Standard deviations by noise to which a displacement is known that drift removal has gone over."""
+"""Standard deviations by noise to which a slow displacement is known after the removal of drift."""
 _RELATIVE_REACH: Final = 0.05
-"""Of a frequency: twice what is believed to be normal of a mode, as an effect may move it, too."""
+"""Of a frequency, by which a resonance may be elsewhere: twice the bound of a mode, as an effect moves it, too."""
 _MOST_OF_STATED: Final = 2.0
-"""Of a sensor's noise: drives of repeats that differ by more were not the same."""
+"""Over a sensor's noise: drives of repeats that differ by more were not the same."""
 _SECONDS_OF_A_SPECTRUM: Final = 4.0
 _FEWEST_LINES: Final = 3
 
@@ -60,12 +63,14 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
         Per run.
     """
     plain = {run.name: observations(run, model.compared(run), model.driving(run)) for run in case.runs}
+    # A first fit only shows where the simulation is; its weights must not depend on the noise that is sought here.
     fit, _ = fitted(
         FreeRunProblem(model, [_with_inflated_variance(plain[run.name]) for run in case.runs]),
         model.believed,
         n_iterations=5,
     )
     raw = {name: _raw_residual(model, observed, fit) for name, observed in plain.items()}
+    # From here on the noise of drives is added explicitly, so that slow displacements keep their information.
     if isinstance(model, RigModel):
         plain = {
             run.name: observations(run, model.compared(run), model.driving(run), knows_noise_of_drive=True)
@@ -108,7 +113,7 @@ def _noise_of_drives(
 ) -> dict[tuple[str, str], FloatArray]:
     """Mean square that the noise of driving accelerometers adds to each coefficient, per run and channel.
 
-    At a resonance it is narrow: two repeats alone tell its size to a factor of two or three. It is measured by
+    At a resonance it is narrow, and two repeats estimate it to a factor of two or three only. It is computed by
     simulations whose drive has as much noise once more, with the spectrum that repeats tell
     (`_spectrum_of_drive_noise`). Of several that drive together each may have to do so alone, beside an effect on
     the others, and the noisiest counts.
@@ -127,9 +132,10 @@ def _noise_of_drives(
         if run.is_free or not plain[run.name]:
             continue
         for kept in driving:
+            # An effect on a sensor leaves the drive to the others, against whose noise its gain must count.
             recording = run.recording.drop_vars([name for name in driving if name != kept])
             kept_alone, spectrum = replace(run, recording=recording), spectrum_of[kept]
-            for place, noise in _propagated_noise(case, kept_alone, kept, spectrum, plain, fit).items():
+            for place, noise in _propagated_noise(case, kept_alone, kept, spectrum, plain=plain, fit=fit).items():
                 found[place] = np.maximum(found.get(place, 0.0), _over_bands_of_a_resonance(noise))
     return found
 
@@ -139,8 +145,8 @@ def _with_noise_of_drive(
 ) -> Observation:
     """An observation of a sensor with the noise of drives in its variance.
 
-    Slow displacements of a base are lost with the drift that integration removes; what is left of them besides its
-    noise is known to a few times that only.
+    Integration of an accelerometer removes slow displacements of the base with its drift; what is left is known to
+    a few times its noise only.
     """
     variance = observation.variance + noise.get((observation.run.name, observation.channel), 0.0)
     return replace(
@@ -152,10 +158,10 @@ def _with_noise_of_drive(
 def _ignored_where_drive_noise_dominates(
     observation: Observation, of_sensor: Observation, noise: Mapping[tuple[str, str], FloatArray]
 ) -> Observation:
-    """An observation that counts for nothing where there is nothing but the noise of drives.
+    """An observation that is ignored where the noise of drives dominates and nothing stands out of it.
 
-    There a simulation shows noise that the recording has not, and is nearer to it the less of a resonance it has:
-    it would be fitted with more damping, less participation, and a frequency beyond the bands that are compared.
+    There a simulation shows noise that the recording has not: a fit would lessen it by more damping, less
+    participation, and a frequency beyond the bands that are compared.
     """
     is_noise = (
         noise.get((observation.run.name, observation.channel), 0.0) > _DOMINANT_NOISE_RATIO * of_sensor.variance
@@ -179,7 +185,7 @@ class _NoiseSpectrum:
     ratios: FloatArray
 
     def coloured(self, white: FloatArray, rate_hz: float) -> FloatArray:
-        """White noise with this spectrum instead, shape (n,)."""
+        """White noise filtered to have this spectrum, shape (n,)."""
         at = np.interp(np.fft.rfftfreq(white.size, 1 / rate_hz), self.frequencies_hz, self.ratios)
         return np.asarray(np.fft.irfft(np.fft.rfft(white) * np.sqrt(at), white.size))
 
@@ -188,10 +194,10 @@ _WHITE: Final = _NoiseSpectrum(np.zeros(1), np.ones(1))
 
 
 def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
-    """Spectrum of a driving sensor's noise, from repeats whose drives differ by no more than noise can.
+    """Spectrum of a driving sensor's noise, from repeats whose drives differ by no more than noise.
 
-    What accelerometers and their amplifiers add grows towards low frequencies, where structures resonate; the
-    noise that is stated, or seen in the quietest bands, is that of high frequencies.
+    Noise of accelerometers and amplifiers grows towards low frequencies, where structures resonate (two to ten
+    times the stated density there); the stated noise, or that of the quietest bands, is that of high frequencies.
     """
     ratios: list[FloatArray] = []
     frequencies: FloatArray = np.zeros(1)
@@ -202,6 +208,7 @@ def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
             std = max(noise_of_sensor(first, name), noise_of_sensor(other, name))
             if a.size != b.size or rate != other.attributes.sampling_rate_hz or not std > 0:
                 continue
+            # The signal of repeats cancels; the noise of two independent readings adds.
             difference = (a - b) / np.sqrt(2)
             if not np.isfinite(difference).all() or difference.std() > _MOST_OF_STATED * std:
                 continue
@@ -226,6 +233,7 @@ def _propagated_noise(
     run: CaseRun,
     driving: str,
     spectrum: _NoiseSpectrum,
+    *,
     plain: dict[str, list[Observation]],
     fit: FreeRunFit,
 ) -> dict[tuple[str, str], FloatArray]:
@@ -237,6 +245,7 @@ def _propagated_noise(
     found: dict[tuple[str, str], FloatArray] = {}
     with suppress(SloshlabError):
         noise_free = _readings(case, run, fit)
+        # Fixed seeds: the same case gives the same answer.
         for seed in range(_N_NOISE_DRAWS):
             white = std * np.random.default_rng(seed).standard_normal(values.size)
             noise = spectrum.coloured(white, run.attributes.sampling_rate_hz)
@@ -258,10 +267,10 @@ def _propagated_noise(
 
 
 def _over_bands_of_a_resonance(square: FloatArray) -> FloatArray:
-    """Mean squares over some blocks, the largest of all bands in which a resonance may lie that is in one.
+    """Mean squares over some blocks, of each band the largest within which its resonance may lie.
 
-    What noise makes of a resonance is steady and as narrow as that is; where it is, only a fit will tell, and a
-    band that is thought to be quiet must not draw it, nor a noisy one.
+    Noise through a resonance is steady and narrow; where the resonance is, only the fit will tell, and neither
+    bands of too little nor of too much variance must attract it.
     """
     steady = uniform_filter(square, (_N_BLOCKS, 1), mode="nearest")
     bands = np.arange(square.shape[1])
@@ -277,7 +286,9 @@ def _readings(case: Case, run: CaseRun, fit: FreeRunFit) -> dict[str, FloatArray
 
 
 def _with_inflated_variance(observed: Sequence[Observation]) -> list[Observation]:
-    """With five per cent of each channel added to its noise: a first fit must not depend on unknown noise."""
+    """With five per cent of each channel's RMS added to its noise: the first fit must not depend on unknown
+    noise.
+    """
     return [
         replace(observation, variance=observation.variance + (0.05**2) * float(np.mean(observation.spectra**2)))
         for observation in within_informative_bands(observed)

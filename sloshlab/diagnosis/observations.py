@@ -1,4 +1,4 @@
-"""Recorded channels as short-time spectra, each coefficient weighted by how well it repeats."""
+"""Recorded channels as short-time spectra, each coefficient with its variance (whitening weights)."""
 
 from __future__ import annotations
 
@@ -19,16 +19,21 @@ from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times
 
 FloatArray = NDArray[np.float64]
 BLOCK_S: Final = 0.5
+"""Length of a block of the lapped transform."""
 ZERO_IS_KNOWN: Final = "zero_is_known"
 """Optional attribute of a channel: 1 where its static part is measured too, as that of displacements is."""
 _INFORMATIVE: Final = 4.0
+"""Power over variance, from which a coefficient stands out of the noise."""
 _SLOWEST_INTEGRATED_HZ: Final = 5 * DRIFT_CORNER_HZ
+"""Below it displacements from integrated accelerometers are not valid."""
 _FILTER_SETTLING_S: Final = 1.0 / DRIFT_CORNER_HZ
-"""What a filter that removes drift makes of beginnings and ends."""
+"""Beginnings and ends that the filter which removes drift disturbs."""
 IGNORED_VARIANCE: Final = 100.0
+"""Factor of a variance with which a coefficient counts for next to nothing."""
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
+"""Of the blocks, in which a band must be informative to be kept."""
 _LEAST_SHARE: Final = 1e-4
-"""No channel is believed to better than this share of its RMS per coefficient; quantisation and rounding."""
+"""Of the RMS of a channel: least standard deviation of a coefficient, for quantisation and rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +51,11 @@ class Observation:
     spectra : ndarray, shape (n_blocks, n_kept)
         Of the recording, in the lowest bands.
     variance : ndarray, shape (n_blocks, n_kept)
-        Of each coefficient, by what does not repeat.
+        Of each coefficient, by noise and by what does not repeat.
     n_transformed : int
         Bands of the transform, if not all of them are kept.
     is_rough : bool
-        Whether some of the channel need not be described, though repeats may share it.
+        Whether a model need not describe the channel to its noise (`known_to`), although the rest repeats.
     simulated : ndarray of shape of `spectra`, or None
         Of the same, as a first fit of the baseline simulates it, where that is known.
     """
@@ -83,9 +88,9 @@ class Observation:
 
     @property
     def informative(self) -> NDArray[np.bool_]:
-        """Coefficients in whose neighbourhood the recording or its simulation stands out of what does not repeat.
+        """Coefficients in whose neighbourhood the recording or its simulation stands out of the noise.
 
-        A simulation that is driven by a faulty sensor moves where nothing is recorded.
+        The simulation counts, too: driven by a faulty sensor it moves where nothing is recorded.
         """
         shown = [spectra for spectra in (self.spectra, self.simulated) if spectra is not None]
         power = np.max([uniform_filter(spectra**2, (3, 3), mode="nearest") for spectra in shown], axis=0)
@@ -96,7 +101,9 @@ class Observation:
         return _spectra(values, self.known, self.keeps_mean, self.n_bands, self.run)[:, : self.spectra.shape[1]]
 
     def residual(self, values: FloatArray) -> FloatArray:
-        """Recorded minus simulated spectra in standard deviations, shape (n_blocks, n_bands)."""
+        """Whitened residual: recorded minus simulated spectra in standard deviations, shape (n_blocks,
+        n_bands).
+        """
         return np.asarray((self.spectra - self.of(values)) / self._deviation)
 
     @cached_property
@@ -132,6 +139,7 @@ def observations(
         variable = run.recording[name]
         values = np.asarray(variable.values, np.float64)
         known = np.isfinite(values) & ~clipped_samples(variable)
+        # Less than two blocks have no spectrum to compare.
         if known.sum() < 2 * n_bands:
             continue
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
@@ -143,6 +151,7 @@ def observations(
         lost = slow_displacements(observation, driving)
         if lost.any():
             times = observation.times_s
+            # The filter that removes drift has no past at the beginning and no future at the end.
             at_ends = (times - times[0] < _FILTER_SETTLING_S) | (times[-1] - times < _FILTER_SETTLING_S)
             everywhere = IGNORED_VARIANCE * (spectra[lost] ** 2).mean()
             variance[lost & (at_ends[:, None] | (not knows_noise_of_drive))] += everywhere
@@ -151,7 +160,7 @@ def observations(
 
 
 def slow_displacements(observation: Observation, driving: Sequence[str]) -> NDArray[np.bool_]:
-    """Coefficients of displacements and velocities that integration of an accelerometer hardly tells.
+    """Coefficients of displacements and velocities below the band in which integrated accelerometers are valid.
 
     Parameters
     ----------
@@ -197,7 +206,7 @@ def _is_integrated(run: CaseRun, driving: Sequence[str]) -> bool:
 
 
 def within_informative_bands(observed: Sequence[Observation]) -> list[Observation]:
-    """The channels of a run without the high bands in which none of them stands out of what does not repeat.
+    """The channels of a run without the high bands in which none of them stands out of the noise.
 
     Parameters
     ----------
@@ -258,7 +267,7 @@ def with_scatter(
         scatter[name] = uniform_filter(about, (3, 9), mode="nearest")
     return [
         [
-            _weighted(observation, np.maximum(scatter[observation.channel], _floor(observation)))
+            _weighted(observation, np.maximum(scatter[observation.channel], observation.variance))
             if observation.channel in scatter
             else observation
             for observation in repeat
@@ -268,9 +277,9 @@ def with_scatter(
 
 
 def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observation]) -> list[Observation]:
-    """Observations of a test that was not repeated, weighted as its channels scatter elsewhere.
+    """Observations of a test that was not repeated, with the scatter of its channels in repeated tests.
 
-    The scatter there is taken as noise that is always there, per band, and a share of the signal.
+    That scatter is modelled as a constant noise per band, and a share of the signal.
 
     Parameters
     ----------
@@ -304,21 +313,16 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
 
 
 def _weighted(observation: Observation, variance: FloatArray) -> Observation:
-    return replace(observation, variance=np.maximum(variance, _floor(observation)))
-
-
-def _floor(observation: Observation) -> FloatArray:
-    """Variance by the sensor alone, of an observation that is weighted by nothing else."""
-    return observation.variance
+    return replace(observation, variance=np.maximum(variance, observation.variance))
 
 
 def _spectra(
     values: FloatArray, known: NDArray[np.bool_], keeps_mean: bool, n_bands: int, run: CaseRun
 ) -> FloatArray:
-    """Spectra of what is known, faded in and out.
+    """Spectra of the known samples, tapered at both ends.
 
-    A run that ends abruptly spreads the scatter of its strong bands over weak ones, where it would count far too
-    much. A release is faded in quickly: its first cycles are what it is made for.
+    An abrupt end leaks the scatter of strong bands into weak ones, where it would count far too much. A release
+    has a short taper at its start: its first cycles hold most of the information.
     """
     masked = np.zeros(known.size)
     n = min(known.size, values.size)
@@ -337,4 +341,5 @@ def _white_level(spectra: FloatArray) -> float:
     upper = spectra[:, int(0.6 * spectra.shape[1]) :]
     width = max(4, upper.shape[1] // 8)
     levels = [float(np.median(upper[:, i : i + width] ** 2)) for i in range(0, upper.shape[1] - width + 1, width)]
+    # medians, as a line of the mains or a harmonic in some of the bands must not count
     return min(levels) / 0.4549  # the median of a squared normal number over its mean

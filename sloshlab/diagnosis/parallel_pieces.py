@@ -1,7 +1,7 @@
-"""Independent work in two processes: this one, and a copy of it that takes every piece that is left.
+"""Independent work in two processes: this one and a fork of it take pieces from one queue.
 
-What comes of a piece is the same, bit for bit, whoever does it; pieces that the copy fails at are done here, where
-what is wrong with them shows.
+Results are the same, bit for bit, whichever process computes them; pieces that fail in the fork are done again
+here, where their error is raised.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class _ThisProcess:
 
 
 def is_single_threaded() -> bool:
-    """Whether one thread does everything: on one core, or beside another process that has the other core."""
+    """Whether one thread does everything: on one core, or while another process uses the other core."""
     return forked_process.N_WORKERS == 1 or _ThisProcess.shares_cores or is_fork()
 
 
@@ -48,12 +48,13 @@ def in_parallel(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Ca
     if len(pieces) < 2 or not CAN_FORK or is_single_threaded():
         return [piece() for piece in pieces]
     known = {id(candidate): candidate for candidate in candidates}
+    # A shared counter, not halves: pieces differ in length, and one process would wait for the other.
     taken = multiprocessing.get_context("fork").Value("i", 0)
     fork, line = forked(_work_off_queue, pieces, taken, known)
     try:
         with _sharing_cores():
             results = {i: pieces[i]() for i in _untaken_pieces(taken, len(pieces))}
-        with suppress(OSError, EOFError):  # it has ended before its time
+        with suppress(OSError, EOFError):  # the fork was killed
             results |= _Reader(io.BytesIO(line.recv_bytes()), known).load()
     finally:
         terminate(fork, line)
@@ -70,7 +71,7 @@ def _sharing_cores() -> Iterator[None]:
 
 
 def _untaken_pieces(taken: Synchronized[int], n: int) -> Iterator[int]:
-    """Numbers of pieces that nobody has taken, one at a time."""
+    """Indices of pieces that neither process has taken, one at a time."""
     while True:
         with taken.get_lock():
             i = taken.value
@@ -86,7 +87,7 @@ def _work_off_queue(
     taken: Synchronized[int],
     known: Mapping[int, Candidate],
 ) -> None:
-    """Take pieces until none is left, then hand over what came of them."""
+    """Take pieces until none is left, then send their results."""
     results = {}
     for i in _untaken_pieces(taken, len(pieces)):
         with suppress(Exception):  # whatever it is, the first process meets it when it does the piece itself
@@ -97,7 +98,7 @@ def _work_off_queue(
 
 
 class _Writer(pickle.Pickler):
-    """Candidates are not written, as effects are functions: they stand at the same address in both processes."""
+    """Candidates are sent by address: their effects are functions, and at the same address in both processes."""
 
     def __init__(self, file: io.BytesIO, known: Mapping[int, Candidate]) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
@@ -108,7 +109,7 @@ class _Writer(pickle.Pickler):
 
 
 class _Reader(pickle.Unpickler):
-    """Reads only what our own copy wrote to its end of a line."""
+    """Reads only what our own fork wrote to its end of the pipe."""
 
     def __init__(self, file: io.BytesIO, known: Mapping[int, Candidate]) -> None:
         super().__init__(file)

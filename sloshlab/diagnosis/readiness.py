@@ -1,4 +1,4 @@
-"""Whether a case can be diagnosed at all: before hours are spent, and in words that say what to correct.
+"""Checks before a search: whether a case can be diagnosed at all, in words that say what to correct.
 
 A twin that does not run, or reads something else than what was recorded by orders of magnitude, has no missing
 physics: the rig, the units or the folder is another one.
@@ -23,6 +23,7 @@ FloatArray = NDArray[np.float64]
 LARGEST_RATIO: Final = 30.0
 """Recorded over simulated RMS of a channel; beyond, its units or its rig are others. g for m/s² is 9.8."""
 _MASSES_AGREE: Final = 0.05
+"""Relative difference, up to which two statements of a mass agree."""
 _FEWEST_SAMPLES: Final = 64
 
 

@@ -27,9 +27,12 @@ _N_LEVELS: Final = 10
 _N_PHASES: Final = 24
 _N_CELLS: Final = 8
 _LARGEST: Final = 1e6
+"""Squares of weighted residuals are cut off there."""
 _NARROW: Final = 0.6
+"""Share of the power about one frequency, from which a motion has a single one."""
 NAMED_ORDERS: Final = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 _ABOUT: Final = 0.2
+"""Half width of the neighbourhood of an order."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The twin of a rig as a diagnosis sees it: what its parameters may be, and what its channels show in a run."""
+"""The twin of a rig as a model to be retuned: its parameters with priors, and the readings of its channels."""
 
 from __future__ import annotations
 
@@ -35,29 +35,41 @@ from sloshlab.twin.twin import Twin
 FloatArray = NDArray[np.float64]
 STEPS_PER_PERIOD: Final = 8.0
 _STEPS_PER_PERIOD_OF_A_RELEASE: Final = 12.0
-"""Of the highest mode, which a release excites most; its own motion is followed exactly (`for_steps_of`)."""
+"""Of the highest mode, which a release excites most.
+
+Modes move exactly at any step (`for_steps_of`); with 12 and 8 steps errors were 0.3 standard deviations over a run
+of three beams.
+"""
 _FINER_FOR_EVENTS: Final = 2.0
-"""Within longer steps friction may stop a place twice, and a contact open and close."""
+"""Factor where there are events: within longer steps friction may stop twice, and a contact open and close."""
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
+"""Of the lowest mode: forces with memory need them."""
 _LEAST_STEPS_PER_S: Final = 500.0
-"""Of a tank that follows its measured motion: forces that average over a cycle need some tens of steps in it."""
+"""Of a tank that follows its measured motion: forces with a running mean need some tens of steps per cycle.
+
+At 64 Hz the memory of the liquid's damping was integrated in steps of a seventh of a cycle and diverged.
+"""
 _MOST_KEPT_BYTES: Final = 5e7
+"""Of simulated channels in each process; answers do not depend on it."""
 _MOST_READINGS_TO_FORK: Final = 350_000
-"""Of all channels and runs: processes that simulate and fit a third more were seen to hold three gigabytes."""
+"""Of all channels and runs: with a third more, the processes together were seen to hold three gigabytes."""
 RELEASE: Final = "release of "
 _FLUCTUATION: Final = "damping of the liquid in "
 _TOLERANCE_OF_FLUCTUATION: Final = 0.05
-"""By which a chaotic liquid damps more or less in one run than on average."""
+"""Of the damping of a chaotic liquid in one run, over its mean."""
 _DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
 _BOUND_TOLERANCES: Final = 1.25
-"""Tolerances by which masses, frequencies, losses and gains may be off; beyond, something else is the matter."""
+"""Bound, in tolerances, of masses, frequencies, losses and gains; beyond it something else is wrong."""
 _TOLERANCE_OF_SHAPE: Final = 0.01
-"""Of the value at the tip: where a sensor sits, and that a beam is not quite uniform."""
+"""Of the value at the tip: position of a sensor, and a beam that is not quite uniform.
+
+Mode shapes as constants made cross talk out of such errors.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class _Channels:
-    """What is needed of a run's channels again and again."""
+    """Channels of a run, kept since every simulation needs them."""
 
     compared: tuple[str, ...]
     attributes: Mapping[str, Mapping[str, Any]]
@@ -68,7 +80,7 @@ class _Channels:
 
 @dataclass(frozen=True, eq=False)
 class _TrueReadings:
-    """What perfect sensors show in a run, and motions of the modes, (n, n_modes), for those along a beam."""
+    """Readings of perfect sensors in a run, and motions of the modes, (n, n_modes), for those along a beam."""
 
     channels: dict[str, FloatArray]
     modes: dict[str, FloatArray]
@@ -134,7 +146,7 @@ class RigModel:
         return np.asarray(self._simulation(run, values, NOTHING, ()).places[:, 1])
 
     def _belongs(self, parameter: str, run: CaseRun) -> bool:
-        """Whether a number of the motion is of this run or of all."""
+        """Whether a parameter of the motion belongs to this run or to all."""
         for beginning in (RELEASE, _FLUCTUATION):
             if parameter.startswith(beginning):
                 return parameter == beginning + run.name
@@ -213,11 +225,13 @@ class RigModel:
         return readings
 
     def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> _TrueReadings:
+        # Gains, offsets and shapes change readings only: a simulation serves for all of their values.
         physical = tuple(
             values.get(parameter.name, parameter.believed)
             for parameter in self.parameters
             if not parameter.is_reading and self._belongs(parameter.name, run)
         )
+        # A fault of a driving channel changes the motion, so that it is part of the key; others only read it.
         undone = tuple(fault for fault in extension.faults if fault.channel in self.driving(run))
         others = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
         key = (run.name, physical, tuple(others), tuple(fault.key for fault in undone))
@@ -254,6 +268,9 @@ class RigModel:
         gains = [values.get(f"gain of {name}", 1.0) for name in trusted]
         excitation = drive.excitation
         if gains:
+            # The drive is the mean of several accelerometers, weighted by the inverse of their stated noise
+            # variance: gains are retuned, so that only noise decides. A plain mean had half of the loudest
+            # sensor's noise.
             excitation = excitation.scaled(1.0 / float(np.dot(weights_by_noise(run.recording, trusted), gains)))
         rate = drive.excitation.sampling_rate_hz
         start = values.get(f"{RELEASE}{run.name}", drive.initial_displacement_m)
@@ -262,11 +279,13 @@ class RigModel:
             per_period *= _FINER_FOR_EVENTS
         n_substeps = steps_per_sample(twin, rate, per_period)
         if twin.structure is not None:
+            # Stiffness and damping for which the integrator's step moves each mode exactly: with them half as many
+            # steps are enough.
             twin = replace(twin, structure=twin.structure.for_steps_of(1.0 / (rate * n_substeps)))
         return twin.simulate(excitation, initial_displacement_m=start, n_substeps=n_substeps).require_done()
 
     def _compared_drives(self, run: CaseRun, undone: Sequence[SensorFault] = ()) -> list[str]:
-        """Channels whose mean moves the tank, and which are compared, too: their gains say how far it moved."""
+        """Channels whose mean drives the tank and which are compared, too: their gains scale the drive."""
         faulty = {fault.channel for fault in undone}
         compared = self._channels[run.name].compared
         return [name for name in self.driving(run) if name in compared and name not in faulty and not run.is_free]
@@ -301,6 +320,7 @@ class RigModel:
         configuration = run.attributes.configuration
         if configuration != "sloshing":
             liquid = ()
+        # Rig files state the mass with liquid.
         if configuration == "empty":
             liquid = (MASS_ERROR(place="tank", mass_kg=-self.rig.liquid_mass_kg),)
         carried = twin.carried_mass_kg * values.get("carried mass", 1.0)
@@ -315,6 +335,7 @@ class RigModel:
         drive = drive_of(corrected(run, undone, driving), self.twin, by_noise=True)
         drive = replace(drive, excitation=with_cached_inputs(drive.excitation))
         with self._lock:
+            # Drives with faults are as many as a fit has trial values; those of the recordings are kept.
             if len(self._drives) > 20 * max(1, len(self.runs)):
                 self._drives = {known: self._drives[known] for known in self._drives if len(known) == 1}
             self._drives[key] = drive
@@ -335,6 +356,7 @@ class RigModel:
             found += _structure_parameters(self.twin.structure, moves=any(not run.is_free for run in self.runs))
         for term in self.twin.terms:
             for name, value in term.values.items():
+                # A force that is zero in the rig file is absent, and a tolerance of 20 % of zero would be none.
                 if name in _TUNED_NUMBERS and value:
                     number = f"{term.name}.{name}"
                     found.append(
@@ -354,7 +376,9 @@ class RigModel:
                 channel="" if name in moving else name,
             )
             for name in names
-            if not name.endswith("_root")  # a base at rest has none to tell, and participations hold it otherwise
+            if not name.endswith(
+                "_root"
+            )  # not observable for a base at rest, and part of the participations otherwise
         ]
         cells = _cells(names)
         found += [
@@ -411,7 +435,10 @@ def steps_per_sample(twin: Twin, sampling_rate_hz: float, per_period: float = ST
 
 
 def _structure_parameters(structure: Structure, *, moves: bool) -> list[BaselineParameter]:
-    """Participations hold the gain of the sensor at the base too, which drives the twin and is not compared."""
+    """Frequencies, losses, masses and participations of the modes.
+
+    The gain of the sensor at the base is part of the participations, as it drives the twin and is not compared.
+    """
     n = structure.masses_kg.size
     found = []
     for i in range(n):
@@ -455,7 +482,7 @@ def _damps_as_liquid(term: Term) -> bool:
 
 
 def _fluctuating(term: Term, factor: float) -> Term:
-    """The damping of the liquid as it was in one run: what moves chaotically never damps twice alike."""
+    """The damping of the liquid in one run: that of a chaotic motion differs from run to run."""
     if factor == 1.0 or not _damps_as_liquid(term):
         return term
     return term.changed(**{_DAMPING_OF_LIQUID: factor * term.values[_DAMPING_OF_LIQUID]})
@@ -478,6 +505,7 @@ def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str
     """
     recording = run.recording
     for fault in undone:
+        # A redundant sensor with a fault is left out: the others drive, and its own reading tests the fault.
         redundant = [name for name in driving if name != fault.channel and name in recording.data_vars]
         if redundant and fault.channel in recording.data_vars:
             recording = recording.drop_vars(fault.channel)
@@ -498,16 +526,16 @@ def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str
 
 
 def with_cached_inputs(excitation: Excitation) -> Excitation:
-    """The excitation with the interpolated values of earlier simulations kept."""
+    """The excitation with a cache of its interpolated inputs, which every simulation of a run asks for again."""
     inputs = excitation.inputs
     if inputs is None:
         return excitation
     kept: dict[tuple[float, int, float], FloatArray] = {}
 
-    def with_cached_inputs(time: FloatArray) -> FloatArray:
+    def cached(time: FloatArray) -> FloatArray:
         key = (float(time[0]), time.size, float(time[-1]))
         if key not in kept:
             kept[key] = inputs(time)
         return kept[key]
 
-    return replace(excitation, inputs=with_cached_inputs)
+    return replace(excitation, inputs=cached)

@@ -1,4 +1,8 @@
-"""What one Gauss–Newton step from a fit promises of an effect, before anything is fitted."""
+"""Score test of an effect beside a fit: the gain that one Gauss–Newton step predicts, before anything is fitted.
+
+Rao (1948), doi:10.1017/S0305004100023987, with the parameters of the fit as nuisance parameters: they follow the
+effect by their own Gauss–Newton step.
+"""
 
 from __future__ import annotations
 
@@ -14,15 +18,15 @@ FloatArray = NDArray[np.float64]
 
 
 class ScoreTest:
-    """What one Gauss–Newton step promises, with channels believed to a share of their RMS.
+    """Predicted gains of effects beside one fit, with inflated noise.
 
-    Parameters at their bounds cannot follow an effect; all others do, and what is believed of them counts.
+    Parameters at their bounds cannot follow an effect; all others do, within their priors.
 
     Parameters
     ----------
     problem : FreeRunProblem
     theta, residual : ndarray
-        Where it was fitted, and what is left there.
+        Optimum of the fit, and the residuals there.
     jacobian : BlockJacobian
         There.
     inflation : float
@@ -37,6 +41,7 @@ class ScoreTest:
         inflation: float,
     ) -> None:
         inflation_weights = problem.inflation_weights(inflation)
+        # A wide Huber limit: far from the optimum large residuals are what an effect has to explain.
         self._weights = inflation_weights * robust_weights(inflation_weights * residual, 10.0)
         self._weighted, self._left = jacobian.weighted(self._weights), self._weights * residual
         self._can_move = np.flatnonzero(~problem.at_bounds(theta))
@@ -49,6 +54,7 @@ class ScoreTest:
         """Decrease of the cost by the best multiple of a change of the residuals, and that multiple."""
         direction = self._weights * change
         touched = self._weighted.transposed_times(direction)[self._can_move]
+        # What the parameters of the fit can follow is no gain of the effect (projection onto their complement).
         followed = self._inverse @ touched
         size = float(direction @ direction - followed @ touched)
         along = float(direction @ self._left - followed @ self._gradient)
@@ -56,4 +62,4 @@ class ScoreTest:
         gain = along * inflation
         return (
             (gain, -inflation) if isfinite(gain) else (0.0, 0.0)
-        )  # what explodes without a bound promises nothing
+        )  # a simulation that diverges without end predicts nothing

@@ -1,8 +1,7 @@
 """Simulations in a second process: two threads of one interpreter wait for each other half of the time.
 
-It is a copy of this one (fork), so that runs, effects and compiled laws need not be sent. It gives the same
-numbers, bit for bit, and is no more than a second pair of hands: where it cannot be had, or has ended, all is done
-here.
+It is a fork of this one, so that runs, effects and compiled laws need not be sent. It gives the same numbers, bit
+for bit; where it cannot be started, or has ended, everything is done here.
 """
 
 from __future__ import annotations
@@ -30,12 +29,12 @@ Values = Mapping[str, float]
 Work = Callable[[DiagnosedModel, Runs, Values, Sequence[Candidate]], FloatArray]
 """Weighted residuals of runs, one after another."""
 _LEAST_COEFFICIENTS: Final = 20_000
-"""Of all runs; a copy and its messages take longer than what is less."""
+"""Of all runs; with fewer a fork and its messages take longer than the work."""
 _Item = TypeVar("_Item")
 
 
 class SecondProcess:
-    """A copy of this process that does one kind of work on one model.
+    """A fork of this process that does one kind of work on one model.
 
     Parameters
     ----------
@@ -63,7 +62,7 @@ class SecondProcess:
         n = sum(observation.spectra.size for observation in self.observed.all)
         self._shared: FloatArray = np.frombuffer(mmap(-1, 8 * max(1, n)), np.float64)
         self._process, self._line = forked(
-            _serve, work, model, self.observed.all, self.candidates.all, self._shared
+            _serve, work, model, (self.observed.all, self.candidates.all), self._shared
         )
 
     def done(self, runs: Runs, values: Values, candidates: Sequence[Candidate]) -> FloatArray | None:
@@ -93,7 +92,7 @@ _PRESENT: Final[weakref.WeakKeyDictionary[DiagnosedModel, SecondProcess]] = weak
 def second_process(
     work: Work, model: DiagnosedModel, runs: Runs, candidates: Sequence[Candidate]
 ) -> SecondProcess | None:
-    """That of a model, made anew where it has not seen a run or an effect; ended when the model is.
+    """The second process of a model, started anew for an unknown run or effect; terminated when the model ends.
 
     To be called while no other thread works on the model.
 
@@ -107,7 +106,7 @@ def second_process(
     Returns
     -------
     SecondProcess or None
-        None where it would be of no use or of no good: small problems, other systems, code that is not ours.
+        None for small problems, on other systems, and for twins with code of a user's own.
     """
     if is_single_threaded() or not (CAN_FORK and model.may_be_forked):
         return None
@@ -127,7 +126,7 @@ def second_process(
 
 
 class _Numbered(Generic[_Item]):
-    """Things in the order in which they were given, told apart by which they are, not by what they equal."""
+    """Items in the order in which they were given, by identity, not by equality."""
 
     def __init__(self, items: Iterable[_Item]) -> None:
         self.all = tuple(items)
@@ -144,11 +143,11 @@ def _serve(
     line: Connection,
     work: Work,
     model: DiagnosedModel,
-    observed: Sequence[Observation],
-    candidates: Sequence[Candidate],
+    known: tuple[Sequence[Observation], Sequence[Candidate]],
     shared: FloatArray,
 ) -> None:
-    """Work until the first process hangs up."""
+    """Work until the first process closes the pipe."""
+    observed, candidates = known
     with suppress(OSError, EOFError):
         while True:
             of_runs, values, of_candidates = line.recv()

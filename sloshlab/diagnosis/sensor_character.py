@@ -1,4 +1,4 @@
-"""Questions to a sensor that contradicts the others: what is its error a function of."""
+"""Character of the error of a sensor that contradicts the others: gain, rate, trend, mains, clock, clipping, …"""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.evidence import (
     CLOCK_DRIFT,
-    CROSS_TALK,
+    FOLLOWS_OTHER_CHANNEL,
     MAINS_LINE,
     PROPORTIONAL_TO_INTEGRAL,
     PROPORTIONAL_TO_RATE,
@@ -26,9 +26,12 @@ from sloshlab.recording import channels
 
 FloatArray = NDArray[np.float64]
 _N_PARTS: Final = 8
+"""Stretches of a run that are resampled as wholes (block bootstrap)."""
 _N_DRAWS: Final = 120
-_MUCH: Final = 0.3
-_CLOSE: Final = 0.1
+_LEAST_SHARE: Final = 0.3
+"""Of the variance of the error that a form must explain to hold."""
+_SHARE_MARGIN: Final = 0.1
+"""Below the best form, within which a form may hold, too."""
 _MAINS_HZ: Final = (50.0, 60.0)
 
 
@@ -56,14 +59,14 @@ class SensorAnswer:
 def sensor_character(
     runs: Sequence[Sequence[Observation]], found: Sequence[RunForces], channel: str, seed: int = 0
 ) -> tuple[SensorAnswer, ...]:
-    """Ask what the error of a channel is a function of.
+    """Regress the error of a channel on the forms that faults of sensors have.
 
     Parameters
     ----------
     runs : sequence of sequences of Observation
         Per run.
     found : sequence of RunForces
-        Of the same runs, the channel not believed.
+        Of the same runs, the channel left out.
     channel : str
     seed : int
         Of the draws for intervals.
@@ -84,9 +87,9 @@ def sensor_character(
     answers = [SensorAnswer(SINGLE_CHANNEL, 1.0, 1.0, 1.0, True)]
     for term, (share, low, high) in sorted(shares.items(), key=lambda item: -item[1][0]):
         holds = None
-        if low > _MUCH and share > top - _CLOSE:
+        if low > _LEAST_SHARE and share > top - _SHARE_MARGIN:
             holds = True
-        elif high < top - _CLOSE or high < _CLOSE:
+        elif high < top - _SHARE_MARGIN or high < _SHARE_MARGIN:
             holds = False
         answers.append(SensorAnswer(term, share, low, high, holds))
     return tuple(answers)
@@ -98,7 +101,7 @@ def decided_terms(answers: Sequence[SensorAnswer]) -> dict[str, bool]:
 
 
 def _forms(observation: Observation, error: FloatArray) -> Mapping[str, FloatArray]:
-    """Columns that the error may be a sum of, shape (n, k) each."""
+    """Features of each form, shape (n, k) each."""
     recording = observation.run.recording
     rate = observation.run.attributes.sampling_rate_hz
     reading = np.nan_to_num(np.asarray(recording[observation.channel].values, np.float64))
@@ -128,7 +131,7 @@ def _forms(observation: Observation, error: FloatArray) -> Mapping[str, FloatArr
         and recording[name].attrs.get("quantity") != recording[observation.channel].attrs["quantity"]
     ]
     if others:
-        forms[CROSS_TALK] = np.stack([other - other.mean() for other in others], axis=1)
+        forms[FOLLOWS_OTHER_CHANNEL] = np.stack([other - other.mean() for other in others], axis=1)
     return forms
 
 

@@ -1,4 +1,4 @@
-"""Which runs choose a model, and which ones judge it."""
+"""Split into runs that are fitted and runs that are held out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sloshlab.diagnosis.case import Case, CaseRun, level
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Runs that are fitted, and runs that choose nothing.
+    """Runs that are fitted, and held-out runs.
 
     Attributes
     ----------
@@ -48,6 +48,8 @@ def split(case: Case) -> Split:
     held: list[CaseRun] = []
     for group in by_experiment.values():
         ordered = sorted(group, key=lambda test: level(test[0]))
+        # Interpolation between levels is validated, not extrapolation: the smallest and the largest level are
+        # fitted.
         if len(ordered) >= 3:
             for test in ordered[1:-1:2]:
                 held += test

@@ -1,4 +1,4 @@
-"""What effects may know of a case to choose sizes that matter."""
+"""Sizes of the motion in a case, from which effects choose their start values."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ from sloshlab.rig import Rig
 FloatArray = NDArray[np.float64]
 _BASE: Final = ACCELERATION_ROOT
 _LARGEST_COHERENCE: Final = 0.9
-"""Of the mean square of a channel that may be another one's, with a gain and a delay, before they are alike."""
+"""Squared coherence of a channel with the base from which both read one motion, with a gain and a delay."""
 _MOST_PEAKS: Final = 3
+"""Bands in which modes are sought."""
 ACROSS_A_BAND: Final = (0.0, -0.4, 0.4, -0.8, 0.8)
-"""Of half its width, from its middle: a resonance may be narrower."""
+"""Places in a band, in halves of its width from its middle: a resonance may be narrower than the band."""
 _ONE_FREQUENCY: Final = 1.1
 """Of x_rms a_rms/v_rms², which is one for a harmonic motion, times the ratio of the frequencies of runs."""
 
@@ -71,7 +72,7 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
 
 
 def _incoherent_with_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:
-    """Channels whose analytic signal is not that of the accelerometer of the base times one complex number.
+    """Channels whose analytic signal is not coherent with that of the accelerometer of the base.
 
     Of all driven runs together: steady motion of one frequency has one such number, motion of several has not.
     """
@@ -97,7 +98,7 @@ def _analytic(values: FloatArray) -> NDArray[np.complex128]:
 def residual_peaks_hz(
     fitting: Sequence[Sequence[Observation]], residual: FloatArray, places: Sequence[float] = (0.0,)
 ) -> tuple[float, ...]:
-    """Frequencies of the highest peaks of weighted residuals, all runs and channels together.
+    """Frequencies of the highest peaks of the weighted residuals, all runs and channels together.
 
     Parameters
     ----------

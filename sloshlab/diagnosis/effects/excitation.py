@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
+from sloshlab.diagnosis.evidence import CONSERVATIVE, NO_ONSET, ODD_IN_DISPLACEMENT
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.base_rocking import BaseRocking
 
@@ -40,6 +41,6 @@ ROCKING = register(
         ("stiffness_change", "mass_error", "missing_mode"),
         "two accelerometers on the base, one before and one behind the root, in a decay",
         _has_root_moment,
-        spoken_for_by=("does no work", "odd in displacement", "no onset"),
+        spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, NO_ONSET),
     )
 )

@@ -6,11 +6,40 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final
 
 from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, never_distinct, register
+from sloshlab.diagnosis.evidence import (
+    CONSERVATIVE,
+    DISSIPATIVE,
+    NO_ONSET,
+    ODD_IN_DISPLACEMENT,
+    ODD_IN_VELOCITY,
+    RATE_DEPENDENT,
+    RATE_INDEPENDENT,
+    STATE_FUNCTION,
+    THIRD_ORDER,
+    WORK_1,
+    WORK_2,
+    WORK_3,
+)
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.terms import ForceKind
 
 MOST_DAMPING_OF_A_MODE: Final = 0.2
-"""Ratio to the critical one; what is damped more is no resonance but relaxes, and is no mode."""
+"""Ratio to the critical one; a coordinate with more damping has no resonance and is no mode."""
+
+VISCOUS_CHARACTER: Final = (DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, RATE_DEPENDENT, WORK_2, NO_ONSET)
+COULOMB_CHARACTER: Final = (
+    DISSIPATIVE,
+    ODD_IN_VELOCITY,
+    STATE_FUNCTION,
+    RATE_INDEPENDENT,
+    WORK_1,
+    NO_ONSET,
+    THIRD_ORDER,
+)
+DRAG_CHARACTER: Final = (DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, RATE_DEPENDENT, WORK_3)
+INERTIAL_CHARACTER: Final = (CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION, NO_ONSET)
+STRUCTURAL_CHARACTER: Final = (DISSIPATIVE, ODD_IN_VELOCITY, RATE_INDEPENDENT, WORK_2, NO_ONSET)
+"""Terms of `evidence.TERMS` that hold for forces of one kind, in the structure as in the tank."""
 
 
 def has_structure(surroundings: Surroundings) -> bool:
@@ -60,7 +89,7 @@ def force_effect(
     bounds : mapping, optional
         Narrower ones than those of the kind.
     may_rest : tuple of str
-        Names of numbers that may be at a bound in earnest.
+        Names of parameters for which a bound is a value like any other.
     look_alikes, separated_by, needs, spoken_for_by, includes, differs, variant_of, size
         As of `Effect`.
 

@@ -1,4 +1,4 @@
-"""Effects of the sensors: what a channel makes of what it should show."""
+"""Effects of the sensors: faults between the true motion or force and the recorded channel."""
 
 from __future__ import annotations
 
@@ -19,15 +19,28 @@ from sloshlab.diagnosis.candidate import (
     joined_channels,
     register,
 )
+from sloshlab.diagnosis.evidence import (
+    CLOCK_DRIFT,
+    FOLLOWS_OTHER_CHANNEL,
+    MAINS_LINE,
+    PROPORTIONAL_TO_INTEGRAL,
+    PROPORTIONAL_TO_RATE,
+    PROPORTIONAL_TO_READING,
+    SATURATING,
+    SINGLE_CHANNEL,
+    TREND,
+)
 from sloshlab.diagnosis.extension import Extension, Reading, SensorFault
 
 FloatArray = NDArray[np.float64]
 Others = Mapping[str, FloatArray]
 _MAINS_HZ: Final = 0.2
+"""By which the frequency of the mains may be off."""
 _MOST_PAIRS: Final = 20
+"""Of channel and source."""
 _SPLINE_DEGREE: Final = 5
 _LARGEST_LEAK: Final = 0.1
-"""Of a channel's reading; what adds more is no leak but another connection or gain."""
+"""Of a channel's reading; more than that is another connection or gain."""
 _LARGEST_LEAK_OF_ITS_KIND: Final = 0.2
 """The same for what another channel of the same quantity adds: both have the same cables and amplifiers."""
 
@@ -39,7 +52,7 @@ def _channels_and_devices(at: Surroundings) -> list[str]:
 
 
 def _compared_channels(at: Surroundings) -> list[str]:
-    """Those that are seen beside the simulation: all but one that drives it alone."""
+    """Channels that are compared with the simulation: all but one that drives it alone."""
     alone = at.driving if len(at.driving) == 1 else ()
     return [name for name in at.channels if name not in alone]
 
@@ -50,8 +63,8 @@ def _sensor_effect(
     parameters: tuple[EffectParameter, ...],
     starts: Callable[[Surroundings], Iterable[Numbers]],
     reading: Callable[[Numbers], Reading],
-    undone: Callable[[Numbers], Reading] | None,
     *,
+    undone: Callable[[Numbers], Reading] | None,
     look_alikes: tuple[str, ...] = (),
     separated_by: str = "the channel beside a second sensor at the same place",
     places: Callable[[Surroundings], list[str]] | None = None,
@@ -98,20 +111,22 @@ GAIN = _sensor_effect(
     (EffectParameter("ratio", -0.9, 5.0),),
     lambda at: [{"ratio": ratio} for ratio in (0.05, -0.05)],
     _scaled(lambda numbers: 1 + numbers["ratio"]),
-    _scaled(lambda numbers: 1 / (1 + numbers["ratio"])),
+    undone=_scaled(lambda numbers: 1 / (1 + numbers["ratio"])),
     look_alikes=("mass_error",),
-    spoken_for_by=("one channel alone", "proportional to the reading"),
+    spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_READING),
     places=_channels_and_devices,
 )
 
 
 _RINGING_SAMPLES: Final = 4
-"""What is made of a jump by filters and interpolation between samples."""
+"""Ringing of filters and of interpolation after a jump."""
 
 
 def _delayed(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-        """What happened before the recording, or after it, is not known: a held tank that is released jumps."""
+        """Before and after the recording nothing is known (a released tank jumps): there it reads what was
+        recorded.
+        """
         del others
         samples = numbers["delay_s"] * rate
         moved, place = _shifted(values, samples), np.arange(values.size)
@@ -131,7 +146,7 @@ def _advanced(numbers: Numbers) -> Reading:
 
 
 def _shifted(values: FloatArray, samples: float) -> FloatArray:
-    """Values `samples` later, by phase; the series is reflected at its ends."""
+    """Values delayed by `samples`, by a linear phase; the series is reflected at its ends."""
     margin = min(values.size - 1, 64 + int(abs(samples)))
     padded = np.concatenate(
         [2 * values[0] - values[margin:0:-1], values, 2 * values[-1] - values[-2 : -margin - 2 : -1]]
@@ -149,18 +164,19 @@ DELAY = _sensor_effect(
     (EffectParameter("delay_s", -0.05, 0.05),),
     lambda at: [{"delay_s": sign * 0.02 / at.frequency_hz} for sign in (1, -1)],
     _delayed,
-    _advanced,
+    undone=_advanced,
     look_alikes=("viscous_damping", "sensor_high_pass"),
-    spoken_for_by=("one channel alone", "follows its rate"),
+    spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_RATE),
     places=_channels_and_devices,
 )
 
 
 def _high_passed(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-        """The charge at the first sample is free in every run: what had not leaked away before."""
+        """The charge at the first sample is free in every run, by least squares."""
         del others
         two = 2 * numbers["time_constant_s"] * rate
+        # Bilinear transform: exact at zero frequency, and stable for every time constant.
         a, b = (two - 1) / (two + 1), two / (two + 1)
         passed = np.asarray(lfilter([b, -b], [1.0, -a], values))
         leaking = a ** np.arange(values.size)
@@ -186,9 +202,9 @@ HIGH_PASS = _sensor_effect(
     (EffectParameter("time_constant_s", 1e-3, 100.0),),
     lambda at: [{"time_constant_s": value} for value in (2.0, 0.2, 0.03)],
     _high_passed,
-    _high_pass_undone,
+    undone=_high_pass_undone,
     look_alikes=("sensor_delay",),
-    spoken_for_by=("one channel alone", "follows its integral"),
+    spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_INTEGRAL),
     places=_channels_and_devices,
 )
 
@@ -207,8 +223,8 @@ CLIPPING = _sensor_effect(
     (EffectParameter("limit", 1e-9, 1e9),),
     lambda at: [{"limit": share * at.peaks.get(at.channel, 2.0 * at.reading)} for share in (1.0, 0.97, 0.8)],
     _clipped,
-    None,
-    spoken_for_by=("one channel alone", "at the largest readings"),
+    undone=None,
+    spoken_for_by=(SINGLE_CHANNEL, SATURATING),
 )
 
 
@@ -227,16 +243,16 @@ DRIFT = _sensor_effect(
     (EffectParameter("rate", -1e6, 1e6),),
     lambda at: [{"rate": sign * 0.3 * at.reading / at.longest_run_s} for sign in (1, -1)],
     _drifted,
-    None,
+    undone=None,
     look_alikes=("liquid_loss",),
-    spoken_for_by=("one channel alone", "slow trend"),
+    spoken_for_by=(SINGLE_CHANNEL, TREND),
 )
 
 
 def _with_hum(line_hz: float, sign: float) -> Callable[[Numbers], Reading]:
     def of(numbers: Numbers) -> Reading:
         def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
-            """Its phase and the mains' frequency are free in every run: those of what is left."""
+            """Its phase and the mains' frequency are free in every run: those of the residual."""
             del others
             left = recorded - values if sign > 0 else recorded
             return np.asarray(values + sign * numbers["amplitude"] * _line(np.nan_to_num(left), rate, line_hz))
@@ -253,6 +269,7 @@ def _line(values: FloatArray, rate: float, line_hz: float) -> FloatArray:
     if not n:
         return np.zeros(values.size)
     power = np.abs(zoom_fft(values, within, n, fs=rate, endpoint=True))
+    # A parabola through the peak: the grid of the zoomed transform is coarser than the frequency must be known.
     k = min(max(int(np.argmax(power)), 1), n - 2)
     before, at, after = power[k - 1 : k + 2]
     curvature = before - 2 * at + after
@@ -270,9 +287,9 @@ HUM = [
         (EffectParameter("amplitude", 0.0, 1e9),),
         lambda at: [{"amplitude": 0.02 * at.reading}],
         _with_hum(line, 1.0),
-        _with_hum(line, -1.0),
+        undone=_with_hum(line, -1.0),
         separated_by="the channel with nothing moving",
-        spoken_for_by=("one channel alone", "a line of the mains"),
+        spoken_for_by=(SINGLE_CHANNEL, MAINS_LINE),
         variant_of=variant_of,
     )
     for name, line, variant_of in (("mains_hum", 50.0, ""), ("mains_hum_60", 60.0, "mains_hum"))
@@ -291,7 +308,7 @@ def _with_clock_skew(sign: float) -> Callable[[Numbers], Reading]:
 
 
 def _interpolated(values: FloatArray, places: FloatArray) -> FloatArray:
-    """Values between samples by splines; straight lines would take a ninth of what has six samples per cycle.
+    """Spline interpolation; linear interpolation would lose a ninth of a sine of six samples per cycle.
 
     Beyond the ends the last value stays; what is next to a lost sample is lost.
     """
@@ -309,17 +326,17 @@ CLOCK = _sensor_effect(
     (EffectParameter("ratio", -0.05, 0.05),),
     lambda at: [{"ratio": sign * 0.02 / (at.frequency_hz * at.longest_run_s)} for sign in (1, -1)],
     _with_clock_skew(1.0),
-    _with_clock_skew(-1.0),
+    undone=_with_clock_skew(-1.0),
     look_alikes=("sensor_delay",),
-    spoken_for_by=("one channel alone", "rate growing along the run"),
+    spoken_for_by=(SINGLE_CHANNEL, CLOCK_DRIFT),
     places=_channels_and_devices,
 )
 
 
 def _pairs(at: Surroundings) -> list[str]:
-    """Channel and source, of the same quantity first; what moves alike at one frequency leaks as a gain would.
+    """Channel and source, of the same quantity first; a leak between coherent channels is a gain and not offered.
 
-    On a shaker all of one quantity read one motion or one force, and a leak from each other is a gain, too.
+    On a shaker all channels of one quantity read one motion or one force and are coherent.
     """
     is_shaker = at.twin.structure is None
     pairs = [
@@ -332,6 +349,7 @@ def _pairs(at: Surroundings) -> list[str]:
         or (source.endswith("_root") and to in at.incoherent_with_base)
         if not (is_shaker and _read_same_quantity(to, source))
     ]
+    # Leaks within one quantity share cables and amplifiers; they come first where the list is cut.
     pairs.sort(key=lambda pair: not _read_same_quantity(*pair))
     return [f"{to}<{source}" for to, source in pairs[:_MOST_PAIRS]]
 
@@ -359,7 +377,7 @@ def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
 
 
 def _ratio_of_readings(at: Surroundings) -> float:
-    """Ratio with which as much would leak as the channel itself reads."""
+    """Ratio at which the leak is as large as the reading of the channel itself."""
     to, _, source = at.channel.partition("<")
     return at.channels.get(to, 1.0) / max(at.channels.get(source, 1.0), 1e-300)
 
@@ -389,6 +407,6 @@ CROSS_TALK = register(
         "the second channel disconnected",
         places=_pairs,
         limits=_largest_leaks,
-        spoken_for_by=("one channel alone", "another channel"),
+        spoken_for_by=(SINGLE_CHANNEL, FOLLOWS_OTHER_CHANNEL),
     )
 )

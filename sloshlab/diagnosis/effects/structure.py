@@ -3,7 +3,31 @@
 from __future__ import annotations
 
 from sloshlab.diagnosis.candidate import Numbers, Surroundings
-from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, force_effect
+from sloshlab.diagnosis.effects.force_effect import (
+    COULOMB_CHARACTER,
+    DRAG_CHARACTER,
+    INERTIAL_CHARACTER,
+    MOST_DAMPING_OF_A_MODE,
+    STRUCTURAL_CHARACTER,
+    VISCOUS_CHARACTER,
+    force_effect,
+)
+from sloshlab.diagnosis.evidence import (
+    CONSERVATIVE,
+    CONSTANT,
+    DISSIPATIVE,
+    EVEN,
+    MEMORY,
+    NO_ONSET,
+    ODD_IN_DISPLACEMENT,
+    ODD_IN_VELOCITY,
+    ONSET,
+    RATE_INDEPENDENT,
+    SECOND_ORDER,
+    STATE_FUNCTION,
+    THIRD_ORDER,
+    WORK_1,
+)
 from sloshlab.twin.rate_independent_forces import (
     FRICTION_BEHIND_PLAY,
     HYSTERESIS,
@@ -45,14 +69,7 @@ VISCOUS = force_effect(
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
     look_alikes=("structural_damping", "coulomb_friction", "sensor_delay"),
     separated_by=_OTHER_LEVELS + ", and at two frequencies",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "grows with rate",
-        "work ∝ amplitude²",
-        "no onset",
-    ),
+    spoken_for_by=VISCOUS_CHARACTER,
 )
 COULOMB = force_effect(
     COULOMB_FRICTION,
@@ -60,15 +77,7 @@ COULOMB = force_effect(
     lambda at: [{"force_n": share * at.force_n} for share in (0.003, 0.02)],
     look_alikes=("viscous_damping", "structural_damping", "stribeck_friction", "asymmetric_friction"),
     separated_by=_OTHER_LEVELS + ", down to rest",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "rate-independent",
-        "work ∝ amplitude",
-        "no onset",
-        "third order",
-    ),
+    spoken_for_by=COULOMB_CHARACTER,
 )
 
 
@@ -87,15 +96,7 @@ ASYMMETRIC = force_effect(
     ],
     look_alikes=("coulomb_friction + constant_force",),
     separated_by="none: the two are the same force; measure the static rest position with the friction taken off",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "rate-independent",
-        "work ∝ amplitude",
-        "no onset",
-        "constant part",
-    ),
+    spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, RATE_INDEPENDENT, WORK_1, NO_ONSET, CONSTANT),
     includes=("coulomb_friction", "constant_force"),
     differs=_clearly_asymmetric,
 )
@@ -113,7 +114,7 @@ STRIBECK = force_effect(
     bounds={"stribeck_velocity_m_per_s": (1e-3, 1e3)},
     look_alikes=("coulomb_friction",),
     separated_by="slow motion about the Stribeck velocity",
-    spoken_for_by=("takes energy", "odd in velocity", "function of the state", "no onset", "third order"),
+    spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, NO_ONSET, THIRD_ORDER),
     includes=("coulomb_friction",),
 )
 DRAG = force_effect(
@@ -122,13 +123,7 @@ DRAG = force_effect(
     lambda at: [{"drag_n_s2_per_m2": 0.01 * at.force_n / at.velocity_m_per_s**2}],
     look_alikes=("viscous_damping",),
     separated_by=_OTHER_LEVELS,
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "grows with rate",
-        "work ∝ amplitude³",
-    ),
+    spoken_for_by=DRAG_CHARACTER,
 )
 STRUCTURAL = force_effect(
     STRUCTURAL_DAMPING,
@@ -138,8 +133,10 @@ STRUCTURAL = force_effect(
     fitted=("loss_factor",),
     look_alikes=("viscous_damping", "coulomb_friction"),
     separated_by="the same amplitude at two frequencies",
-    spoken_for_by=("takes energy", "odd in velocity", "rate-independent", "work ∝ amplitude²", "no onset"),
+    spoken_for_by=STRUCTURAL_CHARACTER,
 )
+# Reid's law above is nonlinear; relaxing springs have a nearly constant loss factor over some decades and are
+# linear.
 LINEAR_STRUCTURAL = force_effect(
     LINEAR_STRUCTURAL_DAMPING,
     "structure",
@@ -149,7 +146,7 @@ LINEAR_STRUCTURAL = force_effect(
     may_rest=("creep_decades",),
     look_alikes=("viscous_damping", "coulomb_friction"),
     separated_by="the same amplitude at two frequencies",
-    spoken_for_by=("takes energy", "odd in velocity", "rate-independent", "work ∝ amplitude²", "no onset"),
+    spoken_for_by=STRUCTURAL_CHARACTER,
     variant_of="structural_damping",
 )
 
@@ -176,7 +173,7 @@ BOUC_WEN = force_effect(
     may_rest=("exponent",),
     look_alikes=("coulomb_friction", "structural_damping"),
     separated_by="slow loops of several amplitudes",
-    spoken_for_by=("takes energy", "memory", "rate-independent"),
+    spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT),
     includes=("coulomb_friction", "stiffness_change"),
 )
 
@@ -186,6 +183,7 @@ def _is_of_a_user(at: Surroundings) -> bool:
     return at.rig is None
 
 
+# For twins of a user's own only: machines have play, rigs of tanks have none.
 BEHIND_PLAY = force_effect(
     FRICTION_BEHIND_PLAY,
     "structure",
@@ -200,7 +198,7 @@ BEHIND_PLAY = force_effect(
     look_alikes=("hysteresis", "coulomb_friction", "clearance"),
     separated_by="slow reversals at several amplitudes, with the force read while it is low",
     needs=_is_of_a_user,
-    spoken_for_by=("takes energy", "memory", "rate-independent"),
+    spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT),
     includes=("coulomb_friction",),
 )
 CUBIC = force_effect(
@@ -209,7 +207,7 @@ CUBIC = force_effect(
     lambda at: [{"stiffness_n_per_m3": sign * 0.03 * at.force_n / at.displacement_m**3} for sign in (1, -1)],
     look_alikes=("quadratic_stiffness", "clearance"),
     separated_by="a larger range of amplitudes on both sides of rest",
-    spoken_for_by=("does no work", "odd in displacement", "function of the state", "third order"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION, THIRD_ORDER),
 )
 QUADRATIC = force_effect(
     QUADRATIC_STIFFNESS,
@@ -217,7 +215,7 @@ QUADRATIC = force_effect(
     lambda at: [{"stiffness_n_per_m2": sign * 0.03 * at.force_n / at.displacement_m**2} for sign in (1, -1)],
     look_alikes=("cubic_stiffness",),
     separated_by="a larger range of amplitudes on both sides of rest",
-    spoken_for_by=("does no work", "even", "function of the state", "second order"),
+    spoken_for_by=(CONSERVATIVE, EVEN, STATE_FUNCTION, SECOND_ORDER),
 )
 STIFFNESS = force_effect(
     STIFFNESS_CHANGE,
@@ -225,7 +223,7 @@ STIFFNESS = force_effect(
     lambda at: [{"stiffness_n_per_m": sign * 0.03 * _stiffness(at)} for sign in (1, -1)],
     look_alikes=("mass_error",),
     separated_by="a known mass added to the tank",
-    spoken_for_by=("does no work", "odd in displacement", "function of the state", "no onset"),
+    spoken_for_by=INERTIAL_CHARACTER,
 )
 GAP = force_effect(
     CLEARANCE,
@@ -236,10 +234,11 @@ GAP = force_effect(
     ],
     look_alikes=("cubic_stiffness",),
     separated_by="amplitudes just below and above the gap",
-    spoken_for_by=("does no work", "odd in displacement", "function of the state", "onset", "third order"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION, ONSET, THIRD_ORDER),
     includes=("stiffness_change",),
     size=("stiffness_n_per_m",),
 )
+# Far from its frequency a mode acts as a mass or as a spring, which are nested in it.
 MODE = force_effect(
     MISSING_MODE,
     "structure",
@@ -254,7 +253,7 @@ MODE = force_effect(
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("mass_error", "stiffness_change"),
     separated_by="a sweep over the missing mode's frequency",
-    spoken_for_by=("memory",),
+    spoken_for_by=(MEMORY,),
     includes=("mass_error", "stiffness_change", "viscous_damping"),
     size=("participation",),
 )
@@ -265,7 +264,7 @@ MASS = force_effect(
     bounds={"mass_kg": (-10.0, 10.0)},
     look_alikes=("stiffness_change", "sensor_gain"),
     separated_by="a known mass added to the tank",
-    spoken_for_by=("does no work", "odd in displacement", "function of the state", "no onset"),
+    spoken_for_by=INERTIAL_CHARACTER,
 )
 OFFSET = force_effect(
     CONSTANT_FORCE,
@@ -273,5 +272,5 @@ OFFSET = force_effect(
     lambda at: [{"force_n": sign * 0.01 * at.force_n} for sign in (1, -1)],
     look_alikes=("asymmetric_friction", "quadratic_stiffness"),
     separated_by="the static rest position",
-    spoken_for_by=("does no work", "even", "constant part", "no onset"),
+    spoken_for_by=(CONSERVATIVE, EVEN, CONSTANT, NO_ONSET),
 )

@@ -11,7 +11,27 @@ from scipy.stats import qmc
 
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
-from sloshlab.diagnosis.effects.force_effect import MOST_DAMPING_OF_A_MODE, force_effect, rocks
+from sloshlab.diagnosis.effects.force_effect import (
+    COULOMB_CHARACTER,
+    DRAG_CHARACTER,
+    INERTIAL_CHARACTER,
+    MOST_DAMPING_OF_A_MODE,
+    VISCOUS_CHARACTER,
+    force_effect,
+    rocks,
+)
+from sloshlab.diagnosis.evidence import (
+    CONSERVATIVE,
+    DISSIPATIVE,
+    HALF_ORDER,
+    IMPULSIVE,
+    MEMORY,
+    ODD_IN_DISPLACEMENT,
+    ODD_IN_VELOCITY,
+    ONSET,
+    STATE_FUNCTION,
+    TIME_VARYING,
+)
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.twin.liquid_effects import AIR_CUSHION, FARADAY_WAVE, LATERAL_MODE, LIQUID_DAMPING, LIQUID_LOSS
 from sloshlab.twin.structure_forces import COULOMB_FRICTION, MASS_ERROR, QUADRATIC_DRAG, VISCOUS_DAMPING
@@ -19,11 +39,15 @@ from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS
 from sloshlab.twin.terms import Term
 
 _CONTACT_HZ: Final = 50.0
+"""Of the first starts of an impact."""
 _LOWEST_PLACE, _HIGHEST_PLACE = np.log((0.25, 20.0, 0.05)), np.log((1.3, 200.0, 0.9))
 _PLACES_OF_AN_IMPACT: Final = np.exp(
     qmc.scale(qmc.Halton(3, scramble=False).random(301)[1:], _LOWEST_PLACE, _HIGHEST_PLACE)
 )
-"""Share of the room, frequency [Hz] and damping ratio of a contact: 2 % of the gap make another later bounce."""
+"""Share of the room, frequency [Hz] and damping ratio of a contact, spread evenly in logarithms (Halton).
+
+An impact needs many starts: with a gap that differs by 2 % every later bounce is another one.
+"""
 _LEVELS = "decays or sweeps at accelerations below and above the threshold"
 
 
@@ -42,14 +66,7 @@ VISCOUS = force_effect(
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
     look_alikes=("quadratic_drag", "coulomb_friction", "sensor_delay"),
     separated_by="two or more amplitudes and frequencies",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "grows with rate",
-        "work ∝ amplitude²",
-        "no onset",
-    ),
+    spoken_for_by=VISCOUS_CHARACTER,
 )
 COULOMB = force_effect(
     COULOMB_FRICTION,
@@ -57,15 +74,7 @@ COULOMB = force_effect(
     lambda at: [{"force_n": 0.1 * _liquid_force(at)}],
     look_alikes=("viscous_damping",),
     separated_by="two or more amplitudes",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "rate-independent",
-        "work ∝ amplitude",
-        "no onset",
-        "third order",
-    ),
+    spoken_for_by=COULOMB_CHARACTER,
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,
@@ -73,13 +82,7 @@ DRAG = force_effect(
     lambda at: [{"drag_n_s2_per_m2": 0.2 * _liquid_force(at) / at.velocity_m_per_s**2}],
     look_alikes=("viscous_damping", "liquid_sloshing"),
     separated_by="two or more amplitudes",
-    spoken_for_by=(
-        "takes energy",
-        "odd in velocity",
-        "function of the state",
-        "grows with rate",
-        "work ∝ amplitude³",
-    ),
+    spoken_for_by=DRAG_CHARACTER,
 )
 MASS = force_effect(
     MASS_ERROR,
@@ -88,7 +91,7 @@ MASS = force_effect(
     bounds={"mass_kg": (-10.0, 10.0)},
     look_alikes=("effective_mass", "sensor_gain", "stiffness_change"),
     separated_by="a known mass added to the tank, and a run with frozen liquid",
-    spoken_for_by=("does no work", "odd in displacement", "function of the state", "no onset"),
+    spoken_for_by=INERTIAL_CHARACTER,
 )
 EFFECTIVE = force_effect(
     EFFECTIVE_MASS,
@@ -98,7 +101,7 @@ EFFECTIVE = force_effect(
     fitted=("beta",),
     look_alikes=("mass_error",),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
-    spoken_for_by=("does no work", "odd in displacement", "function of the state"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION),
 )
 FADING = force_effect(
     FADING_MASS,
@@ -113,7 +116,7 @@ FADING = force_effect(
     may_rest=("averaging_s",),
     look_alikes=("cubic_stiffness", "hysteresis", "clearance"),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
-    spoken_for_by=("does no work", "odd in displacement"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
     includes=("mass_error",),
     variant_of="effective_mass",
 )
@@ -132,6 +135,8 @@ def _sweeps(at: Surroundings) -> bool:
     return at.twin.structure is None and not at.has_one_frequency
 
 
+# On a shaker the liquid follows less at high frequencies and more at high levels: no constant effective mass
+# explains that, a quadratic in octaves and doublings does.
 VARYING = force_effect(
     VARYING_MASS,
     "tank",
@@ -149,7 +154,7 @@ VARYING = force_effect(
     fitted=("beta", *(f"beta_{name}" for name in _VARIES)),
     needs=_sweeps,
     separated_by="runs with frozen and moving liquid, at several amplitudes",
-    spoken_for_by=("does no work", "odd in displacement"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
     includes=("mass_error",),
     variant_of="effective_mass",
 )
@@ -186,7 +191,7 @@ SLOSHING = register(
         _damping,
         ("viscous_damping", "quadratic_drag"),
         _LEVELS,
-        spoken_for_by=("takes energy", "odd in velocity", "onset"),
+        spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, ONSET),
         size=("peak_w_bar",),
     )
 )
@@ -194,7 +199,7 @@ SLOSHING = register(
 
 _DAMPERS: Final = ("viscous_damping", "liquid_damping", VISCOUS_MAP.name)
 _OF_MOVING_LIQUID: Final = (*_DAMPERS, "effective_mass_map")
-"""Forces of the baseline that stand for moving liquid: liquid that has not broken up yet has none of them."""
+"""Forces of the baseline for moving liquid; liquid that has not broken up yet has none of them."""
 
 
 def _changed_liquid(
@@ -229,6 +234,8 @@ def _damps(at: Surroundings) -> bool:
     return any(term.place == "tank" and term.name in _DAMPERS for term in at.twin.terms)
 
 
+# A liquid that has broken up stays so: with a state that fell back as soon as the motion calmed down, a liquid
+# that is broken up for good could not be described.
 _NEVER_CALM_S: Final = 1e9
 DELAY = register(
     Effect(
@@ -262,7 +269,7 @@ DELAY = register(
         ("high_g_saturation",),
         "a sudden start at constant amplitude",
         _damps,
-        spoken_for_by=("memory", "odd in velocity"),
+        spoken_for_by=(MEMORY, ODD_IN_VELOCITY),
         size=("time_constant_s",),
     )
 )
@@ -288,7 +295,7 @@ SATURATION = register(
         ("breakup_delay", "liquid_sloshing"),
         _LEVELS,
         _damps,
-        spoken_for_by=("odd in velocity", "onset"),
+        spoken_for_by=(ODD_IN_VELOCITY, ONSET),
     )
 )
 
@@ -298,6 +305,7 @@ def _knows_work(at: Surroundings) -> bool:
     return any(term.place == "tank" and term.name == VISCOUS_MAP.name for term in at.twin.terms)
 
 
+# Work per cycle may go on growing, less than with the square of the level.
 GRADUAL_SATURATION = register(
     Effect(
         "gradual_saturation",
@@ -323,7 +331,7 @@ GRADUAL_SATURATION = register(
         ("breakup_delay", "liquid_sloshing"),
         _LEVELS,
         _knows_work,
-        spoken_for_by=("odd in velocity", "onset"),
+        spoken_for_by=(ODD_IN_VELOCITY, ONSET),
         includes=("high_g_saturation",),
         variant_of="high_g_saturation",
     )
@@ -333,7 +341,7 @@ GRADUAL_SATURATION = register(
 def _impact_numbers(
     at: Surroundings, room: float, contact_hz: float, damping_ratio: float, share: float = 0.05
 ) -> dict[str, float]:
-    """A share of the liquid that flies through so much of the room above it."""
+    """Parameters of an impact by the share of the room above the liquid and by its contact."""
     rate, mass_kg = 2 * pi * contact_hz, share * at.rig.liquid_mass_kg
     return {
         "gap_m": room * (1 - at.rig.liquid.fill_level) * at.rig.tank.height_m,
@@ -346,6 +354,7 @@ def _impact_numbers(
 def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     del channel
     height = at.rig.tank.height_m
+    # A ball needs a radius: a gap as high as the tank leaves none.
     gap = min(numbers["gap_m"], 0.98 * height)
     ball = BOUNCING_BALL(
         radius_m=0.5 * (height - gap),
@@ -355,7 +364,7 @@ def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         beta=1.0 - numbers["share"],
         liquid_mass_kg=at.rig.liquid_mass_kg,
         height_m=height,
-        contact_pulls=0.0,
+        contact_pulls=0.0,  # a liquid pushes and never pulls; a contact that pulls made every bounce too slow
     )
     return Extension(terms=(ball,))
 
@@ -377,7 +386,7 @@ IMPACT = register(
         _impact,
         ("liquid_sloshing", "clearance"),
         "accelerations below and above 1 g, forces sampled fast",
-        spoken_for_by=("takes energy", "impulsive", "onset", "memory"),
+        spoken_for_by=(DISSIPATIVE, IMPULSIVE, ONSET, MEMORY),
         size=("stiffness_n_per_m", "damping_kg_per_s", "share"),
         sought_at=lambda at: [_impact_numbers(at, *place) for place in _PLACES_OF_AN_IMPACT],
     )
@@ -393,7 +402,7 @@ LATERAL = force_effect(
     look_alikes=("missing_mode",),
     separated_by="a slow sweep over its frequency at small amplitude",
     needs=rocks,
-    spoken_for_by=("memory",),
+    spoken_for_by=(MEMORY,),
     includes=("mass_error", "effective_mass"),
     size=("mass_kg",),
 )
@@ -411,7 +420,7 @@ FARADAY = force_effect(
     ],
     bounds={"growth": (1e-3, 100.0), "damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     separated_by="spectra at half the frequency below and above the threshold",
-    spoken_for_by=("half order", "memory", "onset"),
+    spoken_for_by=(HALF_ORDER, MEMORY, ONSET),
     size=("force_n",),
 )
 LOSS = force_effect(
@@ -420,7 +429,7 @@ LOSS = force_effect(
     lambda at: [{"rate_kg_per_s": 0.1 * at.rig.liquid_mass_kg / at.longest_run_s}],
     look_alikes=("mass_error", "sensor_drift"),
     separated_by="the same test at the beginning and at the end of the day",
-    spoken_for_by=("changes along the run", "odd in displacement"),
+    spoken_for_by=(TIME_VARYING, ODD_IN_DISPLACEMENT),
 )
 CUSHION = force_effect(
     AIR_CUSHION,
@@ -437,7 +446,7 @@ CUSHION = force_effect(
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("effective_mass", "lateral_mode"),
     separated_by="two pressures of the gas",
-    spoken_for_by=("does no work", "odd in displacement"),
+    spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
     includes=("mass_error", "effective_mass", "lateral_mode"),
     size=("stiffness_n_per_m", "mass_kg"),
 )

@@ -1,4 +1,4 @@
-"""The ceiling: what any force could explain, alone and beside the best explanation with a name."""
+"""The ceiling: what a restoring force surface explains, alone and beside the best explanation with a name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sloshlab.diagnosis.search.fits import Fits, best_fitting
 
 
 def ceilings(fits: Fits, at: Surroundings, known: Sequence[Explanation], retuned: FreeRunFit) -> list[Explanation]:
-    """The retuned baseline, and the best explanation, each with any force; none where all is explained.
+    """The retuned baseline, and the best explanation, each with a force surface; none where only noise is left.
 
     Parameters
     ----------
@@ -28,6 +28,7 @@ def ceilings(fits: Fits, at: Surroundings, known: Sequence[Explanation], retuned
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
     alone = _with_force_surface(fits, at, retuned)
+    # beside the best effect only one surface is fitted, in the block where it helped most alone
     by_cost = sorted(alone, key=lambda explanation: explanation.fit.cost)
     helpful = [explanation.fit.candidates[-1].effect.block for explanation in by_cost]
     return [*alone, *_with_force_surface(fits, at, best.fit, helpful[:1])]

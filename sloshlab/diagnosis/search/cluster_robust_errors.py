@@ -1,4 +1,4 @@
-"""Standard errors from how much runs, and parts of runs, disagree about a number."""
+"""Cluster-robust standard errors: from how much runs, and parts of runs, disagree about a parameter."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, robu
 
 FloatArray = NDArray[np.float64]
 _PARTS_OF_A_RUN: Final = (1, 4)
+"""Clusters per run."""
 _QUANTILE: Final = 0.95
+"""Of Student's t over the normal distribution: intervals are two-sided at 90 %."""
 
 
 def cluster_robust_errors(problem: FreeRunProblem, fit: FreeRunFit, jacobian: BlockJacobian) -> dict[str, float]:
-    """Standard errors of the effects' numbers if what is left belongs to runs, or parts of runs, as a whole.
+    """Standard errors of the effects' parameters with runs, or parts of runs, as clusters.
 
     Residuals of one stretch of a run are not independent: a chaotic liquid damps more for a while than it does on
-    average. Whole runs, and quarters of runs, are taken for independent instead, and the larger error counts.
+    average. Whole runs, and quarters of runs, are the independent clusters instead, and the larger error counts.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What all fits of one search share: the runs, how a fit is judged on runs that chose nothing, what failed."""
+"""What all fits of one search share: the runs, validation on held-out runs, what failed."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.second_process import second_process
 
 _LEAST_MISFIT_RATIO: Final = 1.2
+"""Misfit of a held-out run over that of the fitted ones, from which other releases are tried."""
 _RELEASE_OFFSETS: Final = (-0.03, -0.02, -0.01, -0.005, 0.005, 0.01, 0.02, 0.03)
-"""Dry friction stops a motion in jumps, and what follows a release has side valleys."""
+"""Of a held-out run, tried as starts: with dry friction the cost over the release has local minima."""
 _LITTLE_REPEATABLE: Final = 0.25
 _LITTLE_REPEATABLE_IN_A_CHANNEL: Final = 0.5
 _LITTLE_WITHOUT_REPEAT: Final = 1.5
-"""Mean squares, in noise floors: what repeats of a test share, in all channels and in one; what one run leaves in
-most channels."""
+"""Mean squares, in noise floors: repeatable residual of a test, in all channels and in one; residual of a
+run without a repeat in most channels."""
 Progress = Callable[[str, int, int], None]
 _Result = TypeVar("_Result")
 
@@ -60,7 +61,7 @@ class Fits:
     failed : dict
         Candidates that could not be fitted, and why.
     screened : dict
-        Candidates that promised too little, and how much.
+        Candidates whose score test predicts too little, and the gain that it predicts.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Fits:
     def one_repeat_per_test(self) -> Fits:
         """The same with the first fitted run of every test alone; itself where no test has two of them.
 
-        Repeats have the same drive: to look at seventy candidates, and to begin fits from afar, one is enough.
+        Repeats have the same drive: one of them is enough for score tests of all candidates and for coarse fits.
         """
         test_of = {name: i for i, test in enumerate(self.tests) for name in test}
         first: dict[object, list[Observation]] = {}
@@ -100,7 +101,7 @@ class Fits:
         return sum(observation.spectra.size for run in self.fitting for observation in run)
 
     def jacobian_of_part(self, jacobian: BlockJacobian, fit: FreeRunFit, whole: Fits) -> BlockJacobian:
-        """Of a Jacobian of more fitted runs, at a fit to them, what concerns those that are fitted here."""
+        """Rows and columns of a Jacobian of more fitted runs that concern those fitted here."""
         if whole is self:
             return jacobian
         names, all_names = self.problem_of(fit).names, whole.problem_of(fit).names
@@ -110,7 +111,7 @@ class Fits:
         return jacobian.part(chosen, [all_names.index(name) for name in names])
 
     def share_with_second_process(self, candidates: Sequence[Candidate]) -> None:
-        """Tell the second process of many effects at once; of each that it has not seen it would be made anew."""
+        """Start the second process with many effects at once: an unknown one would start another process."""
         second_process(residuals_of_runs, self.model, [*self.fitting, *self.held_out], candidates)
 
     def in_parallel(
@@ -131,7 +132,7 @@ class Fits:
     def all_fitted(
         self, pieces: Sequence[Callable[[], FreeRunFit]], candidates: Iterable[Candidate]
     ) -> list[Explanation]:
-        """Fits that do not depend on each other, each judged; without those that did not run."""
+        """Fits that do not depend on each other, each validated; without those that did not run."""
 
         def validated(piece: Callable[[], FreeRunFit]) -> Explanation | None:
             fit = piece()
@@ -141,7 +142,7 @@ class Fits:
         return [explanation for explanation in found if explanation is not None]
 
     def all_validated(self, fits: Sequence[FreeRunFit], candidates: Iterable[Candidate]) -> list[Explanation]:
-        """Fits, each judged; without those that did not run."""
+        """Fits, each validated; without those that did not run."""
         return self.in_parallel([partial(self.validated, fit) for fit in fits if not fit.trouble], candidates)
 
     def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
@@ -153,15 +154,16 @@ class Fits:
         return self.problem(fit.candidates)
 
     def jacobian(self, fit: FreeRunFit) -> BlockJacobian:
-        """Derivatives by all parameters of a fit, where it is."""
+        """Derivatives by all parameters of a fit, at its optimum."""
         problem = self.problem_of(fit)
         theta = problem.theta_of(fit.values)
         return problem.jacobian(theta, problem.residual(theta), range(theta.size))
 
     def validated(self, fit: FreeRunFit) -> Explanation:
-        """A fit with its held-out residuals; only releases and offsets of those runs are fitted to them."""
+        """A fit with its held-out error; only releases and offsets of the held-out runs are fitted to them."""
         shared = {name: value for name, value in fit.values.items() if not run_of(name, self.model)}
         problem = _ProblemWithFixedEffects(self.model, self.held_out, fit.candidates, shared)
+        # Held-out runs must not choose anything: only what belongs to the single run is fitted to it.
         own: dict[str, float] = {}
         for run in self.held_out:
             own |= self._run_parameters(run, fit, shared)
@@ -169,6 +171,8 @@ class Fits:
         if not np.isfinite(residual).all():
             return Explanation(fit, np.inf, np.inf)
         observed = [observation for run in problem.runs for observation in run]
+        # Errors are reported where the recording stands out of the noise; elsewhere they are one whatever is
+        # simulated.
         informative = np.concatenate([observation.informative.ravel() for observation in observed])
         chosen = residual[informative] if informative.any() else residual
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
@@ -189,7 +193,9 @@ class Fits:
     def _run_parameters(
         self, run: list[Observation], fit: FreeRunFit, shared: dict[str, float]
     ) -> dict[str, float]:
-        """Release, offsets and the like of a held-out run; from more releases where it fits worse than others."""
+        """Parameters of one held-out run alone; from more releases where its misfit is above that of the
+        others.
+        """
         problem = _ProblemWithFixedEffects(self.model, [run], fit.candidates, shared)
         if not problem.names:
             return {}
@@ -207,11 +213,11 @@ class Fits:
         return best.values if other.trouble or other.cost > best.cost else other.values
 
     def is_complete(self, explanation: Explanation) -> bool:
-        """Whether repeats have next to nothing in common of what is left, and what was not repeated leaves little.
+        """Whether next to nothing of the residual is repeatable, and runs without a repeat leave little.
 
-        Of a run without a repeat half of its channels tell: what moves shows in most of them, what is wrong with a
-        sensor shows in the repeated runs, too, and a burst of noise in one channel is neither. Then nothing more
-        can be found, and nothing without a name is better. False where no test was repeated.
+        Of a run without a repeat the median over its channels counts: missing physics of the motion shows in most
+        channels, a sensor fault shows in the repeated runs, too, and a burst of noise in one channel is neither.
+        Then nothing more can be found, and no force surface is better. False where no test was repeated.
         """
         repeated = {run for test in self.tests if len(test) > 1 for run in test}
         alone: dict[str, list[float]] = {}
@@ -223,7 +229,7 @@ class Fits:
         )
 
     def has_little_repeatable(self, explanation: Explanation) -> bool:
-        """Whether repeats have next to nothing in common of what is left; False where no test was repeated."""
+        """Whether next to nothing of the residual is repeatable; False where no test was repeated."""
         shared = explanation.repeatable_by_test
         return bool(shared) and all(
             max(left) < _LITTLE_REPEATABLE_IN_A_CHANNEL and float(np.mean(left)) < _LITTLE_REPEATABLE
@@ -231,12 +237,14 @@ class Fits:
         )
 
     def rests_on_baseline_bounds(self, fit: FreeRunFit) -> bool:
-        """Whether a number of the baseline is as far from what is believed as it may be: nothing is near there."""
+        """Whether a baseline parameter rests at its bound: the fit is then no starting point for others."""
         problem = self.problem_of(fit)
         return bool(problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline].any())
 
     def reset_from_bounds(self, fit: FreeRunFit) -> dict[str, float]:
-        """Its numbers, those at bounds of the baseline as believed: an effect may take their place."""
+        """Its parameters, those of the baseline at their bounds set back to the prior: an effect may replace
+        them.
+        """
         problem = self.problem_of(fit)
         at_bounds = problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline]
         strained = [name for name, is_at in zip(problem.names, at_bounds, strict=False) if is_at]
@@ -244,12 +252,12 @@ class Fits:
 
 
 def best_fitting(explanations: Sequence[Explanation]) -> Explanation | None:
-    """The one with the lowest cost on the fitted runs; None of none."""
+    """The explanation with the lowest cost on the fitted runs; None of none."""
     return min(explanations, key=lambda explanation: explanation.fit.cost, default=None)
 
 
 class _ProblemWithFixedEffects(FreeRunProblem):
-    """Effects whose numbers are fixed; only what belongs to single runs is free."""
+    """Effects and shared parameters are fixed; only what belongs to single runs is free."""
 
     def __init__(
         self,

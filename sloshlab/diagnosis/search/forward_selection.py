@@ -1,4 +1,4 @@
-"""One more effect beside a fit: candidates are screened, begun, and the promising ones finished."""
+"""Forward selection: one more effect beside a fit, in three stages: screening, coarse fits, fits to the end."""
 
 from __future__ import annotations
 
@@ -26,9 +26,11 @@ from sloshlab.diagnosis.search.screening import ScreenedCandidate, Screening
 from sloshlab.diagnosis.search.substitution import Substitution
 
 _MOST_SIZE_SCANS: Final = 1
+"""Best candidates whose sizes are scanned."""
 _ALWAYS_REFINED: Final = 3
+"""Best candidates that are fitted to the end in any case."""
 _LEAST_SHARE_OF_GAIN: Final = 0.3
-"""Of the best candidate's gain after the first stages; the others do not go on."""
+"""Of the best candidate's gain after the coarse fits, below which a candidate is dropped."""
 
 
 class ForwardSelection:
@@ -46,10 +48,12 @@ class ForwardSelection:
     def fitted(
         self, base: FreeRunFit, jacobian: BlockJacobian, pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
-        """Fit each of some candidates beside what is in `base` already; the promising ones to the end.
+        """Fit each of some candidates beside what is in `base` already; the best ones to the end.
 
-        They are looked at and begun on one repeat of every test, and finished on all.
+        They are screened and coarsely fitted on one repeat of every test, and fitted to the end on all.
         """
+        # Near the recordings, soft stages would hide what is missing, and the Jacobian of the base is a warm
+        # start.
         stages = stages_for(self.fits.problem_of(base), base)
         is_near = stages != INFLATION_STAGES and not self.fits.rests_on_baseline_bounds(base)
         base_jacobian = self.subset.jacobian_of_part(jacobian, base, self.fits)
@@ -71,12 +75,13 @@ class ForwardSelection:
         what: str,
         stages: Sequence[float],
     ) -> list[tuple[CoarseFit, ScreenedCandidate]]:
-        """Candidates after their first stages; what did not run is remembered as failed."""
+        """Candidates after their coarse fits; what did not run is noted as failed."""
 
         def first_stages(i: int, screened: ScreenedCandidate) -> tuple[FreeRunFit, float]:
             self.fits.progress(f"{what}: {screened.candidate.key}", i, 2 * len(chosen))
             problem = self.subset.problem((*base.candidates, screened.candidate))
             coarse_fit = coarsely_fitted(problem, screened.starts, stages, near=base_jacobian)
+            # Jacobians are not sent between processes, which would each hold a copy; it is computed anew.
             return coarse_fit.fit, coarse_fit.cost
 
         pieces = [partial(first_stages, i, screened) for i, screened in enumerate(chosen)]
@@ -97,7 +102,7 @@ class ForwardSelection:
         stages: Sequence[float],
         more: float,
     ) -> list[CoarseFit]:
-        """Those that gained most, the best first; the others are remembered with what they promised."""
+        """Those that gained most, the best first; the others are noted with their gains."""
         lowest = min((coarse_fit.cost for coarse_fit, _ in coarse_fits), default=0.0)
         best_force_match = min(
             (screened for _, screened in coarse_fits),
@@ -108,6 +113,8 @@ class ForwardSelection:
         found = []
         for i, (coarse_fit, screened) in enumerate(sorted(coarse_fits, key=lambda each: each[0].cost)):
             is_out = i >= _ALWAYS_REFINED and at_base - coarse_fit.cost < _LEAST_SHARE_OF_GAIN * (at_base - lowest)
+            # The candidate whose force is most like the latent force may gain late: its coarse fit may still be
+            # far off.
             if is_out and not (screened is best_force_match and screened.matches_latent_force):
                 self.fits.screened[screened.candidate.key] = max(more * (at_base - coarse_fit.cost), 0.0)
             else:
@@ -122,7 +129,7 @@ class ForwardSelection:
         what: str,
         stages: Sequence[float],
     ) -> list[FreeRunFit]:
-        """Fits to the end on all runs; far from the recordings, of the best one from other sizes, too."""
+        """Fits to the end on all runs; far from the recordings the best one is refitted from other sizes, too."""
 
         def to_the_end(i: int, coarse_fit: CoarseFit) -> FreeRunFit:
             n = len(selected)
@@ -140,7 +147,7 @@ class ForwardSelection:
         return done
 
     def _size_scanned(self, fit: FreeRunFit, stages: Sequence[float]) -> FreeRunFit:
-        """The best of a fit and of fits from other sizes of its effect, where anything is left to be found."""
+        """The best of a fit and of fits from other sizes of its effect; itself where it is down to noise."""
         problem, last = self.fits.problem_of(fit), fit.candidates[-1]
         if problem.is_down_to_noise(fit):
             return fit

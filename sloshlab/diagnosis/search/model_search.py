@@ -1,4 +1,8 @@
-"""From a case to fitted explanations, each judged on runs that chose nothing."""
+"""The search from a case to fitted explanations, each validated on held-out runs.
+
+Retuning, forward selection of one effect, restarts, forward selection of a second one, nested and nesting models,
+backward elimination, and the ceiling.
+"""
 
 from __future__ import annotations
 
@@ -29,19 +33,19 @@ from sloshlab.errors import InputError
 assert effects.__all__  # importing the vocabulary makes it known
 
 _LEAST_STRENGTH_FOR_PAIRS: Final = 0.5
-"""Noise floors that single effects remove at most where pairs are not tried: below what a verdict speaks of."""
+"""Noise floors that a single effect must remove before pairs are tried: below it a verdict names nothing."""
 _SHARE_LEFT_BY_A_PAIR: Final = 0.8
-"""Of what its first effect leaves; a second one that gains less does not tell that the first one is wrong."""
+"""Of the cost with its first effect alone; a second one that gains less does not show that the first is wrong."""
 _LOOK_ALIKES_AFTER_RESTART: Final = 6
-"""Fitted where the best effect has left its side valley: what is nearest at first may be in that of another."""
+"""Fitted where the best effect has left its local minimum: look-alikes may be in others."""
 _SHARE_OF_A_NESTED_MODEL: Final = 0.5
-"""Of what the general form gains; what gains less has little of it."""
+"""Of the gain of the nesting model, from which second effects are tried beside the nested one, too."""
 
 
 def findings_of(
     case: Case, progress: Progress = lambda what, done, of: None, model: DiagnosedModel | None = None
 ) -> Findings:
-    """Retune, fit every candidate, add greedily, and find the ceiling.
+    """Retune, select effects greedily, refine them, and find the ceiling.
 
     Parameters
     ----------
@@ -65,6 +69,7 @@ def findings_of(
     fits = Fits(model, fitting, held_out, progress, case.names_by_test())
     problem = fits.problem()
     believed_values = problem.values(problem.theta_of(model.believed))
+    # the cost of what is believed has no prior term: there is no deviation from it
     at_believed = huber_cost(problem.residual(problem.theta_of(believed_values)))
     believed = fits.validated(FreeRunFit((), believed_values, at_believed, at_believed))
     retuned_fit, jacobian = fitted_baseline(problem)
@@ -72,17 +77,26 @@ def findings_of(
     surroundings = surroundings_of(problem, retuned_fit, case.rig)
     pool = candidates(surroundings)
     fits.share_with_second_process(pool)
+    # First effect: all candidates beside the retuned baseline.
     found = ForwardSelection(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
     refinement, best = Refinement(fits), best_fitting(found)
     if not fits.is_complete(retuned):
+        # With dry friction every fit stays in the local minimum in which it begins, and effects of more parameters
+        # leave theirs more easily: without these restarts they would be named in place of a simple effect.
         found += _restarted_from_other_sizes(fits, retuned_fit, found, pool)
         best = best_fitting(found)
     is_complete = fits.is_complete(best or retuned)
     if not is_complete and best is not None:
+        # Before the restarts, since a nested model that is enough makes them superfluous: a trapped air of next to
+        # no stiffness was a mass that the tank lacks.
         found += Substitution(fits).nested_models(best, found, pool)
         best = best_fitting(found)
         is_complete = best is not None and fits.is_complete(best)
+    # Second effects and the ceiling cost most of the time. Where the residual is not repeatable nothing more can
+    # be found: of 54 known cases no case with two effects was complete with one.
     if is_complete:
+        # Where nothing is left only the choice among rivals is open: at its bounds the baseline has taken a part
+        # of the effect, and a mass and a stiffness look the same from there.
         found += refinement.rivals_restarted_from_prior(found)
     else:
         found += refinement.restarted_from_prior(retuned_fit, found)
@@ -93,10 +107,13 @@ def findings_of(
         pairs = _second_effects(fits, found, retuned, surroundings, pool)
         found += [*pairs, *multi_start_refined(fits, [pair for pair in pairs if len(pair.keys) > 1])]
     found += refinement.converged(retuned_fit, found, pool)
+    # Last, since an effect without size would otherwise gain what is only a better optimum of the baseline.
     retuned = refinement.retuned_from(found, retuned)
     ceiling = [] if is_complete else ceilings(fits, surroundings, found, retuned_fit)
     best, highest = best_fitting(found), best_fitting(ceiling)
     if best is not None and highest is not None and best.fit.cost - highest.fit.cost > LEAST_COST_DECREASE:
+        # A force surface that is far better than every name: from its baseline an effect may be found, such as
+        # hysteresis, that fits from the retuned baseline do not reach.
         found += Substitution(fits).replaced_by_single(highest.fit, retuned_fit, pool)
     return Findings(
         case,
@@ -117,9 +134,9 @@ def findings_of(
 def _restarted_from_other_sizes(
     fits: Fits, retuned: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
 ) -> list[Explanation]:
-    """Effects of one number from other sizes, and what looks like them from where the best is one of these.
+    """Effects of one parameter refitted from other sizes, and look-alikes of the best where it is one of them.
 
-    Look-alikes that were fitted before may be in the side valley that it has left.
+    Look-alikes that were fitted before may be in the local minimum that it has left.
     """
     found = Refinement(fits).from_other_sizes(retuned, known)
     best = best_fitting([*known, *found])
@@ -136,15 +153,17 @@ def _second_effects(
     at: Surroundings,
     pool: Sequence[Candidate],
 ) -> list[Explanation]:
-    """Pairs of the best first effect and another, and what is left of the best pair without either.
+    """Pairs of the best first effect and another, and each effect of the best pair alone.
 
-    None where no effect removes anything to speak of and repeats have next to nothing in common: what other runs
-    leave is noise then. Where pairs leave too much, others are tried beside the special case of the best effect,
-    whose other numbers stood for a second one, and beside the second of the best pair: the first was best alone.
+    None where no effect removes anything worth naming and the residual of repeats is not repeatable: what other
+    runs leave is noise then. Where pairs leave too much, candidates are tried beside the model nested in the best
+    effect, whose other parameters may have stood for a second effect, and beside the second effect of the best
+    pair, since the first was only the best alone.
     """
     best = best_fitting(known)
     if best is None or retuned.fit.cost - best.fit.cost < LEAST_COST_DECREASE:
         return []
+    # Pairs cost most of the search, and with nothing missing they would be tried only because channels are noisy.
     largest = max(largest_strength(retuned.by_run, explanation.by_run) for explanation in known)
     if largest < _LEAST_STRENGTH_FOR_PAIRS and fits.has_little_repeatable(retuned):
         return []
@@ -162,6 +181,7 @@ def _second_effects(
         pair = best_fitting(pairs)
     if pair is not None and best.fit.cost - pair.fit.cost > LEAST_COST_DECREASE:
         alone += more.substitution.replaced_by_single(pair.fit, retuned.fit, pool)
+    # The first effect was chosen without the second one and need not be one of the two.
     alone += Refinement(fits).backward_eliminated([pair for pair in pairs if pair.keys[:-1] == best.keys])
     cost = min((explanation.fit.cost for explanation in alone), default=best.fit.cost)
     if cost < best.fit.cost:
@@ -177,7 +197,7 @@ def _second_effects(
 
 
 def _nested_model_of(best: Explanation, known: Sequence[Explanation], retuned: Explanation) -> Explanation | None:
-    """The best explanation by a special case of an effect that gains a good share of what that does."""
+    """The best explanation by a model nested in an effect, if it gains a good share of what that gains."""
     least = _SHARE_OF_A_NESTED_MODEL * (retuned.fit.cost - best.fit.cost)
     general = best.fit.candidates[-1]
     specials = [explanation for explanation in known if is_nested_in(explanation.fit.candidates[-1], general)]
@@ -185,7 +205,7 @@ def _nested_model_of(best: Explanation, known: Sequence[Explanation], retuned: E
 
 
 def _candidates_beside(best: Explanation, at: Surroundings, pool: Sequence[Candidate]) -> list[Candidate]:
-    """Effects that act on forces which only the best effect has brought, such as on the damping of a liquid."""
+    """Effects that act on forces which only the best effect has added, such as on the damping of a liquid."""
     forces = extension_of(best.fit.candidates, best.fit.values).terms
     if not forces:
         return []

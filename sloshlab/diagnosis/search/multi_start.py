@@ -1,4 +1,8 @@
-"""From a fit that ended on a ridge to a better place: numbers thrown about it, runs released anew."""
+"""Multi-start refinement: restarts from random perturbations of the best fit, and from other releases of its runs.
+
+Iterated local search: perturb, fit, keep what is better. A move that has led to a better place is repeated from
+there, as in a pattern search.
+"""
 
 from __future__ import annotations
 
@@ -17,23 +21,24 @@ from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.search.fits import Fits, best_fitting
 
 _N_PERTURBED_STARTS: Final = 48
+"""Of each restart, of which the best is fitted."""
 _LEAST_RELATIVE_GAIN: Final = 0.01
-"""Of the cost: a throw that gains less is in vain, as crumbs lead nowhere."""
+"""Of the cost: a restart that gains less counts as in vain."""
 _ABANDON_COST_RATIO: Final = 1.1
-"""Cost, channels known to a share of their RMS only, over that of the best fit."""
+"""Cost with inflated noise, over that of the best fit, beyond which a restart is abandoned half way."""
 _RELEASE_FACTORS: Final = tuple(np.linspace(0.94, 1.06, 41))
-"""Over that of a run, each tried for the run by itself."""
+"""Over the release of a run, each tried for the run by itself."""
 
 
 @dataclass(frozen=True)
 class _Perturbation:
-    """How far and how often numbers are thrown.
+    """How far and how often parameters are perturbed.
 
     Attributes
     ----------
     max_restarts, max_restarts_in_vain : int
     log_deviations : tuple of float
-        Standard deviations of the logarithm of a number over places about one, in turns.
+        Standard deviations of the logarithm of a parameter over the perturbed starts, in turns.
     """
 
     max_restarts: int
@@ -41,18 +46,19 @@ class _Perturbation:
     log_deviations: tuple[float, ...]
 
 
+# small changes of an impact make another one, so that its restarts are more and nearer
 _ALONG_RIDGE: Final = _Perturbation(16, 4, (0.4, 0.15))
 _MULTIMODAL: Final = _Perturbation(32, 8, (0.1, 0.03))
 _MULTIMODAL_BESIDE_ANOTHER: Final = _Perturbation(16, 4, (0.1, 0.03))
 
 
 def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explanation]:
-    """The best effect of several numbers from the nearest of many places about it, time and again.
+    """The best effect of several parameters, refitted from the best of many perturbed starts, time and again.
 
-    Of two effects that which comes in jumps is thrown, and stays beside the other one. Contacts and friction make
-    ridges along which steps are short: a throw goes further, and what has led to a better place is done once more
-    from there (Hooke and Jeeves 1961, doi:10.1145/321062.321069). Where a throw is in vain, the runs are released
-    anew, until that is in vain, too.
+    Of two effects the multimodal one is perturbed, beside the other one. Contacts and friction make ridges along
+    which steps are short: a perturbation goes further, and a move that has led to a better place is repeated from
+    there (pattern move of Hooke and Jeeves 1961, doi:10.1145/321062.321069). Where a restart is in vain, the
+    releases of the runs are scanned, until that is in vain, too.
 
     Parameters
     ----------
@@ -67,7 +73,7 @@ def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explan
     if perturbed.is_multimodal:
         perturbation = _MULTIMODAL if len(best.keys) == 1 else _MULTIMODAL_BESIDE_ANOTHER
     problem, fit, n_in_vain = fits.problem_of(best.fit), best.fit, 0
-    further: Mapping[str, float] | None = None
+    further: Mapping[str, float] | None = None  # the last successful move once more
     may_scan_releases = True
     for i in range(perturbation.max_restarts):
         if n_in_vain >= perturbation.max_restarts_in_vain:
@@ -83,6 +89,7 @@ def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explan
         if not _is_better(other, fit):
             n_in_vain += further is None
             further = None
+            # After a scan in vain the releases are at their best for this fit until it moves.
             if not may_scan_releases:
                 continue
             other = _with_releases_scanned(problem, fit)
@@ -90,6 +97,7 @@ def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explan
             if not may_scan_releases:
                 continue
         may_scan_releases = True
+        # A fit that is better by little is kept, but counts as in vain.
         n_in_vain = 0 if _gain(other, fit) > _LEAST_RELATIVE_GAIN else n_in_vain + 1
         further = {name: value + (value - fit.values[name]) for name, value in other.values.items()}
         fit = other
@@ -97,7 +105,7 @@ def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explan
 
 
 def _perturbed_candidate(best: Explanation) -> Candidate | None:
-    """The effect whose numbers are thrown: one of several numbers alone, of two the one that comes in jumps."""
+    """The effect that is perturbed: a single one if it has several parameters, of two the multimodal one."""
     if len(best.keys) > 1:
         return next((candidate for candidate in best.fit.candidates if candidate.is_multimodal), None)
     last = best.fit.candidates[-1]
@@ -105,7 +113,7 @@ def _perturbed_candidate(best: Explanation) -> Candidate | None:
 
 
 def _fitted_from_restart(problem: FreeRunProblem, start: Mapping[str, float], best: FreeRunFit) -> FreeRunFit:
-    """A fit along a ridge, given up half way where it is far behind the best one there."""
+    """A fit from a perturbed start, abandoned at half of its stages where it is far behind the best one there."""
     inflation = INFLATION_STAGES[2]
     first, jacobian = fitted(
         problem, start, n_iterations=6, stages=(INFLATION_STAGES[1], inflation), is_last=False
@@ -129,7 +137,7 @@ def _gain(other: FreeRunFit, fit: FreeRunFit) -> float:
 def _with_releases_scanned(problem: FreeRunProblem, fit: FreeRunFit) -> FreeRunFit:
     """The fit from other releases of its runs, each the best for its run alone; itself where none is better.
 
-    Contacts and friction change what follows a release in jumps, of every run by itself.
+    With contacts and friction the residual is a discontinuous function of the release, of every run by itself.
     """
     values, theta = dict(fit.values), problem.theta_of(fit.values)
     residual = problem.residual(theta)
@@ -148,7 +156,7 @@ def _with_releases_scanned(problem: FreeRunProblem, fit: FreeRunFit) -> FreeRunF
 def _perturbed_starts(
     fit: FreeRunFit, perturbed: Candidate, turn: int, log_deviations: Sequence[float]
 ) -> list[dict[str, float]]:
-    """Values of a fit, some numbers larger or smaller by factors drawn evenly; others at every turn."""
+    """Values of a fit, those of one effect times log-normal factors; another Halton sequence at every turn."""
     names = [f"{perturbed.key}.{parameter.name}" for parameter in perturbed.effect.parameters]
     log_deviation = log_deviations[turn % len(log_deviations)]
     factors = np.exp(log_deviation * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PERTURBED_STARTS)))

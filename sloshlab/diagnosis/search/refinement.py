@@ -1,4 +1,4 @@
-"""What is done with explanations that were found: to where they converge, one effect less, the baseline again."""
+"""Refinement of explanations: restarts from the prior and from other sizes, convergence, backward elimination."""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ from sloshlab.diagnosis.search.fits import Fits, best_fitting
 from sloshlab.diagnosis.search.substitution import LEAST_COST_DECREASE, Substitution
 
 _MOST_RESTARTED: Final = 3
+"""Effects that are refitted."""
 _MOST_RIVALS: Final = 5
+"""Rivals that are refitted with the best effect."""
 _LEAST_SHARE_OF_GAIN: Final = 0.5
-"""Of that of the best, by which an effect is worth another beginning."""
+"""Of the gain of the best, from which an effect is worth a restart."""
 _OTHER_SIZES: Final = (1.0, 2.0, 4.0)
-"""Of what was found: beside a baseline that hides a part of an effect the rest of it is left."""
+"""Over the size that was found: a retuned baseline hides a part of an effect, and only the rest is found."""
 _SIZES_UNDER_DRY_FRICTION: Final = (0.5, 0.75, 1.5, 2.0, 3.0)
-"""Over that which was found: every fit beside dry friction ends in the side valley in which it begins."""
+"""Over the size that was found: with dry friction every fit ends in the local minimum in which it begins."""
 _OTHER_FREQUENCIES: Final = tuple(np.geomspace(0.7, 1.4, 6))
-"""Over that of a mode: its valley is narrow, and what is left at first does not tell the way there."""
+"""Over that of a mode: its minimum is narrow, and the residual does not point there from afar."""
 _MOST_PROMISING: Final = 2
-"""Of these, that are fitted to the end."""
+"""Of these, the number that are fitted to the end."""
 
 
 class Refinement:
-    """Better numbers of explanations.
+    """Better optima of explanations.
 
     Parameters
     ----------
@@ -43,10 +45,10 @@ class Refinement:
         self.substitution = Substitution(fits)
 
     def restarted_from_prior(self, base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
-        """The best effects, fitted again from what is believed of the baseline.
+        """The best effects, refitted from the prior means of the baseline.
 
-        A baseline that was retuned alone hides as much of an effect as it can; from there the effect takes the
-        rest, and the way back is barred by the side valleys that dry friction makes.
+        A baseline that was retuned alone hides as much of an effect as it can; from there the effect takes only
+        the rest, and local minima due to dry friction bar the way back.
 
         Parameters
         ----------
@@ -62,10 +64,10 @@ class Refinement:
         return self._each_restarted_from_prior(list(chosen))
 
     def from_other_sizes(self, base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
-        """The best effects of one number, fitted again from other sizes where the baseline has dry friction.
+        """The best effects of one parameter, refitted from other sizes where the baseline has dry friction.
 
-        An effect of more numbers leaves a side valley more easily, and would be named in the place of a simple one
-        that stays in it. Nothing is done where the best effect has one number and leaves nothing.
+        An effect of more parameters leaves a local minimum more easily, and would be named in place of a simple
+        one that stays in it. Nothing is done where the best effect has one parameter and leaves only noise.
 
         Parameters
         ----------
@@ -88,10 +90,10 @@ class Refinement:
         return found
 
     def rivals_restarted_from_prior(self, known: Sequence[Explanation]) -> list[Explanation]:
-        """The best effect and its rivals from what is believed, where it has the baseline at the end of its range.
+        """The best effect and its rivals, refitted from the prior where baseline parameters rest at their bounds.
 
-        The retuned baseline that it was fitted from took as much of it as is allowed. All may describe the
-        recordings nearly alike from there, though not from where the baseline is more likely.
+        The retuned baseline took as much of the effect as its bounds allow. From there a mass and a stiffness may
+        describe the recordings equally well, though not from where the baseline is more likely.
 
         Parameters
         ----------
@@ -116,7 +118,7 @@ class Refinement:
         return [better for of_one in found for better in of_one]
 
     def _restarted_from_prior(self, explanation: Explanation) -> list[Explanation]:
-        """An effect fitted with the baseline as believed, from some sizes; none where that is no better."""
+        """An effect refitted with the baseline as believed, from some sizes; none where that is no better."""
         sizes = self._scaled(explanation, _OTHER_SIZES)
         places = [[{**self.fits.model.believed, **numbers} for numbers in sizes]]
         frequency = f"{explanation.keys[-1]}.frequency_hz"
@@ -130,7 +132,7 @@ class Refinement:
     def _most_promising(
         self, explanation: Explanation, starts: Sequence[Mapping[str, float]]
     ) -> list[Mapping[str, float]]:
-        """Where the best of several beginnings are after two stages on one repeat of every test."""
+        """The best of several starts, after a coarse fit of each on one repeat of every test."""
         problem = self.fits.one_repeat_per_test.problem_of(explanation.fit)
 
         def beginning(start: Mapping[str, float]) -> tuple[FreeRunFit, float]:
@@ -148,14 +150,14 @@ class Refinement:
         return [values for _, values in sorted(fits, key=lambda each: each[0])[:_MOST_PROMISING]]
 
     def _scaled(self, explanation: Explanation, factors: Sequence[float]) -> list[dict[str, float]]:
-        """The numbers of its effect, without those of the baseline, larger by factors."""
+        """The parameters of its effect, without those of the baseline, with its size multiplied by factors."""
         effect = {
             name: value for name, value in explanation.fit.values.items() if name not in self.fits.model.believed
         }
         return [explanation.fit.candidates[-1].sized(effect, factor) for factor in factors]
 
     def _best_restart(self, explanation: Explanation, places: Sequence[Mapping[str, float]]) -> list[Explanation]:
-        """The best of fits of the same effects from several places; none where that is no better."""
+        """The best of fits of the same effects from several starts; none where that is no better."""
         problem = self.fits.problem_of(explanation.fit)
         pieces = [partial(_fitted_from, problem, place) for place in places]
         best = min(self.fits.in_parallel(pieces, explanation.fit.candidates), key=lambda fit: fit.cost)
@@ -164,9 +166,9 @@ class Refinement:
     def converged(
         self, base: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
     ) -> list[Explanation]:
-        """The best of one and of two effects to where they converge, special cases in their place, each alone.
+        """The best pair and the best single effect fitted to convergence, then models nested in them.
 
-        Look-alikes of each of two effects are tried in its place, too.
+        Look-alikes of each effect of a pair are tried in its place, and each effect of it alone.
 
         Parameters
         ----------
@@ -176,6 +178,8 @@ class Refinement:
         pool : sequence of Candidate
         """
         found: list[Explanation] = []
+        # Pairs first: their eliminations give single effects, of which the best is then fitted to convergence,
+        # too.
         for n in (2, 1):
             best = best_fitting([explanation for explanation in (*known, *found) if len(explanation.keys) == n])
             if best is None:
@@ -190,13 +194,14 @@ class Refinement:
             found += self.substitution.nested_models(best, [*known, *found], pool)
             if n > 1:
                 single = best_fitting([explanation for explanation in known if len(explanation.keys) == 1])
+                # Look-alikes can only matter where the second effect gains something.
                 if single is None or single.fit.cost - best.fit.cost > LEAST_COST_DECREASE:
                     found += self.substitution.exchanged(best, base, [*known, *found], pool)
                 found += self.backward_eliminated([best])
         return found
 
     def backward_eliminated(self, pairs: Sequence[Explanation]) -> list[Explanation]:
-        """Each effect of the best pair alone, from the numbers that it has there: one of them may be enough."""
+        """Backward elimination: each effect of the best pair alone, from its parameters there."""
         pair = best_fitting(pairs)
         if pair is None:
             return []
@@ -210,7 +215,10 @@ class Refinement:
         return self.fits.all_fitted(pieces, pair.fit.candidates)
 
     def retuned_from(self, known: Sequence[Explanation], retuned: Explanation) -> Explanation:
-        """The retuned baseline from where the best explanations have it: what an effect gains must be its own."""
+        """The baseline retuned once more from that of the best explanations.
+
+        Otherwise an effect without size would seem to gain what is only a better optimum of the baseline.
+        """
         best = retuned
         for chosen in (
             best_fitting(known),
@@ -232,7 +240,7 @@ def _fitted_from(problem: FreeRunProblem, place: Mapping[str, float]) -> FreeRun
 
 
 def _with_good_gains(base: FreeRunFit, known: Sequence[Explanation]) -> list[Explanation]:
-    """The best fit of each effect that gains a good share of what the best effect does, the best first."""
+    """The best fit of each effect whose gain is a good share of the best one's, the best first."""
     ranked = _best_by_effect(known)
     lowest = min((explanation.fit.cost for explanation in ranked), default=base.cost)
     least = max(LEAST_COST_DECREASE, _LEAST_SHARE_OF_GAIN * (base.cost - lowest))
@@ -240,7 +248,7 @@ def _with_good_gains(base: FreeRunFit, known: Sequence[Explanation]) -> list[Exp
 
 
 def _has_one_number(explanation: Explanation) -> bool:
-    """Whether its effect has one number."""
+    """Whether its effect has a single parameter."""
     return len(explanation.fit.candidates[-1].effect.parameters) == 1
 
 

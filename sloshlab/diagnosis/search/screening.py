@@ -1,4 +1,4 @@
-"""Which candidates are worth a fit, and where it starts: first looks, and the force that is missing."""
+"""Which candidates are worth a fit, and where it starts: score tests, and likeness to the latent force."""
 
 from __future__ import annotations
 
@@ -23,21 +23,28 @@ from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
 
 FloatArray = NDArray[np.float64]
 _LEAST_PREDICTED: Final = 8.0
+"""Decrease of the cost, below which a candidate is not fitted."""
 _MOST_FITTED: Final = 9
 _MOST_BESIDE: Final = 6
-"""Candidates that are fitted from a first look, as a first effect and as a second one."""
+"""Candidates that are fitted by their score tests, as a first effect and as a second one."""
 _MOST_STARTS: Final = 2
+"""Starts of a candidate by its score tests."""
 _LEAST_SHARE_OF_PREDICTED_GAIN: Final = 0.02
+"""Of the largest predicted gain, below which a candidate is not fitted."""
 _MOST_BY_FORCE: Final = 2
+"""Candidates that are fitted since their force is most like the latent force."""
 _SIZES_OF_MULTIMODAL: Final = (1.0, 0.75, 1.25, 1.5, 2.0)
-"""Over those with which the force of what comes in jumps is like the missing one."""
+"""Over those with which the force of a multimodal effect matches the latent force: the baseline hides a part of
+it."""
 _MATCHES_LATENT_FORCE: Final = 0.85
-"""Share of the missing force that an effect's own may leave, to be like it."""
+"""Share of the latent force that an effect's own force may leave unexplained and still match it."""
 
 
 @dataclass(frozen=True, eq=False)
 class _ScoredStart:
-    """A start, with its only number as large as a first step says, and what that step gains in each look."""
+    """A start, the same with the size of the first Gauss–Newton step, and the gain that each score test
+    predicts.
+    """
 
     gains: FloatArray
     start: dict[str, float]
@@ -46,20 +53,20 @@ class _ScoredStart:
 
 @dataclass(frozen=True, eq=False)
 class ScreenedCandidate:
-    """What is known of a candidate before it is fitted.
+    """A candidate after screening, before it is fitted.
 
     Attributes
     ----------
     candidate : Candidate
-    gains : ndarray, shape (n_looks,)
-        Decreases of the cost that first looks promise.
+    gains : ndarray, shape (n_score_tests,)
+        Decreases of the cost that score tests predict.
     scored_starts : list of _Look
-        Its starts, the most promising one first.
+        Its starts, the one with the largest predicted gain first.
     force_start : ForceStart or None
-        Its numbers with which its own force is most like the missing one, where that is known.
+        Its parameters with which its own force is most like the latent force, where that is known.
     distant_start : dict or None
-        Its number with which it is nearer to the recordings beside what is believed than the fit beside which it
-        is looked at, though no step from a small number leads there.
+        Its parameter with which it is nearer to the recordings, beside the baseline as believed, than the fit that
+        it is to extend, though no Gauss–Newton step from a small size leads there.
     starts : list of Start
         Where it is fitted from; none of a candidate that is not chosen.
     """
@@ -73,17 +80,17 @@ class ScreenedCandidate:
 
     @property
     def unexplained_share(self) -> float:
-        """Of the missing force that its own leaves; one where that is not known."""
+        """Of the latent force that its own leaves; one where that is not known."""
         return self.force_start.unexplained_share if self.force_start else 1.0
 
     @property
     def matches_latent_force(self) -> bool:
-        """Whether it is to be fitted to the end whatever first looks promise and others gain."""
+        """Whether it is fitted to the end whatever score tests predict and others gain."""
         return self.unexplained_share < _MATCHES_LATENT_FORCE
 
 
 class Screening:
-    """Candidates by what they promise beside a fit.
+    """Candidates by the gains that score tests predict beside a fit.
 
     Parameters
     ----------
@@ -104,18 +111,21 @@ class Screening:
         is_near: bool,
         more: float = 1.0,
     ) -> list[ScreenedCandidate]:
-        """Candidates by what one Gauss–Newton step promises of the cost, each with starts to fit from.
+        """Candidates by their predicted decrease of the cost, each with starts to fit from.
 
-        What is promised counts so many times as there are `more` coefficients to be fitted than are looked at.
+        Predicted gains are multiplied by `more`, the ratio of the coefficients to be fitted to those tested here.
         """
         problem = self.fits.problem(base.candidates)
         theta = problem.theta_of(base.values)
         residual = problem.residual(theta)
         forces = self._force_starts(base)
+        # With inflated noise a candidate shows that is far from its optimum, without it one that is near.
         score_tests = [
             ScoreTest(problem, theta, residual, jacobian, inflation)
             for inflation in dict.fromkeys((stages[min(1, len(stages) - 1)], stages[-1]))
         ]
+        # A mode has a narrow minimum: it is tested at five frequencies across each of the bands with the largest
+        # residuals beside what is there already, not only beside the baseline.
         missed_hz = residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND)
 
         def screened_candidate(i: int, candidate: Candidate) -> ScreenedCandidate | None:
@@ -145,6 +155,7 @@ class Screening:
             )
             return ScreenedCandidate(candidate, gains_of, scored_starts, force_start, distant_start)
 
+        # An effect twice is the same effect with another size.
         others = [candidate for candidate in pool if candidate.key not in {known.key for known in base.candidates}]
         pieces = [partial(screened_candidate, i, candidate) for i, candidate in enumerate(others)]
         results = self.fits.in_parallel(pieces, pool)
@@ -153,6 +164,7 @@ class Screening:
                 self.fits.failed[candidate.key] = "does not run from any start"
         all_screened = [screened for screened in results if screened is not None]
         return [
+            # Starts cost four to six simulations of all runs: only those of chosen candidates are computed.
             replace(screened, starts=self._starts(base, screened, stages[0], is_near=is_near))
             for screened in self._most_promising(all_screened, _MOST_BESIDE if base.candidates else _MOST_FITTED)
         ]
@@ -160,7 +172,7 @@ class Screening:
     def _distant_start(
         self, candidate: Candidate, residual: FloatArray, inflation: float
     ) -> dict[str, float] | None:
-        """A size at which an effect beside what is believed leaves less than a fit without it."""
+        """A size at which an effect beside the baseline as believed leaves less than the retuned baseline."""
         sizes = starts_of_growing_size(candidate)
         if not sizes:
             return None
@@ -175,6 +187,7 @@ class Screening:
         """Where a candidate is fitted from."""
         extended = self.fits.problem((*base.candidates, screened.candidate))
         matched = self._force_matched_start(base, extended, screened)
+        # Close to the optimum the linearised step is right, and all parameters of the base fit are kept.
         if is_near:
             sets = [
                 *([matched] if matched else []),
@@ -189,7 +202,7 @@ class Screening:
     def _force_matched_start(
         self, base: FreeRunFit, problem: FreeRunProblem, screened: ScreenedCandidate
     ) -> dict[str, float]:
-        """Numbers with which a candidate's force is like the missing one, at the best size beside a fit."""
+        """Parameters with which a candidate's force is like the latent force, at the best size beside a fit."""
         sets = _force_matched_numbers(screened)
         if len(sets) < 2:
             return sets[0] if sets else {}
@@ -199,8 +212,9 @@ class Screening:
     def _starts_from_prior_and_fit(
         self, base: FreeRunFit, problem: FreeRunProblem, screened: ScreenedCandidate, inflation: float
     ) -> list[Start]:
-        """A start with the baseline as believed and one with its numbers in a fit, each the nearest of several."""
+        """A start with the baseline as believed and one with its parameters in a fit, each the best of several."""
         scored_starts = screened.scored_starts
+        # The retuned baseline hides a part of the effect, so that one start has the baseline as believed.
         believed = base.values if base.candidates else self.fits.model.believed
         larger = [screened.distant_start] if screened.distant_start else []
         far = [
@@ -219,7 +233,7 @@ class Screening:
         ]
 
     def _force_starts(self, base: FreeRunFit) -> ForceStarts | None:
-        """Of what a fit lacks; None for a twin of a user's own, of which the missing force is not known."""
+        """Of the latent force beside a fit; None for a twin of a user's own, of which that is not known."""
         if not isinstance(self.fits.model, RigModel):
             return None
         return ForceStarts(
@@ -227,7 +241,9 @@ class Screening:
         )
 
     def _most_promising(self, all_screened: Sequence[ScreenedCandidate], most: int) -> list[ScreenedCandidate]:
-        """The candidates that promise most, in a soft look or in a hard one, or by their force."""
+        """Candidates with the largest predicted gains, with or without inflated noise, or that match the latent
+        force.
+        """
         if not all_screened:
             return []
         top = np.maximum(np.max([screened.gains for screened in all_screened], axis=0), _LEAST_PREDICTED)
@@ -249,10 +265,10 @@ class Screening:
 
 
 def _force_matched_numbers(screened: ScreenedCandidate) -> list[dict[str, float]]:
-    """Numbers with which a candidate's force is like the missing one; none where they are not known.
+    """Parameters with which a candidate's force is like the latent force; none where they are not known.
 
-    What comes in jumps is tried wherever it was like it, and at other sizes, too: the baseline beside which it was
-    sought hides some of it, and from one place no way leads to another.
+    A multimodal effect is tried at all optima of the force, and at other sizes, too: the retuned baseline hides a
+    part of it, and no descent leads from one optimum to another.
     """
     if screened.force_start is None:
         return []

@@ -1,4 +1,4 @@
-"""Numbers that effects start from: at several sizes, and as large as those of an effect that was found."""
+"""Start values of effects: at several sizes, and from the optimum of a nested or nesting effect."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.units import named_and_units
 
 _SIZE_FACTORS: Final = (0.03, 0.1, 0.3, 1.0, 3.0)
+"""Over a start: effects in the place of another one are of any size."""
 _DOES_NO_WORK: Final = "does no work"
 _GROWING_FACTORS: Final = tuple(1.5**i for i in range(1, 12))
-"""What moves a resonance by more than its width is missed by every step from a small start."""
+"""An effect that moves a resonance by more than its width is missed by every step from a small start."""
 
 
 def starts_from_nested(wider: Candidate, special: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
-    """Starts of an effect with all numbers of one unit as large as that of its special case was found."""
+    """Starts of an effect, all its parameters of one unit as large as that of its nested model was found."""
     name = special.effect.parameters[0].name
     unit, size = _unit(name), fit.values[f"{special.key}.{name}"]
     return [
@@ -26,7 +27,7 @@ def starts_from_nested(wider: Candidate, special: Candidate, fit: FreeRunFit) ->
 
 
 def starts_from_nesting(special: Candidate, general: Candidate, fit: FreeRunFit) -> list[dict[str, float]]:
-    """Starts of a special case, and some with its number as large as those of one unit of the general form.
+    """Starts of a nested model, and some with its parameter the mean of those of that unit in the nesting model.
 
     Of either sign: a mass that moves by itself is one that the tank lacks.
     """
@@ -55,13 +56,15 @@ def starts_of_growing_size(candidate: Candidate) -> list[dict[str, float]]:
 
 
 def starts_with_smaller_sizes(candidate: Candidate) -> list[dict[str, float]]:
-    """Starts of an effect, and at a tenth of their size too: the step from the full one may lead nowhere."""
+    """Starts of an effect, and at a tenth of their size: from the full one the linearised step may gain
+    nothing.
+    """
     starts = candidate.starts()
     return [*starts, *(candidate.sized(start, 0.1) for start in starts)]
 
 
 def resized(candidate: Candidate, start: dict[str, float], factor: float) -> dict[str, float]:
-    """A start whose size is what the first step says, a tenth to ten times of it."""
+    """A start with the size of the first Gauss–Newton step, limited to a tenth to ten times of it."""
     return candidate.sized(start, min(max(factor, 0.1), 10.0))
 
 

@@ -1,11 +1,16 @@
-"""Effects in the place of one that was found: look-alikes, the general form of it, and its special cases."""
+"""Effects in the place of one that was found: look-alikes, nesting models, and nested models.
+
+A model is nested in another where it is that one with parameters held fixed: Coulomb friction in Stribeck
+friction.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from operator import attrgetter
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -17,15 +22,27 @@ from sloshlab.diagnosis.search.fits import Fits, best_fitting
 from sloshlab.diagnosis.search.start_values import starts_from_nested, starts_from_nesting, starts_of_many_sizes
 
 LEAST_COST_DECREASE: Final = 24.0
-"""Decrease of the cost by one effect, below which nobody looks for its look-alikes or a second one."""
+"""Decrease of the cost by one effect, below which neither its look-alikes nor a second effect are tried."""
 _AS_GOOD: Final = 2.0
-"""Of the cost: a general form that is worse than its special case has ended in a side valley."""
+"""Of the cost: a nesting model cannot be worse than its nested one; if it is, its fit ended in a local minimum."""
 _COARSE_STAGE: Final = INFLATION_STAGES[-3]
+"""Noise inflation at which effects are compared before they are fitted."""
 _MOST_LOOK_ALIKES: Final = 4
+"""Of each effect, that are fitted in its place."""
 _MOST_SINGLE: Final = 2
+"""Single effects that are fitted in place of a pair or a force surface."""
 _ABANDON_COST_RATIO: Final = 2.0
-"""Cost, channels known to a share of their RMS only, over that of what an effect is tried in place of."""
+"""Cost with inflated noise, over that of what an effect is tried in place of, beyond which its fit is
+abandoned."""
 Limits = Mapping[str, tuple[float, float]]
+
+
+class _NearStart(NamedTuple):
+    """The best start of an effect in the place of others, with its cost at the coarse stage."""
+
+    cost: float
+    problem: FreeRunProblem
+    values: Mapping[str, float]
 
 
 class Substitution:
@@ -53,7 +70,7 @@ class Substitution:
             return []
         before, after = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (base, best.fit))
         special, fitted_already = best.fit.candidates[-1], {explanation.keys[-1] for explanation in kept}
-        nearest_of: dict[str, tuple[float, FreeRunProblem, dict[str, float]]] = {}
+        nearest_of: dict[str, _NearStart] = {}
         for candidate in pool:
             if candidate.key in fitted_already or not _are_look_alikes(candidate, special):
                 continue
@@ -65,10 +82,13 @@ class Substitution:
             ]
             costs = costs_at(problem, starts, _COARSE_STAGE)
             name = f"{candidate.effect.block}.{candidate.effect.name}"
-            if min(costs) < min(before + (before - after), nearest_of[name][0] if name in nearest_of else np.inf):
-                nearest_of[name] = (min(costs), problem, starts[int(np.argmin(costs))])
-        best_of = sorted(nearest_of.values(), key=lambda start: start[0])[:most]
-        pieces = [partial(_fitted_unless_abandoned, problem, start, after) for _, problem, start in best_of]
+            # One start per effect, on the channel where it is nearest.
+            if min(costs) < min(
+                before + (before - after), nearest_of[name].cost if name in nearest_of else np.inf
+            ):
+                nearest_of[name] = _NearStart(min(costs), problem, starts[int(np.argmin(costs))])
+        best_of = sorted(nearest_of.values(), key=attrgetter("cost"))[:most]
+        pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, after) for near in best_of]
         return self.fits.all_fitted(pieces, pool)
 
     def exchanged(
@@ -89,11 +109,12 @@ class Substitution:
         pool : sequence of Candidate
         """
         most, reached = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (base, pair.fit))
+        # Order does not matter: a pair is a set of effects.
         tried = {frozenset(explanation.keys) for explanation in known}
-        nearest_starts: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
+        nearest_starts: list[_NearStart] = []
         for replaced in pair.fit.candidates:
             others = tuple(candidate for candidate in pair.fit.candidates if candidate is not replaced)
-            near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
+            of_replaced: list[_NearStart] = []
             for candidate in pool:
                 keys = frozenset((candidate.key, *(other.key for other in others)))
                 if keys in tried or len(keys) < len(pair.keys) or not _are_look_alikes(candidate, replaced):
@@ -102,37 +123,32 @@ class Substitution:
                 problem = self.fits.problem((*others, candidate))
                 sizes = starts_of_many_sizes(candidate)
                 places = [pair.fit.values, {**pair.fit.values, **self.fits.model.believed}]
-                start = best_start(problem, [{**at, **size} for at in places for size in sizes], _COARSE_STAGE)
-                cost = huber_cost(
-                    problem.inflation_weights(_COARSE_STAGE) * problem.residual(problem.theta_of(start))
-                )
-                if cost < most:
-                    near.append((cost, problem, start))
-            nearest_starts += sorted(near, key=lambda start: start[0])[:_MOST_LOOK_ALIKES]
-        pieces = [
-            partial(_fitted_unless_abandoned, problem, start, reached) for _, problem, start in nearest_starts
-        ]
+                near = _near_start(problem, [{**at, **size} for at in places for size in sizes])
+                if near.cost < most:
+                    of_replaced.append(near)
+            nearest_starts += sorted(of_replaced, key=attrgetter("cost"))[:_MOST_LOOK_ALIKES]
+        pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, reached) for near in nearest_starts]
         return self.fits.all_fitted(pieces, [*pair.fit.candidates, *pool])
 
     def replaced_by_single(
         self, wider: FreeRunFit, base: FreeRunFit, pool: Sequence[Candidate]
     ) -> list[Explanation]:
-        """One effect of several numbers in place of everything that a fit has beyond the baseline, from there.
+        """A single effect of several parameters in place of all effects of a fit, from its baseline parameters.
 
-        Two effects that are simple may be what one of more numbers looks like, such as a softer spring and a loss
-        what is hysteresis; and what the baseline is beside them is nearer than what it is without any.
+        Two simple effects may stand for one with more parameters, such as a softer spring and a loss for
+        hysteresis; the baseline beside them is nearer to that effect than the retuned baseline alone.
 
         Parameters
         ----------
         wider : FreeRunFit
-            With effects, or with any force.
+            With effects, or with a force surface.
         base : FreeRunFit
             Without; an effect must lie nearer to `wider` than this before it is fitted.
         pool : sequence of Candidate
         """
         reached, before = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (wider, base))
         most = 0.5 * (reached + before)
-        near: list[tuple[float, FreeRunProblem, Mapping[str, float]]] = []
+        found: list[_NearStart] = []
         chosen = [
             candidate
             for candidate in pool
@@ -141,19 +157,17 @@ class Substitution:
         for i, candidate in enumerate(chosen):
             self.fits.progress(f"one effect in place of all: {candidate.key}", i, len(chosen))
             problem = self.fits.problem((candidate,))
-            sizes = starts_of_many_sizes(candidate)
-            start = best_start(problem, [{**wider.values, **size} for size in sizes], _COARSE_STAGE)
-            cost = huber_cost(problem.inflation_weights(_COARSE_STAGE) * problem.residual(problem.theta_of(start)))
-            if cost < most:
-                near.append((cost, problem, start))
-        best_of = sorted(near, key=lambda start: start[0])[:_MOST_SINGLE]
-        pieces = [partial(_fitted_unless_abandoned, problem, start, most) for _, problem, start in best_of]
+            near = _near_start(problem, [{**wider.values, **size} for size in starts_of_many_sizes(candidate)])
+            if near.cost < most:
+                found.append(near)
+        best_of = sorted(found, key=attrgetter("cost"))[:_MOST_SINGLE]
+        pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, most) for near in best_of]
         return self.fits.all_fitted(pieces, pool)
 
     def nesting_models(
         self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
     ) -> list[Explanation]:
-        """Effects of which the best one is a special case, from there: they cannot be worse."""
+        """Effects in which the best one is nested, fitted from its optimum: they cannot be worse."""
         best = best_fitting(kept)
         if best is None:
             return []
@@ -187,12 +201,14 @@ class Substitution:
         pieces: list[Callable[[], FreeRunFit]] = []
         for candidate in sorted(
             pool, key=lambda candidate: -len(candidate.effect.parameters)
-        ):  # what takes longest first
+        ):  # the longest fits first: two processes then end together
             if not is_nested_in(special, candidate):
                 continue
             self.fits.progress(f"{what}: {candidate.key} from {special.effect.name}", 0, 1)
             problem = self.fits.problem((*base.candidates, candidate))
             pieces += self._distinct_from_nested(problem, candidate, special, best.fit)
+            # A nesting model of an effect that is down to noise can gain nothing; only its distinct forms are
+            # rivals.
             if is_done or candidate.key in known:
                 continue
             starts = [
@@ -205,7 +221,7 @@ class Substitution:
     def _distinct_from_nested(
         self, problem: FreeRunProblem, candidate: Candidate, special: Candidate, fit: FreeRunFit
     ) -> list[Callable[[], FreeRunFit]]:
-        """Fits of a general effect where it clearly is not its special case."""
+        """Fits of a nesting effect within bounds where it clearly differs from its nested model."""
         if len(special.effect.parameters) > 1:
             return []
         size = fit.values[f"{special.key}.{special.effect.parameters[0].name}"]
@@ -220,7 +236,9 @@ class Substitution:
     def nested_models(
         self, wider: Explanation, known: Sequence[Explanation], pool: Sequence[Candidate]
     ) -> list[Explanation]:
-        """Special cases in place of the effects of an explanation, unless they are known from a better place."""
+        """Nested models in place of the effects of an explanation, unless a fit of them with a lower cost is
+        known.
+        """
         tried: dict[frozenset[str], float] = {}
         for explanation in known:
             keys = frozenset(explanation.keys)
@@ -241,8 +259,15 @@ class Substitution:
         return self.fits.all_fitted(pieces, [*wider.fit.candidates, *pool])
 
 
+def _near_start(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]]) -> _NearStart:
+    """The best of several starts."""
+    values = best_start(problem, starts, _COARSE_STAGE)
+    residual = problem.residual(problem.theta_of(values))
+    return _NearStart(huber_cost(problem.inflation_weights(_COARSE_STAGE) * residual), problem, values)
+
+
 def _fitted_closely(problem: FreeRunProblem, start: Mapping[str, float]) -> FreeRunFit:
-    """A fit from what is nearly it."""
+    """A fit from a start close to its optimum: the last two stages are enough."""
     return fitted(problem, start, n_iterations=6, stages=INFLATION_STAGES[-2:])[0]
 
 
@@ -254,7 +279,7 @@ def _fitted_within(
 
 
 def _fitted_unless_abandoned(problem: FreeRunProblem, start: Mapping[str, float], reached: float) -> FreeRunFit:
-    """A fit from nearby, left where it is after its first stage if its cost there is far beyond that reached."""
+    """A fit from nearby, abandoned after its first stage if its cost there is far beyond that reached."""
     first, jacobian = fitted(problem, start, n_iterations=6, stages=(_COARSE_STAGE,), is_last=False)
     if first.trouble or inflated_cost(problem, first, _COARSE_STAGE) > _ABANDON_COST_RATIO * reached:
         return first
@@ -266,7 +291,7 @@ def _constant_limits(limits: Limits) -> Callable[[Surroundings], Limits]:
 
 
 def is_nested_in(special: Candidate, general: Candidate) -> bool:
-    """Whether an effect is another one with fewer numbers, in the same block."""
+    """Whether an effect is nested in another one of the same block."""
     return general.effect.block == special.effect.block and special.effect.known_as in general.effect.includes
 
 

@@ -21,9 +21,9 @@ _POINTER: Final = ctypes.POINTER(ctypes.c_double)
 class AddedForce:
     """Sum of the forces of some effects on one coordinate, upward positive.
 
-    A smooth stand-in for what the engine does with events: dry friction turns over `friction_speed_m_per_s`, so
-    that an explicit integrator needs a step below 2 × mass × that speed / friction force; contacts are noticed at
-    the instants at which the force is asked for.
+    A regularised form of what the engine does with events: dry friction changes sign over
+    `friction_speed_m_per_s`, so that an explicit integrator needs a step below 2 × mass × that speed / friction
+    force; contacts are noticed at the instants at which the force is asked for.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A user's twin as a search sees it."""
+"""A user's twin as a model to be retuned and extended."""
 
 from __future__ import annotations
 
@@ -227,6 +227,7 @@ class UserTwinModel:
         series = [part for part in (ready.force_n, ready.base) if part is not None]
         if not series:
             return free((run.n_samples - 1) / rate, rate)
+        # By content: the user's function makes new arrays in every call.
         digest = hashlib.blake2b(f"{rate} {ready.force_n is None} {ready.base is None}".encode())
         for part in series:
             digest.update(np.ascontiguousarray(part).view(np.uint8).data)

@@ -1,4 +1,4 @@
-"""Explanations that cannot be told from the best one: by the recordings, or because they are the same force."""
+"""Explanations that are indistinguishable from the best one: by the recordings, or as they are the same force."""
 
 from __future__ import annotations
 
@@ -18,24 +18,26 @@ from sloshlab.diagnosis.verdict.comparison import (
 )
 
 LEAST_SEPARATION: Final = 6.0
-"""Log-likelihood ratio, on all runs, by which an explanation must beat another to be the only one."""
+"""Difference of the evidence, on all runs, by which an explanation must beat another to be the only one."""
 _WITHIN_SCATTER: Final = 0.5 * LEAST_STRENGTH
 """Noise floors that hardly show in any channel of any run.
 
-Channels share the noise of what drives them, so that log-likelihoods of all together are surer than they may be:
-what leaves no more than this beyond the best is as good then.
+On a driven rig all channels share the noise of the drive, so that the sum of their log-likelihoods overstates the
+evidence: an explanation that leaves no more than this beyond the best is as good then. On decays the noise of
+single sensors is independent, and likelihoods alone decide.
 """
 _LEAST_SHARE: Final = 0.5
 """Of the gain of the best that an alternative must have."""
 _LITTLE_OF_EXPLAINED: Final = 0.05
 _LITTLE_OF_ONE_POWER: Final = 0.1
-"""Of a mean square that an effect of one frequency explains, which may be in beginnings and ends; the second one
-for effects whose work grows with the same power of the amplitude, which nothing else could tell apart.
+"""Of a mean square that an effect explains in motion of one frequency, which may lie in beginnings and ends of
+runs; the second one for effects whose work grows with the same power of the amplitude, which nothing else
+separates.
 """
 _EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure."""
 _BEYOND_ALL_LEVELS: Final = 5.0
-"""Of the largest acceleration: what fades there has hardly faded where it was seen."""
+"""Over the largest acceleration: an effective mass that fades there has not faded within the recordings."""
 _EQUIVALENT_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "mass_error"}
 """The same force in the tank, where the share of the liquid that does not follow is the same at all levels."""
 
@@ -43,8 +45,8 @@ _EQUIVALENT_MASSES: Final = {"mass_error": "effective_mass", "effective_mass": "
 def alternatives_of(found: Findings, best: Explanation, scale: LikelihoodScale) -> list[Explanation]:
     """Explanations of at most as many effects that are as good within chance, the best first.
 
-    Special cases that are clearly worse are none, not even at one frequency: a general form such as a mode that is
-    missing shows something that they cannot. Nor are general forms that are: other numbers make them so.
+    Nested models that are clearly worse are no alternatives, not even at one frequency: a nesting model such as a
+    missing mode describes something that they cannot. Nor are nesting models that are clearly worse.
     """
     indistinguishable = [best]
     shares_noise = bool(found.surroundings.driving)
@@ -56,10 +58,12 @@ def alternatives_of(found: Findings, best: Explanation, scale: LikelihoodScale) 
             or not np.isfinite(explanation.held_out)
         ):
             continue
+        # A nesting model describes the same force and is no rival, unless its parameters make it another one.
         if explanation.has_effect_at_bound or (
-            includes(explanation, best) and not _is_distinct_from_nested(explanation, best)
+            nests(explanation, best) and not _is_distinct_from_nested(explanation, best)
         ):
             continue
+        # An effect that explains less than half of what the best one does is no answer to the same question.
         if scale.held_out_gain(found.retuned, explanation) < _LEAST_SHARE * scale.held_out_gain(
             found.retuned, best
         ):
@@ -84,7 +88,7 @@ def alternatives_of(found: Findings, best: Explanation, scale: LikelihoodScale) 
 
 
 def _is_relevantly_worse(general: Explanation, special: Explanation, scale: LikelihoodScale) -> bool:
-    """Whether a general form with numbers of its own is worse than its special case by more than scatter."""
+    """Whether a nesting model with parameters of its own is worse than the nested one by more than scatter."""
     return gains_beyond_chance(special, general, scale) and not _is_within_scatter(general, special)
 
 
@@ -94,10 +98,10 @@ def _is_within_scatter(explanation: Explanation, best: Explanation) -> bool:
 
 
 def _are_indistinguishable_at_one_frequency(found: Findings, explanation: Explanation, best: Explanation) -> bool:
-    """Look-alikes of one frequency that differ by less than the noise floor, or by little of what they explain.
+    """Look-alikes that differ by less than the noise floor, or by little of what they explain, at one frequency.
 
-    What tells them apart then are beginnings and ends of runs, on which no name should rest; a structure with more
-    modes tells them apart at the frequencies of the others.
+    Only beginnings and ends of runs separate them then, on which no name should rest; a structure with more modes
+    separates them at the frequencies of the others.
     """
     at = found.surroundings
     if not at.has_one_frequency or at.n_modes > 1 or len(explanation.keys) != 1 or len(best.keys) != 1:
@@ -105,6 +109,8 @@ def _are_indistinguishable_at_one_frequency(found: Findings, explanation: Explan
     this, other = explanation.fit.candidates[0].effect, best.fit.candidates[0].effect
     if this.name not in other.look_alikes and other.name not in this.look_alikes:
         return False
+    # Nothing but beginnings and ends of runs separates effects whose work grows with the same power of the
+    # amplitude.
     powers = [{term for term in effect.spoken_for_by if term.startswith("work")} for effect in (this, other)]
     little = _LITTLE_OF_ONE_POWER if powers[0] and powers[0] == powers[1] else _LITTLE_OF_EXPLAINED
     return all(
@@ -113,8 +119,8 @@ def _are_indistinguishable_at_one_frequency(found: Findings, explanation: Explan
     )
 
 
-def includes(wider: Explanation, narrower: Explanation) -> bool:
-    """Whether every effect of the narrower is one of the wider, or a special case of one of them."""
+def nests(wider: Explanation, narrower: Explanation) -> bool:
+    """Whether every effect of the narrower is one of the wider, or nested in one of them."""
     held = {
         f"{candidate.effect.block}.{name}"
         for candidate in wider.fit.candidates
@@ -124,14 +130,14 @@ def includes(wider: Explanation, narrower: Explanation) -> bool:
 
 
 def _is_nested_in(narrower: Explanation, wider: Explanation) -> bool:
-    """Whether every effect of the narrower, in whatever block, is a special case of one of the wider."""
+    """Whether every effect of the narrower, in whatever block, is nested in one of the wider."""
     return set(narrower.names) <= {
         name for candidate in wider.fit.candidates for name in candidate.effect.includes
     }
 
 
 def _is_distinct_from_nested(wider: Explanation, narrower: Explanation) -> bool:
-    """Whether a more general effect has numbers with which it is clearly not its special case."""
+    """Whether a nesting effect has parameters with which it clearly differs from the nested one."""
     if len(wider.keys) != 1 or len(narrower.keys) != 1:
         return False
     general, special = wider.fit.candidates[0], narrower.fit.candidates[0]
@@ -155,6 +161,7 @@ def equivalents_of(best: Explanation) -> list[tuple[str, ...]]:
             if set(this) <= set(in_structure):
                 others = [name for name in best.names if name not in this]
                 found.append(tuple(sorted((*others, *other))))
+    # A mass of the tank and an effective mass are the same force where the share of the liquid is constant.
     for mass in best.fit.candidates:
         if mass.effect.block == "tank" and (mass.effect.name in _EQUIVALENT_MASSES or _never_fades(best, mass)):
             others = [each.effect.known_as for each in best.fit.candidates if each is not mass]

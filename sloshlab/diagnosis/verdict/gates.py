@@ -1,4 +1,4 @@
-"""What the findings amount to: nothing missing, named, indistinguishable, or unknown."""
+"""The gates between findings and a verdict: nothing missing, named, indistinguishable, or unknown."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sloshlab.diagnosis.explanation import LARGEST_REMAINDER, Explanation, Findings
-from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equivalents_of, includes
+from sloshlab.diagnosis.verdict.alternatives import alternatives_of, equivalents_of, nests
 from sloshlab.diagnosis.verdict.comparison import (
     LikelihoodScale,
     explains_half,
@@ -31,15 +31,18 @@ from sloshlab.diagnosis.verdict.wording import (
 LEAST_GAIN: Final = 12.0
 """Held-out log-likelihood ratio from which something is missing."""
 ADEQUATE: Final = 1.15
-"""Held-out error over that of the best correction, or over the noise floor, up to which one is adequate."""
+"""Held-out error over that of the ceiling, or over the noise floor, up to which an explanation is adequate."""
 _LARGEST_WITHOUT_REPEATS: Final = 2.0
-"""What a baseline may leave and be called complete where only what is said of sensors tells the noise."""
+"""Held-out error of a complete baseline where only the stated noise of sensors is known."""
 _LITTLE_REPEATABLE: Final = 0.25
 _MOST_REPEATABLE: Final = 0.5
 _MOST_REPEATABLE_IN_A_CHANNEL: Final = 1.5
-"""Mean squares, in noise floors, of what repeats of a test have in common of what is left."""
+"""Repeatable mean squares of the residual, in noise floors.
+
+Missing physics is missing in each repeat of a test alike; noise, bursts and the chaos of a liquid are not.
+"""
 _NUMBERS_OF_UNKNOWN: Final = 3
-"""What it would have if it had a name."""
+"""Parameters that a missing effect without a name is penalised for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,7 @@ class Verdict:
     best : Explanation or None
         The best explanation with a name; None where nothing is missing.
     alternatives : list of Explanation
-        All that cannot be told from the best, itself first.
+        All that are indistinguishable from the best, itself first.
     gain : float
         Of the best over the retuned baseline, on held-out runs.
     adequacy : float
@@ -92,6 +95,7 @@ def verdict_of(found: Findings) -> Verdict:
     is_complete = not (
         leaves_repeatable_residual(found, found.retuned) or _exceeds_stated_noise(found, found.retuned)
     )
+    # Gates in order: is anything missing at all, is there a name that passes, and does the name itself matter?
     if is_complete and not is_more:
         certain = _weighted_by_decision(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
@@ -100,6 +104,7 @@ def verdict_of(found: Findings) -> Verdict:
     if named is None or not is_answer:
         certain = _weighted_by_decision(probabilities, "unknown")
         return Verdict("unknown", named, [], gain, adequacy, unknown_statement(found, named), "", certain)
+    # A residual within the scatter of repeats needs no name, even if the ceiling was better by a size.
     if is_complete and not improves_relevantly(with_least_residuals(found, named), found.retuned, scale):
         certain = _weighted_by_decision(probabilities, "none")
         return Verdict("nothing_missing", None, [], gain, 1.0, nothing_statement(found), "", certain)
@@ -118,7 +123,7 @@ def verdict_of(found: Findings) -> Verdict:
 
 
 def leaves_repeatable_residual(found: Findings, explanation: Explanation) -> bool:
-    """Whether an explanation leaves what repeats of a test have in common, or too much where none tell.
+    """Whether an explanation leaves a repeatable residual, or too large an error where no repeats tell.
 
     Parameters
     ----------
@@ -135,18 +140,18 @@ def leaves_repeatable_residual(found: Findings, explanation: Explanation) -> boo
 
 
 def _exceeds_stated_noise(found: Findings, explanation: Explanation) -> bool:
-    """Whether an explanation leaves more than may be called complete where no repeats tell the noise."""
+    """Whether an explanation leaves more than twice the stated noise where no repeats tell the noise."""
     return not found.has_repeats and explanation.rms_without_bursts > _LARGEST_WITHOUT_REPEATS
 
 
 def _held_out_repeatable(found: Findings, explanation: Explanation) -> float:
-    """Mean of what repeats of held-out tests have in common; NaN where none of them is repeated."""
+    """Mean repeatable mean square of held-out tests; NaN where none of them is repeated."""
     left = [in_common for (test, _), in_common in explanation.repeatable.items() if test in found.held_out_tests]
     return float(np.mean(left)) if left else float("nan")
 
 
 def _needing_all_effects(found: Findings, scale: LikelihoodScale) -> list[Explanation]:
-    """What shows more than each of its parts: one effect may bring the gain of chance, another one the size."""
+    """What improves on each of its parts: one effect may bring the likelihood, another the size."""
     described = [*found.explanations, *found.ceilings]
     parts = [(frozenset(explanation.keys), explanation) for explanation in found.explanations]
     return [
@@ -163,9 +168,9 @@ def _needing_all_effects(found: Findings, scale: LikelihoodScale) -> list[Explan
 def _most_parsimonious_accepted(
     found: Findings, scale: LikelihoodScale, described: Sequence[Explanation], ceiling: Explanation
 ) -> tuple[Explanation | None, bool]:
-    """The shortest sufficient explanation, and whether it passes the gates.
+    """The most parsimonious sufficient explanation, and whether it passes the gates.
 
-    Where a single effect does not, two that do are the answer, if they show more than it and explain half.
+    Where a single effect does not, two that do are the answer, if they improve on it and explain half.
     """
     named = _most_parsimonious(found, scale, ADEQUATE * ceiling.held_out_rms)
     if named is None or _passes_gates(found, scale, named, described, ceiling):
@@ -191,6 +196,7 @@ def _passes_gates(
 ) -> bool:
     """Whether an explanation passes the gates on held-out runs."""
     return (
+        # One run alone leaves no run to validate a name on.
         found.split.has_held_out
         and scale.held_out_gain(found.retuned, named) >= LEAST_GAIN
         and not leaves_repeatable_residual(found, named)
@@ -217,7 +223,7 @@ def _most_parsimonious(found: Findings, scale: LikelihoodScale, adequate_rms: fl
 
 
 def _best_of(found: Findings, scale: LikelihoodScale, n: int) -> Explanation | None:
-    """The best explanation of so many effects, special cases in their place; None of none."""
+    """The best explanation of so many effects, nested models in their place; None of none."""
     known = [
         explanation
         for explanation in found.explanations
@@ -228,9 +234,9 @@ def _best_of(found: Findings, scale: LikelihoodScale, n: int) -> Explanation | N
 
 
 def _nested_unless_worse(best: Explanation, alike: Sequence[Explanation], scale: LikelihoodScale) -> Explanation:
-    """A special case of effects in their place, unless the general form is better by a size worth speaking of."""
+    """A nested model in the place of the best, unless the nesting model is better by a size worth naming."""
     for special in sorted(alike, key=lambda explanation: -scale.evidence(explanation)):
-        is_special = special.n_numbers < best.n_numbers and includes(best, special)
+        is_special = special.n_numbers < best.n_numbers and nests(best, special)
         if is_special and not any(
             is_more(best, special, scale)
             for is_more in (is_clearly_better, improves_relevantly, gains_beyond_shared_noise)
@@ -240,11 +246,11 @@ def _nested_unless_worse(best: Explanation, alike: Sequence[Explanation], scale:
 
 
 def _may_be_zero(found: Findings, named: Explanation) -> bool:
-    """Whether one effect is not told from nothing, and removes little enough for that to be so.
+    """Whether the interval of a single effect holds zero, and it removes little enough for that to be so.
 
-    Where masses and gains trade against an effect, or its own numbers against each other, its interval may hold
-    zero although no baseline describes the recordings without it; what removes more than what is clear, or half of
-    what is left without it, is there.
+    Where an effect is correlated with masses and gains, or its parameters with each other, its interval may hold
+    zero although no baseline describes the recordings without it; an effect that removes a clear part, or half of
+    what is left without it, is kept.
     """
     if len(named.keys) > 1 or is_unmistakable(found.retuned, named):
         return False
@@ -258,10 +264,10 @@ def _is_dominated(
     ceiling: Explanation,
     scale: LikelihoodScale,
 ) -> bool:
-    """Whether another description shows more, unless repeats have too little in common of what is left to them.
+    """Whether another description improves on it, unless too little of its residual is repeatable.
 
-    What they do not have in common is what one run happened to have, such as a liquid that damps more for a while.
-    What leaves no more than `ADEQUATE` noise floors is adequate however little a freer description leaves.
+    A residual that does not repeat is what one run happened to have, such as a liquid that damps more for a while.
+    An explanation that leaves no more than `ADEQUATE` noise floors is adequate however little others leave.
     """
     if _held_out_repeatable(found, named) < _LITTLE_REPEATABLE:
         return False
@@ -271,7 +277,7 @@ def _is_dominated(
 
 
 def _probabilities(found: Findings, scale: LikelihoodScale) -> dict[str, float]:
-    """Weights of the explanations by their likelihood on held-out runs and their number of parameters."""
+    """Weights of the explanations by their likelihood on held-out runs less the penalty of their parameters."""
     scores: dict[str, float] = {"none": -found.retuned.held_out / scale.held_out}
     for explanation in found.explanations:
         if np.isfinite(explanation.held_out):
@@ -282,6 +288,8 @@ def _probabilities(found: Findings, scale: LikelihoodScale) -> dict[str, float]:
     for ceiling in found.ceilings:
         if np.isfinite(ceiling.held_out):
             beside = sum(len(each.effect.parameters) for each in ceiling.fit.candidates if each.key in named)
+            # Effects beside the surface are penalised as named ones, or the name would seem less probable beside
+            # it.
             score = -ceiling.held_out / scale.held_out - scale.penalty_per_number * (_NUMBERS_OF_UNKNOWN + beside)
             scores["unknown"] = max(scores.get("unknown", -np.inf), score)
     top = max(scores.values())

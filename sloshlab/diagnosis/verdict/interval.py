@@ -1,4 +1,4 @@
-"""Intervals of the numbers that were found."""
+"""Confidence intervals of the parameters of named effects."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from sloshlab.diagnosis.explanation import Explanation
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
 _ERRORS_OVER_STANDARD_ERRORS: Final = 1.25
-"""On cases whose truth was known, root of the mean square, where nothing but noise counts."""
+"""RMS of errors over standard errors, on cases whose truth was known and where nothing but noise counts."""
 _CALIBRATION: Final = 0.01
+"""Relative standard error of gains and masses."""
 _POWER_OF_LENGTH: Final = {"_n_per_m3": 3, "_n_per_m2": 2, "_n_s2_per_m2": 2, "_n_per_m": 1, "_n_s_per_m": 1}
 """Power of a length, or of one per time, by which a force of the unit is divided: its gain counts as often."""
 _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta")
@@ -23,11 +24,11 @@ _FREE_OF_GAINS: Final = ("_hz", "_s", "exponent", "loss_factor", "ratio", "beta"
 def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[float, float, float]:
     """Estimate and 90 % interval of one parameter.
 
-    What noise does is widened by what the fit leaves and by how far estimates were off where the truth was known,
-    or it is what runs and parts of runs disagree by, whichever is more.
-    What is not known of the baseline counts once, as its standard error or as how far fits about other baselines
-    end elsewhere, whichever is more. Where gains or masses scale the number, it is known no better than those: a
-    cubic spring by the gain of a force and three times by that of a displacement, a leak by those of two sensors.
+    The standard error by noise is widened by the held-out error and by the calibration on known truths, or
+    replaced by the cluster-robust one, whichever is more. The uncertainty of the baseline counts once, as the
+    standard error by its prior or as the spread over randomised baselines, whichever is more. Where gains or
+    masses scale the parameter, it is known no better than those: a cubic spring by the gain of a force and three
+    times by that of a displacement, a leak by those of two sensors.
     """
     estimate = best.fit.values[f"{candidate.key}.{parameter}"]
     width = _half_width(best, candidate, parameter)
@@ -38,7 +39,7 @@ def interval(best: Explanation, candidate: Candidate, parameter: str) -> tuple[f
 
 
 def interval_excludes_zero(best: Explanation, candidate: Candidate) -> bool:
-    """Whether the interval of a number that grows with an effect, bounds aside, does not hold zero.
+    """Whether the interval of a size of an effect, its bounds aside, excludes zero.
 
     Parameters
     ----------
@@ -61,12 +62,14 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
     scatter = _ERRORS_OVER_STANDARD_ERRORS * of_noise * max(1.0, best.held_out_rms)
     scatter = max(scatter, best.scatter.get(name, 0.0))
     is_between = _named(candidate, parameter).is_between_readings
+    # A rate per second ends like a time but scales with the reading.
     is_free = parameter.endswith(_FREE_OF_GAINS) and not parameter.endswith("_per_s") and not is_between
     power = next(
         (power for ending, power in _POWER_OF_LENGTH.items() if parameter.endswith(ending)), int(is_between)
     )
     of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(best.fit.values[name])
     elsewhere = max(best.spread.get(name, 0.0), of_belief, of_gain)
+    # Noise and baseline are independent; gains are part of the baseline and must not count twice.
     return _NORMAL_90 * float(np.hypot(scatter, elsewhere))
 
 

@@ -99,7 +99,7 @@ LIGHTER = {"structure.mass_error.mass_kg": 0.05}
         pytest.param(AT, LIGHTER, 1.0, "named", id="several frequencies"),
     ],
 )
-def test_beginnings_and_ends_do_not_tell_look_alikes_of_one_frequency(
+def test_beginnings_and_ends_do_not_separate_look_alikes_of_one_frequency(
     at: Surroundings, other: Mapping[str, float], in_one_run: float, kind: str
 ) -> None:
     """Fifty units of likelihood between a mass and a spring, but less than the noise anywhere."""
@@ -120,7 +120,7 @@ def test_nor_does_a_twentieth_of_what_they_explain(in_one_run: float, kind: str)
 
 
 @pytest.mark.parametrize(("squares", "kind"), [(1.4, "indistinguishable"), (1.6, "named")])
-def test_a_special_case_that_is_clearly_worse_is_no_rival_at_one_frequency(squares: float, kind: str) -> None:
+def test_a_nested_model_that_is_clearly_worse_is_no_rival_at_one_frequency(squares: float, kind: str) -> None:
     """A mode that is missing moves by itself, whichever block the mass is in that would stand in for it."""
     mode = {
         "structure.missing_mode.frequency_hz": 9.0,
@@ -132,7 +132,7 @@ def test_a_special_case_that_is_clearly_worse_is_no_rival_at_one_frequency(squar
 
 
 @pytest.mark.parametrize(("squares", "kind"), [(1.4, "indistinguishable"), (1.6, "named")])
-def test_nor_is_a_general_form_that_is_clearly_worse_than_its_special_case(squares: float, kind: str) -> None:
+def test_nor_is_a_nesting_model_that_is_clearly_worse(squares: float, kind: str) -> None:
     """Friction that is made to differ by direction, at one amplitude of one frequency."""
     described = [left(0.0, 0.0, FRICTION), left(50.0, 50.0, BOTH_SIDES, squares=squares)]
     assert verdict_of(findings(BASELINE, described, at=AT_ONE_FREQUENCY)).kind == kind

@@ -86,7 +86,7 @@ def test_an_effect_without_which_nothing_changes_has_no_size(
     ("in_common", "kind"),
     [pytest.param(0.2, "named", id="one is enough"), pytest.param(0.3, "unknown", id="it is not")],
 )
-def test_where_one_of_two_may_be_nothing_all_pairs_are_given_up(
+def test_where_one_of_two_effects_may_be_zero_all_pairs_are_rejected(
     monkeypatch: pytest.MonkeyPatch, in_common: float, kind: str
 ) -> None:
     """1.645 × 0.5 is more than 0.8 N s²/m², so that the drag may be nothing; the other pair is not tried.
@@ -115,7 +115,7 @@ def test_where_one_of_two_may_be_nothing_all_pairs_are_given_up(
         pytest.param(10.1, 1.42, STRIBECK, False, id="nobody knows what it removes"),
     ],
 )
-def test_one_of_two_that_may_be_nothing_stands_where_it_removes_what_is_clear(
+def test_one_of_two_effects_that_may_be_zero_stands_where_it_is_clear(
     monkeypatch: pytest.MonkeyPatch, squares: float, rms: float, beside: Mapping[str, float], is_named: bool
 ) -> None:
     """As for one effect, √(10 − 1) is three noise floors; held against the other effect fitted alone."""
@@ -137,7 +137,7 @@ def test_one_of_two_that_may_be_nothing_stands_where_it_removes_what_is_clear(
         pytest.param(0.1, 9.9, 1.0, "named", id="it has a size"),
     ],
 )
-def test_one_effect_that_may_be_nothing_is_named_only_where_it_removes_what_is_clear(
+def test_one_effect_that_may_be_zero_is_named_only_where_it_is_clear(
     monkeypatch: pytest.MonkeyPatch, spread: float, squares: float, rms: float, kind: str
 ) -> None:
     """√(10 − 1) is three noise floors, and an error of √2 has twice the mean square of one of 1."""
@@ -158,7 +158,7 @@ def test_nothing_is_drawn_where_nothing_is_named(monkeypatch: pytest.MonkeyPatch
     [(0.37 / 1.65, True), (0.37 / 1.64, False), (0.0, True)],
     ids=["just", "just not", "sure"],
 )
-def test_a_size_is_told_from_nothing_by_its_interval(spread: float, is_told: bool) -> None:
+def test_a_size_is_significant_by_its_interval(spread: float, is_told: bool) -> None:
     """90 % are 1.645 standard deviations; two standard errors of 0.01 and one per cent are beside the spread."""
     own = (spread**2 - 0.02**2 - 0.0037**2) ** 0.5 if spread else 0.0
     explanation = replace(left(0.0, 0.0, FRICTION), spread={FRICTION_NUMBER: own})

@@ -60,7 +60,7 @@ def of_run(name: str, shape: tuple[int, int], channel: str = "force") -> Spectra
     return Spectra(np.zeros(shape), np.ones(shape, bool), Run(name), channel)
 
 
-def test_what_repeats_share_is_told_from_noise() -> None:
+def test_a_repeatable_residual_is_separated_from_noise() -> None:
     """A common part of mean square 0.5 under noise of one in each run; lengths and bands differ."""
     generator = np.random.default_rng(3)
     common = np.sqrt(0.5) * generator.standard_normal((60, 40))
@@ -94,7 +94,7 @@ def test_a_channel_that_need_not_be_described_is_not_asked() -> None:
     assert repeatable_mean_squares([["a", "b"]], cast(Any, observed), np.ones(200)) == {}
 
 
-def test_what_few_coefficients_show_is_not_told() -> None:
+def test_few_coefficients_give_no_repeatable_mean_square() -> None:
     observed = [of_run("a", (7, 7)), of_run("b", (7, 7))]
     assert repeatable_mean_squares([["a", "b"]], cast(Any, observed), np.ones(98)) == {}
 

@@ -184,7 +184,7 @@ def test_hidden_numbers_come_back_within_their_intervals(tmp_path: Path, key: st
         tmp_path, made(), [(f"{block}.{name}", *place) if place else (f"{block}.{name}", "")], free
     )
     fit = fit_of(problem)
-    if "friction" in name:  # as the search polishes its best: where a decay sticks has side valleys
+    if "friction" in name:  # as the search fits its best: where a decay sticks has local minima
         fit, _ = fitted(problem, fit.values, stages=INFLATION_STAGES[-2:])
     assert fit.trouble == ""
     assert fit.misfit < 1.25 * sum(observation.known.sum() for run in problem.runs for observation in run)
@@ -339,7 +339,7 @@ def test_only_channels_that_are_asked_for_are_made(tmp_path: Path) -> None:
     np.testing.assert_array_equal(alone, every[TIP])
 
 
-def test_no_step_is_simulated_that_promises_next_to_nothing(
+def test_no_step_is_simulated_that_predicts_next_to_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From the optimum a fit makes one Jacobian and at most a step; refused ones were made ever smaller before."""

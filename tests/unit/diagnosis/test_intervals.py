@@ -67,7 +67,7 @@ def beside_a_gain(n: float) -> FreeRunFit:
 
 
 @pytest.mark.parametrize("n", [0.5, 4.0, 1e4])
-def test_standard_errors_by_noise_and_by_what_is_believed_are_told_apart(n: float) -> None:
+def test_standard_errors_by_noise_and_by_the_prior_are_separate(n: float) -> None:
     """The mean of the values knows the sum to 1/√n; the effect is it less the gain, which is known to 1."""
     fit = beside_a_gain(n)
     assert fit.standard_errors(fit.names[1]) == pytest.approx((0.01 / np.sqrt(n), 0.01))

@@ -89,7 +89,7 @@ def test_the_stated_error_is_the_error(tmp_path: Path) -> None:
     assert 0.5 < error / at.standard_error_n < 1.6
 
 
-def test_nothing_missing_asks_for_no_force(tmp_path: Path) -> None:
+def test_with_nothing_missing_the_latent_force_is_noise(tmp_path: Path) -> None:
     found = forces_of(tmp_path, in_tank=False, pushed=False)
     for force in found.forces:
         assert force.power_n2 < 0.5 * force.standard_error_n**2 + 1e-4
@@ -102,7 +102,7 @@ def test_an_error_of_the_release_is_no_force(tmp_path: Path) -> None:
     assert np.abs(at.force_n).max() < 0.03 * STIFFNESS * 0.0005
 
 
-def test_a_channel_that_is_not_believed_asks_for_nothing(tmp_path: Path) -> None:
+def test_a_channel_that_is_left_out_adds_nothing_to_the_force(tmp_path: Path) -> None:
     believed = forces_of(tmp_path, in_tank=False, measured=False, pushed=False, gain=0.7)
     suspect = forces_of(
         tmp_path, in_tank=False, measured=False, pushed=False, gain=0.7, without=frozenset({"displacement_tank"})

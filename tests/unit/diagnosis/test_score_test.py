@@ -1,4 +1,4 @@
-"""What a first look promises is what least squares give, and where the misfit peaks is where it is looked for."""
+"""The gain of a score test is that of least squares, and start frequencies are where the residual peaks."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def least(columns: np.ndarray, residual: np.ndarray, prior: np.ndarray, theta: n
 
 
 def test_the_gain_does_not_depend_on_the_size_of_a_change_however_large() -> None:
-    """What changes nothing promises nothing, and so does what explodes beyond all numbers."""
+    """No change predicts no gain, and neither does a diverging simulation."""
     generator = np.random.default_rng(3)
     jacobian, residual, change = (generator.standard_normal(shape) for shape in ((2, N), (N,), (N,)))
     problem = cast(FreeRunProblem, cast(Any, Linear(np.zeros(2, bool))))
@@ -81,7 +81,7 @@ def test_the_gain_is_that_of_least_squares_with_the_numbers_that_can_follow(
     assert moved == pytest.approx(with_it, rel=1e-9)
 
 
-def test_a_change_that_the_baseline_can_make_promises_nothing() -> None:
+def test_a_change_that_the_baseline_can_follow_predicts_no_gain() -> None:
     generator = np.random.default_rng(4)
     jacobian, residual = generator.standard_normal((N, N_NUMBERS)), generator.standard_normal(N)
     problem = cast(FreeRunProblem, cast(Any, Linear(np.zeros(N_NUMBERS, bool), n_baseline=0)))

@@ -45,24 +45,26 @@ def light(tmp_path_factory: pytest.TempPathFactory) -> Light:
     return Light(tmp_path_factory.mktemp("light"), MASS_KG + LACKING_KG)
 
 
-def test_a_large_mass_is_begun_where_it_is_nearest(light: Light, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is kept whatever its first look promises, and its fit ends at the frequency of what is lighter.
+def test_a_large_mass_starts_where_it_is_nearest(light: Light, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is kept whatever its score test predicts, and its fit ends at the frequency of what is lighter.
 
     Decays tell a mass to what is believed of the frequency.
     """
     monkeypatch.setattr(screening, "_MOST_FITTED", 0)
-    [promise] = [promise for promise in light.chosen() if promise.candidate.key == MASS]
-    assert promise.distant_start is not None
-    assert promise.distant_start[f"{MASS}.mass_kg"] == pytest.approx(LACKING_KG, rel=0.25)
-    done = refined(coarsely_fitted(light.fits.problem((promise.candidate,)), promise.starts))
+    [screened] = [screened for screened in light.chosen() if screened.candidate.key == MASS]
+    assert screened.distant_start is not None
+    assert screened.distant_start[f"{MASS}.mass_kg"] == pytest.approx(LACKING_KG, rel=0.25)
+    done = refined(coarsely_fitted(light.fits.problem((screened.candidate,)), screened.starts))
     mass_kg = done.values["modal mass of mode 1"] * MASS_KG
     faster = done.values["frequency of mode 1"] ** 2 * mass_kg / (mass_kg + done.values[f"{MASS}.mass_kg"])
     assert faster == pytest.approx(MASS_KG / (MASS_KG + LACKING_KG), rel=2e-3)
     assert done.misfit < 1.2 * light.fits.problem().residual(np.zeros(len(light.baseline.names))).size
 
 
-def test_nothing_large_is_sought_beside_a_baseline_that_is_right(tmp_path: Path) -> None:
-    assert [promise.distant_start for promise in Light(tmp_path, MASS_KG).chosen() if promise.distant_start] == []
+def test_no_distant_start_is_sought_beside_a_baseline_that_is_right(tmp_path: Path) -> None:
+    assert [
+        screened.distant_start for screened in Light(tmp_path, MASS_KG).chosen() if screened.distant_start
+    ] == []
 
 
 def test_only_what_does_no_work_is_sought_at_a_hundred_times_its_size(light: Light) -> None:

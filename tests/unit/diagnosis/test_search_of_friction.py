@@ -89,14 +89,14 @@ def test_it_is_fitted_where_it_clearly_differs_too(case: Decays, coulomb: Explan
     assert sum(less <= 0.66 * size and more >= 1.34 * size for less, more in sides) >= 1
 
 
-def test_a_general_form_is_left_out_where_it_is_known(case: Decays, coulomb: Explanation) -> None:
+def test_a_nesting_model_is_left_out_where_it_is_known(case: Decays, coulomb: Explanation) -> None:
     """Only the forms that clearly differ are fitted again."""
     wide = case.fit(ASYMMETRIC)
     found = Substitution(case.fits).nesting_models(case.baseline, [coulomb, wide], list(case.pool.values()), "")
     assert len([explanation for explanation in found if explanation.keys == (ASYMMETRIC,)]) <= 2
 
 
-def test_the_special_case_takes_the_place_of_the_general_form_once(case: Decays, coulomb: Explanation) -> None:
+def test_the_nested_model_replaces_the_nesting_one_once(case: Decays, coulomb: Explanation) -> None:
     stribeck = case.fit(STRIBECK)
     pool = list(case.pool.values())
     found = Substitution(case.fits).nested_models(stribeck, [stribeck], pool)
@@ -105,7 +105,7 @@ def test_the_special_case_takes_the_place_of_the_general_form_once(case: Decays,
     assert Substitution(case.fits).nested_models(stribeck, [stribeck, coulomb], pool) == []
 
 
-def test_the_special_case_is_fitted_again_from_a_better_place(case: Decays, coulomb: Explanation) -> None:
+def test_the_nested_model_is_refitted_from_a_better_optimum(case: Decays, coulomb: Explanation) -> None:
     stribeck, pool = case.fit(STRIBECK), list(case.pool.values())
     stuck = replace(coulomb, fit=replace(coulomb.fit, cost=1e9))
     [found] = Substitution(case.fits).nested_models(stribeck, [stribeck, stuck], pool)
@@ -141,7 +141,7 @@ def test_a_look_alike_that_is_far_behind_is_not_fitted_to_the_end(
     assert found.cost == pytest.approx((first if is_left else whole).cost, rel=1e-4)
 
 
-def test_a_look_alike_takes_the_place_of_one_of_two_effects(case: Decays) -> None:
+def test_a_look_alike_replaces_one_of_two_effects(case: Decays) -> None:
     """A damper looks like friction; the constant force beside it stays. What is known is not tried again."""
     viscous = Candidate(effect("structure.viscous_damping"), case.pool[CUBIC].surroundings)
     candidates = (viscous, case.pool[CONSTANT])
@@ -162,7 +162,7 @@ def test_what_is_no_nearer_than_the_baseline_takes_no_place(case: Decays, coulom
 def test_a_held_out_run_is_tried_with_other_releases(
     case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A fit that stays where it begins, as in a side valley; two per cent more is the release."""
+    """A fit that stays where it begins, as in a local minimum; two per cent more is the release."""
     release = "release of " + case.fits.held_out[0][0].run.name
 
     def stuck(problem: FreeRunProblem, start: Mapping[str, float], **_: object) -> tuple[FreeRunFit, None]:
@@ -181,7 +181,7 @@ def test_a_held_out_run_is_tried_with_other_releases(
     assert case.fits.validated(alone).held_out > 2 * right.held_out
 
 
-def strained(case: Decays, coulomb: Explanation) -> Explanation:
+def with_baseline_at_bounds(case: Decays, coulomb: Explanation) -> Explanation:
     """Half of the friction, and a baseline that hides the rest as well as it can."""
     baseline = {**coulomb.fit.values, "damping of mode 1": 1.25, "modal mass of mode 1": 1.0125}
     values = {**baseline, COULOMB_N: 0.5 * coulomb.fit.values[COULOMB_N]}
@@ -198,7 +198,7 @@ def test_an_effect_is_fitted_again_from_what_is_believed(
         return fitted(problem, start)
 
     monkeypatch.setattr(refinement, "fitted", watched)
-    [found] = Refinement(case.fits).restarted_from_prior(case.baseline, [strained(case, coulomb)])
+    [found] = Refinement(case.fits).restarted_from_prior(case.baseline, [with_baseline_at_bounds(case, coulomb)])
     assert found.keys == (COULOMB,)
     assert found.fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
     [start] = coarsely_fitted
@@ -258,7 +258,7 @@ def test_beside_dry_friction_simple_effects_are_fitted_from_other_sizes(
     also_general: bool,
     is_tried: bool,
 ) -> None:
-    """Each side valley keeps what begins in it; here the one about twice the size is the deepest."""
+    """Each local minimum keeps what begins in it; here the one about twice the size is the deepest."""
     size, cost = coulomb.fit.values[COULOMB_N], coulomb.fit.cost
     coarsely_fitted: list[Mapping[str, float]] = []
 
@@ -287,11 +287,11 @@ def test_beside_dry_friction_simple_effects_are_fitted_from_other_sizes(
     assert best.fit.values[COULOMB_N] == pytest.approx(2.0 * size)
 
 
-def test_rivals_beside_a_strained_baseline_are_fitted_from_what_is_believed(
+def test_rivals_with_the_baseline_at_its_bounds_are_refitted_from_the_prior(
     case: Decays, coulomb: Explanation
 ) -> None:
     """The best one and what is nearly as good, not what is far behind."""
-    best = strained(case, coulomb)
+    best = with_baseline_at_bounds(case, coulomb)
     other = case.fit(STRIBECK)
     near, far = (replace(other, fit=replace(other.fit, cost=best.fit.cost + more)) for more in (23.0, 25.0))
     found = Refinement(case.fits).rivals_restarted_from_prior([near, best])
@@ -329,7 +329,7 @@ def test_numbers_spread_as_far_as_what_is_believed_leaves_them(case: Decays, cou
 
 
 def test_a_better_place_takes_the_place_of_what_was_found(case: Decays, coulomb: Explanation) -> None:
-    worse = case.fits.validated(strained(case, coulomb).fit)
+    worse = case.fits.validated(with_baseline_at_bounds(case, coulomb).fit)
     at_worse = huber_cost(
         case.fits.problem_of(worse.fit).residual(case.fits.problem_of(worse.fit).theta_of(worse.fit.values))
     )
@@ -360,7 +360,7 @@ def test_derivatives_and_places_are_the_same_on_one_core_and_on_two(
         np.testing.assert_array_equal(residual, problem.residual(place))
 
 
-def test_polishing_takes_a_fit_to_its_end(case: Decays) -> None:
+def test_the_best_fit_is_taken_to_convergence(case: Decays) -> None:
     coarsely_fitted = case.fit(COULOMB, n_iterations=1)
     found = Refinement(case.fits).converged(coarsely_fitted.fit, [coarsely_fitted], [])
     best = best_fitting(found)
@@ -414,16 +414,16 @@ def test_screening_keeps_what_explains_and_begins_it_near(case: Decays, monkeypa
     problem = case.fits.problem()
     theta = problem.theta_of(case.baseline.values)
     jacobian = problem.jacobian(theta, problem.residual(theta), range(theta.size))
-    promises = Screening(case.fits).chosen(
+    all_screened = Screening(case.fits).chosen(
         case.baseline, jacobian, list(case.pool.values()), "", (0.3, 0.1, 0.03, 0.01, 0.0), is_near=False
     )
-    keys = [promise.candidate.key for promise in promises]
+    keys = [screened.candidate.key for screened in all_screened]
     assert COULOMB in keys
     assert sought == keys
     assert len(keys) < len(case.pool)
-    for promise in promises:
-        assert any(start.is_near for start in promise.starts)
-        assert (promise.gains > 0).any()
+    for screened in all_screened:
+        assert any(start.is_near for start in screened.starts)
+        assert (screened.gains > 0).any()
 
 
 class Repeated(Decays):
@@ -465,7 +465,7 @@ def test_the_part_of_a_jacobian_is_that_of_fewer_runs(repeated: Repeated) -> Non
         np.testing.assert_allclose(part.times(unit), expected.times(unit), rtol=1e-9, atol=1e-9)
 
 
-def test_what_is_begun_on_some_runs_is_finished_on_all(repeated: Repeated) -> None:
+def test_a_coarse_fit_to_some_runs_is_refined_on_all(repeated: Repeated) -> None:
     few, fits, base = repeated.fits.one_repeat_per_test, repeated.fits, repeated.baseline
     candidate = repeated.pool[COULOMB]
     jacobian = fits.jacobian(base)
@@ -485,7 +485,7 @@ def test_what_is_begun_on_some_runs_is_finished_on_all(repeated: Repeated) -> No
     assert set(found.fit.names) == {*fits.problem().names, COULOMB_N}
 
 
-def test_what_comes_in_jumps_is_begun_at_the_best_of_places_and_sizes(
+def test_a_multimodal_effect_starts_from_the_best_of_places_and_sizes(
     case: Decays, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its force was like the missing one at two places, both too small; what is smooth starts at the first."""
@@ -500,10 +500,10 @@ def test_what_comes_in_jumps_is_begun_at_the_best_of_places_and_sizes(
     jacobian = case.fits.jacobian(base)
 
     def begun_from(candidate: Candidate) -> list[dict[str, float]]:
-        [promise] = Screening(case.fits).chosen(
+        [screened] = Screening(case.fits).chosen(
             base, jacobian, [candidate], "", INFLATION_STAGES[-2:], is_near=True
         )
-        return [{name: start.values[name] for name in near} for start in promise.starts]
+        return [{name: start.values[name] for name in near} for start in screened.starts]
 
     assert begun_from(smooth)[0] == far
     twice = {name: pytest.approx(2.0 * value) for name, value in near.items()}
@@ -514,7 +514,7 @@ def test_what_comes_in_jumps_is_begun_at_the_best_of_places_and_sizes(
 def test_look_alikes_are_fitted_from_a_better_size(
     case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch, other_size_gains: float
 ) -> None:
-    """Where the best effect has left its side valley, what looks like it may still be in there; six of them."""
+    """Where the best effect has left its local minimum, look-alikes may still be in it; six of them."""
     other = replace(coulomb, fit=replace(coulomb.fit, cost=coulomb.fit.cost - other_size_gains + 1.0))
     alike, asked = case.fit(STRIBECK, n_iterations=1), []
 

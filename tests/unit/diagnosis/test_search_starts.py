@@ -66,13 +66,13 @@ def test_a_look_alike_starts_from_a_thirtieth_to_three_times_its_size(at: Surrou
     assert found == pytest.approx([size * factor for size in sizes for factor in (0.03, 0.1, 0.3, 1.0, 3.0)])
 
 
-@pytest.mark.parametrize(("promised", "factor"), [(2.0, 2.0), (0.001, 0.1), (300.0, 10.0)])
+@pytest.mark.parametrize(("predicted", "factor"), [(2.0, 2.0), (0.001, 0.1), (300.0, 10.0)])
 def test_a_start_is_as_large_as_a_first_step_says_within_a_decade(
-    at: Surroundings, promised: float, factor: float
+    at: Surroundings, predicted: float, factor: float
 ) -> None:
     candidate = Candidate(effect("tank.fading_mass"), at)
     start = candidate.starts()[0]
-    found = numbers(start_values.resized(candidate, start, promised))
+    found = numbers(start_values.resized(candidate, start, predicted))
     assert found["beta"] == pytest.approx(0.1 * factor)
     assert found["fade_g"] == numbers(start)["fade_g"]
 

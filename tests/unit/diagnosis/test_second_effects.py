@@ -101,7 +101,7 @@ def test_where_the_best_pair_leaves_too_much_its_first_effect_is_exchanged(
         pytest.param(explanation(3990.0, "mass_error"), True, False, id="the pair leaves nothing"),
     ],
 )
-def test_a_second_effect_is_sought_beside_the_special_case_of_the_first(
+def test_a_second_effect_is_sought_beside_the_model_nested_in_the_first(
     monkeypatch: pytest.MonkeyPatch, special: Any, is_complete: bool, is_tried: bool
 ) -> None:
     """Other numbers of the general form may have stood for the second effect."""

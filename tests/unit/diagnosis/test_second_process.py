@@ -59,7 +59,7 @@ def test_it_gives_the_same_numbers_bit_for_bit(case: Decays, monkeypatch: pytest
         np.testing.assert_array_equal(jacobian.times(unit), alone.times(unit))
 
 
-def test_it_is_made_anew_for_an_effect_that_it_has_not_seen(case: Decays) -> None:
+def test_it_is_started_again_for_an_unknown_effect(case: Decays) -> None:
     known = made(case.fits.problem([case.pool[COULOMB]]))
     problem = case.fits.problem([case.pool[COULOMB], case.pool[CUBIC]])
     assert case.pool[CUBIC] not in known.candidates

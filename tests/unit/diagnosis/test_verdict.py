@@ -311,7 +311,7 @@ def test_a_pair_that_has_its_gain_from_one_effect_and_its_size_from_the_other_sh
 
 
 def test_of_each_run_counts_what_the_best_fit_of_the_same_effects_leaves() -> None:
-    """Friction has side valleys: one fit suits one run, one another."""
+    """Friction makes local minima: one fit suits one run, one another."""
     first = left(0.0, 0.0, FRICTION, squares=1.0, in_one_run=2.0)
     second = left(30.0, 30.0, FRICTION, squares=1.0, in_fitted_run=3.0, in_one_run=1.0)
     more = left(-40.0, -40.0, {**FRICTION, **OFFSET}, squares=1.0, in_one_run=1.0)
