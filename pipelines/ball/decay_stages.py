@@ -20,6 +20,7 @@ from sloshlab.bouncing_ball.free_decay import (
     damping_shares,
     measured_curve,
     natural_frequency_hz,
+    pooled_curve,
     simulated_curve,
     simulated_decay,
     steady_loss_factor,
@@ -64,7 +65,7 @@ def ball_from_decays(
         with naming(path):
             recordings.append(_recording(path))
             curves.append(_curve(recordings[-1], settings))
-    measured, rate = _pooled(curves), float(recordings[0].attrs["sampling_rate_hz"])
+    measured, rate = pooled_curve(curves), float(recordings[0].attrs["sampling_rate_hz"])
     duration = recordings[0].sizes["time"] / rate
     with amounts("search of the ball") as advance:
         found = identify_from_decay(
@@ -145,15 +146,6 @@ def _acceleration(recording: xr.Dataset) -> tuple[FloatArray, float]:
         raise AnalysisError("channels", got="no acceleration", allowed="at least one on the tank")
     mean = np.mean([recording[name].values for name in names], axis=0)
     return np.asarray(mean, dtype=np.float64), float(recording.attrs["sampling_rate_hz"])
-
-
-def _pooled(curves: Sequence[DampingCurve]) -> DampingCurve:
-    """All decays in one, amplitudes falling."""
-    amplitude = np.concatenate([curve.acceleration_m_per_s2 for curve in curves])
-    order = np.argsort(-amplitude, kind="stable")
-    damping = np.concatenate([curve.damping_ratio for curve in curves])
-    frequency = float(np.mean([curve.frequency_hz for curve in curves]))
-    return DampingCurve(amplitude[order], damping[order], frequency)
 
 
 def _measured_trace(recording: xr.Dataset, rig: Rig) -> ForceTrace:

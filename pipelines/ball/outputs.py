@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pipelines.ball.results import BallExperiment, DecayResult
-from pipelines.report.outputs import sha256_of, versions, write_dataset
+from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
 from sloshlab import atomic_file
 from sloshlab.bouncing_ball.frequency_error import summary
 from sloshlab.quantities import described
@@ -22,11 +21,7 @@ def write_ball(experiment: BallExperiment, folder: Path, *, command: str, report
 
     All files appear together, complete, or none does.
     """
-    provenance: dict[str, object] = {
-        "command": command,
-        "inputs": {path.name: sha256_of(path) for path in experiment.inputs},
-        "versions": versions(),
-    }
+    provenance = provenance_of(command, experiment.inputs)
     with atomic_file.filled_folder(folder) as complete:
         atomic_file.write_bytes(complete / "ball.toml", _twin_table(experiment).encode())
         write_dataset(_dataset(experiment, provenance), complete / "ball.nc")
@@ -77,8 +72,7 @@ def _dataset(experiment: BallExperiment, provenance: dict[str, object]) -> xr.Da
         rig=experiment.rig_name,
         tuned_omega_bar=experiment.omega_bar,
         damping_in_flight=experiment.identified.ball.damping_in_flight,
-        inputs=json.dumps(provenance["inputs"], sort_keys=True),
-        versions=json.dumps(provenance["versions"], sort_keys=True),
+        **stamp_of(provenance),
     )
 
 

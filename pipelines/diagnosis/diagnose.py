@@ -9,7 +9,7 @@ from typing import Any
 
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.free_place import require_free_folder
-from pipelines.report.outputs import sha256_of, versions
+from pipelines.report.outputs import provenance_of
 from pipelines.report.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.answer import answered
@@ -80,8 +80,4 @@ def diagnose_case(
 
 def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:
     files = [twin or case.folder / "rig.toml", *effects, *sorted((case.folder / "recordings").glob("*.nc"))]
-    return {
-        "command": command,
-        "inputs": {file.name: sha256_of(file) for file in files},
-        "versions": versions(),
-    }
+    return provenance_of(command, files)

@@ -16,7 +16,6 @@ from pipelines.liquid_model.results import (
     CeilingPair,
     ComparedMaps,
     ComparedRun,
-    MapError,
     Training,
     ValidatedModel,
 )
@@ -28,6 +27,7 @@ from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.resampling import resampled
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
+from sloshlab.maps.map_error import MapError
 from sloshlab.reduced_order_model.fit_quality import fit_quality
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.model import ReducedOrderModel
@@ -191,15 +191,8 @@ def _compared_maps(
 
 
 def _map_error(measured: RigResult, predicted: RigResult, name: str) -> MapError:
-    true, said = measured.maps.dataset[name], predicted.maps.dataset[name]
-    difference = (said - true).values
-    windows = predicted.windows[name].values - measured.windows[name].values
-    return MapError(
-        largest=float(np.nanmax(np.abs(true.values))),
-        rms=float(np.sqrt(np.nanmean(difference**2))),
-        mean=float(np.nanmean(difference)),
-        rms_of_windows=float(np.sqrt(np.nanmean(windows**2))),
-    )
+    maps = measured.maps.dataset[name], predicted.maps.dataset[name]
+    return MapError.between(*maps, (measured.windows[name], predicted.windows[name]))
 
 
 def _ceiling(model: ReducedOrderModel, read: Sequence[_Read], skipped: dict[str, str]) -> tuple[CeilingPair, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from pipelines.liquid_model.comparison import validated
 from pipelines.liquid_model.results import Training, ValidatedModel
 from pipelines.liquid_model.sections import page_of
 from pipelines.liquid_model.training_runs import TrainingRuns
-from pipelines.report.outputs import sha256_of, versions, write_dataset
+from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
 from pipelines.report.page import write_page
 from pipelines.report.progress import progress
 from sloshlab import atomic_file
@@ -57,12 +56,7 @@ def write_validation(
         found = validated(model, runs, test, training=training, advance=advance)
         read = () if model_file is None else (model_file,)
         inputs = (*read, *files.training, *files.validation, *test, *files.still, files.rig)
-        provenance = {
-            "command": command,
-            "inputs": {path.name: sha256_of(path) for path in inputs},
-            "versions": versions(),
-        }
-        found = dataclasses.replace(found, provenance=provenance)
+        found = dataclasses.replace(found, provenance=provenance_of(command, inputs))
         with atomic_file.filled_folder(folder) as complete:
             for name, dataset in datasets(found).items():
                 write_dataset(dataset, complete / name)
@@ -79,11 +73,7 @@ def datasets(found: ValidatedModel) -> dict[str, xr.Dataset]:
         written["maps.nc"] = _maps(found)
     if found.tests:
         written["residual.nc"] = _residual(found)
-    stamp = {
-        "title": "Validation of a reduced-order model",
-        "inputs": json.dumps(found.provenance.get("inputs", {}), sort_keys=True),
-        "versions": json.dumps(found.provenance.get("versions", {}), sort_keys=True),
-    }
+    stamp = {"title": "Validation of a reduced-order model", **stamp_of(found.provenance)}
     return {name: described(dataset).assign_attrs(stamp) for name, dataset in written.items()}
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.sweep.results import RigResult, RunResult
+from sloshlab.maps.map_error import MapError
 from sloshlab.reduced_order_model.fit_quality import FitQuality, fit_quality
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.model import ReducedOrderModel
@@ -84,31 +85,6 @@ class CeilingPair:
     rms_of_force: FloatArray
     rms_of_repeat: FloatArray
     rms_of_model: FloatArray
-
-
-@dataclass(frozen=True)
-class MapError:
-    """Predicted − measured over a map.
-
-    Attributes
-    ----------
-    largest : float
-        Largest absolute value of the measured map.
-    rms, mean : float
-        Of the difference over the measured region.
-    rms_of_windows : float
-        Of the difference over the windows, without interpolation.
-    """
-
-    largest: float
-    rms: float
-    mean: float
-    rms_of_windows: float
-
-    @property
-    def relative_rms(self) -> float:
-        """RMS over the largest value."""
-        return self.rms / self.largest if self.largest > 0 else float("nan")
 
 
 @dataclass(frozen=True)

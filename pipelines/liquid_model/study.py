@@ -20,7 +20,7 @@ from pipelines.liquid_model.sensitivity_study import (
 )
 from pipelines.liquid_model.study_page import StudiedModels, page_of
 from pipelines.liquid_model.training_runs import RunFiles, training_runs
-from pipelines.report.outputs import sha256_of, versions, write_dataset
+from pipelines.report.outputs import provenance_of, write_dataset
 from pipelines.report.page import write_page
 from pipelines.report.progress import amounts
 from sloshlab import atomic_file
@@ -94,11 +94,7 @@ def study(
     pick = picked(results)
     best = folder / pick.best.case.name / MODEL_NAME
     inputs = (*files.training, *files.validation, *files.still, files.rig)
-    provenance = {
-        "command": command,
-        "inputs": {path.name: sha256_of(path) for path in inputs},
-        "versions": versions(),
-    }
+    provenance = provenance_of(command, inputs)
     flags = (*runs.flags, *(f"{result.case.name}: {result.ended}" for result in results if not result.is_trained))
     found = StudiedModels(tuple(results), pick, settings, runs.rate.reason, flags, provenance)
     with atomic_file.filled_folder(folder) as complete:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,3 +49,33 @@ def versions() -> dict[str, str]:
 
     names = ("sloshlab", "numpy", "scipy", "numba", "xarray", "netCDF4")
     return {"python": platform.python_version(), **{name: version(name) for name in names}}
+
+
+def provenance_of(
+    command: str, inputs: Iterable[Path], known_sha256: Mapping[Path, str] | None = None
+) -> dict[str, Any]:
+    """What a result rests on: the command, hashes of the input files and versions.
+
+    Parameters
+    ----------
+    command : str
+        What the user typed.
+    inputs : iterable of Path
+        Every file that the results depend on.
+    known_sha256 : mapping of Path to str, optional
+        Hashes that need not be computed again.
+    """
+    known = known_sha256 or {}
+    return {
+        "command": command,
+        "inputs": {path.name: known.get(path) or sha256_of(path) for path in inputs},
+        "versions": versions(),
+    }
+
+
+def stamp_of(provenance: Mapping[str, Any]) -> dict[str, str]:
+    """Attributes of a result that say what it rests on; the command stands in the report only.
+
+    Files of the same inputs then have the same bytes, wherever they are written.
+    """
+    return {name: json.dumps(provenance.get(name, {}), sort_keys=True) for name in ("inputs", "versions")}

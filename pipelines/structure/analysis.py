@@ -16,7 +16,7 @@ from pipelines.structure.stages import Loaded, analysed, has_spectra, loaded
 from pipelines.sweep.stages import naming
 from sloshlab.conditioning.calibration import ApparentMass, apparent_mass
 from sloshlab.errors import AnalysisError, InputError
-from sloshlab.modal.instantaneous_damping import InstantaneousDamping
+from sloshlab.modal.instantaneous_damping import mean_over_decay
 from sloshlab.modal.pooled_decays import PooledDamping, pooled_damping
 from sloshlab.modal.rig_modes import stated_modes, structure_of, uniform_beam
 from sloshlab.modal.structural_update import UpdatedBeam, update_beam
@@ -145,9 +145,12 @@ def _frozen_modes(runs: Sequence[BeamRun]) -> dict[int, FrozenMode]:
     for run in runs:
         if run.group != "frozen":
             continue
-        for one in run.decays:
-            if one.decay is not None and one.decay.local_sine_fit.used.any() and one.mode not in found:
-                found[one.mode] = _of_decay(one.decay.local_sine_fit)
+        for read in run.decays:
+            if read.decay is not None and read.decay.local_sine_fit.used.any() and read.mode not in found:
+                mean = mean_over_decay(read.decay.local_sine_fit)
+                found[read.mode] = FrozenMode(
+                    mean.natural_frequency_hz, mean.frequency_hz_std, mean.damping_ratio, "decay"
+                )
     for run in runs:
         if run.group != "frozen" or run.random is None:
             continue
@@ -163,17 +166,6 @@ def _frozen_modes(runs: Sequence[BeamRun]) -> dict[int, FrozenMode]:
                     ),
                 )
     return found
-
-
-def _of_decay(reading: InstantaneousDamping) -> FrozenMode:
-    """Mean over the decay, each stretch weighted by its error; the scatter between stretches is its own error."""
-    used = reading.used
-    weight = 1 / np.maximum(reading.frequency_hz_std[used], 1e-9) ** 2
-    damping = float(np.average(reading.damping_ratio[used], weights=weight))
-    seen = float(np.average(reading.frequency_hz[used], weights=weight))
-    scatter = float(np.sqrt(np.average((reading.frequency_hz[used] - seen) ** 2, weights=weight)))
-    std = max(scatter / math.sqrt(int(used.sum())), float(1 / np.sqrt(weight.sum())))
-    return FrozenMode(seen / math.sqrt(1 - damping**2), std, damping, "decay")
 
 
 def _updated(rig: Rig, frozen: dict[int, FrozenMode]) -> tuple[UpdatedBeam | None, str]:

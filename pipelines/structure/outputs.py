@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -11,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
-from pipelines.report.outputs import sha256_of, versions, write_dataset
+from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
 from pipelines.structure.analysis import analyse_beam
 from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, ModeDecay
 from sloshlab import atomic_file
@@ -227,13 +226,8 @@ def write_beam(experiment: BeamExperiment, folder: Path, *, command: str, report
         ``lines`` for people, ``flags``, and numbers for machines.
     """
     known = {run.path: run.sha256 for run in experiment.runs}
-    inputs = {path.name: known.get(path) or sha256_of(path) for path in experiment.inputs}
-    provenance = {"command": command, "inputs": inputs, "versions": versions()}
-    stamp = {
-        "title": experiment.title,
-        "inputs": json.dumps(inputs, sort_keys=True),
-        "versions": json.dumps(provenance["versions"], sort_keys=True),
-    }
+    provenance = provenance_of(command, experiment.inputs, known)
+    stamp = {"title": experiment.title, **stamp_of(provenance)}
     with atomic_file.filled_folder(folder) as complete:
         for name, dataset in (
             ("modal.nc", modal_dataset(experiment)),

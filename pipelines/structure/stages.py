@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -10,7 +9,6 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
-from scipy.signal import butter, resample_poly, sosfiltfilt
 
 from pipelines.report.outputs import sha256_of
 from pipelines.structure.random_runs import random_response
@@ -24,11 +22,13 @@ from sloshlab.conditioning.combined_channels import (
     mean_acceleration,
     total_force,
 )
+from sloshlab.conditioning.gaps import longest_whole_stretch
 from sloshlab.conditioning.quality import RunQuality, quality_of
 from sloshlab.errors import AnalysisError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
-from sloshlab.modal.free_decay import FreeDecay, analyse_free_decay
+from sloshlab.modal.free_decay import analyse_free_decay
 from sloshlab.modal.modal_filter import ModalFilter, ModalResponse, modal_filter
+from sloshlab.modal.mode_band import decay_in_band
 from sloshlab.modal.rig_modes import (
     ModeNames,
     rig_modal_filter,
@@ -43,15 +43,9 @@ from sloshlab.rig import Rig
 FloatArray = npt.NDArray[np.float64]
 
 _FIRST_MODE_RANGE: Final = (0.7, 1.4)
-_HIGHER_MODE_RANGE: Final = (0.88, 1.14)
-"""Where a mode is looked for, over its believed frequency; the liquid takes mass away from the first."""
+"""Where the first mode is looked for, over its believed frequency; the liquid takes mass away from it."""
 _LARGEST_ROOT_SHARE: Final = 0.05
 _LARGEST_RESIDUAL_SHARE: Final = 0.1
-_N_CYCLES_OF_HIGHER_MODES: Final = 8
-_SMALLEST_RATE_OVER_FREQUENCY: Final = 2.5
-_SAMPLES_PER_CYCLE: Final = 16
-"""Higher modes are resampled to so many, so that a parabola over a quarter of a cycle makes sense."""
-_EDGE_IN_CYCLES_OF_THE_BAND: Final = 2.0
 
 
 @dataclass(frozen=True)
@@ -193,10 +187,7 @@ def _longest_part_without_gaps(run: Loaded, names: list[str]) -> tuple[xr.Datase
     whole = np.all([np.isfinite(run.recording[name].values) for name in names], axis=0)
     if whole.all():
         return run.recording, []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
-    starts, stops = edges[::2], edges[1::2]
-    longest = int(np.argmax(stops - starts))
-    part = run.recording.isel(time=slice(int(starts[longest]), int(stops[longest])))
+    part = run.recording.isel(time=longest_whole_stretch(whole))
     time = part["time"].values
     return part, [
         f"{run.attributes.run_id}: {int((~whole).sum())} samples are lost; the decay is read from {time[0]:.3f} s "
@@ -252,46 +243,18 @@ def _decays(
             decay = analyse_free_decay(
                 signal,
                 rate_hz,
-                frequency_range_hz=_around(believed, _FIRST_MODE_RANGE),
+                frequency_range_hz=(_FIRST_MODE_RANGE[0] * believed, _FIRST_MODE_RANGE[1] * believed),
                 n_cycles=settings.n_cycles,
             )
             found.append(ModeDecay(0, decay))
             continue
         try:
-            found.append(ModeDecay(mode, _higher_decay(signal, modes, mode, rate_hz)))
+            found.append(
+                ModeDecay(mode, decay_in_band(signal, modes.frequency_hz, mode, rate_hz, name=modes.names[mode]))
+            )
         except AnalysisError as error:
             found.append(ModeDecay(mode, None, str(error)))
     return tuple(found)
-
-
-def _higher_decay(signal: FloatArray, modes: ModeNames, mode: int, rate_hz: float) -> FreeDecay:
-    """Decay of a mode in its own band, with enough samples per cycle for peaks."""
-    own = modes.frequency_hz[mode]
-    if own * _SMALLEST_RATE_OVER_FREQUENCY > rate_hz:
-        allowed = f"> {_SMALLEST_RATE_OVER_FREQUENCY * own:.4g} Hz for {modes.names[mode]}"
-        raise AnalysisError("sampling rate", got=f"{rate_hz:g} Hz", allowed=allowed, remedy="record faster")
-    low, high = _band(modes, mode, rate_hz)
-    sections = butter(2, [low, high], btype="bandpass", fs=rate_hz, output="sos")
-    narrow = sosfiltfilt(sections, signal)
-    finer = max(1, math.ceil(_SAMPLES_PER_CYCLE * own / rate_hz))
-    return analyse_free_decay(
-        resample_poly(narrow, finer, 1, padtype="line"),
-        finer * rate_hz,
-        frequency_range_hz=_around(own, _HIGHER_MODE_RANGE),
-        n_cycles=_N_CYCLES_OF_HIGHER_MODES,
-        filter_edge_s=_EDGE_IN_CYCLES_OF_THE_BAND / low,
-    )
-
-
-def _band(modes: ModeNames, mode: int, rate_hz: float) -> tuple[float, float]:
-    """Band of a mode [Hz]: what others leak into it through gains and shapes lies outside."""
-    own = modes.frequency_hz[mode]
-    above = modes.frequency_hz[mode + 1] if mode + 1 < len(modes.frequency_hz) else 4 * own
-    return float(np.sqrt(modes.frequency_hz[mode - 1] * own)), min(float(np.sqrt(own * above)), 0.48 * rate_hz)
-
-
-def _around(frequency_hz: float, shares: tuple[float, float]) -> tuple[float, float]:
-    return shares[0] * frequency_hz, shares[1] * frequency_hz
 
 
 def _random(
@@ -304,4 +267,6 @@ def _random(
     outputs = {**motion.sensors, **dict(zip(modes.names, response.acceleration_m_per_s2, strict=True))}
     if motion.force is not None:
         outputs[FORCE_INTERFACE] = motion.force
-    return random_response(motion.root, motion.tank, outputs, modes, settings.segment_s, rate_hz)
+    return random_response(
+        motion.root, motion.tank, outputs, modes, segment_s=settings.segment_s, sampling_rate_hz=rate_hz
+    )

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.report.numbers import MISSING, signed, text
 from pipelines.report.tables import Table
 from pipelines.structure.figures_twin import pairs_of
 from pipelines.structure.results import BeamExperiment, BeamRun, in_g
+from sloshlab.modal.free_decay import FreeDecay
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping
-from sloshlab.modal.pooled_decays import PooledDamping, pooled_damping
-
-FloatArray = npt.NDArray[np.float64]
+from sloshlab.modal.pooled_decays import DampingDeviation, PooledDamping, damping_deviation, pooled_damping
 
 CYCLES_LEFT_OUT: Final = 2.0
 """After a release, while the liquid breaks up and no model of steady motion can hold."""
@@ -26,78 +23,44 @@ _SCATTER_ALLOWED: Final = 0.3
 """Half a 90 % interval of the mean over ζ beyond which the repeats do not say what a model should meet."""
 
 
-@dataclass(frozen=True)
-class DecayComparison:
-    """One twin against the mean of the repeated releases, at amplitudes that are met after the second cycle.
+def decay_comparisons(experiment: BeamExperiment) -> dict[str, DampingDeviation]:
+    """Compare every twin of a sloshing decay with the mean of the repeated releases; none where there is only one.
 
-    Attributes
-    ----------
-    group : str
-        The twin.
-    amplitude_m_per_s2, measured, twin : ndarray, shape (n_amplitudes,)
-        ζ at common amplitudes, rising.
-    is_known : ndarray of bool, shape (n_amplitudes,)
-        Where the repeats agree well enough with each other.
+    Returns
+    -------
+    dict of str to DampingDeviation
+        By twin; from the third cycle after the release on.
     """
-
-    group: str
-    amplitude_m_per_s2: FloatArray
-    measured: FloatArray
-    twin: FloatArray
-    is_known: npt.NDArray[np.bool_]
-
-    @property
-    def deviation(self) -> FloatArray:
-        """Relative deviation of the twin's ζ, shape (n_amplitudes,)."""
-        return np.asarray(self.twin / self.measured - 1.0)
-
-
-def decay_comparisons(experiment: BeamExperiment) -> list[DecayComparison]:
-    """Compare every twin of a sloshing decay with the recordings; none where there is only one."""
     measured = _pooled(experiment, "sloshing")
     if measured is None:
-        return []
-    half = 0.5 * np.diff(measured.damping_ratio_interval, axis=0)[0] / np.abs(measured.damping_ratio)
-    repeated = measured.n_repeats >= _MEASURED_REPEATS
-    found = []
+        return {}
+    found = {}
     for group in dict.fromkeys(run.group for run in experiment.free_runs if run.is_simulated):
         twin = _pooled(experiment, group)
-        if twin is None:
-            continue
-        amplitude = measured.acceleration_amplitude_m_per_s2
-        its_own = twin.acceleration_amplitude_m_per_s2
-        inside = repeated & (amplitude >= its_own.min()) & (amplitude <= its_own.max() * (1 + 1e-9))
-        if not inside.any():
-            continue
-        damping = np.interp(np.log(amplitude[inside]), np.log(its_own), twin.damping_ratio)
-        known = half[inside] <= _SCATTER_ALLOWED
-        found.append(DecayComparison(group, amplitude[inside], measured.damping_ratio[inside], damping, known))
+        deviation = (
+            None
+            if twin is None
+            else damping_deviation(
+                measured, twin, fewest_repeats=_MEASURED_REPEATS, largest_scatter=_SCATTER_ALLOWED
+            )
+        )
+        if deviation is not None:
+            found[group] = deviation
     return found
 
 
 def _pooled(experiment: BeamExperiment, group: str) -> PooledDamping | None:
     """Mean over the repeats, the cycles after the release left out."""
-    readings = [
-        _later(run.first_decay.readings[_METHOD], run)
-        for run in experiment.free_runs
-        if run.group == group and run.first_decay is not None
-    ]
+    decays = [run.first_decay for run in experiment.free_runs if run.group == group]
+    readings = [_later(decay) for decay in decays if decay is not None]
     readings = [reading for reading in readings if reading.used.any()]
     return pooled_damping(readings) if readings else None
 
 
-def _later(reading: InstantaneousDamping, run: BeamRun) -> InstantaneousDamping:
-    decay = run.first_decay
-    assert decay is not None
+def _later(decay: FreeDecay) -> InstantaneousDamping:
+    reading = decay.readings[_METHOD]
     frequency = float(np.nanmedian(reading.frequency_hz))
-    kept = reading.time_s >= decay.release.release_s + CYCLES_LEFT_OUT / frequency
-    return InstantaneousDamping(
-        reading.method,
-        *(getattr(reading, name)[kept] for name in (
-            "time_s", "acceleration_amplitude_m_per_s2", "damping_ratio", "damping_ratio_std", "frequency_hz",
-            "frequency_hz_std", "coverage_factor", "trust",
-        )),
-    )  # fmt: skip
+    return reading.since(decay.release.release_s + CYCLES_LEFT_OUT / frequency)
 
 
 def decay_table(experiment: BeamExperiment) -> Table | None:
@@ -105,11 +68,11 @@ def decay_table(experiment: BeamExperiment) -> Table | None:
     found = decay_comparisons(experiment)
     if not found:
         return None
-    amplitudes = sorted({float(a) for one in found for a in one.amplitude_m_per_s2}, reverse=True)
-    rows = [_row(amplitude, found) for amplitude in amplitudes]
-    rows.append(("largest deviation", "", *(_largest(one) for one in found)))
-    rows.append(("RMS deviation", "", *(_rms(one) for one in found)))
-    header = ("a [g]", "measured ζ₁ [%]", *(f"{one.group} [%]" for one in found))
+    amplitudes = sorted({float(a) for twin in found.values() for a in twin.amplitude_m_per_s2}, reverse=True)
+    rows = [_row(amplitude, list(found.values())) for amplitude in amplitudes]
+    rows.append(("largest deviation", "", *(_share(twin.largest) for twin in found.values())))
+    rows.append(("RMS deviation", "", *(_share(twin.rms) for twin in found.values())))
+    header = ("a [g]", "measured ζ₁ [%]", *(f"{group} [%]" for group in found))
     note = (
         f"Logarithmic decrement of the first mode from {CYCLES_LEFT_OUT:g} cycles after the release on, means "
         "over repeats within an eighth of a decade of amplitude; in parentheses the deviation of the twin. "
@@ -120,27 +83,21 @@ def decay_table(experiment: BeamExperiment) -> Table | None:
     return Table("Damping of decays, twins against recordings", header, tuple(rows), note)
 
 
-def _row(amplitude: float, found: list[DecayComparison]) -> tuple[str, ...]:
+def _row(amplitude: float, twins: list[DampingDeviation]) -> tuple[str, ...]:
     cells, measured, known = [], MISSING, False
-    for one in found:
-        at = np.flatnonzero(one.amplitude_m_per_s2 == amplitude)
+    for twin in twins:
+        at = np.flatnonzero(twin.amplitude_m_per_s2 == amplitude)
         if not at.size:
             cells.append(MISSING)
             continue
-        measured, known = text(100 * one.measured[at[0]]), bool(one.is_known[at[0]])
-        cells.append(f"{text(100 * one.twin[at[0]])} ({signed(100 * one.deviation[at[0]], 2)} %)")
+        measured, known = text(100 * twin.measured[at[0]]), bool(twin.is_known[at[0]])
+        cells.append(f"{text(100 * twin.model[at[0]])} ({signed(100 * twin.relative[at[0]], 2)} %)")
     shown = text(float(in_g(np.array(amplitude))), 3)
     return (shown if known else f"[{shown}]", measured, *cells)
 
 
-def _largest(decay_comparison: DecayComparison) -> str:
-    known = decay_comparison.deviation[decay_comparison.is_known]
-    return f"{text(100 * float(np.abs(known).max()), 2)} %" if known.size else MISSING
-
-
-def _rms(decay_comparison: DecayComparison) -> str:
-    known = decay_comparison.deviation[decay_comparison.is_known]
-    return f"{text(100 * float(np.sqrt(np.mean(known**2))), 2)} %" if known.size else MISSING
+def _share(deviation: float) -> str:
+    return f"{text(100 * deviation, 2)} %" if np.isfinite(deviation) else MISSING
 
 
 def random_table(experiment: BeamExperiment) -> Table | None:

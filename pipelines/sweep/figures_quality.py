@@ -25,6 +25,7 @@ from pipelines.report.style import (
 )  # fmt: skip
 from pipelines.sweep.figures_runs import run_label
 from pipelines.sweep.selection import by_level
+from sloshlab.sweep.energy_identity import harmonic_mass_kg, harmonic_work_share
 
 if TYPE_CHECKING:
     from pipelines.sweep.results import RunResult
@@ -79,15 +80,9 @@ def _regime_styles(
 
 def identity_difference(windows: xr.Dataset) -> tuple[FloatArray, str, str]:
     """(W − πγΩu₀²) over m_l u₀² Ω², or over u₀² Ω² without a liquid; what it is divided by, and the unit."""
-    speed2 = (2 * np.pi * windows["frequency_hz"].values * windows["amplitude_m"].values) ** 2
-    difference = (windows["work_j"].values - windows["work_harmonic_j"].values) / np.where(
-        speed2 > 0, speed2, np.nan
-    )
-    if "w_bar" not in windows:
-        return difference, "u₀²Ω² [kg]", "kg"
-    w_bar = windows["w_bar"].values
-    liquid_mass_kg = windows["dissipated_mass_kg"].values / np.where(w_bar != 0, w_bar, np.nan)
-    return difference / liquid_mass_kg, "m_l u₀²Ω²", "1"
+    if "w_bar" in windows:
+        return harmonic_work_share(windows), "m_l u₀²Ω²", "1"
+    return harmonic_mass_kg(windows), "u₀²Ω² [kg]", "kg"
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from pipelines.report.axes import plain_log_ticks
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import legend_columns, new_figure, ordered_colours, plain, png_bytes
+from sloshlab.sweep.frequency_response import FrequencyResponse, frequency_response_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,94 +22,31 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 _ZOOM = 0.09
-_NEIGHBOURHOOD = 0.1
-"""Part of the frequency around the largest acceleration that is taken for the same mode."""
 
 
 @dataclass(frozen=True)
-class Response:
-    """Frequency response of one run from its windows.
+class Response(FrequencyResponse):
+    """Frequency response of one run.
 
     Attributes
     ----------
     label : str
         The run.
-    frequency_hz, acceleration_g : ndarray, shape (n,)
-        Of the windows, in order of time.
-    accelerance_per_kg : ndarray of complex, shape (n,)
-        ü/F at the excitation frequency [m s-2 N-1 = kg-1].
-    work_j : ndarray, shape (n,)
-        Dissipated work per cycle.
-    loudest_hz, loudest_g : float
-        Where the acceleration is largest, and that value.
-    peak_hz, peak_per_kg : float
-        Where |ü/F| is largest in the neighbourhood of the largest acceleration, and that value.
-    work_peak_hz, work_peak_j : float
-        Where the work is largest in the same neighbourhood, and that value.
     """
 
     label: str
-    frequency_hz: FloatArray
-    acceleration_g: FloatArray
-    accelerance_per_kg: npt.NDArray[np.complex128]
-    work_j: FloatArray
-    loudest_hz: float
-    loudest_g: float
-    peak_hz: float
-    peak_per_kg: float
-    work_peak_hz: float
-    work_peak_j: float
 
 
 def responses(runs: Sequence[RunResult]) -> tuple[Response, ...]:
-    """Compute ü/F = 1/(m − jγ/Ω) of every run: F = m ü + γ u̇ and u̇ = ü/(jΩ)."""
+    """ü/F of every run that has a window in which the structure moves."""
     found = []
     for run in runs:
-        windows = run.windows.sortby("time_s")
-        frequency = windows["frequency_hz"].values
-        apparent = windows["apparent_mass_kg"].values - 1j * windows["gamma_kg_per_s"].values / (
-            2 * np.pi * frequency
-        )
-        usable = np.isfinite(apparent) & (np.abs(apparent) > 0)
-        if not usable.any():
-            continue
-        label = plain(run.attributes.run_id, 28)
-        found.append(_response(label, windows.isel(window=usable), 1 / apparent[usable]))
+        response = frequency_response_of(run.windows)
+        if response is not None:
+            found.append(Response(**vars(response), label=plain(run.attributes.run_id, 28)))
     if not found:
         raise NothingToDrawError("no run has a window")
     return tuple(found)
-
-
-def _response(label: str, windows: xr.Dataset, accelerance_per_kg: npt.NDArray[np.complex128]) -> Response:
-    frequency, acceleration, work = (windows[name].values for name in ("frequency_hz", "acceleration_g", "work_j"))
-    loudest, level = vertex(frequency, acceleration)
-    near = np.abs(np.log(frequency / loudest)) < _NEIGHBOURHOOD
-    peaks = [vertex(frequency, np.where(near, values, -np.inf)) for values in (np.abs(accelerance_per_kg), work)]
-    return Response(label, frequency, acceleration, accelerance_per_kg, work, loudest, level, *peaks[0], *peaks[1])
-
-
-def vertex(abscissa: FloatArray, values: FloatArray) -> tuple[float, float]:
-    """Place and height of the largest value, by the parabola through it and its two neighbours.
-
-    Examples
-    --------
-    >>> x = np.array([0.0, 1.0, 2.0, 3.0])
-    >>> [round(float(part), 6) for part in vertex(x, 5 - (x - 1.3) ** 2)]
-    [1.3, 5.0]
-    """
-    at = int(np.nanargmax(values))
-    if not 0 < at < values.size - 1:
-        return float(abscissa[at]), float(values[at])
-    x, y = abscissa[at - 1 : at + 2], values[at - 1 : at + 2]
-    if not (np.isfinite(y).all() and (x[1] - x[0]) * (x[2] - x[1]) > 0):
-        return float(abscissa[at]), float(values[at])
-    left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
-    curvature = (right - left) / (x[2] - x[0])
-    if curvature >= 0:
-        return float(x[1]), float(y[1])
-    place = float(np.clip(0.5 * (x[0] + x[1]) - left / (2 * curvature), x.min(), x.max()))
-    height = y[0] + left * (place - x[0]) + curvature * (place - x[0]) * (place - x[1])
-    return place, float(height)
 
 
 def frequency_response(name: str, runs: Sequence[RunResult]) -> ReportFigure:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pipelines.report.outputs import sha256_of, versions, write_dataset
+from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
 from pipelines.sweep.results import SweepExperiment
 from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 from sloshlab import atomic_file
@@ -38,9 +37,7 @@ def write_experiment(
     """
     known = {run.path: run.sha256 for run in experiment.runs}
     provenance = {
-        "command": command,
-        "inputs": {path.name: known.get(path) or sha256_of(path) for path in experiment.inputs},
-        "versions": versions(),
+        **provenance_of(command, experiment.inputs, known),
         "n_unsteady_windows": sum(int(run.windows.attrs["n_unsteady_windows"]) for run in experiment.runs),
     }
     with atomic_file.filled_folder(folder) as complete:
@@ -67,8 +64,7 @@ def _write_results(experiment: SweepExperiment, folder: Path, provenance: dict[s
     for name, dataset in (("windows.nc", experiment.windows), ("maps.nc", experiment.maps)):
         stamped = dataset.assign_attrs(
             title=experiment.title,
-            inputs=json.dumps(provenance["inputs"], sort_keys=True),
-            versions=json.dumps(provenance["versions"], sort_keys=True),
+            **stamp_of(provenance),
             half_width_cycles=experiment.settings.half_width_cycles,
             spacing_cycles=experiment.settings.spacing_cycles,
             n_unsteady_windows=provenance["n_unsteady_windows"],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +12,10 @@ import xarray as xr
 from pipelines.report.progress import progress
 from pipelines.sweep.results import RigResult, RunResult, SweepExperiment
 from pipelines.sweep.stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
-from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass
+from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass, w_bar_bias_of_delay
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
+    dynamic_force_noise_power,
     force_channels,
     mean_acceleration,
     total_force,
@@ -32,6 +32,7 @@ from sloshlab.sweep.windows import WindowSettings
 
 _LARGEST_PLAUSIBLE_GAIN_ERROR = 0.05
 _LARGEST_BIAS_OF_W_BAR = 0.02
+_FREQUENCY_OF_BIAS_HZ = 20.0
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ def sweep_signals(
         motion=mean_acceleration(recording).values,
         not_measured=not_measured(recording, forces + accelerations, quality),
         inertia_kg=mass,
-        noise_power=_noise_power(recording, forces, accelerations, mass),
+        noise_power=dynamic_force_noise_power(recording, forces, accelerations, mass),
     )
     return signals, quality
 
@@ -227,15 +228,6 @@ def _enough_for_signs(recording: xr.Dataset) -> xr.Dataset:
     part = recording.isel(time=slice(max(0, middle - half), middle + half))
     complete = all(np.isfinite(part[name].values.sum()) for name in channels(part))
     return part if complete else recording
-
-
-def _noise_power(
-    recording: xr.Dataset, forces: Sequence[str], accelerations: Sequence[str], mass_kg: float
-) -> float:
-    """Mean square of m ü − F that the stated sensor noise alone gives [N²]; 0 if none is stated."""
-    noise = {name: float(recording[name].attrs.get("noise_std", 0.0)) for name in [*forces, *accelerations]}
-    of_mean = sum(noise[name] ** 2 for name in accelerations) / len(accelerations) ** 2
-    return sum(noise[name] ** 2 for name in forces) + mass_kg**2 * of_mean
 
 
 def _windows_of(name: str, results: Sequence[RunResult]) -> xr.Dataset:
@@ -285,19 +277,13 @@ def _calibration_flags(dry: Mapping[str, DryMass | None], rigs: Mapping[str, Rig
             flags.append(
                 f"{name}: the gain of force over acceleration is {mass.gain_ratio:.3f}; check the calibration"
             )
-        bias = w_bar_bias_of_delay(mass, rigs[name])
+        bias = w_bar_bias_of_delay(mass, rigs[name], frequency_hz=_FREQUENCY_OF_BIAS_HZ)
         if abs(mass.delay_s) > 3 * mass.delay_std_s and abs(bias) > _LARGEST_BIAS_OF_W_BAR:
             flags.append(
                 f"{name}: force lags acceleration by {1e6 * mass.delay_s:.0f} µs, which shifts W̄ at 20 Hz by "
                 f"{bias:+.3f}; compensate it with delay_s in the channel map"
             )
     return flags
-
-
-def w_bar_bias_of_delay(dry: DryMass, rig: Rig, *, frequency_hz: float = 20.0) -> float:
-    """W̄ that a delay τ of force behind acceleration feigns: π Ωτ (M_dry + m_l)/m_l, to first order in Ωτ."""
-    total = dry.mass_kg + rig.liquid_mass_kg
-    return math.pi * 2 * math.pi * frequency_hz * dry.delay_s * total / rig.liquid_mass_kg
 
 
 def _joined(rigs: Sequence[RigResult]) -> xr.Dataset:

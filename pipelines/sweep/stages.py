@@ -14,7 +14,7 @@ import xarray as xr
 from pipelines.report.outputs import sha256_of
 from pipelines.sweep.results import Excerpt, RunResult
 from sloshlab.conditioning.clipping import clipped_samples
-from sloshlab.conditioning.integration import integrated
+from sloshlab.conditioning.integration import displacement_of_part
 from sloshlab.conditioning.quality import RunQuality, quality_of
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.experiments import EXPERIMENTS
@@ -177,7 +177,7 @@ def analyse_sweep(
         windows=windows,
         law=law,
         stated=stated,
-        boundary_error_s=_boundary_error(measured + start_time_s, stated),
+        boundary_error_s=float("nan") if stated is None else stated.boundary_error_s(measured + start_time_s),
         quality=quality,
         n_cycles=cycles.usable.size,
         n_cycles_lost=n_lost,
@@ -238,18 +238,6 @@ def _boundaries(
     return np.asarray(times - start_time_s)
 
 
-def _boundary_error(measured_s: FloatArray, stated: SweepLaw | None) -> float:
-    """Largest deviation of the measured boundaries from those of the law, the mean phase offset removed [s]."""
-    if stated is None:
-        return float("nan")
-    turns = stated.phase_rad(measured_s) / (2 * np.pi)
-    if not np.isfinite(turns).all():
-        return float("nan")
-    deviation = turns - np.arange(turns.size)
-    deviation -= deviation.mean()
-    return float(np.abs(deviation / stated.frequency_hz(measured_s)).max())
-
-
 def _excerpts(
     cycles: Cycles,
     windows: xr.Dataset,
@@ -276,13 +264,8 @@ def _excerpt(
     middle = (float(window["time_s"]) - start_time_s) * rate_hz
     half = 6.0 / frequency * rate_hz
     shown = slice(max(0, int(middle - half)), min(signals.motion.size, int(middle + half) + 1))
-    padding = int(2.0 * rate_hz)
-    used = slice(max(0, shown.start - padding), min(signals.motion.size, shown.stop + padding))
     corner = max(0.2 * frequency, 0.5)
-    speed = integrated(np.asarray(signals.motion[used], dtype=np.float64), 1 / rate_hz, corner_hz=corner)
-    shift = integrated(speed, 1 / rate_hz, corner_hz=corner)[shown.start - used.start :][
-        : shown.stop - shown.start
-    ]
+    shift = displacement_of_part(signals.motion, rate_hz, shown, corner_hz=corner, padding_s=2.0)
     force, motion = signals.force_n[shown], signals.motion[shown]
     dry = signals.inertia_kg - rig.liquid_mass_kg if rig is not None else 0.0
     shown_force = dry * motion - force if rig is not None else force.copy()

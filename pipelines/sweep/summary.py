@@ -12,6 +12,7 @@ from pipelines.report.figure import NothingToDrawError
 from pipelines.report.numbers import interval, signed, text
 from pipelines.sweep.figures_response import responses
 from pipelines.sweep.selection import by_level, is_sweep, level_g, rig_text, runs_of
+from sloshlab.sweep.crossing_level import crossing_level
 
 if TYPE_CHECKING:
     from pipelines.sweep.results import RigResult, RunResult, SweepExperiment
@@ -78,11 +79,7 @@ def onset_g(runs: Sequence[RunResult], threshold: float) -> float:
         if on_level.any():
             levels.append(level)
             means.append(float(run.windows["w_bar"].values[on_level].mean()))
-    for low in range(len(levels) - 1):
-        if means[low] < threshold <= means[low + 1] and levels[low + 1] > levels[low]:
-            part = (threshold - means[low]) / (means[low + 1] - means[low])
-            return float(levels[low] * (levels[low + 1] / levels[low]) ** part)
-    return math.nan
+    return crossing_level(levels, means, threshold)
 
 
 def _effective_mass(rig: RigResult, runs: Sequence[RunResult]) -> str:

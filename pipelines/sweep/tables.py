@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from pipelines.report.figure import NothingToDrawError
@@ -18,9 +17,9 @@ from pipelines.sweep.figures_response import responses
 from pipelines.sweep.figures_runs import law_text
 from pipelines.sweep.selection import REFERENCE_FREQUENCIES_HZ, by_level, is_sweep, level_g, rig_text, runs_of
 from sloshlab import viscous_equivalent
-from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import SloshlabError
 from sloshlab.free_surface_modes import mode_table
+from sloshlab.sweep.frequency_response import force_amplitude_n
 from sloshlab.sweep.regime import QUIET_FORCE_RATIO, REGIMES
 
 if TYPE_CHECKING:
@@ -298,7 +297,7 @@ def resonance_table(runs: Sequence[RunResult]) -> Table:
                 text(response.work_peak_hz, 4),
                 text(response.peak_hz, 4),
                 text(response.peak_per_kg, 3),
-                interval(_force_n(run), 3),
+                interval(force_amplitude_n(run.windows), 3),
             )
         )
     return Table(
@@ -310,13 +309,6 @@ def resonance_table(runs: Sequence[RunResult]) -> Table:
         "the frequency "
         "of the largest acceleration. A frequency that falls as the level rises is softening.",
     )  # fmt: skip
-
-
-def _force_n(run: RunResult) -> npt.NDArray[np.float64]:
-    windows = run.windows
-    quadrature = windows["gamma_kg_per_s"].values / (2 * np.pi * windows["frequency_hz"].values)
-    acceleration = GRAVITY_M_PER_S2 * windows["acceleration_g"].values
-    return np.asarray(np.hypot(windows["apparent_mass_kg"].values, quadrature) * acceleration)
 
 
 def work_level_table(runs: Sequence[RunResult]) -> Table:

@@ -13,14 +13,14 @@ import xarray as xr
 from pipelines.report.progress import progress
 from pipelines.sweep.results import RunResult, SweepExperiment
 from pipelines.sweep.stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
+from sloshlab.conditioning.differentiation import differentiated
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.recording import channels, read_recording
+from sloshlab.sweep.passivity import gives_energy
 from sloshlab.sweep.windows import WindowSettings
 
 FloatArray = npt.NDArray[np.float64]
-
-_SIGMA_OF_A_WRONG_SIGN = 5.0
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def _analysed(path: Path, settings: WorkSettings) -> RunResult:
     if settings.phase_reference:
         reference = np.asarray(_channel(recording, path, settings.phase_reference, None), dtype=np.float64)
     if settings.motion_quantity == "displacement":
-        motion = _derivative(np.asarray(motion, dtype=np.float64), float(recording.attrs["sampling_rate_hz"]))
+        motion = differentiated(np.asarray(motion, dtype=np.float64), float(recording.attrs["sampling_rate_hz"]))
     signals = SweepSignals(
         force_n=force,
         motion=motion,
@@ -128,22 +128,12 @@ def _channel(recording: xr.Dataset, path: Path, name: str, quantity: str | None)
     return np.asarray(recording[name].values)
 
 
-def _derivative(displacement_m: FloatArray, rate_hz: float) -> FloatArray:
-    """Velocity by the central difference over seven samples, amplitude error (ω Δt)⁶/140 and no phase error."""
-    weights = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0 * rate_hz
-    velocity = np.full_like(displacement_m, np.nan)
-    velocity[3:-3] = np.convolve(displacement_m, weights, mode="valid")
-    return velocity
-
-
 def _check_energy_sign(windows: xr.Dataset, settings: WorkSettings) -> None:
-    """A passive structure cannot give energy: a work that is negative throughout means a wrong sign."""
-    used = windows["dissipated_mass_kg"].values
-    error = np.maximum(windows["dissipated_mass_kg_std"].values, np.finfo(float).tiny)
-    if used.size and np.median(used / error) < -_SIGMA_OF_A_WRONG_SIGN and np.mean(used < 0) > 0.9:
+    if gives_energy(windows):
+        share = np.mean(windows["dissipated_mass_kg"].values < 0)
         raise AnalysisError(
             f"sign of {settings.force} or {settings.motion}",
-            got=f"negative work in {100 * np.mean(used < 0):.0f} % of the windows",
+            got=f"negative work in {100 * share:.0f} % of the windows",
             allowed="a structure that takes energy",
             remedy=f"set sign = -1 for {settings.force} in the channel map and import again",
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +92,15 @@ def measured_curve(
             remedy="release from further away, record less noise, or lower the smallest acceleration",
         )
     return DampingCurve(amplitude[used], reading.damping_ratio[used], decay.release.frequency_hz)
+
+
+def pooled_curve(curves: Sequence[DampingCurve]) -> DampingCurve:
+    """The values of several decays in one curve, amplitudes falling; the frequency is the mean of theirs."""
+    amplitude = np.concatenate([curve.acceleration_m_per_s2 for curve in curves])
+    order = np.argsort(-amplitude, kind="stable")
+    damping = np.concatenate([curve.damping_ratio for curve in curves])
+    frequency = float(np.mean([curve.frequency_hz for curve in curves]))
+    return DampingCurve(amplitude[order], damping[order], frequency)
 
 
 def simulated_decay(

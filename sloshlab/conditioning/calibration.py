@@ -283,6 +283,32 @@ def _apparent_masses(
     return [apparent_mass(recording, force_names, acceleration_names) for recording in recordings]
 
 
+def w_bar_bias_of_delay(dry: DryMass, rig: Rig, *, frequency_hz: float) -> float:
+    """W̄ that a delay of force behind acceleration feigns.
+
+    Parameters
+    ----------
+    dry : DryMass
+        With the delay τ.
+    rig : Rig
+        With the liquid.
+    frequency_hz : float
+        Ω/2π.
+
+    Returns
+    -------
+    float
+        Positive for a force that comes late: then the inertia force seems to take work from the tank.
+
+    Notes
+    -----
+    The force (M_dry + m_l) ü of a mass, later by τ, has W = π (M_dry + m_l) (Ωu₀)² sin Ωτ in a cycle, so that
+    W̄ = π Ωτ (M_dry + m_l)/m_l to first order in Ωτ.
+    """
+    total = dry.mass_kg + rig.liquid_mass_kg
+    return math.pi * 2 * math.pi * frequency_hz * dry.delay_s * total / rig.liquid_mass_kg
+
+
 def _combined(masses: Sequence[ApparentMass]) -> tuple[float, float]:
     """Mean over runs; its standard deviation from the runs' own or their scatter, whichever is larger."""
     values = np.array([mass.mass_kg for mass in masses])

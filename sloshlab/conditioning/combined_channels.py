@@ -165,6 +165,30 @@ def mean_acceleration(
     return _combined(recording, chosen, factors, "acceleration_mean", "acceleration")
 
 
+def dynamic_force_noise_power(
+    recording: xr.Dataset, forces: Sequence[str], accelerations: Sequence[str], mass_kg: float
+) -> float:
+    """Mean square of m ü − F that the stated noise of the sensors alone gives.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Its channels may have the attribute `noise_std`.
+    forces, accelerations : sequence of str
+        Channels that are added to F, and averaged to ü; their noises are taken as independent.
+    mass_kg : float
+        m.
+
+    Returns
+    -------
+    float
+        [N²]; 0 if no channel states a noise.
+    """
+    noise = {name: float(recording[name].attrs.get("noise_std", 0.0)) for name in [*forces, *accelerations]}
+    of_mean = sum(noise[name] ** 2 for name in accelerations) / len(accelerations) ** 2
+    return sum(noise[name] ** 2 for name in forces) + mass_kg**2 * of_mean
+
+
 def _require_quantity(recording: xr.Dataset, names: Sequence[str], quantity: str) -> None:
     if not names:
         raise AnalysisError(f"{quantity} channels", got="an empty list", allowed="at least one")

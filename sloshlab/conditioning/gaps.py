@@ -107,6 +107,17 @@ def runs(mask: BoolArray, value: bool) -> list[tuple[int, int]]:
     return list(zip(bounds[first:-1:2], bounds[first + 1 :: 2], strict=True))
 
 
+def longest_whole_stretch(usable: BoolArray) -> slice:
+    """The longest stretch of usable samples, the first of several; empty if there is none.
+
+    Examples
+    --------
+    >>> longest_whole_stretch(np.array([True, False, True, True]))
+    slice(2, 4, None)
+    """
+    return slice(*max(runs(usable, True), key=lambda stretch: stretch[1] - stretch[0], default=(0, 0)))
+
+
 def require_channels(recording: xr.Dataset, names: Sequence[str]) -> None:
     """Refuse to go on when a channel is missing, naming it and those there are."""
     missing = [name for name in names if name not in recording.data_vars]

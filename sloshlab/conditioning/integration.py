@@ -128,6 +128,36 @@ def integrated(
     return result
 
 
+def displacement_of_part(
+    acceleration: FloatArray, sampling_rate_hz: float, part: slice, *, corner_hz: float, padding_s: float
+) -> FloatArray:
+    """Displacement in a part of a long recording, without integrating all of it.
+
+    Parameters
+    ----------
+    acceleration : ndarray, shape (n,)
+        [m/s²], NaN where lost.
+    sampling_rate_hz : float
+        Samples per second.
+    part : slice
+        Samples that are wanted, with start and stop.
+    corner_hz : float
+        As for `velocity`.
+    padding_s : float
+        Stretch on both sides that is integrated, too: near the ends of a stretch the drift is known less well.
+
+    Returns
+    -------
+    ndarray, shape (part.stop - part.start,)
+        [m].
+    """
+    padding = int(padding_s * sampling_rate_hz)
+    used = slice(max(0, part.start - padding), min(acceleration.size, part.stop + padding))
+    speed = integrated(np.asarray(acceleration[used], dtype=np.float64), 1 / sampling_rate_hz, corner_hz=corner_hz)
+    moved = integrated(speed, 1 / sampling_rate_hz, corner_hz=corner_hz)
+    return moved[part.start - used.start :][: part.stop - part.start]
+
+
 def is_away_from_ends(usable: BoolArray, step_s: float, *, corner_hz: float = DRIFT_CORNER_HZ) -> BoolArray:
     """True where a sample lies at least one corner period from a gap and from the ends.
 

@@ -6,7 +6,8 @@ cover the scatter of a chaotic liquid from release to release: only repeated rel
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Final
 
@@ -81,6 +82,12 @@ class InstantaneousDamping:
         half = self.coverage_factor * self.frequency_hz_std
         return np.stack([self.frequency_hz - half, self.frequency_hz + half])
 
+    def since(self, time_s: float) -> InstantaneousDamping:
+        """The values from a time on."""
+        kept = self.time_s >= time_s
+        arrays = {field.name: getattr(self, field.name)[kept] for field in fields(self) if field.name != "method"}
+        return replace(self, **arrays)
+
     def to_dataset(self) -> xr.Dataset:
         """All values over ``decay_time_s``, with the attributes of the table of quantities."""
         along = "decay_time_s"
@@ -125,3 +132,44 @@ def damping_ratio_of(
     squared = decay_per_s**2 + omega_rad_per_s**2
     std = omega_rad_per_s * np.hypot(omega_rad_per_s * decay_std, decay_per_s * omega_std) / squared**1.5
     return decay_per_s / np.sqrt(squared), std
+
+
+@dataclass(frozen=True)
+class DecayMean:
+    """One mode as a whole decay shows it.
+
+    Attributes
+    ----------
+    natural_frequency_hz : float
+        Undamped.
+    frequency_hz_std : float
+        Standard error of the damped one.
+    damping_ratio : float
+    """
+
+    natural_frequency_hz: float
+    frequency_hz_std: float
+    damping_ratio: float
+
+
+def mean_over_decay(reading: InstantaneousDamping) -> DecayMean:
+    """Means over the values that may be used, weighted by the error of their frequency.
+
+    Parameters
+    ----------
+    reading : InstantaneousDamping
+        With at least one such value.
+
+    Returns
+    -------
+    DecayMean
+        Its standard error is the scatter between stretches or, if that is smaller, what their own errors give.
+    """
+    used = reading.used
+    # an error of zero would be an infinite weight
+    weight = 1 / np.maximum(reading.frequency_hz_std[used], 1e-9) ** 2
+    damping = float(np.average(reading.damping_ratio[used], weights=weight))
+    damped = float(np.average(reading.frequency_hz[used], weights=weight))
+    scatter = float(np.sqrt(np.average((reading.frequency_hz[used] - damped) ** 2, weights=weight)))
+    std = max(scatter / math.sqrt(int(used.sum())), float(1 / np.sqrt(weight.sum())))
+    return DecayMean(damped / math.sqrt(1 - damping**2), std, damping)

@@ -111,6 +111,70 @@ def pooled_damping(
     )
 
 
+@dataclass(frozen=True)
+class DampingDeviation:
+    """A model's ζ beside the mean of repeated measurements, at common amplitudes.
+
+    Attributes
+    ----------
+    amplitude_m_per_s2, measured, model : ndarray, shape (n_amplitudes,)
+        Amplitudes, rising, and ζ at each.
+    is_known : ndarray of bool, shape (n_amplitudes,)
+        Where the repeats agree well enough with each other.
+    """
+
+    amplitude_m_per_s2: FloatArray
+    measured: FloatArray
+    model: FloatArray
+    is_known: npt.NDArray[np.bool_]
+
+    @property
+    def relative(self) -> FloatArray:
+        """Relative deviation of the model's ζ, shape (n_amplitudes,)."""
+        return np.asarray(self.model / self.measured - 1.0)
+
+    @property
+    def largest(self) -> float:
+        """Largest relative deviation without its sign, where ζ is known; NaN if nowhere."""
+        known = self.relative[self.is_known]
+        return float(np.abs(known).max()) if known.size else float("nan")
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the relative deviation, where ζ is known; NaN if nowhere."""
+        known = self.relative[self.is_known]
+        return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
+
+def damping_deviation(
+    measured: PooledDamping, model: PooledDamping, *, fewest_repeats: int, largest_scatter: float
+) -> DampingDeviation | None:
+    """Compare where both have values, the model's ζ taken as linear in the logarithm of the amplitude.
+
+    Parameters
+    ----------
+    measured, model : PooledDamping
+    fewest_repeats : int
+        Of the measurement, at an amplitude that is compared.
+    largest_scatter : float
+        Half a 90 % interval of the measured mean over ζ, up to which ζ counts as known.
+
+    Returns
+    -------
+    DampingDeviation or None
+        None without a common amplitude.
+    """
+    half = 0.5 * np.diff(measured.damping_ratio_interval, axis=0)[0] / np.abs(measured.damping_ratio)
+    amplitude, own = measured.acceleration_amplitude_m_per_s2, model.acceleration_amplitude_m_per_s2
+    inside = (amplitude >= own.min()) & (amplitude <= own.max() * (1 + 1e-9))
+    inside &= measured.n_repeats >= fewest_repeats
+    if not inside.any():
+        return None
+    modelled = np.interp(np.log(amplitude[inside]), np.log(own), model.damping_ratio)
+    known = half[inside] <= largest_scatter
+    return DampingDeviation(amplitude[inside], measured.damping_ratio[inside], modelled, known)
+
+
 def _bin_means(
     bins: npt.NDArray[np.int64], index: npt.NDArray[np.int64], value: FloatArray, std: FloatArray
 ) -> FloatArray:

@@ -87,6 +87,24 @@ class SweepLaw:
             times = (-self.start_hz + np.sqrt(self.start_hz**2 + 2 * self.rate * n)) / self.rate
         return np.sort(times)
 
+    def boundary_error_s(self, measured_s: FloatArray) -> float:
+        """Largest deviation of measured cycle boundaries from those of the law, the mean phase offset removed [s].
+
+        The offset is left out because a recording need not start with the law. NaN for a law without a phase.
+
+        Examples
+        --------
+        >>> law = SweepLaw(LawKind.LINEAR, 10.0, 0.0, stated=True)
+        >>> round(law.boundary_error_s(np.array([0.03, 0.13, 0.23, 0.37])), 6)
+        0.03
+        """
+        turns = self.phase_rad(measured_s) / (2 * np.pi)
+        if not np.isfinite(turns).all():
+            return float("nan")
+        deviation = turns - np.arange(turns.size)
+        deviation -= deviation.mean()
+        return float(np.abs(deviation / self.frequency_hz(measured_s)).max())
+
 
 def identify_law(time_s: FloatArray, frequency_hz: FloatArray) -> SweepLaw:
     """Find the law that a measured frequency follows.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -51,6 +52,57 @@ class WindowSettings:
     half_width_cycles: int = 6
     spacing_cycles: int = 24
     smallest_n_cycles: int = 3
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One quantity of the table of windows; some have a second dimension, some need the tank."""
+
+    dtype: type = np.float64
+    along: str = ""
+    width: int = 1
+    needs_rig: bool = False
+
+
+_NUMBER, _OF_TANK = _Column(), _Column(needs_rig=True)
+_COLUMNS: Final[dict[str, _Column]] = {
+    "time_s": _NUMBER,
+    "frequency_hz": _NUMBER,
+    "amplitude_m": _NUMBER,
+    "acceleration_g": _NUMBER,
+    "n_cycles": _Column(np.int32),
+    "work_j": _NUMBER,
+    "work_j_std": _NUMBER,
+    "work_harmonic_j": _NUMBER,
+    "phase_error_rad": _NUMBER,
+    "gamma_kg_per_s": _NUMBER,
+    "apparent_mass_kg": _NUMBER,
+    "dissipated_mass_kg": _NUMBER,
+    "dissipated_mass_kg_std": _NUMBER,
+    "harmonic_amplitude_n": _Column(along="harmonic", width=5),
+    "elastic_change_m2": _NUMBER,
+    "kinetic_change_m2_per_s2": _NUMBER,
+    "chirp_m2_per_s2": _NUMBER,
+    "growth_per_cycle": _NUMBER,
+    "stored_work_j": _NUMBER,
+    "subharmonic_amplitude_n": _Column(along="subharmonic", width=2),
+    "regime": _Column(object),
+    "force_ratio": _NUMBER,
+    "subharmonic_share": _NUMBER,
+    "harmonic_share": _NUMBER,
+    "unrepeated_share": _NUMBER,
+    "crest_factor": _NUMBER,
+    "beta_std": _OF_TANK,
+    "w_bar": _OF_TANK,
+    "w_bar_std": _OF_TANK,
+    "beta": _OF_TANK,
+    "loss_factor": _OF_TANK,
+    "omega_bar": _OF_TANK,
+    "u_bar": _OF_TANK,
+    "v_bar": _OF_TANK,
+    "fill_level": _OF_TANK,
+}
+"""All quantities of a window in the order of the table, with windows or without."""
 
 
 def window_slices(cycles: Cycles, settings: WindowSettings) -> Iterator[slice]:
@@ -306,19 +358,14 @@ def _phase_error(starts_s: FloatArray, law: SweepLaw | None) -> float:
 
 def _table(rows: list[dict[str, object]], run_id: str, rig: Rig | None) -> xr.Dataset:
     variables: dict[str, tuple[object, ...]] = {"run": ("window", np.array([run_id] * len(rows), dtype=object))}
-    two_dimensional = {"harmonic_amplitude_n": "harmonic", "subharmonic_amplitude_n": "subharmonic"}
-    for name in rows[0] if rows else _empty_names(rig):
-        column = [row[name] for row in rows]
-        if name in two_dimensional:
-            width = 5 if name.startswith("harmonic") else 2
-            variables[name] = (
-                ("window", two_dimensional[name]),
-                np.array(column, float).reshape(len(rows), width),
-            )
-        elif name == "regime":
-            variables[name] = ("window", np.array(column, dtype=object))
+    for name, column in _COLUMNS.items():
+        if column.needs_rig and rig is None:
+            continue
+        values: npt.NDArray[Any] = np.array([row[name] for row in rows], dtype=column.dtype)
+        if column.along:
+            variables[name] = (("window", column.along), values.reshape(len(rows), column.width))
         else:
-            variables[name] = ("window", np.array(column, dtype=np.int32 if name == "n_cycles" else np.float64))
+            variables[name] = ("window", values)
     table = xr.Dataset(variables)
     table["phase_error_rad"] = ("window", _continuous(table["phase_error_rad"].values))
     return table.assign_coords(harmonic=np.arange(1, 6), subharmonic=np.array([0.5, 1.5]))
@@ -326,15 +373,3 @@ def _table(rows: list[dict[str, object]], run_id: str, rig: Rig | None) -> xr.Da
 
 def _continuous(phase_error_rad: FloatArray) -> FloatArray:
     return np.unwrap(phase_error_rad) if np.isfinite(phase_error_rad).all() else phase_error_rad
-
-
-def _empty_names(rig: Rig | None) -> list[str]:
-    names = [
-        "time_s", "frequency_hz", "amplitude_m", "acceleration_g", "n_cycles", "work_j", "work_j_std",
-        "work_harmonic_j", "phase_error_rad", "gamma_kg_per_s", "apparent_mass_kg", "dissipated_mass_kg",
-        "dissipated_mass_kg_std", "harmonic_amplitude_n", "subharmonic_amplitude_n", "regime", "force_ratio",
-        "subharmonic_share", "harmonic_share", "unrepeated_share", "crest_factor",
-        *_CHANGES, "stored_work_j", "growth_per_cycle",
-    ]  # fmt: skip
-    scaled = ["w_bar", "w_bar_std", "beta", "beta_std", "loss_factor", "omega_bar", "u_bar", "v_bar", "fill_level"]
-    return names + (scaled if rig is not None else [])

@@ -19,8 +19,9 @@ from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.break_up_fit import with_break_up
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.model import ReducedOrderModel
+from sloshlab.sweep.transient_cycles import cycle_works_j, upward_crossings_s
 from studies.beyond_the_source.models import RATE_HZ, Workshop
-from studies.beyond_the_source.recordings import REST_S, Recordings, cycle_works_j, upward_crossings_s
+from studies.beyond_the_source.recordings import REST_S, Recordings
 
 FloatArray = NDArray[np.float64]
 

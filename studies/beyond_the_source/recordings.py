@@ -7,8 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from acquisition.virtual_laboratory.numerical_runs import SUDDEN_STARTS, SUDDEN_STARTS_BETWEEN
 from sloshlab.conditioning.calibration import DryMass, identify_dry_mass
 from sloshlab.conditioning.combined_channels import acceleration_channels, force_channels
@@ -127,34 +125,3 @@ def part(signals: LiquidSignals, start_s: float, stop_s: float) -> LiquidSignals
         signals.sampling_rate_hz,
         f"{signals.name}, {start_s:g} … {stop_s:g} s",
     )
-
-
-def cycle_works_j(velocity_m_per_s: np.ndarray, force_n: np.ndarray, rate_hz: float, start_s: float) -> np.ndarray:
-    """Work that the liquid takes from the tank in each cycle from a time on, W = −∮ Δf v dt.
-
-    Parameters
-    ----------
-    velocity_m_per_s, force_n : ndarray, shape (n,)
-        NaN is left out.
-    rate_hz : float
-    start_s : float
-        When the motion starts, upward. A cycle ends where the velocity crosses zero upward.
-
-    Returns
-    -------
-    ndarray, shape (n_cycles,)
-        [J], positive where the liquid dissipates.
-    """
-    ends = upward_crossings_s(velocity_m_per_s, rate_hz, start_s)
-    time_s = np.arange(velocity_m_per_s.size) / rate_hz
-    power = -np.nan_to_num(force_n * velocity_m_per_s)
-    taken = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) / rate_hz])
-    return np.diff(np.interp(ends, time_s, taken))
-
-
-def upward_crossings_s(velocity_m_per_s: np.ndarray, rate_hz: float, start_s: float) -> np.ndarray:
-    """Return the start and the times at which the velocity crosses zero upward after it."""
-    v = np.nan_to_num(velocity_m_per_s)
-    places = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0))
-    times = (places + v[places] / (v[places] - v[places + 1])) / rate_hz
-    return np.concatenate([[start_s], times[times > start_s + 2 / rate_hz]])

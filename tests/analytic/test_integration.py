@@ -8,6 +8,7 @@ from scipy.integrate import cumulative_simpson
 from sloshlab.conditioning import integration
 from sloshlab.conditioning.integration import (
     displacement,
+    displacement_of_part,
     integrated,
     integration_error,
     is_away_from_ends,
@@ -55,6 +56,20 @@ def test_displacement_of_a_sine():
     inside = slice(int(5 * RATE_HZ), -int(5 * RATE_HZ))
     # twice (0.5/5)⁴ = 2e-4
     assert np.abs(result.values - amplitude * np.sin(omega * time))[inside].max() < 2.5e-4 * amplitude
+
+
+def test_displacement_of_a_part_is_that_of_the_sine_up_to_its_ends():
+    """Also where the padding ends at the ends of the record."""
+    amplitude, omega = 0.0125, 2 * np.pi * 5.0
+    time = np.arange(0, 20, 1 / RATE_HZ)
+    acceleration = (-amplitude * omega**2 * np.sin(omega * time) + 0.3).astype(np.float32)
+    for start, stop, tolerance in ((8.0, 10.5, 2e-3), (1.0, 2.0, 2e-2), (18.0, 19.0, 2e-2)):
+        part = slice(round(start * RATE_HZ), round(stop * RATE_HZ))
+        found = displacement_of_part(acceleration, RATE_HZ, part, corner_hz=1.0, padding_s=2.0)
+        assert found.size == part.stop - part.start
+        # high-pass at 1 Hz, twice: 2 (1/5)⁴ = 3.2e-3 of the amplitude are lost
+        expected = amplitude * np.sin(omega * time[part]) * (1 - 3.2e-3)
+        assert np.abs(found - expected).max() < tolerance * amplitude
 
 
 def test_octave_sweep_against_fine_quadrature():

@@ -9,9 +9,11 @@ from bouncing_rigs import guided_tank, shaker, table_2_2
 from sloshlab.bouncing_ball.ball import BouncingBall
 from sloshlab.bouncing_ball.decaying_motion import DecayingRun, decaying_harmonic, w_bar_line
 from sloshlab.bouncing_ball.free_decay import (
+    DampingCurve,
     damping_shares,
     measured_curve,
     natural_frequency_hz,
+    pooled_curve,
     simulated_curve,
     simulated_decay,
     steady_loss_factor,
@@ -159,3 +161,12 @@ def test_refusals() -> None:
         DecayingRun(2)
     with pytest.raises(RigError, match="allowed: sdof"):
         simulated_decay(ball, shaker(), 0.01, 1.0)
+
+
+def test_decays_are_pooled_in_order_of_amplitude() -> None:
+    first = DampingCurve(np.array([9.0, 5.0, 1.0]), np.array([0.09, 0.05, 0.01]), 6.0)
+    second = DampingCurve(np.array([7.0, 5.0]), np.array([0.07, 0.06]), 7.0)
+    pooled = pooled_curve([first, second])
+    assert pooled.acceleration_m_per_s2.tolist() == [9.0, 7.0, 5.0, 5.0, 1.0]
+    assert pooled.damping_ratio.tolist() == [0.09, 0.07, 0.05, 0.06, 0.01]
+    assert pooled.frequency_hz == 6.5

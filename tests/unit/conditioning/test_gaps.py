@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from sloshlab.conditioning.gaps import (
     Gap,
     gaps,
+    longest_whole_stretch,
     runs,
     sample_is_usable,
     sampling_step_s,
@@ -48,6 +49,12 @@ def test_a_flag_without_nan_costs_every_channel_and_one_with_nan_only_the_nan():
 def test_single_precision_channels():
     run = recording(force_cell_1=np.array([0, NAN, 2], dtype=np.float32))
     assert sample_is_usable(run).tolist() == [True, False, True]
+
+
+def test_the_longest_stretch_is_the_first_of_equals_and_empty_without_any():
+    assert longest_whole_stretch(np.array([True, True, False, True, True, False])) == slice(0, 2)
+    assert longest_whole_stretch(np.array([True, False, True, True, True])) == slice(2, 5)
+    assert longest_whole_stretch(np.zeros(3, bool)) == slice(0, 0)
 
 
 def test_a_missing_channel_is_named_with_those_there_are():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sloshlab.errors import AnalysisError
-from sloshlab.modal.instantaneous_damping import InstantaneousDamping, Trust
-from sloshlab.modal.pooled_decays import pooled_damping
+from sloshlab.modal.instantaneous_damping import InstantaneousDamping, Trust, mean_over_decay
+from sloshlab.modal.pooled_decays import damping_deviation, pooled_damping
 
 
 def reading(
@@ -76,3 +76,49 @@ def test_intervals_hold_in_nine_of_ten_repeats_of_the_whole_test() -> None:
         low, high = pooled.damping_ratio_interval[:, 0]
         held.append(low <= 0.02 <= high)
     assert np.mean(held) == pytest.approx(0.90, abs=0.05)
+
+
+def test_a_model_is_compared_where_both_have_values_linear_in_the_logarithm() -> None:
+    repeats = [reading(AMPLITUDES, np.array([0.03, 0.02, 0.01]) + shift) for shift in (-1e-4, 1e-4)]
+    model = pooled_damping([reading(np.array([50.0, 2.0]), np.array([0.05, 0.01]))], bins_per_decade=20)
+    low, high = model.acceleration_amplitude_m_per_s2
+    found = damping_deviation(pooled_damping(repeats), model, fewest_repeats=2, largest_scatter=0.1)
+    assert found is not None
+    assert found.amplitude_m_per_s2.tolist() == [10.0]
+    expected = 0.01 + 0.04 * np.log(10.0 / low) / np.log(high / low)
+    assert found.model == pytest.approx([expected], rel=1e-12)
+    assert found.relative == pytest.approx([expected / 0.02 - 1], rel=1e-12)
+    assert found.largest == found.rms == pytest.approx(expected / 0.02 - 1, rel=1e-12)
+
+
+def test_what_does_not_repeat_is_not_known() -> None:
+    repeats = [reading(AMPLITUDES, np.array([0.03, 0.02, 0.01]) + shift) for shift in (-0.005, 0.005)]
+    model = pooled_damping([reading(AMPLITUDES, np.full(3, 0.02))])
+    found = damping_deviation(pooled_damping(repeats), model, fewest_repeats=2, largest_scatter=1.3)
+    assert found is not None
+    # Student with one degree of freedom, 90 %: 6.314 × 0.00707/√2 = 0.0316, over ζ = 0.01, 0.02, 0.03
+    assert found.is_known.tolist() == [False, False, True]
+    assert found.largest == pytest.approx(1 / 3, rel=1e-9)
+    nowhere = damping_deviation(pooled_damping(repeats), model, fewest_repeats=2, largest_scatter=0.1)
+    assert nowhere is not None
+    assert np.isnan(nowhere.rms)
+    assert damping_deviation(pooled_damping(repeats), model, fewest_repeats=3, largest_scatter=1.3) is None
+
+
+def test_the_mean_over_a_decay_weighs_by_the_error_and_is_undamped() -> None:
+    both = reading(np.array([10.0, 5.0, 1.0]), np.array([0.01, 0.04, 0.9]))
+    changed = {"frequency_hz": np.array([10.0, 10.4, 99.0]), "frequency_hz_std": np.array([0.1, 0.2, 0.1]),
+               "trust": np.array(["used", "used", "noise"])}  # fmt: skip
+    found = mean_over_decay(InstantaneousDamping(**{**vars(both), **changed}))
+    # weights 4 : 1
+    assert found.damping_ratio == pytest.approx(0.016)
+    assert found.natural_frequency_hz == pytest.approx(10.08 / np.sqrt(1 - 0.016**2))
+    # scatter √((4 × 0.08² + 0.32²)/5) = 0.16, over √2; the errors alone say 1/√125
+    assert found.frequency_hz_std == pytest.approx(0.16 / np.sqrt(2))
+
+
+def test_values_from_a_time_on() -> None:
+    later = reading(AMPLITUDES, np.array([0.03, 0.02, 0.01])).since(1.0)
+    assert later.time_s.tolist() == [1.0, 2.0]
+    assert later.damping_ratio.tolist() == [0.02, 0.01]
+    assert later.method == "local sine fit"

@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sloshlab.rig import Liquid, Rig, Tank
 from sloshlab.sweep.cycles import Cycles
 from sloshlab.sweep.windows import WindowSettings, evaluate_windows, window_slices
+
+TANK = Rig(
+    tank=Tank(height_m=0.0272, length_m=0.1172, width_m=0.078, dry_mass_kg=0.61),
+    liquid=Liquid(density_kg_per_m3=1000.0, fill_level=0.5),
+)
 
 
 def cycles_of(frequency_hz, *, usable=None, work_j=None, speed=1.0) -> Cycles:
@@ -110,8 +116,11 @@ def test_a_window_with_too_few_cycles_is_left_out():
     assert windows.n_cycles.values.tolist() == [12]
 
 
-def test_no_cycles_give_an_empty_table_with_all_columns():
-    empty = evaluate_windows(cycles_of(np.full(2, 10.0)), run_id="a", law=None)
-    full = evaluate_windows(cycles_of(np.full(24, 10.0)), run_id="a", law=None)
+@pytest.mark.parametrize("rig", [None, TANK], ids=["force and motion", "tank"])
+def test_no_cycles_give_an_empty_table_with_all_columns(rig):
+    empty = evaluate_windows(cycles_of(np.full(2, 10.0)), run_id="a", law=None, rig=rig)
+    full = evaluate_windows(cycles_of(np.full(40, 10.0)), run_id="a", law=None, rig=rig)
     assert empty.sizes["window"] == 0
-    assert set(empty.variables) == set(full.variables)
+    assert list(empty.variables) == list(full.variables)
+    assert dict(empty.dtypes) == dict(full.dtypes)
+    assert {name: empty[name].dims for name in empty} == {name: full[name].dims for name in full}

@@ -24,7 +24,7 @@ from pipelines.report.figure import NothingToDrawError
 from pipelines.report.style import drawing_style, new_figure
 from pipelines.report.tables import channel_table, provenance_table
 from pipelines.sweep import figures_maps, figures_quality, selection, summary, tables
-from pipelines.sweep.figures_response import responses, vertex
+from pipelines.sweep.figures_response import responses
 from pipelines.sweep.figures_signals import signal_panels
 from pipelines.sweep.figures_work import fill_curves, work_bars
 from pipelines.sweep.planes import dimensional_plane, iso_levels_g, scaled_plane
@@ -75,11 +75,6 @@ def test_summary_says_that_the_mode_softens() -> None:
     assert f"{resonance_hz(82_000.0):.2f} Hz" in text
     assert f"{resonance_hz(74_000.0):.2f} Hz" in text
     assert "the mode softens" in text
-
-
-def test_vertex_falls_back_to_the_largest_value_where_no_parabola_fits() -> None:
-    assert vertex(np.array([1.0, 2.0, 1.5]), np.array([1.0, 3.0, 2.0])) == (2.0, 3.0)
-    assert vertex(np.array([1.0, 2.0]), np.array([1.0, 3.0])) == (2.0, 3.0)
 
 
 def test_largest_w_bar_of_the_summary_is_the_top_of_the_law() -> None:

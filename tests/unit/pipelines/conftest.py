@@ -1,4 +1,4 @@
-"""Reports drawn once for all tests of this folder."""
+"""Reports of sweeps, drawn once for all tests of these folders."""
 
 from __future__ import annotations
 

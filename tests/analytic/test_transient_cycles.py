@@ -1,10 +1,9 @@
-"""Works per cycle of a known damper, and stretches of runs."""
+"""Works per cycle of a known damper whose motion starts from rest."""
 
 import numpy as np
 import pytest
 
-from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
-from studies.beyond_the_source.recordings import cycle_works_j, part, upward_crossings_s
+from sloshlab.sweep.transient_cycles import cycle_works_j, upward_crossings_s
 
 RATE_HZ, START_S, OMEGA = 128.0, 1.0, 2 * np.pi * 10.87
 
@@ -29,11 +28,3 @@ def test_cycles_of_a_decay_last_a_period_and_what_is_unknown_does_no_work():
     works = cycle_works_j(velocity, -velocity, RATE_HZ, START_S)
     assert works[1:6] / works[:5] == pytest.approx(np.exp(-2 * 3.0 * 2 * np.pi / OMEGA), rel=0.02)
     assert cycle_works_j(velocity, np.full(600, np.nan), RATE_HZ, START_S)[:5] == pytest.approx(0.0)
-
-
-def test_a_part_is_a_stretch_of_all_signals():
-    values = np.arange(600.0)
-    found = part(LiquidSignals(values, values + 1, values + 2, RATE_HZ, "run"), 1.0, 2.0)
-    assert found.velocity_m_per_s.tolist() == values[128:256].tolist()
-    assert found.dynamic_force_n[0] == 129
-    assert found.acceleration_m_per_s2[-1] == 257
