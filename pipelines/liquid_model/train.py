@@ -73,7 +73,7 @@ class ModelSettings:
         if self.structure not in ("nfir", "noe"):
             raise InputError("--model", got=repr(self.structure), allowed="nfir, noe")
         if self.network not in NETWORKS:
-            raise InputError("--network", got=repr(self.network), allowed=", ".join(NETWORKS))
+            raise InputError("--network", got=repr(self.network), allowed=", ".join(NETWORKS.names))
         if self.structure == "noe" and self.network == "multilayer":
             raise InputError("--network with feedback", got="multilayer", allowed="normalised_rbf, rbf")
         if self.structure == "noe" and (self.memory_s is not None or self.sudden_starts):

@@ -7,12 +7,13 @@ from typing import Any, Final
 
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.networks.multilayer import Multilayer
-from sloshlab.reduced_order_model.networks.network import Network
+from sloshlab.reduced_order_model.networks.network import LARGEST_PARAMETERS, Network
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
+from sloshlab.registry import Registry
 
-NETWORKS: Final = (NormalisedRadialBasis.kind, RadialBasis.kind, Multilayer.kind)
-LARGEST_PARAMETERS: Final = 12_000
-"""The matrix of the least-squares problem has this many rows: 1.2 GB."""
+NETWORKS: Final[Registry[type[Network]]] = Registry("network")
+for _network in (NormalisedRadialBasis, RadialBasis, Multilayer):
+    NETWORKS.add(_network.kind, _network)
 
 
 def network_of(kind: str, settings: Mapping[str, Any]) -> Network:
@@ -21,7 +22,7 @@ def network_of(kind: str, settings: Mapping[str, Any]) -> Network:
     Parameters
     ----------
     kind : str
-        One of `NETWORKS`.
+        A name of `NETWORKS`.
     settings : mapping
         As `Network.settings` gives them.
 
@@ -35,18 +36,7 @@ def network_of(kind: str, settings: Mapping[str, Any]) -> Network:
     >>> network_of("normalised_rbf", {"n_inputs": 70, "n_neurons": 35}).n_parameters
     2485
     """
-    if kind not in NETWORKS:
-        raise InputError("network", got=repr(kind), allowed=", ".join(NETWORKS))
-    n_inputs = _whole("inputs", settings.get("n_inputs"))
-    network: Network
-    if kind == Multilayer.kind:
-        layers = tuple(_whole("neurons", size) for size in str(settings.get("layers", "")).split())
-        network = Multilayer(n_inputs, layers, str(settings.get("activation", "tanh")))
-    else:
-        n_neurons = _whole("neurons", settings.get("n_neurons"))
-        network = (NormalisedRadialBasis if kind == NormalisedRadialBasis.kind else RadialBasis)(
-            n_inputs, n_neurons
-        )
+    network = NETWORKS[kind].of_settings(settings)
     if network.n_parameters > LARGEST_PARAMETERS:
         raise InputError(
             f"network {kind}",
@@ -55,13 +45,3 @@ def network_of(kind: str, settings: Mapping[str, Any]) -> Network:
             remedy="take fewer delays or neurons",
         )
     return network
-
-
-def _whole(what: str, value: object) -> int:
-    try:
-        number = int(str(value))
-    except ValueError:
-        number = 0
-    if not 1 <= number <= LARGEST_PARAMETERS:
-        raise InputError(f"network: {what}", got=repr(value), allowed=f"a whole number 1 … {LARGEST_PARAMETERS}")
-    return number

@@ -20,9 +20,8 @@ from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.break_up import BreakUp
 from sloshlab.reduced_order_model.free_run import kind_of
 from sloshlab.reduced_order_model.model import ReducedOrderModel
-from sloshlab.reduced_order_model.network_list import LARGEST_PARAMETERS
 from sloshlab.reduced_order_model.networks.multilayer import Multilayer
-from sloshlab.reduced_order_model.networks.network import Network
+from sloshlab.reduced_order_model.networks.network import LARGEST_PARAMETERS, Network
 from sloshlab.reduced_order_model.regressors import MOST_DELAYS
 from sloshlab.reduced_order_model.storage import load_model
 from sloshlab.reduced_order_model.tank_scaling import HYPOTHESES, TankScaling, scaled_to

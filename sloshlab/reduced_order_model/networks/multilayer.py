@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.array_backend import Array
-from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar, SumsOfJacobian
+from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar, SumsOfJacobian, whole_number
 
 FloatArray = NDArray[np.float64]
 ACTIVATIONS: Final = ("tanh", "radial")
@@ -68,6 +69,13 @@ class Multilayer:
             "layers": " ".join(str(size) for size in self.layers),
             "activation": self.activation,
         }
+
+    @classmethod
+    def of_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """See `Network`."""
+        n_inputs = whole_number("inputs", settings.get("n_inputs"))
+        layers = tuple(whole_number("neurons", size) for size in str(settings.get("layers", "")).split())
+        return cls(n_inputs, layers, str(settings.get("activation", "tanh")))
 
     def initial(self, regressors: FloatArray, outputs: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Random weights that neither saturate nor vanish, whatever the number of inputs."""

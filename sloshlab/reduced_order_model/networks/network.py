@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Final, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.array_backend import Array
 
 FloatArray = NDArray[np.float64]
+LARGEST_PARAMETERS: Final = 12_000
+"""The matrix of the least-squares problem has this many rows: 1.2 GB."""
 
 
 @dataclass(frozen=True)
@@ -96,8 +100,30 @@ class Network(Protocol):
         ...
 
     def settings(self) -> dict[str, int | str]:
-        """Return what `network_of` needs to make it again, apart from `kind`."""
+        """Return what `of_settings` needs to make it again."""
         ...
+
+    @classmethod
+    def of_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """Make the network from what `settings` gave, or a person did.
+
+        Raises
+        ------
+        InputError
+            If a setting is missing or impossible.
+        """
+        ...
+
+
+def whole_number(what: str, value: object) -> int:
+    """A size of a network, checked; `what` it is of is for the message."""
+    try:
+        number = int(str(value))
+    except ValueError:
+        number = 0
+    if not 1 <= number <= LARGEST_PARAMETERS:
+        raise InputError(f"network: {what}", got=repr(value), allowed=f"a whole number 1 … {LARGEST_PARAMETERS}")
+    return number
 
 
 class SumsOfJacobian:

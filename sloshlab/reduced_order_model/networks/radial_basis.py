@@ -7,15 +7,16 @@ outputs are linear in the weights.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.reduced_order_model.array_backend import Array
 from sloshlab.reduced_order_model.networks.delay_line_sums import SHORTEST_LINE, DelayLineSums
-from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar
+from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar, whole_number
 from sloshlab.reduced_order_model.networks.pair_sums import PairSums
 
 FloatArray = NDArray[np.float64]
@@ -48,6 +49,12 @@ class _RadialBasisNetwork:
     def settings(self) -> dict[str, int | str]:
         """Return what makes it again."""
         return {"n_inputs": self.n_inputs, "n_neurons": self.n_neurons}
+
+    @classmethod
+    def of_settings(cls, settings: Mapping[str, Any]) -> Self:
+        """See `Network`."""
+        n_inputs = whole_number("inputs", settings.get("n_inputs"))
+        return cls(n_inputs, whole_number("neurons", settings.get("n_neurons")))
 
     def initial(self, regressors: FloatArray, outputs: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Centres at samples that lie far from each other (k-means++), weights the outputs there."""
