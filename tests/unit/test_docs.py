@@ -260,3 +260,13 @@ def test_the_page_of_experiments_says_what_the_registry_says() -> None:
             room = known.pipeline.rpartition(".")[0].replace(".", "/")
             [row] = [row for row in text.splitlines() if f"`{room}`" in row]
             assert f"`{known.name}`" in row
+
+
+def test_every_word_of_the_glossary_stands_once_and_in_its_place() -> None:
+    sections = (DOCS / "glossary.md").read_text(encoding="utf-8").split("\n## ")[1:]
+    words = [re.findall(r"^- \*\*(.+?)\*\* – \S", section, flags=re.MULTILINE) for section in sections]
+    assert [len(found) for found in words] == [section.count("\n- ") for section in sections]
+    for found in words:
+        assert found == sorted(found, key=str.lower)
+    everywhere = [word for found in words for word in found]
+    assert len(everywhere) == len(set(everywhere)) > 100
