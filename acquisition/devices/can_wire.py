@@ -18,8 +18,8 @@ from sloshlab.errors import InputError
 FOREIGN_IDS: Final = range(0x600, 0x640)
 """Identifiers of frames that belong to somebody else on the bus."""
 
-_REPEATS_OF_END = 3
-_LATCH_SAMPLES = 8
+_REPEATS_OF_END = 3  # one lost frame must not hide the end
+_LATCH_SAMPLES = 8  # as far as the three bits of the multiplexor count
 
 
 class CanWire(Wire):

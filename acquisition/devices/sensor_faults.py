@@ -72,6 +72,7 @@ class SensorFaults:
                 n_changed = act[name](fault, counts, samples)
                 if n_changed:
                     self._truth.counts[name] += n_changed
+        # a sample that the device says it has not cannot be stuck, clipped or another sensor's
         for k, channel in enumerate(self._channels):
             if channel.missing_count is not None:
                 missing = piece.counts[:, k] == channel.missing_count

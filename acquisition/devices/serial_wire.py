@@ -24,8 +24,8 @@ from acquisition.wire.serial_frames import (
 from sloshlab.errors import InputError
 
 _USUAL_FRAME_S = 0.02
-_REPEATS_OF_END = 3
-_FRAME_OVERHEAD_BYTES = 28
+_REPEATS_OF_END = 3  # one lost frame must not hide the end
+_FRAME_OVERHEAD_BYTES = 28  # header and checksum
 
 
 class SerialWire(Wire):

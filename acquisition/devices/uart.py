@@ -98,6 +98,7 @@ class Uart:
         survives = len(whole) <= room and not self._is_torn
         if survives and self._has_lost and self._wire.saying_data_were_lost(frames, k):
             self._has_lost, whole = False, frames["bytes"][k]
+        # what finds no room is lost, not delayed: a UART does not make its writer wait
         data = whole[: max(room, 0)]
         frames["bytes"][k] = data
         if data:

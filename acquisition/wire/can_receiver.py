@@ -20,10 +20,12 @@ from acquisition.wire.can_group import DeviceClock, GroupReceiver
 from acquisition.wire.can_layout import STREAM_BITS, CanLayout, ControlMessage, SampleMessage
 from sloshlab.errors import SourceError
 
+# device_status comes once per second: so long samples wait for it after a connection that broke
 _LONGEST_WAIT_NS: Final = 3_000_000_000
 _MOST_HELD: Final = 65_536
 _END_WAIT_NS: Final = 300_000_000
 _STREAMS: Final = 1 << STREAM_BITS
+# a counter announced that lies back by more is that of a device which started anew
 _STATUS_LATE_S: Final = 1.0
 
 HostTime = int | IntArray
