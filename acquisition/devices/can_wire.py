@@ -93,7 +93,7 @@ class CanWire(Wire):
         for bit in generator.choice(n_all, size=min(n_bits, n_all), replace=False):
             frames["data"][chosen, bit // 8] ^= 1 << (bit % 8)
 
-    def saying_data_were_lost(self, frames: FrameArray, chosen: int) -> bool:
+    def flag_lost_data(self, frames: FrameArray, chosen: int) -> bool:
         """Set the bit of lost data in one frame, in place; False if the frame carries no flags."""
         message = self._messages.get(int(frames["id"][chosen]))
         if message is None or message.flags is None or frames["kind"][chosen] != FrameKind.SAMPLES:

@@ -66,6 +66,8 @@ class PlugIns:
 
     def _offered(self) -> list[importlib.metadata.EntryPoint]:
         """Built-in ones in their order, then those of other packages by name."""
-        ours = [importlib.metadata.EntryPoint(name, value, self.group) for name, value in self.built_in.items()]
+        built_in = [
+            importlib.metadata.EntryPoint(name, value, self.group) for name, value in self.built_in.items()
+        ]
         installed = importlib.metadata.entry_points(group=self.group)
-        return [*ours, *sorted(installed, key=lambda entry: entry.name)]
+        return [*built_in, *sorted(installed, key=lambda entry: entry.name)]

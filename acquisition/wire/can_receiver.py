@@ -140,10 +140,10 @@ class CanReceiver:
         deliveries: list[Delivery] = []
         n_known = 0
         for group in self._groups:
-            mine = np.flatnonzero(_is(batch, group.message))
-            n_known += len(mine)
-            if len(mine):
-                deliveries += group.take(batch[mine], monotonic[mine], utc[mine], self._stream)
+            own_frames = np.flatnonzero(_is(batch, group.message))
+            n_known += len(own_frames)
+            if len(own_frames):
+                deliveries += group.take(batch[own_frames], monotonic[own_frames], utc[own_frames], self._stream)
         self.n_unknown += len(batch) - n_known
         self._share_epoch()
         return deliveries
