@@ -68,6 +68,7 @@ def _move(particles, n, time):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=FAST)
 def _compress(particles, n, time):  # type: ignore[no-untyped-def]
+    # of the logarithm: the explicit product ρ (1 + x) loses x²/2 in every step
     for i in range(n):
         particles.s[i] += time * particles.ds[i]
 
