@@ -98,6 +98,7 @@ class CaseDrawing:
     def __init__(self, seed: Sequence[int]) -> None:
         self._seed = [int(value) for value in seed]
         self._used: Counter[str] = Counter()
+        # an effect that a plan cannot show strongly enough comes last in its case, then another plan is tried
         self._failed: Counter[str] = Counter()
         self._plans: list[str] = []
         self._prepared: dict[tuple[int, int, str], _Prepared] = {}
@@ -169,6 +170,7 @@ class CaseDrawing:
             if not all(map(math.isfinite, (reached, *change.parameters.values()))):
                 raise ArithmeticError(f"{effect.name} has no finite size")
         signals = laboratory.signals(changes) if changes else plain
+        # what is stuck tells nothing of what holds it
         if _motion(signals) < _LEAST_MOTION * _motion(plain):
             raise LookupError("what is hidden leaves no motion to speak of")
         nuisance: dict[str, Any] = {}

@@ -36,6 +36,8 @@ SHAPE_TOLERANCE: Final = 0.02
 _STEP = 0.2
 _THINNED = 3
 _LEAST_DAMPING, _MOST_DAMPING = 0.05, 7.0
+# changes of a factor up to which a baseline serves: taken as linear to 0.4 % of a frequency, a rocking base that
+# retuning hides to 0.7 noise floors looked like 20
 _STAYS_LINEAR, _STAYS_LINEAR_IN_FREQUENCY = 0.2, 0.001
 _RELINEARISED_AT_ONCE, _SCANNED = 3, 13
 _MOST_BASELINES: Final = {"sdof": 7, "beam": 5, "shaker": 4}

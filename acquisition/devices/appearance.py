@@ -22,6 +22,7 @@ from acquisition.sources.interface import SourceURL
 from sloshlab.errors import FaultsError, SourceError
 from sloshlab.registry import Registry
 
+# whoever reaches a device can stop it and read every sample: others only where the user says so
 LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
 
 APPEARANCES: Final[Registry[Callable[..., Appearance]]] = Registry(

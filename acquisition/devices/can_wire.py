@@ -18,8 +18,8 @@ from sloshlab.errors import InputError
 FOREIGN_IDS: Final = range(0x600, 0x640)
 """Identifiers of frames that belong to somebody else on the bus."""
 
-_REPEATS_OF_END = 3
-_LATCH_SAMPLES = 8
+_REPEATS_OF_END = 3  # one lost frame must not hide the end
+_LATCH_SAMPLES = 8  # as far as the three bits of the multiplexor count
 
 
 class CanWire(Wire):
@@ -93,7 +93,7 @@ class CanWire(Wire):
         for bit in generator.choice(n_all, size=min(n_bits, n_all), replace=False):
             frames["data"][chosen, bit // 8] ^= 1 << (bit % 8)
 
-    def saying_data_were_lost(self, frames: FrameArray, chosen: int) -> bool:
+    def flag_lost_data(self, frames: FrameArray, chosen: int) -> bool:
         """Set the bit of lost data in one frame, in place; False if the frame carries no flags."""
         message = self._messages.get(int(frames["id"][chosen]))
         if message is None or message.flags is None or frames["kind"][chosen] != FrameKind.SAMPLES:

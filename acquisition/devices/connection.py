@@ -52,7 +52,7 @@ class Connection(ABC):
         """Let the host go; may be called twice."""
 
 
-class Door(ABC):
+class Listener(ABC):
     """Where hosts come in."""
 
     @abstractmethod
@@ -72,7 +72,7 @@ class Door(ABC):
         """Let nobody in any more and leave nothing behind; may be called twice."""
 
 
-class PseudoTerminal(Door, Connection):
+class PseudoTerminal(Listener, Connection):
     """A serial port that is no hardware: a pseudo-terminal whose other side is linked at a path.
 
     It is there for one host at a time and notices when that closes the port.
@@ -238,7 +238,7 @@ class SocketConnection(Connection):
         self._socket.close()
 
 
-class ListeningSocket(Door):
+class ListeningSocket(Listener):
     """A TCP port; more than `most` connections at a time are turned away.
 
     One that comes while another is still going waits a moment: a host that leaves and comes back at once must
@@ -321,7 +321,7 @@ class ListeningSocket(Door):
         return True
 
     def _has_waited_enough(self) -> bool:
-        """Whether somebody has been standing at the full door for long enough to be turned away."""
+        """Whether somebody has been waiting for a free place for long enough to be turned away."""
         if self._listening is None:
             return False
         waiting = select.poll()
@@ -334,7 +334,7 @@ class ListeningSocket(Door):
         return self._now_s() - self._waits_since_s >= _PATIENCE_S
 
     def waiting_on(self) -> int | None:
-        """The listening socket; None while somebody waits at a full door, which would wake at once."""
+        """The listening socket; None while somebody waits for a free place, which would wake at once."""
         if self._listening is None or self._is_full():
             return None
         return self._listening.fileno()

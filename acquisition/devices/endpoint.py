@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from acquisition.devices.connection import Connection, Door
+from acquisition.devices.connection import Connection, Listener
 from acquisition.devices.conversation import Conversation, Host
 from acquisition.devices.frames import FrameArray
 
@@ -18,7 +18,7 @@ LONGEST_STALL_S: Final = 30.0
 """Where several hosts listen, one that takes nothing for so long is let go."""
 
 _LARGEST_ANSWERS_BYTES = 1 << 20
-_DOOR_STEP_S = 0.01
+_LISTENING_STEP_S = 0.01
 _STEP_S = 0.05
 
 
@@ -122,12 +122,12 @@ class StreamEndpoint(Endpoint):
 
     Parameters
     ----------
-    door : Door
+    listener : Listener
     conversation : Conversation
     text : callable
         Frames → bytes on the wire.
     url : callable
-        Where the door is → URL for the host.
+        Where the listener is → URL for the host.
     n_hosts : int
         The device begins when so many hosts have asked for it.
     runs_freely : bool
@@ -138,7 +138,7 @@ class StreamEndpoint(Endpoint):
 
     def __init__(
         self,
-        door: Door,
+        listener: Listener,
         conversation: Conversation,
         text: Callable[[FrameArray], bytes],
         url: Callable[[str], str],
@@ -147,14 +147,14 @@ class StreamEndpoint(Endpoint):
         runs_freely: bool = False,
         now_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._door, self._conversation, self._text, self._url = door, conversation, text, url
+        self._listener, self._conversation, self._text, self._url = listener, conversation, text, url
         self._n_hosts, self._runs_freely, self._now_s = n_hosts, runs_freely, now_s
         self._lines: list[_Line] = []
         self._is_started = self._is_stopped = False
 
     def open(self) -> str:
-        """Open the door."""
-        return self._url(self._door.open())
+        """Begin to listen."""
+        return self._url(self._listener.open())
 
     @property
     def is_started(self) -> bool:
@@ -198,18 +198,18 @@ class StreamEndpoint(Endpoint):
 
     def _wait(self, timeout_s: float, *, for_writing: tuple[_Line, ...] | list[_Line]) -> None:
         waiting = select.poll()
-        at_door = self._door.waiting_on()
-        if at_door is not None:
-            waiting.register(at_door, select.POLLIN)
+        descriptor = self._listener.waiting_on()
+        if descriptor is not None:
+            waiting.register(descriptor, select.POLLIN)
         elif not self._lines:
-            timeout_s = min(timeout_s, _DOOR_STEP_S)
+            timeout_s = min(timeout_s, _LISTENING_STEP_S)
         for line in self._lines:
             events = select.POLLIN | (select.POLLOUT if line in for_writing or line.unsent else 0)
             waiting.register(line.connection.fileno(), events)
         waiting.poll(max(0.0, 1e3 * timeout_s))
 
     def _admit(self) -> None:
-        for connection in self._door.arrived():
+        for connection in self._listener.arrived():
             if any(line.connection is connection for line in self._lines):
                 continue  # a terminal that was closed and opened between two looks
             line = _Line(connection)
@@ -248,7 +248,7 @@ class StreamEndpoint(Endpoint):
     def _let_go(self, line: _Line) -> None:
         if line in self._lines:
             self._lines.remove(line)
-        if not isinstance(line.connection, Door):  # a terminal stays for the next host
+        if not isinstance(line.connection, Listener):  # a terminal stays for the next host
             line.connection.close()
 
     def send(self, frames: FrameArray, *, is_given_up: Callable[[], bool]) -> bool:
@@ -301,11 +301,11 @@ class StreamEndpoint(Endpoint):
         """Close everything, as if a plug were pulled."""
         for line in list(self._lines):
             self._let_go(line)
-        self._door.close()
+        self._listener.close()
 
     def plug_in(self) -> None:
-        """Open the door again."""
-        self._door.open()
+        """Listen again."""
+        self._listener.open()
 
     def close(self) -> None:
         """Close everything."""

@@ -27,8 +27,8 @@ LINGER_S: Final = 10.0
 
 _LONGEST_BLOCK_SAMPLES = 8192
 _PACED_BLOCK_S, _UNPACED_BLOCK_S = 0.25, 1.0
-_DESCRIBED_EVERY_S = 1.0
-_UNPLUGGED_S = 0.5
+_DESCRIBED_EVERY_S = 1.0  # as both protocols say
+_UNPLUGGED_S = 0.5  # of the host's time, where physical time means nothing to it: as fast as possible
 _READ_LINGER_S, _STOPPED_LINGER_S = 2.0, 1.0
 
 

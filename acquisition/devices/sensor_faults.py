@@ -42,7 +42,7 @@ class SensorFaults:
 
         Sensors that are exchanged take their serial numbers along.
         """
-        told: dict[int, tuple[Channel, ...]] = {}
+        described: dict[int, tuple[Channel, ...]] = {}
         channels = list(self.first_description())
         moments = [(fault.from_s, fault) for fault in self._faults.swapped if fault.announced]
         moments += [(fault.to_s, fault) for _, fault in moments if math.isfinite(fault.to_s)]
@@ -51,8 +51,8 @@ class SensorFaults:
             first, second = channels[a], channels[b]
             channels[a] = dataclasses.replace(first, sensor_serial=second.sensor_serial)
             channels[b] = dataclasses.replace(second, sensor_serial=first.sensor_serial)
-            told[self._clock.sample_at(time_s)] = tuple(channels)
-        return told
+            described[self._clock.sample_at(time_s)] = tuple(channels)
+        return described
 
     def first_description(self) -> tuple[Channel, ...]:
         """The channels as described before any fault; with serial numbers if those are to change."""
@@ -72,6 +72,7 @@ class SensorFaults:
                 n_changed = act[name](fault, counts, samples)
                 if n_changed:
                     self._truth.counts[name] += n_changed
+        # a sample that the device says it has not cannot be stuck, clipped or another sensor's
         for k, channel in enumerate(self._channels):
             if channel.missing_count is not None:
                 missing = piece.counts[:, k] == channel.missing_count

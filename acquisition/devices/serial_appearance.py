@@ -7,7 +7,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from acquisition.devices.appearance import Appearance, listening_host, port_text
-from acquisition.devices.connection import Door, ListeningSocket, PseudoTerminal
+from acquisition.devices.connection import Listener, ListeningSocket, PseudoTerminal
 from acquisition.devices.conversation import SerialConversation
 from acquisition.devices.device_clock import DeviceClock
 from acquisition.devices.endpoint import Endpoint, StartRule, StreamEndpoint
@@ -70,13 +70,13 @@ class SerialAppearance(Appearance):
 
     def endpoint(self, laboratory: LaboratoryTime, describe: Callable[[], bytes], start: StartRule) -> Endpoint:
         """One host at the end of a stream of bytes."""
-        door: Door
+        listener: Listener
         if self._is_socket:
-            door, url = ListeningSocket(self._host, self._port, most=1), "serial:socket://{at}"
+            listener, url = ListeningSocket(self._host, self._port, most=1), "serial:socket://{at}"
         else:
-            door, url = PseudoTerminal(Path(self.url.target)), f"serial:{quote(self.url.target)}"
+            listener, url = PseudoTerminal(Path(self.url.target)), f"serial:{quote(self.url.target)}"
         return StreamEndpoint(
-            door,
+            listener,
             SerialConversation(describe),
             lambda frames: b"".join(frames["bytes"]),
             lambda at: url.format(at=at),

@@ -24,8 +24,8 @@ from acquisition.wire.serial_frames import (
 from sloshlab.errors import InputError
 
 _USUAL_FRAME_S = 0.02
-_REPEATS_OF_END = 3
-_FRAME_OVERHEAD_BYTES = 28
+_REPEATS_OF_END = 3  # one lost frame must not hide the end
+_FRAME_OVERHEAD_BYTES = 28  # header and checksum
 
 
 class SerialWire(Wire):
@@ -98,7 +98,7 @@ class SerialWire(Wire):
         np.bitwise_xor.at(body, bits // 8, (1 << (bits % 8)).astype(np.uint8))
         frames["bytes"][chosen] = body.tobytes() + b"\0"
 
-    def saying_data_were_lost(self, frames: FrameArray, chosen: int) -> bool:
+    def flag_lost_data(self, frames: FrameArray, chosen: int) -> bool:
         """Set the overrun bit of one frame, in place; False if the frame has none."""
         parsed = parse(frames["bytes"][chosen]).frames
         if frames["kind"][chosen] != FrameKind.SAMPLES or len(parsed) != 1:

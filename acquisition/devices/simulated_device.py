@@ -61,6 +61,7 @@ def simulated_device(
     wire = found.wire(sensor_faults.first_description(), clock, samples_per_frame)
     if n_hosts > found.most_hosts:
         raise InputError("--wait-clients", got=str(n_hosts), allowed=f"{found.most_hosts} for {found.url.text}")
+    # the place asks the player for the description, and the player sends through the place
     made: list[Player] = []
     place = found.endpoint(
         laboratory,

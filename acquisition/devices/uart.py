@@ -96,8 +96,9 @@ class Uart:
         self._drain(due_s)
         room = self._room(n_waiting_bytes)
         survives = len(whole) <= room and not self._is_torn
-        if survives and self._has_lost and self._wire.saying_data_were_lost(frames, k):
+        if survives and self._has_lost and self._wire.flag_lost_data(frames, k):
             self._has_lost, whole = False, frames["bytes"][k]
+        # what finds no room is lost, not delayed: a UART does not make its writer wait
         data = whole[: max(room, 0)]
         frames["bytes"][k] = data
         if data:
@@ -163,7 +164,7 @@ class TransmitQueue:
                     self._lossy_groups.add(group)
                     self._truth.note("overrun", stream=stream, **place(frames[k]))
                 continue
-            if is_samples and group in self._lossy_groups and self._wire.saying_data_were_lost(frames, k):
+            if is_samples and group in self._lossy_groups and self._wire.flag_lost_data(frames, k):
                 self._lossy_groups.discard(group)
             n = int(frames["length"][k])
             self._free_from_s = self._line.done_s(max(due_s, self._free_from_s), 47 + 8 * n + (34 + 8 * n) // 10)

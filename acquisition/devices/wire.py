@@ -52,5 +52,5 @@ class Wire(ABC):
         """Flip bits of one frame, in place."""
 
     @abstractmethod
-    def saying_data_were_lost(self, frames: FrameArray, chosen: int) -> bool:
+    def flag_lost_data(self, frames: FrameArray, chosen: int) -> bool:
         """Say so in one frame, in place; False if it cannot carry that."""

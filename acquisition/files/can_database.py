@@ -311,8 +311,10 @@ class _DatabaseReader:
         return found
 
     def _multiplexor(self, message: Any, signals: dict[str, Any]) -> BitField | None:
-        ours = re.compile(r"(sample_counter|device_clock)_[0-9]+|device_flags")
-        used = {s.multiplexer_signal for s in signals.values() if s.multiplexer_ids and ours.fullmatch(s.name)}
+        part_name = re.compile(r"(sample_counter|device_clock)_[0-9]+|device_flags")
+        used = {
+            s.multiplexer_signal for s in signals.values() if s.multiplexer_ids and part_name.fullmatch(s.name)
+        }
         if not used:
             return None
         if len(used) > 1 or signals[min(used)].multiplexer_ids:

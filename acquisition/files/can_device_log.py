@@ -142,9 +142,9 @@ class DeviceLog:
             LARGEST_DECODED_BYTES,
         )
         for group, message in enumerate(self._layout.messages):
-            mine = [block for block in blocks if block.group == group]
-            if mine:
-                counts, is_there = _placed(mine, first, stop, len(message.channels))
+            group_blocks = [block for block in blocks if block.group == group]
+            if group_blocks:
+                counts, is_there = _placed(group_blocks, first, stop, len(message.channels))
                 for number, index in enumerate(message.channels):
                     channel = self._layout.channels[index]
                     yield self._column(message.name, channel, counts[:, number], is_there)
@@ -184,8 +184,8 @@ class DeviceLog:
             "database says; the time stamps of the log are not used"
         ]
         for group, message in enumerate(self._layout.messages):
-            mine = [block for block in self._blocks[stream] if block.group == group]
-            n_lost = stop - first - sum(len(block.counts) for block in mine)
+            group_blocks = [block for block in self._blocks[stream] if block.group == group]
+            n_lost = stop - first - sum(len(block.counts) for block in group_blocks)
             if n_lost:
                 traps.append(
                     f"{message.name}: {n_lost} of {stop - first} samples are lost; they are NaN and flagged"

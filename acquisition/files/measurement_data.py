@@ -46,6 +46,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     found: list[Column] = []
     unusable: dict[str, str] = {}
     start: str | None = None
+    # before asammdf reads anything: its C code trusts declared records
     n_data_bytes = _check_links(path)
     guard = ReaderGuard(path, "MF4", loggers=("asammdf",))
     # given a stream, asammdf neither copies nor finishes the file

@@ -39,6 +39,8 @@ def _measure_range(particles, pairs, constants, listed, near):  # type: ignore[n
     soft = constants.smoothing * constants.smoothing * constants.softening
     x, z = particles.x[listed.i], particles.z[listed.i]
     for k in range(listed.first, listed.last):
+        # unsigned here and in all loops over pairs: numba checks every signed index for being negative,
+        # which takes a quarter to a half of their time
         j = np.uintp(pairs.j[k])
         rx, rz = x - particles.x[j], z - particles.z[j]
         r2 = rx * rx + rz * rz
@@ -73,6 +75,7 @@ def rate_of_density(particles: Particles, pairs: Pairs, constants: Constants) ->
     for i in range(constants.n):
         ds[i] = zero
     for i in range(constants.n):
+        # partners up to the middle are liquid and get the same rate; behind it stand images, which have none
         vxi, vzi, own = vx[i], vz[i], zero
         for k in range(np.uintp(pairs.near_start[i]), np.uintp(pairs.near_middle[i])):
             j = np.uintp(pairs.near_j[k])

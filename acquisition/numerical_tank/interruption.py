@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 
 @contextlib.contextmanager
-def told_to_stop() -> Iterator[list[int]]:
+def stop_signals_noted() -> Iterator[list[int]]:
     """Yield a list that stays empty until SIGINT (Ctrl-C) or SIGTERM; nothing is broken off by them.
 
     A signal that is ignored, as SIGINT by jobs in the background, stays ignored. In other threads than
@@ -23,9 +23,9 @@ def told_to_stop() -> Iterator[list[int]]:
     def note(number: int, _: object) -> None:
         stopping.append(number)
 
-    ours = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
+    heeded = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
     try:
-        before = {number: signal.signal(number, note) for number in ours}
+        before = {number: signal.signal(number, note) for number in heeded}
     except ValueError:  # not in the main thread
         before = {}
     try:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 
-from acquisition.numerical_tank.interruption import told_to_stop
+from acquisition.numerical_tank.interruption import stop_signals_noted
 
 
 class LongComputation(ABC):
@@ -65,7 +65,7 @@ class LongComputation(ABC):
             At Ctrl-C or SIGTERM, which are heeded between two blocks.
         """
         stopped, saved_s = "", monotonic_s()
-        with told_to_stop() as stopping:
+        with stop_signals_noted() as stopping:
             while self.n_left and not stopped:
                 start_s = monotonic_s()
                 stopped = self.advance()

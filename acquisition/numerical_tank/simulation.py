@@ -89,6 +89,7 @@ class NumericalTank:
         n, particles = self.setup.n_particles, self._particles
         particles.x[:n], particles.z[:n], particles.s[:n] = particles_at_rest(self.setup)
         self._list()
+        # nothing is corrected at rest: this only sums up what the first step needs, the gradient corrections
         none = self._constants.unity - self._constants.unity
         quiet = self._constants._replace(relaxation=none, spread=none)
         stepping.correct(self.flow._replace(constants=quiet), np.zeros(len(energy.TERMS)))

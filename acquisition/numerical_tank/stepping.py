@@ -68,6 +68,7 @@ def _move(particles, n, time):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=FAST)
 def _compress(particles, n, time):  # type: ignore[no-untyped-def]
+    # of the logarithm: the explicit product ρ (1 + x) loses x²/2 in every step
     for i in range(n):
         particles.s[i] += time * particles.ds[i]
 
@@ -84,6 +85,7 @@ def _kick(particles, constants, body_x, body_z):  # type: ignore[no-untyped-def]
         sum_x += 0.5 * (vx + new_x)
         sum_z += 0.5 * (vz + new_z)
         square = new_x * new_x + new_z * new_z
+        # so that not a number counts as fastest
         if not square <= largest:
             largest, fastest = square, i
     return sum_x, sum_z, largest, fastest
@@ -122,6 +124,7 @@ def correct(flow: Flow, sums: NDArray[np.float64]) -> None:
     """Make the slow corrections of density and arrangement, at the end of a step; see `advance`."""
     particles, pairs, images, constants = flow.particles, flow.pairs, flow.images, flow.constants
     n_all = constants.n + images.number[0]
+    # the particles have moved since the middle of the step, where the pairs were measured
     place_images(particles, images, constants.n)
     measure_pairs(particles, pairs, constants)
     sum_arrangement(particles, pairs, constants, n_all)
@@ -196,6 +199,7 @@ def end_step(flow, tank, viscosity, force, totals):  # type: ignore[no-untyped-d
     force[FORCE_X] -= impulse_x / constants.step
     force[FORCE_Z] -= impulse_z / constants.step
     counters[CROSSINGS] += crossings
+    # written so that a speed that is not a number counts as too fast
     if not largest <= constants.largest_speed * constants.largest_speed:
         counters[PARTICLE] = fastest
         return TOO_FAST

@@ -168,7 +168,7 @@ def advance_structure(
     ----------
     structure : MovingStructure
     rigid_mass_kg : float
-        A mass at the tank that the structure contains; its force on the tank is told.
+        A mass at the tank that the structure contains; its force on the tank is given.
     base, rows : ndarray, shape (n_steps,) and (n_steps, 3 n)
         As in `step_structure`, one row for each step.
     forces : ndarray, shape (n_steps,)

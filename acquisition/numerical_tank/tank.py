@@ -92,7 +92,9 @@ class Numerics:
 
     smoothing_over_spacing: float = 1.5
     courant_number: float = 0.7
+    # with artificial viscosity the dissipated work depends on the speed of sound, and twice as much on the spacing
     artificial_viscosity: float = 0.0
+    # takes the energy of impacts, which in the real liquid goes into motion too small for any particle
     density_diffusion: float = 0.1
     packing_strength: float = 1.0
     shift_strength: float = 1.0

@@ -3,7 +3,8 @@
 Every particle near a wall has an image behind it, at the mirrored place, with the mirrored velocity
 and the same density. The liquid and its images together are a system without walls, in which pair
 forces are equal and opposite; therefore the wall can neither create nor take energy, and the force on
-it is exactly minus the force of all images on the liquid. The walls slip freely.
+it is exactly minus the force of all images on the liquid. The walls slip freely: the boundary layer of
+water, 0.17 mm at 11 Hz, is thinner than any spacing of particles here.
 
 A particle that crosses a wall changes places with its image: in the mirrored system nothing happens,
 on the wall it is an impulse, and it is counted as one.

@@ -39,6 +39,7 @@ def out_of_order(counter: IntArray, n_samples: IntArray) -> NDArray[np.bool_]:
     """
     stop = counter + n_samples
     start = counter.copy()
+    # a frame that was sent twice must not make all that follows it in its block look late
     is_repeat = (counter[1:] >= counter[:-1]) & (counter[1:] < stop[:-1])
     start[1:][is_repeat] = np.minimum(stop[:-1], stop[1:])[is_repeat]
     if (start[1:] >= np.maximum.accumulate(stop)[:-1]).all():

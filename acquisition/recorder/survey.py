@@ -26,6 +26,8 @@ SHORTEST_STUCK_S: Final = 0.25
 MOST_RUNS_KEPT: Final = 100_000
 THINNED_RATE_HZ: Final = 1000.0
 
+# a sensor is stuck if another one swings by ten counts and eight times its noise, so much that this one, in the
+# proportion in which they move elsewhere, must have moved by four counts and four times its noise
 _MOVES_COUNTS = 10.0
 _MUST_MOVE_COUNTS = 4.0
 _NOISE_FACTOR = 8.0
@@ -326,6 +328,7 @@ def _scan(scanned, measures, findings):  # type: ignore[no-untyped-def]
                 continue
             value, place = counts[i, k], first_place + i
             if totals[k, _N_READ] == 0:
+                # distances are from the first count: squares of a large offset would drown the variance
                 sums[k, 0], run[k, 0], run[k, 1] = value, value, place
             totals[k, _N_READ] += 1
             extremes[k, 0], extremes[k, 1] = min(extremes[k, 0], value), max(extremes[k, 1], value)

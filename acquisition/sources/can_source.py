@@ -223,6 +223,7 @@ class CanSource(Source):
     def _delivered(self, received: Received) -> list[Delivery]:
         now_ns, utc_ns = self._monotonic_ns(), self._utc_ns()
         deliveries: list[Delivery] = []
+        # asked as the receiver asks: a remote frame of the same number, or one with 29 bits, is somebody else's
         if not self._heard and self._receiver.knows_any(received.batch):
             self._heard = True
             if self._away:
@@ -268,6 +269,8 @@ class CanSource(Source):
             self._link.close()
             self._link = None
         self._retried_ns = self._monotonic_ns()
+        # a device that lost power meanwhile, and whose first status nobody hears, counts on through the place
+        # where its old stream stopped: its samples would be taken for that stream
         given_up = self._receiver.break_off(self._retried_ns)
         if self._away or self._complete:
             return given_up

@@ -81,6 +81,8 @@ class StoredCounts:
 
     def __init__(self, path: str | os.PathLike[str], chosen: Sequence[str] | None = None) -> None:
         self._file = Path(path)
+        # the library lets other threads run while it reads, and is not made for them: two recordings played at
+        # once ended in a segmentation fault
         with NETCDF_LOCK, contextlib.ExitStack() as closing:
             attributes = read_attributes(self._file)
             require_sound_structure(self._file)

@@ -40,7 +40,7 @@ COMMAND: Final = "sloshlab virtual campaign --liquid numerical -o raw_data/numer
 _SAMPLING_RATE_HZ: Final = 512.0
 _FIRST_SEED: Final = 500
 """Other seeds than those of the campaign whose liquid follows a law."""
-_SHALLOWEST_FILL: Final = 0.375
+_SHALLOWEST_FILL: Final = 0.375  # a shallower liquid is computed more finely
 
 
 @dataclass(frozen=True)

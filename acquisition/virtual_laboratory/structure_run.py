@@ -53,7 +53,7 @@ _SOUND_OVER_SPEED: Final = 10.0
 _COLUMN_OVER_STRUCTURE: Final = 2.0
 """Quarter-wave resonance c₀/4h of the liquid column over the highest natural frequency of the structure."""
 _LARGEST_SPEED_M_PER_S: Final = 10.0
-_LEAST_DAMPING_RATIO: Final = 0.02
+_LEAST_DAMPING_RATIO: Final = 0.02  # as a sloshing liquid gives
 _LARGEST_SAMPLES: Final = 500_000
 """So that a checkpoint, which holds all that was computed, stays below 200 MB."""
 
@@ -309,6 +309,8 @@ def _with_sound(setup: TankSetup, plan: _Plan, speed_m_per_s: float, wanted_m_pe
         )
     depth_m = setup.column.height_m
     frozen = plan.rig.structure.with_mass_at_tank(setup.liquid_mass_kg)
+    # a column of liquid whose quarter wave meets a mode shatters at the release: at 12 m/s, 220 Hz, it met the
+    # third mode of the beam
     stiff = 4 * depth_m * _COLUMN_OVER_STRUCTURE * float(frozen.natural_frequencies_hz()[-1])
     still = _SOUND_OVER_SPEED * math.sqrt(setup.gravity_m_per_s2 * depth_m)
     chosen = float(math.ceil(max(setup.liquid.speed_of_sound_m_per_s, least, still, stiff)))

@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Final, NoReturn
 
-from acquisition.numerical_tank.interruption import told_to_stop
+from acquisition.numerical_tank.interruption import stop_signals_noted
 from sloshlab.errors import InputError, RecordingInterruptedError, SloshlabError
 
 MOST_WORKERS: Final = 256
@@ -77,7 +77,7 @@ def work_through(
         raise InputError("--workers", got=str(n_workers), allowed=f"1 … {MOST_WORKERS}")
     running: dict[Connection, _Running] = {}
     waiting = list(enumerate(tasks))[::-1]
-    with told_to_stop() as stopping:
+    with stop_signals_noted() as stopping:
         while waiting or running:
             while waiting and len(running) < n_workers and not stopping:
                 number, task = waiting.pop()
@@ -100,11 +100,11 @@ class _Running:
 
 def _start(work: Work, number: int, task: Any) -> _Running:
     context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_child, args=(theirs, work, task), name=f"task {number}")
+    parent_end, child_end = context.Pipe()
+    process = context.Process(target=_child, args=(child_end, work, task), name=f"task {number}")
     process.start()
-    theirs.close()
-    return _Running(number, process, ours)
+    child_end.close()
+    return _Running(number, process, parent_end)
 
 
 def _listen(
@@ -159,14 +159,14 @@ def _child(connection: Connection, work: Work, task: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _interrupt)
 
-    def say_share(share: float) -> None:
+    def report_share(share: float) -> None:
         try:
             connection.send((_SHARE, share))
         except OSError:
             raise KeyboardInterrupt from None  # the parent is gone: save and stop
 
     try:
-        answer = _DONE, work(task, say_share)
+        answer = _DONE, work(task, report_share)
     except (KeyboardInterrupt, RecordingInterruptedError):
         answer = _STOPPED, ""
     except (SloshlabError, OSError, MemoryError) as error:

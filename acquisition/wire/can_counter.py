@@ -32,6 +32,7 @@ LATEST_FRAMES: Final = 64
 LONGEST_GAP_S: Final = 3600.0
 
 _MOST_WAITING: Final = 4096
+# a counter that cannot be proved for so long makes no sense
 _PATIENCE_S: Final = 3.0
 _FEWEST_PATIENCE: Final = 1024
 _MOST_CONTRADICTIONS: Final = 2

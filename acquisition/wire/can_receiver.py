@@ -20,10 +20,12 @@ from acquisition.wire.can_group import DeviceClock, GroupReceiver
 from acquisition.wire.can_layout import STREAM_BITS, CanLayout, ControlMessage, SampleMessage
 from sloshlab.errors import SourceError
 
+# device_status comes once per second: so long samples wait for it after a connection that broke
 _LONGEST_WAIT_NS: Final = 3_000_000_000
 _MOST_HELD: Final = 65_536
 _END_WAIT_NS: Final = 300_000_000
 _STREAMS: Final = 1 << STREAM_BITS
+# a counter announced that lies back by more is that of a device which started anew
 _STATUS_LATE_S: Final = 1.0
 
 HostTime = int | IntArray
@@ -138,10 +140,10 @@ class CanReceiver:
         deliveries: list[Delivery] = []
         n_known = 0
         for group in self._groups:
-            mine = np.flatnonzero(_is(batch, group.message))
-            n_known += len(mine)
-            if len(mine):
-                deliveries += group.take(batch[mine], monotonic[mine], utc[mine], self._stream)
+            own_frames = np.flatnonzero(_is(batch, group.message))
+            n_known += len(own_frames)
+            if len(own_frames):
+                deliveries += group.take(batch[own_frames], monotonic[own_frames], utc[own_frames], self._stream)
         self.n_unknown += len(batch) - n_known
         self._share_epoch()
         return deliveries

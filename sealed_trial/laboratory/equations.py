@@ -53,8 +53,9 @@ def elastic_force(t, x, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def structure_force(t, x, v, state, p, conditions):  # type: ignore[no-untyped-def]
-    """All of the structure at the place of the tank but dry friction [N]."""
+def structure_force(t, place, state, p, conditions):  # type: ignore[no-untyped-def]
+    """All of the structure at the place of the tank, x and v there, but dry friction [N]."""
+    x, v = place
     force = elastic_force(t, x, p)
     force -= v * (p[at.STRUCTURE_VISCOUS] + p[at.STRUCTURE_DRAG] * abs(v) + p[at.DAMPING_OF_DISPLACEMENT] * x * x)
     force -= state[at.S_HYSTERESIS]
@@ -146,8 +147,12 @@ def friction_limit(direction, v, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def state_rates(rates, state, v, tank, p, conditions, bank):  # type: ignore[no-untyped-def]
-    """Rates of the states; `tank` is its velocity and acceleration, `bank` rate and weight of every spring."""
+def state_rates(rates, state, motion, p, conditions):  # type: ignore[no-untyped-def]
+    """Rates of the states but those of the relaxing springs, which are set to zero.
+
+    `motion` is the relative velocity v, and velocity and acceleration of the tank.
+    """
+    v, tank_velocity, tank_acceleration = motion
     for j in range(at.N_STATES):
         rates[j] = 0.0
     if p[at.HYSTERESIS_STIFFNESS] != 0.0:
@@ -156,27 +161,31 @@ def state_rates(rates, state, v, tank, p, conditions, bank):  # type: ignore[no-
         if v * z > 0.0:
             share -= (abs(z) / p[at.HYSTERESIS_YIELD]) ** p[at.HYSTERESIS_EXPONENT]
         rates[at.S_HYSTERESIS] = p[at.HYSTERESIS_STIFFNESS] * v * share
-    rates[at.S_MEAN_SQUARE_A] = (tank[1] ** 2 - state[at.S_MEAN_SQUARE_A]) / at.AVERAGING_TIME
-    rates[at.S_MEAN_SQUARE_V] = (tank[0] ** 2 - state[at.S_MEAN_SQUARE_V]) / at.AVERAGING_TIME
+    rates[at.S_MEAN_SQUARE_A] = (tank_acceleration**2 - state[at.S_MEAN_SQUARE_A]) / at.AVERAGING_TIME
+    rates[at.S_MEAN_SQUARE_V] = (tank_velocity**2 - state[at.S_MEAN_SQUARE_V]) / at.AVERAGING_TIME
     if p[at.BUILD_UP_TIME] > 0.0:
         rates[at.S_VIOLENCE] = 0.5 * (1.0 + math.tanh((amplitude_g(state) - p[at.BUILD_UP_START]) / 0.05))
     if p[at.WAVE_MASS] != 0.0:
         rate, wave = p[at.WAVE_RATE], state[at.S_WAVE]
-        spring = 1.0 + p[at.WAVE_COUPLING] * tank[1] / at.GRAVITY + p[at.WAVE_HARDENING] * wave * wave
+        spring = 1.0 + p[at.WAVE_COUPLING] * tank_acceleration / at.GRAVITY + p[at.WAVE_HARDENING] * wave * wave
         rates[at.S_WAVE] = state[at.S_WAVE_RATE]
         rates[at.S_WAVE_RATE] = -rate * (2 * p[at.WAVE_DAMPING] * state[at.S_WAVE_RATE] + rate * spring * wave)
     if p[at.SLUG_MASS] != 0.0:
         rates[at.S_SLUG] = state[at.S_SLUG_RATE]
-        rates[at.S_SLUG_RATE] = -slug_force(state, p) / p[at.SLUG_MASS] - tank[1]
+        rates[at.S_SLUG_RATE] = -slug_force(state, p) / p[at.SLUG_MASS] - tank_acceleration
     if p[at.LOOSE_MASS] != 0.0:
         rates[at.S_LOOSE] = state[at.S_LOOSE_RATE]
         push = loose_force(state, p, conditions) / p[at.LOOSE_MASS]
-        rates[at.S_LOOSE_RATE] = -at.GRAVITY - push - tank[1]
+        rates[at.S_LOOSE_RATE] = -at.GRAVITY - push - tank_acceleration
     if p[at.APPENDAGE_MASS] != 0.0:
         rate = p[at.APPENDAGE_RATE]
         pull = rate * (rate * state[at.S_APPENDAGE] + 2 * p[at.APPENDAGE_DAMPING] * state[at.S_APPENDAGE_RATE])
         rates[at.S_APPENDAGE] = state[at.S_APPENDAGE_RATE]
-        rates[at.S_APPENDAGE_RATE] = -pull - tank[1]
-    if p[at.RELAXATION_GAIN] != 0.0:
-        for j in range(at.N_RELAXATION):
-            rates[at.S_RELAXATION + j] = bank[j, 1] * v - bank[j, 0] * state[at.S_RELAXATION + j]
+        rates[at.S_APPENDAGE_RATE] = -pull - tank_acceleration
+
+
+@njit(cache=True)
+def relaxation_rates(rates, state, v, bank):  # type: ignore[no-untyped-def]
+    """Rates of the relaxing springs; `bank` is rate and weight of every one."""
+    for j in range(at.N_RELAXATION):
+        rates[at.S_RELAXATION + j] = bank[j, 1] * v - bank[j, 0] * state[at.S_RELAXATION + j]

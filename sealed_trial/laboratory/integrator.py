@@ -5,13 +5,14 @@ J. R. Dormand, P. J. Prince, A family of embedded Runge–Kutta formulae, J. Com
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
 from sealed_trial.laboratory import kernel_layout as at
+from sealed_trial.laboratory.compiled_system import CompiledSystem, Record, Sampling, Trial
 from sealed_trial.laboratory.kernel import evaluate, margins, switch
 
 FloatArray = npt.NDArray[np.float64]
@@ -34,8 +35,9 @@ _MOST_EVENTS: Final = 200_000
 
 
 @njit(cache=True)
-def _step(t, y, h, slopes, trial, seen, conditions, system):  # type: ignore[no-untyped-def]
-    """One step of length h into `trial`; slopes[0] is given, the others are filled."""
+def _step(t, y, h, trial, system):  # type: ignore[no-untyped-def]
+    """One step of length h."""
+    slopes = trial.slopes
     stage = np.empty(y.size)
     for i in range(1, 7):
         for k in range(y.size):
@@ -44,19 +46,20 @@ def _step(t, y, h, slopes, trial, seen, conditions, system):  # type: ignore[no-
                 total += _A[i, j] * slopes[j, k]
             stage[k] = y[k] + h * total
         if i == 6:
-            trial[:] = stage
-        evaluate(t + _C[i] * h, stage, slopes[i], seen, conditions, system)
+            trial.end[:] = stage
+        evaluate(t + _C[i] * h, stage, slopes[i], trial.seen, system)
 
 
 @njit(cache=True)
-def _error(y, trial, h, slopes, relative, scale):  # type: ignore[no-untyped-def]
+def _error(h, trial, relative, scale):  # type: ignore[no-untyped-def]
     """Largest error over its tolerance; `scale` holds the largest size seen of every component."""
+    slopes, end = trial.slopes, trial.end
     worst = 0.0
-    for k in range(y.size):
+    for k in range(end.size):
         total = 0.0
         for i in range(7):
             total += _ERROR[i] * slopes[i, k]
-        allowed = relative * max(scale[k], abs(trial[k])) + 1e-13
+        allowed = relative * max(scale[k], abs(end[k])) + 1e-13
         worst = max(worst, abs(h * total) / allowed)
     return worst
 
@@ -80,38 +83,39 @@ def _note(row, seen, rates, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def integrate(y, n_samples, step, relative, conditions, system, seen_all, events):  # type: ignore[no-untyped-def]
-    """Advance `y` sample by sample and fill what is seen, shape (n_samples, outputs).
+def integrate(y, sampling, system, record):  # type: ignore[no-untyped-def]
+    """Advance `y` sample by sample and fill the record.
 
-    `events` receives time, condition and its new value, shape (most, 3). Returns the number of events, or a
-    negative number where the integration fails.
+    Returns the number of events, or a negative number where the integration fails.
     """
-    p = system[5]
-    n = system[4].size
-    slopes, trial, scale = np.zeros((7, y.size)), np.empty(y.size), np.abs(y)
+    n_samples, step, relative = sampling
+    seen_all, events = record.seen, record.events
+    p, conditions, n = system.p, system.conditions, system.psi.size
+    slopes, end, scale = np.zeros((7, y.size)), np.empty(y.size), np.abs(y)
     seen, out, shifted = np.empty(at.N_OUTPUTS + 4), np.empty(at.N_CONDITIONS), np.empty(y.size)
+    whole, part = Trial(slopes, end, seen), Trial(slopes, shifted, seen)
     n_events, t, h = 0, 0.0, 0.2 * step
-    evaluate(t, y, slopes[0], seen, conditions, system)
+    evaluate(t, y, slopes[0], seen, system)
     for _ in range(at.N_CONDITIONS):  # what is let go outside a margin has left it at once
-        margins(y, seen, conditions, n, p, out)
+        margins(y, seen, conditions, p, out)
         which = _first_left(out)
         if which < 0:
             break
-        switch(which, y, seen, conditions, n, p)
-        evaluate(t, y, slopes[0], seen, conditions, system)
+        switch(which, y, seen, conditions, p)
+        evaluate(t, y, slopes[0], seen, system)
     _note(seen_all[0], seen, slopes[0], n)
     for sample in range(1, n_samples):
-        end = sample * step
-        while t < end - _SHORTEST:
-            now = min(h, end - t)
-            _step(t, y, now, slopes, trial, seen, conditions, system)
-            error = _error(y, trial, now, slopes, relative, scale)
+        end_s = sample * step
+        while t < end_s - _SHORTEST:
+            now = min(h, end_s - t)
+            _step(t, y, now, whole, system)
+            error = _error(now, whole, relative, scale)
             if not error <= 1.0:
                 if now < 1e-11 or not np.isfinite(error):
                     return -1
                 h = now * max(0.2, 0.9 * error**-0.2)
                 continue
-            margins(trial, seen, conditions, n, p, out)
+            margins(end, seen, conditions, p, out)
             which = _first_left(out)
             if which >= 0:
                 early, late = 0.0, now
@@ -119,26 +123,30 @@ def integrate(y, n_samples, step, relative, conditions, system, seen_all, events
                     if late - early < _SHORTEST:
                         break
                     middle = 0.5 * (early + late)
-                    _step(t, y, middle, slopes, shifted, seen, conditions, system)
-                    margins(shifted, seen, conditions, n, p, out)
+                    _step(t, y, middle, part, system)
+                    margins(shifted, seen, conditions, p, out)
                     which_middle = _first_left(out)
                     if which_middle >= 0:
                         late, which = middle, which_middle
-                        trial[:] = shifted
+                        end[:] = shifted
                     else:
                         early = middle
                 now = late
-                _step(t, y, now, slopes, trial, seen, conditions, system)
-            y[:] = trial
+                _step(t, y, now, whole, system)
+            y[:] = end
             t += now
             for k in range(y.size):
                 scale[k] = max(scale[k], abs(y[k]))
             slopes[0] = slopes[6]
             if which >= 0:
-                switch(which, y, seen, conditions, n, p)
-                evaluate(t, y, slopes[0], seen, conditions, system)
+                switch(which, y, seen, conditions, p)
+                evaluate(t, y, slopes[0], seen, system)
                 if n_events < events.shape[0]:
-                    events[n_events, 0], events[n_events, 1], events[n_events, 2] = t, which, conditions[which]
+                    events[n_events, 0], events[n_events, 1], events[n_events, 2] = (
+                        t,
+                        which,
+                        conditions[which],
+                    )
                 n_events += 1
                 if n_events > _MOST_EVENTS:
                     return -2
@@ -153,8 +161,7 @@ def integrated(
     initial: FloatArray,
     n_samples: int,
     step_s: float,
-    system: tuple[Any, ...],
-    conditions: npt.NDArray[np.int64],
+    system: CompiledSystem,
     *,
     relative_tolerance: float = 1e-9,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -176,7 +183,7 @@ def integrated(
     y = initial.astype(np.float64)
     seen = np.empty((n_samples, at.N_OUTPUTS))
     events = np.empty((20_000, 3))
-    status = integrate(y, n_samples, step_s, relative_tolerance, conditions.copy(), system, seen, events)
+    status = integrate(y, Sampling(n_samples, step_s, relative_tolerance), system, Record(seen, events))
     if status < 0:
         raise ArithmeticError("the hidden laboratory diverges" if status == -1 else "contacts chatter")
     return seen, y, events[: min(status, events.shape[0])]

@@ -1,7 +1,6 @@
 """The rates of all coordinates and states, and what switches contact and friction, compiled.
 
-A system is handed over as a tuple of arrays (see `system.arrays`): inverse mass matrix, damping matrix, stiffness
-matrix, Γ, ψ, parameters, relaxing springs, and the step and the table of the base's motion.
+A system is handed over as a `CompiledSystem`.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from sealed_trial.laboratory import kernel_layout as at
 from sealed_trial.laboratory.equations import (
     base_motion,
     friction_limit,
+    relaxation_rates,
     state_rates,
     structure_force,
     tank_extra_mass,
@@ -24,9 +24,9 @@ STANDSTILL = 1e-10
 
 
 @njit(cache=True)
-def evaluate(t, y, rates, seen, conditions, system):  # type: ignore[no-untyped-def]
+def evaluate(t, y, rates, seen, system):  # type: ignore[no-untyped-def]
     """Rates dy/dt and what is seen (outputs, then hold force, upper and lower limit, sliding velocity)."""
-    inverse_mass, damping, stiffness, gamma, psi, p, bank, step, table = system
+    inverse_mass, damping, stiffness, gamma, psi, p, bank, step, table, conditions = system
     n = psi.size
     state = y[2 * n :]
     base = np.empty(4)
@@ -40,7 +40,7 @@ def evaluate(t, y, rates, seen, conditions, system):  # type: ignore[no-untyped-
     at_tank = p[at.FRICTION_AT_TANK]
     extra = tank_extra_mass(t, state, p)
     moved = extra + p[at.STRUCTURE_MASS]
-    on_structure = structure_force(t, x, v, state, p, conditions)
+    on_structure = structure_force(t, (x, v), state, p, conditions)
     on_tank = tank_force(tank[0], state, p, conditions, base[3])
     sliding = v + at_tank * base[1]
     friction = hold = 0.0
@@ -80,7 +80,9 @@ def evaluate(t, y, rates, seen, conditions, system):  # type: ignore[no-untyped-
                 loss += y[n + j] * damping[j, k] * y[n + k]
         place_acceleration = tank[1] - base[2]
         loss -= v * (on_structure + on_tank + friction - moved * (place_acceleration + base[2]))
-    state_rates(rates[2 * n :], state, v, tank, p, conditions, bank)
+    state_rates(rates[2 * n :], state, (v, tank[0], tank[1]), p, conditions)
+    if p[at.RELAXATION_GAIN] != 0.0:
+        relaxation_rates(rates[2 * n :], state, v, bank)
     if n > 0:
         rates[2 * n + at.S_DISSIPATED] = loss
     seen[at.O_DISPLACEMENT] = base[0] + x
@@ -96,8 +98,9 @@ def evaluate(t, y, rates, seen, conditions, system):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def margins(y, seen, conditions, n, p, out):  # type: ignore[no-untyped-def]
+def margins(y, seen, conditions, p, out):  # type: ignore[no-untyped-def]
     """How far each condition is from being left; negative where it has been."""
+    n = (y.size - at.N_STATES) // 2
     out[:] = 1.0
     if n > 0 and (p[at.FRICTION_UP] != 0.0 or p[at.FRICTION_DOWN] != 0.0):
         side = conditions[at.D_FRICTION]
@@ -118,8 +121,9 @@ def margins(y, seen, conditions, n, p, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def switch(which, y, seen, conditions, n, p):  # type: ignore[no-untyped-def]
+def switch(which, y, seen, conditions, p):  # type: ignore[no-untyped-def]
     """Take the condition `which` to the one beyond its margin."""
+    n = (y.size - at.N_STATES) // 2
     if which == at.D_FRICTION:
         hold, up, down = seen[at.N_OUTPUTS], seen[at.N_OUTPUTS + 1], seen[at.N_OUTPUTS + 2]
         if hold < -up:

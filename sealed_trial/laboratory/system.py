@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from sealed_trial.laboratory import kernel_layout as at
+from sealed_trial.laboratory.compiled_system import CompiledSystem
 from sealed_trial.laboratory.integrator import integrated
 from sealed_trial.laboratory.prescribed_motion import Motion
 
@@ -42,10 +43,10 @@ class System:
     parameters: FloatArray
     relaxation_exponent: float = 0.0
 
-    def arrays(self, motion: Motion) -> tuple[Any, ...]:
-        """What the kernel takes."""
+    def compiled(self, motion: Motion) -> CompiledSystem:
+        """What the kernel takes, with the contacts of a rig at rest."""
         inverse = np.linalg.inv(self.mass) if self.shape.size else np.zeros((0, 0))
-        return (
+        return CompiledSystem(
             np.ascontiguousarray(inverse),
             self.damping,
             self.stiffness,
@@ -55,6 +56,7 @@ class System:
             relaxing_springs(self.relaxation_exponent),
             motion.step_s,
             motion.table,
+            initial_conditions(self),
         )
 
     def with_parameters(self, changes: dict[int, float]) -> System:
@@ -144,8 +146,7 @@ def simulate(
         initial_state(system, deflection_m),
         n_samples,
         1.0 / sampling_rate_hz,
-        system.arrays(motion),
-        initial_conditions(system),
+        system.compiled(motion),
         relative_tolerance=relative_tolerance,
     )
     return SimulatedRun(seen, events, final)

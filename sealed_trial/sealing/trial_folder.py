@@ -105,16 +105,17 @@ def seal(
             write_case(complete / "cases" / name, case, np.random.default_rng([*words, number, 4]))
             truths[name] = case.truth
             said(name)
-        return _written(complete, purpose, seed, key, secret, truths)
+        return _written(complete, truths, purpose=purpose, seed=seed, key=key, secret=secret)
 
 
 def _written(
     folder: Path,
+    truths: dict[str, HiddenTruth],
+    *,
     purpose: Literal["sealed", "development"],
     seed: int,
     key: bytes | None,
     secret: bytes,
-    truths: dict[str, HiddenTruth],
 ) -> Commitments:
     """Publish the commitments, then write the truths."""
     contents = {name: asdict(truth) for name, truth in truths.items()}

@@ -31,7 +31,8 @@ def written_trial(folder: Path, truths: list[HiddenTruth], key: bytes | None) ->
         (place / "rig.toml").write_text("[tank]\n")
         (place / "recordings" / "run_01.nc").write_text(f"samples of {its_truth.case}")
     purpose = "development" if key is None else "sealed"
-    return _written(folder, purpose, 1, key, b"secret", {its_truth.case: its_truth for its_truth in truths})
+    by_case = {its_truth.case: its_truth for its_truth in truths}
+    return _written(folder, by_case, purpose=purpose, seed=1, key=key, secret=b"secret")
 
 
 DIAGNOSIS = """

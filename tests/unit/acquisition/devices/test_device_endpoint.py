@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquisition.devices.can_conversation import SocketcandConversation
-from acquisition.devices.connection import Connection, Door, ListeningSocket, PseudoTerminal
+from acquisition.devices.connection import Connection, Listener, ListeningSocket, PseudoTerminal
 from acquisition.devices.conversation import Conversation
 from acquisition.devices.endpoint import LONGEST_STALL_S, StreamEndpoint
 
@@ -65,7 +65,7 @@ class ScriptedHost(Connection):
             os.close(end)
 
 
-class ScriptedDoor(Door):
+class ScriptedListener(Listener):
     """All hosts come at once."""
 
     def __init__(self, *hosts):
@@ -86,8 +86,8 @@ class ScriptedDoor(Door):
 
 
 @contextlib.contextmanager
-def served(*hosts, clock, text=b"", door=None):
-    endpoint = StreamEndpoint(door or ScriptedDoor(*hosts), Greedy(), lambda _: text, str, now_s=clock)
+def served(*hosts, clock, text=b"", listener=None):
+    endpoint = StreamEndpoint(listener or ScriptedListener(*hosts), Greedy(), lambda _: text, str, now_s=clock)
     try:
         endpoint.serve(0.0)
         for host in hosts:
@@ -129,9 +129,9 @@ def test_a_host_may_speak_while_much_is_on_its_way_to_it(n_questions):
 
 def test_a_terminal_that_is_opened_again_before_that_is_noticed_is_one_host():
     host = ScriptedHost(lambda: 1 << 30)
-    door = ScriptedDoor(host)
-    with served(host, clock=Clock(), text=b"x", door=door) as endpoint:
-        door.coming = [host]
+    listener = ScriptedListener(host)
+    with served(host, clock=Clock(), text=b"x", listener=listener) as endpoint:
+        listener.coming = [host]
         endpoint.serve(0.0)
         assert endpoint.send(FRAMES, is_given_up=lambda: False)
     assert host.taken == b"x"
@@ -187,17 +187,17 @@ def test_a_terminal_whose_host_was_let_go_is_there_for_the_next_one(tmp_path):
 
 def test_at_a_full_door_each_one_waits_its_own_time():
     clock = Clock()
-    door = ListeningSocket("127.0.0.1", 0, most=1, now_s=clock)
-    host, _, port = door.open().rpartition(":")
+    listener = ListeningSocket("127.0.0.1", 0, most=1, now_s=clock)
+    host, _, port = listener.open().rpartition(":")
     with contextlib.ExitStack() as stack:
-        stack.callback(door.close)
+        stack.callback(listener.close)
         clients = [stack.enter_context(socket.create_connection((host, int(port)), timeout=30)) for _ in range(3)]
-        (first,) = door.arrived()
+        (first,) = listener.arrived()
         stack.callback(first.close)
         for k, client in enumerate(clients[1:], start=2):
-            assert door.arrived() == []
+            assert listener.arrived() == []
             clock.now_s += 2.1
-            assert door.arrived() == []
+            assert listener.arrived() == []
             assert client.recv(1) == b""
             still_there(clients[k:])
 
