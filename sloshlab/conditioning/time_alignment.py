@@ -103,10 +103,6 @@ class ClockDelay:
     gain_ratio: float
     correlation: float
 
-    def delay_at(self, time_s: float) -> float:
-        """Delay at a time of the reference [s]: what it shows then, the other shows that much later."""
-        return self.delay_s + 1e-6 * self.drift_ppm * (time_s - self.centre_s)
-
     def reference_line(self, start_s: float, step_s: float) -> tuple[float, float]:
         """First instant and step of the other signal on the reference's time base, from its stated ones [s]."""
         growth = 1e-6 * self.drift_ppm

@@ -37,13 +37,13 @@ def network_of(kind: str, settings: Mapping[str, Any]) -> Network:
     """
     if kind not in NETWORKS:
         raise InputError("network", got=repr(kind), allowed=", ".join(NETWORKS))
-    n_inputs = _whole("inputs", settings.get("n_inputs"))
+    n_inputs = _positive_integer("inputs", settings.get("n_inputs"))
     network: Network
     if kind == Multilayer.kind:
-        layers = tuple(_whole("neurons", size) for size in str(settings.get("layers", "")).split())
+        layers = tuple(_positive_integer("neurons", size) for size in str(settings.get("layers", "")).split())
         network = Multilayer(n_inputs, layers, str(settings.get("activation", "tanh")))
     else:
-        n_neurons = _whole("neurons", settings.get("n_neurons"))
+        n_neurons = _positive_integer("neurons", settings.get("n_neurons"))
         network = (NormalisedRadialBasis if kind == NormalisedRadialBasis.kind else RadialBasis)(
             n_inputs, n_neurons
         )
@@ -57,7 +57,7 @@ def network_of(kind: str, settings: Mapping[str, Any]) -> Network:
     return network
 
 
-def _whole(what: str, value: object) -> int:
+def _positive_integer(what: str, value: object) -> int:
     try:
         number = int(str(value))
     except ValueError:

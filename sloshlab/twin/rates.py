@@ -179,7 +179,7 @@ def _known_force(m: Model, stage: Stage, s: Scratch) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _difficult_force(m: Model, free: float, known: float, stage: Stage, s: Scratch) -> tuple[float, bool]:
+def _implicit_force(m: Model, free: float, known: float, stage: Stage, s: Scratch) -> tuple[float, bool]:
     """Sum of all forces where some depend on the acceleration or friction holds, and whether there is one."""
     inertia = 1.0 + m.added_mass * m.mobility
     if s.friction[0] == STICKS:
@@ -211,7 +211,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
     _set_motion(s, now.seconds, x, v)
     total, good = _known_force(m, stage, s), True
     if m.uses_acceleration or s.friction[0] == STICKS:
-        total, good = _difficult_force(m, free, total, stage, s)
+        total, good = _implicit_force(m, free, total, stage, s)
     # all forces act at one place of the modes, so that the mass they add needs no system of equations
     a = (free + m.mobility * total) * m.inverse_inertia
     total -= m.added_mass * a
@@ -242,8 +242,8 @@ def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def rates_once(m: Model, excited: Excited, now: Time, s: Scratch) -> bool:
-    """The rates of the present state, into the first slopes, for those who need them now and then."""
+def rates_by_call(m: Model, excited: Excited, now: Time, s: Scratch) -> bool:
+    """The rates of the present state, into the first slopes, not compiled into callers that rarely need them."""
     return rates(m, excited, now, Stage(s.state, s.slopes[0], s.powers[0]), s)  # type: ignore[no-any-return]
 
 
@@ -269,8 +269,8 @@ def advance(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def advance_once(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
-    """The step for those who need it now and then; a call hands over two hundred numbers, a third of a step."""
+def advance_by_call(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
+    """The step, not compiled into callers that rarely need it: the call itself costs a third of a step."""
     return advance(m, excited, start, length, s)  # type: ignore[no-any-return]
 
 
@@ -286,12 +286,12 @@ def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     for j in range(n):
         s.state[n + j] -= m.shape[j] * m.inverse_mass[j] * velocity / m.mobility
     s.friction[0] = STICKS
-    rates_once(m, excited, now, s)
-    let_go(s)
+    rates_by_call(m, excited, now, s)
+    release_friction(s)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def let_go(s: Scratch) -> None:
+def release_friction(s: Scratch) -> None:
     """Slide where sticking would need more than friction can hold."""
     if s.friction[1] > s.friction[3]:
         s.friction[0] = -1.0
