@@ -31,7 +31,9 @@ _SMALLEST_CORRELATION = 0.3
 _CLEARLY_WORSE = 2.0
 _FEWEST_WINDOWS = 4
 _OUTLIER = 6.0
+"""Windows further from the line than this many standard deviations, from their median, are left out."""
 _WINDOW_OVERLAP_VARIANCE = 4.0 / 3.0
+"""Hann windows that overlap by half have noise correlated by 1/6, with a neighbour on either side."""
 
 
 @dataclass(frozen=True)
@@ -359,8 +361,9 @@ def _delay_of(
     x: npt.NDArray[np.complex128], y: npt.NDArray[np.complex128], omega: FloatArray
 ) -> tuple[float, float, tuple[float, float, float]]:
     power = np.abs(x) ** 2
-    carries = power >= 0.01 * power.max()
+    carries = power >= 0.01 * power.max()  # the phases of other lines are noise
     cross = (y * x.conj())[carries]
+    # a phase −ωτ tells the delay the better the higher its frequency: weighted least squares of the phases
     information = float((np.abs(cross) * omega[carries] ** 2).sum())
     lag = -float((np.abs(cross) * omega[carries] * np.angle(cross)).sum())
     powers = float(cross.real.sum()), float(power[carries].sum()), float((np.abs(y[carries]) ** 2).sum())

@@ -295,6 +295,7 @@ def residual_spread(members: Sequence[ReducedOrderModel], runs: Sequence[Run]) -
     error, variance, level = (np.concatenate(parts) for parts in (errors, variances, levels))
     if error.size < len(PROBABILITIES):
         raise AnalysisError("residuals of an ensemble", got=f"{error.size} samples", allowed="more than 95")
+    # σ² stays above zero where members agree and the force is nil
     least = _LEAST_SHARE * float(np.mean(error**2)) + 1e-300
 
     def negative_log_likelihood(logarithms: FloatArray) -> float:
