@@ -183,11 +183,11 @@ def clock_delay(
     """
     _require_common_time(reference, other)
     candidates = _candidates(reference, other, largest_delay_s, largest_drift_ppm)
-    fits = [fit for line in candidates if (fit := _followed(reference, other, line)) is not None]
+    fits = [fit for line in candidates if (fit := _line_through_windows(reference, other, line)) is not None]
     if not fits:
         return _nothing_in_common(reference)
     fits.sort(key=lambda fit: fit.residual_rms_s)
-    best = _followed(reference, other, fits[0].line) or fits[0]
+    best = _line_through_windows(reference, other, fits[0].line) or fits[0]
     half_period_s = 0.25 / _highest_frequency_hz(reference)
     rivals = [fit for fit in fits[1:] if abs(fit.line.middle_s - best.line.middle_s) > half_period_s]
     status = AlignmentStatus.ALIGNED
@@ -310,7 +310,7 @@ def _best_apart(found: list[tuple[float, _Line]], distance_s: float) -> list[_Li
     return chosen
 
 
-def _followed(reference: SampledSignal, other: SampledSignal, line: _Line) -> _Fit | None:
+def _line_through_windows(reference: SampledSignal, other: SampledSignal, line: _Line) -> _Fit | None:
     """Delays of the windows after `line` has been taken off, and the better line; None without signal."""
     time = reference.start_s + reference.step_s * np.arange(reference.values.size)
     positions = (time + line.at(time) - other.start_s) / other.step_s

@@ -90,7 +90,7 @@ def _log_ratio_std(first: FloatArray, last: FloatArray, apart: int) -> FloatArra
 def _extrema(
     signal: FloatArray, sampling_rate_hz: float, frequency_hz: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], FloatArray, FloatArray]:
-    """Extrema that the phase asks for.
+    """Extrema near the instants at which the phase is a multiple of π.
 
     Times [s], values, ±1 for maximum or minimum, whether there is one, and standard errors of times and values for
     white noise of 1.

@@ -1,4 +1,4 @@
-"""What makes the damping of a liquid less than that of liquid long thrown about: saturation, and break-up in time.
+"""What makes the damping of a liquid less than that of liquid that is broken up: saturation, and break-up in time.
 
 Laws of the liquid share these; the level is that of a harmonic motion with the running mean square of a.
 """

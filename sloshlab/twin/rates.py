@@ -71,7 +71,7 @@ def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
         s.motion[at + TIME] = time
         s.motion[at + DISPLACEMENT] = x + frame * s.inputs[0]
         s.motion[at + VELOCITY] = v + frame * s.inputs[1]
-        s.motion[at + ACCELERATION] = np.nan  # a law that reads it without saying so spoils its result, visibly
+        s.motion[at + ACCELERATION] = np.nan  # a law that reads it without saying so gets NaN as its force
         s.motion[at + BASE_ACCELERATION] = s.inputs[2]
         s.motion[at + PHASE] = s.inputs[3]
         s.motion[at + FREQUENCY] = s.inputs[4]
@@ -276,7 +276,7 @@ def advance_by_call(m: Model, excited: Excited, start: Time, length: Time, s: Sc
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
-    """At rest: stick if the holding force allows, else slide the way the other forces push."""
+    """At rest: stick if the holding force allows, else slide in the direction of the other forces."""
     n = m.stiffness.size
     velocity = s.motion[m.friction_frame * N_MOTION + VELOCITY]
     if m.mobility == 0.0:  # prescribed motion cannot be held

@@ -179,7 +179,7 @@ _BREAK_UP, _TABLE = 4, len(_OF_MAPS)
 
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
 def _share_of_map(motion, parameters, memory, rates):
-    """What acts of a map, which is that of liquid long thrown about at levels below saturation."""
+    """Share of a map that acts; the map is that of liquid that is broken up, at levels below saturation."""
     rates[2] = (motion[ACCELERATION] ** 2 - memory[2]) / parameters[_BREAK_UP + AVERAGING]
     level = level_g(memory[2])
     rates[3] = rate_of_break_up(parameters, _BREAK_UP, level, memory[3])
