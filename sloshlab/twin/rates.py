@@ -228,7 +228,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
 def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
     """Power of each term on the modes and in its own frame, then those of `N_OTHER_WORKS`."""
     n, n_terms, base = m.stiffness.size, m.law.size, s.inputs[2]
-    y, power = stage.state, stage.powers
+    y, power = stage.state, s.powers[stage.row]
     for i in range(n_terms):
         s.force[i] -= m.mass[i] * s.motion[N_MOTION + ACCELERATION]
         power[2 * i] = s.force[i] * v
@@ -244,7 +244,7 @@ def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def rates_by_call(m: Model, excited: Excited, now: Time, s: Scratch) -> bool:
     """The rates of the present state, into the first slopes, not compiled into callers that rarely need them."""
-    return rates(m, excited, now, Stage(s.state, s.slopes[0], s.powers[0]), s)  # type: ignore[no-any-return]
+    return rates(m, excited, now, Stage(s.state, s.slopes[0], 0), s)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -262,7 +262,7 @@ def advance(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -
             for j in range(y.size):
                 new[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
         now = Time(start.seconds + c * step, start.half_steps + c * length.half_steps)
-        good &= rates(m, excited, now, Stage(new, k[stage], p[stage]), s)
+        good &= rates(m, excited, now, Stage(new, k[stage], stage), s)
     for j in range(s.works.size):
         s.trial_works[j] = s.works[j] + step / 6.0 * (p[0, j] + 2.0 * (p[1, j] + p[2, j]) + p[3, j])
     return good
