@@ -1,7 +1,7 @@
 """Ctrl-C where Python alone would hang on it, or lose it.
 
 The interrupt is an exception that may be raised between any two steps of any library. One that has just taken a
-lock and has not yet noted so never gives it back: closing the file then waits for ever. And one raised in the
+lock and has not yet noted so never releases it: closing the file then waits for ever. And one raised in the
 clean-up of a dead object is printed and forgotten: the command goes on as if nobody had asked it to stop.
 """
 

@@ -25,6 +25,7 @@ def _lagrange_integrals() -> npt.NDArray[np.float64]:
     nodes = range(-3, 3)
     table = np.zeros((6, 7))
     for row, node in enumerate(nodes):
+        # exact fractions, rounded once: the differences of such coefficients lose digits
         polynomial = [Fraction(1)]
         for other in nodes:
             if other == node:

@@ -74,7 +74,7 @@ def trained_ensemble(
             settings=settings,
             n_members=n_members,
             agitation=model.agitation,
-            told=told,
+            on_epoch=told,
         )
     ensemble.facts.update(model.facts)
     return ensemble

@@ -232,7 +232,7 @@ def train_case(task: _Task, say_share: Callable[[float], None]) -> CaseResult:
             task.validation,
             sampling_rate_hz=task.sampling_rate_hz,
             settings=settings,
-            told=told,
+            on_epoch=told,
         )
     except AnalysisError as error:
         result = _failed(case, " ".join(str(error).split()))

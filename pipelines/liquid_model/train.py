@@ -160,7 +160,7 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
             sampling_rate_hz=runs.rate_hz,
             settings=settings,
             agitation=wanted.agitation(),
-            told=told,
+            on_epoch=told,
         )
     errors = {"training_mse_n2": record.best.training_mse, "validation_mse_n2": record.best.validation_mse}
     model.facts.update(runs.facts() | errors)

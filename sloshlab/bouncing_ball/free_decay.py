@@ -80,7 +80,7 @@ def measured_curve(
     AnalysisError
         If nothing decays, or too few values are left.
     """
-    decay = analyse_free_decay(_alive(acceleration), sampling_rate_hz)
+    decay = analyse_free_decay(_until_died_out(acceleration), sampling_rate_hz)
     reading = decay.log_decrement
     amplitude = reading.acceleration_amplitude_m_per_s2
     used = reading.used & (amplitude >= lowest_acceleration_g * GRAVITY_M_PER_S2) & (reading.damping_ratio > 0)
@@ -146,7 +146,7 @@ def simulated_curve(decay: Simulation, frequency_hz: float) -> DampingCurve:
     AnalysisError
         If it has died out within five cycles.
     """
-    signal = _alive(decay.acceleration_m_per_s2)
+    signal = _until_died_out(decay.acceleration_m_per_s2)
     n_cycles = signal.size / decay.sampling_rate_hz * frequency_hz
     if n_cycles < 5:
         raise AnalysisError("simulated decay", got=f"{n_cycles:.1f} cycles", allowed="at least 5")
@@ -159,7 +159,7 @@ def simulated_curve(decay: Simulation, frequency_hz: float) -> DampingCurve:
     return DampingCurve(reading.acceleration_amplitude_m_per_s2[used], reading.damping_ratio[used], frequency_hz)
 
 
-def _alive(signal: FloatArray) -> FloatArray:
+def _until_died_out(signal: FloatArray) -> FloatArray:
     """The signal without an end that has died out; what cannot be compared is left as it is."""
     size = np.abs(signal)
     above = np.flatnonzero(size > _DIED_OUT_SHARE * size.max(initial=0.0))

@@ -38,7 +38,7 @@ def identify_from_decay(
     measured : DampingCurve
         From `measured_curve`.
     rig : Rig
-        Structure and tank; its guide's friction and damping enter as they are believed.
+        Structure and tank; its guide's friction and damping enter with the values that the rig states.
     initial_displacement_m : float
         From which the structure was released.
     duration_s : float

@@ -91,7 +91,7 @@ def guide_from_decay(
         Of the tank [m/s²].
     sampling_rate_hz : float
     rig : Rig
-        Its masses are believed.
+        Its masses are taken as stated.
     initial_displacement_m : float
         From which it was released.
     lowest_acceleration_g : float

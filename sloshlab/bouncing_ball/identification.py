@@ -158,7 +158,7 @@ def identified(
         raise InputError(
             "identification of a ball", got=f"{n_values} values", allowed=f"more than {space.n_parameters}"
         )
-    found = _global(search, settings, progress)
+    found = _evolved(search, settings, progress)
     best = _polished(search, found, settings)
     rough = float(np.sqrt(found.fun / n_values))
     if best.cost * 2 > found.fun:
@@ -200,7 +200,7 @@ class _Search:
         return float(values @ values)
 
 
-def _global(search: _Search, settings: SearchSettings, progress: Progress | None) -> OptimizeResult:
+def _evolved(search: _Search, settings: SearchSettings, progress: Progress | None) -> OptimizeResult:
     done = 0
 
     def report(*_: object, **__: object) -> None:
@@ -224,7 +224,9 @@ def _global(search: _Search, settings: SearchSettings, progress: Progress | None
     )
 
 
-def _local(search: _Search, start: FloatArray, n_evaluations: int, free: npt.NDArray[np.bool_]) -> OptimizeResult:
+def _refined(
+    search: _Search, start: FloatArray, n_evaluations: int, free: npt.NDArray[np.bool_]
+) -> OptimizeResult:
     """Least squares over the free parameters."""
     fixed = start.copy()
 
@@ -251,7 +253,7 @@ def _polished(search: _Search, found: OptimizeResult, settings: SearchSettings) 
     """Least squares from the best candidates, because the nearest valley may be a rough one."""
     free = np.ones(search.space.n_parameters, dtype=bool)
     order = np.argsort(found.population_energies)[: 1 + _EXTRA_LOCAL_STARTS]
-    results = [_local(search, found.population[i], settings.n_local_evaluations, free) for i in order]
+    results = [_refined(search, found.population[i], settings.n_local_evaluations, free) for i in order]
     return min(results, key=lambda result: result.cost)
 
 
@@ -293,7 +295,7 @@ def _interval(
     centre, half = float(best.x[i]), factor * float(np.sqrt(covariance[i, i]))
     growth = factor**2 * 2 * best.cost / (best.fun.size - best.x.size)
     ends = [
-        _end(
+        _interval_end(
             _Profile(search, best, i, side, covariance, n_evaluations=settings.n_local_evaluations // 2),
             half,
             max(growth, 1e-300),
@@ -302,7 +304,7 @@ def _interval(
     ]
     values, open_ends = [], (-np.inf, np.inf)
     for (distance, _), side, open_end in zip(ends, (-1, 1), open_ends, strict=True):
-        moved = _moved(best.x, i, centre + side * distance)
+        moved = _with_parameter(best.x, i, centre + side * distance)
         values.append(search.space.parameter(i, moved) if np.isfinite(distance) else open_end)
     ratios = [ratio for distance, ratio in ends if np.isfinite(distance)]
     at_bound = "lower" if centre < _AT_BOUND else "upper" if centre > 1 - _AT_BOUND else ""
@@ -316,7 +318,7 @@ def _interval(
     )
 
 
-def _moved(point: FloatArray, i: int, share: float) -> FloatArray:
+def _with_parameter(point: FloatArray, i: int, share: float) -> FloatArray:
     moved = point.copy()
     moved[i] = share
     return moved
@@ -347,12 +349,12 @@ class _Profile:
     def growth(self, distance: float) -> float:
         """At a distance, 0 … room."""
         start = np.clip(self._best.x + distance * self._direction, 0.0, 1.0)
-        again = _local(self._search, start, self._n_evaluations, self._free)
+        again = _refined(self._search, start, self._n_evaluations, self._free)
         self._direction = (again.x - self._best.x) / distance
         return max(float(2 * again.cost - 2 * self._best.cost), 0.0)
 
 
-def _end(profile: _Profile, first: float, wanted: float) -> tuple[float, float]:
+def _interval_end(profile: _Profile, first: float, wanted: float) -> tuple[float, float]:
     """Distance at which the growth is the wanted one, and growth over wanted there; infinite if out of bounds.
 
     The root of the growth is a straight line where the residuals are linear, so that secants find it. Where the

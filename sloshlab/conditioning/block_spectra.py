@@ -25,6 +25,7 @@ ComplexArray = npt.NDArray[np.complex128]
 _LOWEST_RATE_HZ = 400.0
 _BLOCK_S = 1.0
 _LINES_BESIDE = 2
+"""To each side of the largest line: a Hann window spreads a sine over so many."""
 _FEWEST_SAMPLES_PER_BLOCK = 32
 
 
@@ -148,6 +149,7 @@ def delay_s(spectra: BlockSpectra, index: int) -> tuple[float, float]:
         the blocks (NaN with a single block).
     """
     cross, omega, weight = spectra.cross[index], spectra.omega_rad_per_s, spectra.power
+    # a sensor mounted upside down is half a period off at every frequency, which is no delay
     sign = 1.0 if cross.real.sum() >= 0 else -1.0
     lag = -np.angle(sign * cross)
     moment = float((weight * omega**2).sum())

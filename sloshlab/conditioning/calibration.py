@@ -19,7 +19,6 @@ import xarray as xr
 from sloshlab.conditioning.block_spectra import block_spectra, delay_s
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
-    derived_channel,
     force_channels,
     force_sign,
     mean_acceleration,
@@ -191,29 +190,6 @@ def identify_dry_mass(
         gain_ratio_std=gain_std,
         source_runs=tuple(identification.run_id for identification in everything),
     )
-
-
-def inertia_removed(force: xr.DataArray, acceleration: xr.DataArray, mass_kg: float) -> xr.DataArray:
-    """Force without the inertia of the dry mass: F_ext − M ü = −F_S (1.6).
-
-    Parameters
-    ----------
-    force : xarray.DataArray
-        F_ext(time) [N], the force on the tank, upward positive.
-    acceleration : xarray.DataArray
-        ü(time) [m/s²], upward positive.
-    mass_kg : float
-        M_dry for −F_S. With M_dry + m_l the result is F_ext − (M_dry + m_l) ü = −Δf.
-
-    Returns
-    -------
-    xarray.DataArray
-        ``force_without_inertia(time)`` [N]; NaN where either is lost.
-    """
-    values = np.multiply(acceleration.values, -mass_kg, dtype=np.float64)
-    values += force.values
-    attributes = {"units": "N", "quantity": "force", "inertia_removed_kg": mass_kg}
-    return derived_channel(force, values, "force_without_inertia", attributes)
 
 
 def check_signs(recording: xr.Dataset, rig: Rig | None = None) -> None:

@@ -25,6 +25,7 @@ HALF_WIDTH: Final = 24
 
 _KAISER_SHAPE = 13.4
 _STEPS_PER_SAMPLE = 4096
+"""Of the table of the kernel, which is interpolated linearly between them."""
 
 
 def half_width(rate_ratio: float = 1.0) -> int:

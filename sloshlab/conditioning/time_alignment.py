@@ -31,7 +31,9 @@ _SMALLEST_CORRELATION = 0.3
 _CLEARLY_WORSE = 2.0
 _FEWEST_WINDOWS = 4
 _OUTLIER = 6.0
+"""Windows further from the line than this many standard deviations, from their median, are left out."""
 _WINDOW_OVERLAP_VARIANCE = 4.0 / 3.0
+"""Hann windows that overlap by half have noise correlated by 1/6, with a neighbour on either side."""
 
 
 @dataclass(frozen=True)
@@ -102,10 +104,6 @@ class ClockDelay:
     phase_error_at_20_hz_rad: float
     gain_ratio: float
     correlation: float
-
-    def delay_at(self, time_s: float) -> float:
-        """Delay at a time of the reference [s]: what it shows then, the other shows that much later."""
-        return self.delay_s + 1e-6 * self.drift_ppm * (time_s - self.centre_s)
 
     def reference_line(self, start_s: float, step_s: float) -> tuple[float, float]:
         """First instant and step of the other signal on the reference's time base, from its stated ones [s]."""
@@ -185,11 +183,11 @@ def clock_delay(
     """
     _require_common_time(reference, other)
     candidates = _candidates(reference, other, largest_delay_s, largest_drift_ppm)
-    fits = [fit for line in candidates if (fit := _followed(reference, other, line)) is not None]
+    fits = [fit for line in candidates if (fit := _line_through_windows(reference, other, line)) is not None]
     if not fits:
         return _nothing_in_common(reference)
     fits.sort(key=lambda fit: fit.residual_rms_s)
-    best = _followed(reference, other, fits[0].line) or fits[0]
+    best = _line_through_windows(reference, other, fits[0].line) or fits[0]
     half_period_s = 0.25 / _highest_frequency_hz(reference)
     rivals = [fit for fit in fits[1:] if abs(fit.line.middle_s - best.line.middle_s) > half_period_s]
     status = AlignmentStatus.ALIGNED
@@ -312,7 +310,7 @@ def _best_apart(found: list[tuple[float, _Line]], distance_s: float) -> list[_Li
     return chosen
 
 
-def _followed(reference: SampledSignal, other: SampledSignal, line: _Line) -> _Fit | None:
+def _line_through_windows(reference: SampledSignal, other: SampledSignal, line: _Line) -> _Fit | None:
     """Delays of the windows after `line` has been taken off, and the better line; None without signal."""
     time = reference.start_s + reference.step_s * np.arange(reference.values.size)
     positions = (time + line.at(time) - other.start_s) / other.step_s
@@ -363,8 +361,9 @@ def _delay_of(
     x: npt.NDArray[np.complex128], y: npt.NDArray[np.complex128], omega: FloatArray
 ) -> tuple[float, float, tuple[float, float, float]]:
     power = np.abs(x) ** 2
-    carries = power >= 0.01 * power.max()
+    carries = power >= 0.01 * power.max()  # the phases of other lines are noise
     cross = (y * x.conj())[carries]
+    # a phase −ωτ tells the delay the better the higher its frequency: weighted least squares of the phases
     information = float((np.abs(cross) * omega[carries] ** 2).sum())
     lag = -float((np.abs(cross) * omega[carries] * np.angle(cross)).sum())
     powers = float(cross.real.sum()), float(power[carries].sum()), float((np.abs(y[carries]) ** 2).sum())

@@ -127,7 +127,7 @@ def cross_validation(field: ScatteredField, *, n_folds: int = 5) -> CrossValidat
     """
     runs = _inner_runs(field)
     chosen = (next(iter(field.coordinates)), DEFAULT_SMOOTHING)
-    # smoothing is not chosen by left-out runs: on a thinned field they asked for too little of it
+    # smoothing is not chosen by left-out runs: on a thinned field that gave too little of it
     if runs:
         thinned = _thinned(field)
         folds = _every(thinned, n_folds)

@@ -150,13 +150,14 @@ def cantilever_modes(beam: Cantilever, *, n_modes: int, x_m: FloatArray | None =
 
 def _characteristic(root: float, ratio: float) -> float:
     """The characteristic equation over cosh λ."""
-    tangent = np.tanh(root)
+    tangent = np.tanh(root)  # over cosh λ, because cosh and sinh themselves overflow for high modes
     return float(1 / np.cosh(root) + np.cos(root) + ratio * root * (tangent * np.cos(root) - np.sin(root)))
 
 
 @lru_cache(maxsize=64)
 def _nodes_and_weights(n: int) -> tuple[FloatArray, FloatArray]:
     nodes, weights = np.polynomial.legendre.leggauss(n)
+    # kept by the cache, and so shared by all callers
     nodes.flags.writeable = weights.flags.writeable = False
     return nodes, weights
 

@@ -97,7 +97,7 @@ def _solved(basis: FloatArray, signal: FloatArray) -> FloatArray:
 
 
 def _basis(time: FloatArray, nonlinear: FloatArray) -> FloatArray:
-    # an exponent of 50 is beyond any decay that can be read and keeps a step that went astray finite
+    # an exponent of 50 is beyond any decay that can be read and keeps a step that goes too far finite
     decay = np.exp(np.clip(-nonlinear[0] * time, -50, 50))
     return np.stack(
         [decay * np.cos(nonlinear[1] * time), decay * np.sin(nonlinear[1] * time), np.ones_like(time)], axis=1

@@ -163,7 +163,7 @@ def _refuse_without_decay(reading: InstantaneousDamping) -> None:
 
 
 def _refuse_other_frequency(reading: InstantaneousDamping, frequency_range_hz: tuple[float, float] | None) -> None:
-    """A mode that is not there shows the foot of another one; the fit walks to where that is."""
+    """Where a mode is not excited lies the foot of another one, to whose frequency the fit converges."""
     low, high = frequency_range_hz or (0.0, np.inf)
     seen = float(np.median(reading.frequency_hz[reading.used]))
     if not low <= seen <= high:

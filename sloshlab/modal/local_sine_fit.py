@@ -93,7 +93,7 @@ def local_sine_fit(
     for first, last in itertools.pairwise(edges):
         fit = fit_decaying_sine(signal[first:last], sampling_rate_hz, frequency_hz=guess[0], decay_per_s=guess[1])
         fits.append(fit)
-        # a stretch of noise must not lead the next one astray
+        # a stretch of noise is no start for the next one
         if _is_clear(fit, fit.noise_std):
             guess = fit.omega_rad_per_s / (2 * np.pi), fit.decay_per_s
     time = 0.5 * (edges[:-1] + edges[1:] - 1) / sampling_rate_hz

@@ -19,6 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 _HALF_WIDTH_SHARE = 1 / 8
 """Half width of the parabola over the period."""
 _NEIGHBOURS = np.array([-0.25, 0.5, -0.25])
+"""Half an extremum less a quarter of both neighbours, of the other sign: no static offset or drift is left."""
 
 
 def log_decrement(
@@ -47,6 +48,7 @@ def log_decrement(
     time, value, sign, found, unit_time_std, unit_value_std = _extrema(signal, sampling_rate_hz, frequency_hz)
     apart = 2 * n_cycles
     amplitude = sign[1:-1] * np.convolve(value, _NEIGHBOURS, mode="valid")
+    # where the motion has ended the logarithm still needs a number; such values are marked as noise
     lost = 1e-6 * np.abs(amplitude).max()
     amplitude = np.maximum(amplitude, lost)
     first, last = slice(0, amplitude.size - apart), slice(apart, amplitude.size)
@@ -88,13 +90,13 @@ def _log_ratio_std(first: FloatArray, last: FloatArray, apart: int) -> FloatArra
 def _extrema(
     signal: FloatArray, sampling_rate_hz: float, frequency_hz: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], FloatArray, FloatArray]:
-    """Extrema that the phase asks for.
+    """Extrema near the instants at which the phase is a multiple of π.
 
     Times [s], values, ±1 for maximum or minimum, whether there is one, and standard errors of times and values for
     white noise of 1.
     """
     phase = np.unwrap(np.angle(analytic_signal(signal, sampling_rate_hz, frequency_hz=frequency_hz)))
-    phase = np.maximum.accumulate(phase)
+    phase = np.maximum.accumulate(phase)  # noise turns it back at times; extrema are counted once
     halves = np.arange(np.ceil(phase[0] / np.pi), np.floor(phase[-1] / np.pi) + 1)
     half_width = max(2, round(_HALF_WIDTH_SHARE * sampling_rate_hz / frequency_hz))
     offset = np.arange(-half_width, half_width + 1)

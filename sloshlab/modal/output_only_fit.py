@@ -181,9 +181,11 @@ class _Model:
         for apart, correlation in enumerate(HANN_LINE_CORRELATIONS, start=1):
             shifted = correlation * jacobian[apart:].T @ jacobian[:-apart]
             total = total + shifted + shifted.T
+        # sandwich: neighbouring lines of a Hann window are correlated, which the inverse of JᵀJ does not know
         bread = np.linalg.pinv(scatter)
         error = self._data / self.density(parameters) - 1
         n_free = max(error.size - parameters.size, 1)
         misfit = float(n_averages * (error**2).sum() / n_free)
+        # a misfit below one is chance and makes no interval shorter
         unscaled = bread @ total @ bread * max(misfit, 1.0) / n_averages
         return unscaled * np.outer(self.scale, self.scale), misfit

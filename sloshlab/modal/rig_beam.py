@@ -31,7 +31,7 @@ _LARGEST_MASS_RATIO = 100.0
 _MASSES_AGREE = 0.25
 
 
-# channels of a simulation ask for it per sensor, and finding the tip mass takes longer than the simulation
+# called for every sensor of a simulation; finding the tip mass takes longer than the simulation
 @lru_cache(maxsize=64)
 def beam_of_rig(described: Structure) -> Cantilever | None:
     """The uniform beam with the tip mass of the module's text; None where the file has no dimensions.

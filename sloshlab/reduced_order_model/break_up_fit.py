@@ -27,6 +27,7 @@ _BOUNDS: Final = {
     "at_rest": (1e-5, 0.2),
 }
 _N_TRIED, _N_REFINED = 128, 3
+"""Points of the Halton sequence, and how many of the best ones least squares starts from."""
 _SLOWEST_SHARE: Final = 0.02
 
 

@@ -19,7 +19,7 @@ class EarlyStop:
         Rises one after another after which it ends.
     least_gain : float
         Share by which the lowest error must fall within twice as many epochs, or it ends, too: an error that
-        wavers rises and falls for ever, and one that creeps falls for ever.
+        rises and falls in turn never rises often enough in a row, and one that falls by little never rises.
 
     Examples
     --------

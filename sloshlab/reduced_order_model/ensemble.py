@@ -179,7 +179,7 @@ def fit_ensemble(
     block_s: float = 5.0,
     agitation: Agitation | None = None,
     backend: ArrayBackend | None = None,
-    told: Callable[[int, Epoch], None] | None = None,
+    on_epoch: Callable[[int, Epoch], None] | None = None,
 ) -> tuple[Ensemble, list[TrainingRecord]]:
     """Train members on training runs whose blocks are drawn with replacement, each from its own start.
 
@@ -191,7 +191,7 @@ def fit_ensemble(
         At least 2.
     block_s : float
         Length of a block; longer than the liquid remembers.
-    told : callable, optional
+    on_epoch : callable, optional
         Takes the number of the member and every epoch. A KeyboardInterrupt keeps the members so far if there
         are two.
 
@@ -225,7 +225,7 @@ def fit_ensemble(
             settings=replace(chosen, seed=chosen.seed + 1000 * (number + 1)),
             agitation=agitation,
             backend=backend,
-            told=None if told is None else lambda epoch, number=number: told(number, epoch),  # type: ignore[misc]
+            on_epoch=None if on_epoch is None else lambda epoch, number=number: on_epoch(number, epoch),  # type: ignore[misc]
         )
         members.append(member)
         records.append(record)
@@ -295,14 +295,15 @@ def residual_spread(members: Sequence[ReducedOrderModel], runs: Sequence[Run]) -
     error, variance, level = (np.concatenate(parts) for parts in (errors, variances, levels))
     if error.size < len(PROBABILITIES):
         raise AnalysisError("residuals of an ensemble", got=f"{error.size} samples", allowed="more than 95")
+    # σ² stays above zero where members agree and the force is nil
     least = _LEAST_SHARE * float(np.mean(error**2)) + 1e-300
 
-    def unlikelihood(logarithms: FloatArray) -> float:
+    def negative_log_likelihood(logarithms: FloatArray) -> float:
         squared = variance + least + np.exp(logarithms[0]) + np.exp(logarithms[1]) * level
         return float(np.mean(np.log(squared) + error**2 / squared))
 
     start = np.array([math.log(float(np.mean(error**2)) + least), math.log(0.1)])
-    found = minimize(unlikelihood, start, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-9})
+    found = minimize(negative_log_likelihood, start, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-9})
     a_squared, b_squared = np.exp(found.x)
     constant, slope = float(np.sqrt(a_squared + least)), float(np.sqrt(b_squared))
     sigma = np.sqrt(variance + constant**2 + slope**2 * level)

@@ -25,9 +25,11 @@ CHANCE_OF_FALSE_ALARM: Final = 0.01
 """Of a test, if nothing is left in the residual and lags are independent."""
 LARGEST_POWER: Final = 3
 _BLOCK_LAGS: Final = 4
+"""Length of a block over the longest lag: products of neighbouring blocks are then nearly independent."""
 _MOST_BLOCKS: Final = 64
 _FEWEST_BLOCKS: Final = 8
 _SMALLEST_EIGENVALUE: Final = 1e-6
+"""Of the largest: directions in which the signal varies less are left out of what a filter explains."""
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ class TrainingSettings:
 
 @dataclass(frozen=True)
 class Epoch:
-    """What a person is told after an epoch.
+    """Where a training stands after an epoch.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ def fit(
     settings: TrainingSettings | None = None,
     agitation: Agitation | None = None,
     backend: ArrayBackend | None = None,
-    told: Callable[[Epoch], None] | None = None,
+    on_epoch: Callable[[Epoch], None] | None = None,
 ) -> tuple[ReducedOrderModel, TrainingRecord]:
     """Train a model; with output delays first one step ahead (NARX), then running free (NOE).
 
@@ -159,7 +159,7 @@ def fit(
         Memory of the liquid's state; its scales are those of the training runs.
     backend : ArrayBackend, optional
         NumPy by default.
-    told : callable, optional
+    on_epoch : callable, optional
         Takes every epoch as it ends. A KeyboardInterrupt within training keeps the best model so far.
 
     Returns
@@ -191,7 +191,7 @@ def fit(
     best, started, interrupted = _Best(), time.monotonic(), False
     try:
         for start in range(chosen.n_starts):
-            _train_once(task, chosen, start, best, started=started, told=told or (lambda epoch: None))
+            _train_once(task, chosen, start, best, started=started, on_epoch=on_epoch or (lambda epoch: None))
     except KeyboardInterrupt:
         interrupted = True
         if best.theta is None:
@@ -210,7 +210,7 @@ def _train_once(
     best: _Best,
     *,
     started: float,
-    told: Callable[[Epoch], None],
+    on_epoch: Callable[[Epoch], None],
 ) -> None:
     """One start: one step ahead, then free if there is feedback."""
     rng = np.random.default_rng([settings.seed, start])
@@ -236,7 +236,7 @@ def _train_once(
             own_settings,
             own,
             place=(start, number, started),
-            told=told,
+            on_epoch=on_epoch,
         )
 
 
@@ -248,7 +248,7 @@ def _descend(
     best: _Best,
     *,
     place: tuple[int, int, float],
-    told: Callable[[Epoch], None],
+    on_epoch: Callable[[Epoch], None],
 ) -> tuple[FloatArray, int]:
     """Epoch after epoch until the validation error keeps rising, nothing improves, or the epochs are used up."""
     start, number, started = place
@@ -269,7 +269,7 @@ def _descend(
             time.monotonic() - started,
         )
         best.take(epoch, parameters)
-        told(epoch)
+        on_epoch(epoch)
         number += 1
         if reason := stop.reason(validation):
             ended = reason

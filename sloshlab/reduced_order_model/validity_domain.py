@@ -1,4 +1,4 @@
-"""Where a model knows what it says: frequencies and speeds of its training runs, and when a motion leaves them.
+"""Domain of validity of a model: frequencies and speeds of its training runs, and when a motion leaves them.
 
 A cycle runs from one rise of the velocity through zero to the next. It has a frequency and a speed, half the
 difference of its extremes; ū, and the acceleration in g, follow from both for motion of one frequency.

@@ -176,7 +176,7 @@ class _Signals(NamedTuple):
     motion_is_velocity: bool
 
 
-class _OneCycle(NamedTuple):
+class _Cycle(NamedTuple):
     """A cycle among the samples."""
 
     start: float  # in samples
@@ -195,14 +195,14 @@ def _kernel(
     phasors = np.full((n_cycles, 2 * N_HARMONICS + 3), np.nan + 0j)
     for n in range(n_cycles):
         if evaluable[n] and _complete(signals, positions[n], positions[n + 1]):
-            cycle = _OneCycle(
+            cycle = _Cycle(
                 positions[n],
                 positions[n + 1],
                 slope[n] * (positions[n + 1] - positions[n]),
                 slope[n + 1] * (positions[n + 1] - positions[n]),
                 n % 2,
             )
-            _one_cycle(signals, cycle, scalars[n], phasors[n])
+            _evaluate_cycle(signals, cycle, scalars[n], phasors[n])
     return scalars, phasors
 
 
@@ -225,7 +225,7 @@ def _complete(signals: _Signals, start: float, stop: float) -> bool:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nsz", "arcp"})  # type: ignore[untyped-decorator]
-def _one_cycle(signals: _Signals, cycle: _OneCycle, scalars: FloatArray, phasors: ComplexArray) -> None:
+def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phasors: ComplexArray) -> None:
     force, motion, motion_is_velocity = signals.force, signals.motion, signals.motion_is_velocity
     step_s, inertia_kg, start, stop = signals.step_s, signals.inertia_kg, cycle.start, cycle.stop
     p, q = int(np.ceil(start)), int(np.floor(stop))

@@ -226,10 +226,10 @@ def _phase_knots(centres: FloatArray, frequency: FloatArray, duration_s: float) 
     step = 0.25 / float(frequency.max())
     fine = np.arange(0.0, duration_s + step, step)
     cycles = np.concatenate([[0.0], np.cumsum(np.interp(fine, centres, frequency))[:-1]]) * step
-    return _one_per_cycle(fine, 2 * np.pi * cycles)
+    return _knot_per_cycle(fine, 2 * np.pi * cycles)
 
 
-def _one_per_cycle(times: FloatArray, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _knot_per_cycle(times: FloatArray, phase: FloatArray) -> tuple[FloatArray, FloatArray]:
     cycles = phase / (2 * np.pi) * _KNOTS_PER_CYCLE
     n = np.arange(np.ceil(cycles[0]), np.floor(cycles[-1]) + 1)
     if n.size < 4:
@@ -241,7 +241,7 @@ def _respaced(times: FloatArray, phase: FloatArray, moving: BoolArray) -> tuple[
     """Knots again one per cycle, now of the demodulated phase."""
     smooth = np.interp(times, times[moving], phase[moving]) if moving.any() else phase
     rising = np.maximum.accumulate(smooth) + 1e-6 * np.arange(smooth.size)
-    new_times, _ = _one_per_cycle(times, rising)
+    new_times, _ = _knot_per_cycle(times, rising)
     spline_phase = CubicSpline(times, smooth)(new_times)
     return new_times, np.maximum.accumulate(spline_phase), np.interp(new_times, times, moving) > 0.5
 

@@ -25,7 +25,9 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 _HALF_WIDTH = 2
+"""Windows to each side from which the stiffness at one is found."""
 _SMALLEST_FREQUENCY_SPREAD = 2e-3
+"""Over the frequency: within less, the slope of μ is that of its scatter."""
 
 
 @dataclass(frozen=True)
@@ -108,5 +110,6 @@ def _local_stiffness(omega: FloatArray, apparent_mass_kg: FloatArray) -> FloatAr
         direction = np.sign(np.diff(omega[near]))
         sweeps_on = direction.size >= 2 and abs(direction.sum()) == direction.size
         if sweeps_on and np.ptp(omega[near]) > _SMALLEST_FREQUENCY_SPREAD * omega[at]:
+            # a mass on a spring: μ = m − k/Ω²
             stiffness[at] = -np.polyfit(omega[near] ** -2.0, apparent_mass_kg[near], 1)[0]
     return stiffness

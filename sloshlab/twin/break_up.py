@@ -1,4 +1,4 @@
-"""What makes the damping of a liquid less than that of liquid long thrown about: saturation, and break-up in time.
+"""What makes the damping of a liquid less than that of liquid that is broken up: saturation, and break-up in time.
 
 Laws of the liquid share these; the level is that of a harmonic motion with the running mean square of a.
 """
@@ -16,7 +16,9 @@ from sloshlab.twin.terms import Parameter
 # mypy: disable-error-code="no-untyped-def"
 
 NEVER_G: Final = 1e6
+"""A level that no motion reaches: a law without saturation."""
 _AT_ONCE_S: Final = 1e-3
+"""Break-up times up to this are none: a state that fast left all bounds at low rates, and no force needs it."""
 _G: Final = GRAVITY_M_PER_S2
 
 PARAMETERS: Final = (
@@ -61,6 +63,7 @@ def rate_of_break_up(parameters, at, level, broken_up):
     if parameters[at + _BREAK_UP] <= _AT_ONCE_S:
         return 0.0
     agitated, time_constant = parameters[at + _AGITATED], parameters[at + _BREAK_UP]
+    # smooth instead of a jump at a_agitated, which would leave fits of the level in side valleys
     violent = 1.0 / (1.0 + (agitated / max(level, 1e-3 * agitated)) ** parameters[at + _SHARPNESS])
     calming = parameters[at + _CALMING] if parameters[at + _CALMING] > 0.0 else time_constant
     return violent * (1.0 - broken_up) / time_constant - (1.0 - violent) * broken_up / calming

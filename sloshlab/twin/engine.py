@@ -22,7 +22,7 @@ from numba import njit
 from sloshlab.twin.law import N_MOTION, VELOCITY
 from sloshlab.twin.law_call import call_law
 from sloshlab.twin.model import NO_FRICTION, STICKS, Excited, FloatArray, Model, Outputs, Scratch, Stretch, Time
-from sloshlab.twin.rates import advance, advance_once, let_go, rates_once, set_friction
+from sloshlab.twin.rates import advance, advance_by_call, rates_by_call, release_friction, set_friction
 from sloshlab.twin.status import Status
 
 DONE, UNSTABLE, FAULT, CHATTER, NO_ACCELERATION = (int(status) for status in Status)
@@ -91,7 +91,7 @@ def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scra
             middle = low + (high - low) * above / (above - below)
             # away from both ends, or the bracket hardly shrinks
             middle = min(max(middle, low + 0.01 * (high - low)), high - 0.01 * (high - low))
-        advance_once(m, excited, start, Time(middle * step, 2.0 * middle), s)
+        advance_by_call(m, excited, start, Time(middle * step, 2.0 * middle), s)
         value = _margin(m, s.trial, s)
         if value < -_SWITCH_TOLERANCE or not np.isfinite(value):
             # Illinois: an end that stays while the other moves twice counts half, so that it moves, too
@@ -103,7 +103,7 @@ def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scra
             below *= 0.5 if kept == -1 else 1.0
             kept = -1
     # the far side of the event, where its function is negative: there the switch turns and stays turned
-    advance_once(m, excited, start, Time(high * step, 2.0 * high), s)
+    advance_by_call(m, excited, start, Time(high * step, 2.0 * high), s)
     return high
 
 
@@ -124,7 +124,7 @@ def _switch(m: Model, excited: Excited, now: Time, s: Scratch, out: Outputs) -> 
                 _log(out, now, i, k, s.state[at + k])
     before = s.friction[0]
     if before == STICKS:
-        let_go(s)
+        release_friction(s)
     elif before != NO_FRICTION and before * s.motion[m.friction_frame * N_MOTION + VELOCITY] < 0.0:
         set_friction(m, excited, now, s)
     if s.friction[0] != before:
@@ -171,7 +171,7 @@ def _fault_of(y: FloatArray, largest: FloatArray) -> int:
 def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
     """Set the switches and the friction of the start and record it; the term that is beyond its limit, or −1."""
     start = Time(0.0, 0.0)
-    rates_once(m, excited, start, s)
+    rates_by_call(m, excited, start, s)
     _update_due(m, excited, start, 0.0, s)
     for i in range(m.law.size):
         if m.events[i]:
@@ -187,7 +187,7 @@ def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
         s.friction[0] = -1.0 if velocity < 0.0 else 1.0
         if velocity == 0.0:
             set_friction(m, excited, start, s)
-    rates_once(m, excited, start, s)
+    rates_by_call(m, excited, start, s)
     _record(m, 0, s, out)
     return -1
 
@@ -198,14 +198,14 @@ def _update(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     updated = False
     for i in range(m.law.size):
         if m.update[i] and m.update_period[i] == 0.0:
-            _update_one(m, i, s)
+            _update_term(m, i, s)
             updated = True
     if updated:
-        rates_once(m, excited, now, s)
+        rates_by_call(m, excited, now, s)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _update_one(m: Model, i: int, s: Scratch) -> None:
+def _update_term(m: Model, i: int, s: Scratch) -> None:
     motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
     call_law(m.update[i], (s.motion, m.parameters, s.state, s.slopes[4]), (motion, m.parameters_at[i], at, at))
 
@@ -216,11 +216,11 @@ def _update_due(m: Model, excited: Excited, now: Time, tolerance_s: float, s: Sc
     updated = False
     for i in range(m.law.size):
         if m.update_period[i] > 0.0 and s.updates[i] * m.update_period[i] <= now.seconds + tolerance_s:
-            _update_one(m, i, s)
+            _update_term(m, i, s)
             s.updates[i] += 1.0
             updated = True
     if updated:
-        rates_once(m, excited, now, s)
+        rates_by_call(m, excited, now, s)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
@@ -273,7 +273,7 @@ def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Out
                 where = _switch(m, excited, now, s, out)
                 if where >= 0:
                     return FAULT, row, where
-                rates_once(m, excited, now, s)
+                rates_by_call(m, excited, now, s)
                 n_switched += 1
                 if n_switched > _MOST_EVENTS_PER_STEP:
                     return CHATTER, row, -1

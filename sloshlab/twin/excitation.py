@@ -221,7 +221,7 @@ def recorded(
                 f"recorded {INPUTS[column]}", got=f"{lost} lost samples", remedy="simulate a stretch without gaps"
             )
 
-    between = {column: _Between(values) for column, values in given.items()}
+    between = {column: _BandLimitedSeries(values) for column, values in given.items()}
 
     def inputs(time: FloatArray) -> FloatArray:
         table = np.zeros((time.size, len(INPUTS)))
@@ -236,7 +236,7 @@ def recorded(
     return Excitation(sampling_rate_hz, shape[0], inputs, moves_base=moves)
 
 
-class _Between:
+class _BandLimitedSeries:
     """Band-limited values of a series at instants between its samples; beyond the ends it is reflected there.
 
     The kernel of `resampled` at the few offsets that are needed is taken from its answer to a unit impulse.

@@ -31,7 +31,7 @@ _BREAK_UP = 6
 
 @law
 def _liquid_damping(motion, parameters, memory, rates):
-    """−s [c · saturation + (m_l/π) ω W̄(â)] v; s builds up while the liquid is thrown about."""
+    """−s [c · saturation + (m_l/π) ω W̄(â)] v; s builds up while the liquid is agitated."""
     omega = sqrt(memory[1] / memory[0]) if memory[0] > 0 else 1.0
     omega = min(max(omega, 1.0), 1e4)
     averaging = parameters[_BREAK_UP + AVERAGING]

@@ -1,6 +1,6 @@
 """When and where a motion was outside of the region in which a map was measured.
 
-There the map's nearest value acts, so that the simulation goes on; whoever reads its result has to know.
+There the map's nearest value acts, so that the simulation goes on; its result carries a remark.
 """
 
 from __future__ import annotations

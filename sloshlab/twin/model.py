@@ -88,7 +88,7 @@ class Stage(NamedTuple):
 
     state: FloatArray  # (n_states,)
     rates: FloatArray  # (n_states,)
-    powers: FloatArray  # (n_works,)
+    row: int  # of `Scratch.powers`; an array more in every call costs time
 
 
 class Time(NamedTuple):

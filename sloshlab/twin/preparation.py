@@ -179,7 +179,7 @@ def run(
     """Integrate stretch by stretch; `watch` is told samples done and samples in all after each."""
     ready = prepared(twin.terms, twin.structure, excitation)
     model, n_rows = ready.model, excitation.n_samples
-    largest = _largest(model.stiffness.size, ready.memory.size)
+    largest = _state_bounds(model.stiffness.size, ready.memory.size)
     s = scratch(model, start_state(twin, ready, excitation.at_start(), *start), _n_event_functions(twin.terms))
     n_kept = n_columns(model.stiffness.size, model.law.size, ready.memory.size)
     _check_size(n_rows, n_kept)
@@ -246,7 +246,7 @@ def _keep_inputs(excited: Excited, n_substeps: int, first: int, stop: int, input
         inputs.external_force_n[first:stop] = of_rows[:, INPUTS.index("force")]
 
 
-def _largest(n_modes: int, n_memory: int) -> FloatArray:
+def _state_bounds(n_modes: int, n_memory: int) -> FloatArray:
     """Bounds of the state: displacement and velocity of the modes, memory of the terms."""
     bounds = np.full(2 * n_modes + n_memory, _LARGEST_MEMORY)
     bounds[:n_modes], bounds[n_modes : 2 * n_modes] = _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S

@@ -71,7 +71,7 @@ def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
         s.motion[at + TIME] = time
         s.motion[at + DISPLACEMENT] = x + frame * s.inputs[0]
         s.motion[at + VELOCITY] = v + frame * s.inputs[1]
-        s.motion[at + ACCELERATION] = np.nan  # a law that reads it without saying so spoils its result, visibly
+        s.motion[at + ACCELERATION] = np.nan  # a law that reads it without saying so gets NaN as its force
         s.motion[at + BASE_ACCELERATION] = s.inputs[2]
         s.motion[at + PHASE] = s.inputs[3]
         s.motion[at + FREQUENCY] = s.inputs[4]
@@ -179,7 +179,7 @@ def _known_force(m: Model, stage: Stage, s: Scratch) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _difficult_force(m: Model, free: float, known: float, stage: Stage, s: Scratch) -> tuple[float, bool]:
+def _implicit_force(m: Model, free: float, known: float, stage: Stage, s: Scratch) -> tuple[float, bool]:
     """Sum of all forces where some depend on the acceleration or friction holds, and whether there is one."""
     inertia = 1.0 + m.added_mass * m.mobility
     if s.friction[0] == STICKS:
@@ -211,7 +211,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
     _set_motion(s, now.seconds, x, v)
     total, good = _known_force(m, stage, s), True
     if m.uses_acceleration or s.friction[0] == STICKS:
-        total, good = _difficult_force(m, free, total, stage, s)
+        total, good = _implicit_force(m, free, total, stage, s)
     # all forces act at one place of the modes, so that the mass they add needs no system of equations
     a = (free + m.mobility * total) * m.inverse_inertia
     total -= m.added_mass * a
@@ -228,7 +228,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
 def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
     """Power of each term on the modes and in its own frame, then those of `N_OTHER_WORKS`."""
     n, n_terms, base = m.stiffness.size, m.law.size, s.inputs[2]
-    y, power = stage.state, stage.powers
+    y, power = stage.state, s.powers[stage.row]
     for i in range(n_terms):
         s.force[i] -= m.mass[i] * s.motion[N_MOTION + ACCELERATION]
         power[2 * i] = s.force[i] * v
@@ -242,9 +242,9 @@ def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def rates_once(m: Model, excited: Excited, now: Time, s: Scratch) -> bool:
-    """The rates of the present state, into the first slopes, for those who need them now and then."""
-    return rates(m, excited, now, Stage(s.state, s.slopes[0], s.powers[0]), s)  # type: ignore[no-any-return]
+def rates_by_call(m: Model, excited: Excited, now: Time, s: Scratch) -> bool:
+    """The rates of the present state, into the first slopes, not compiled into callers that rarely need them."""
+    return rates(m, excited, now, Stage(s.state, s.slopes[0], 0), s)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -262,21 +262,21 @@ def advance(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -
             for j in range(y.size):
                 new[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
         now = Time(start.seconds + c * step, start.half_steps + c * length.half_steps)
-        good &= rates(m, excited, now, Stage(new, k[stage], p[stage]), s)
+        good &= rates(m, excited, now, Stage(new, k[stage], stage), s)
     for j in range(s.works.size):
         s.trial_works[j] = s.works[j] + step / 6.0 * (p[0, j] + 2.0 * (p[1, j] + p[2, j]) + p[3, j])
     return good
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def advance_once(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
-    """The step for those who need it now and then; a call hands over two hundred numbers, a third of a step."""
+def advance_by_call(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
+    """The step, not compiled into callers that rarely need it: the call itself costs a third of a step."""
     return advance(m, excited, start, length, s)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
-    """At rest: stick if the holding force allows, else slide the way the other forces push."""
+    """At rest: stick if the holding force allows, else slide in the direction of the other forces."""
     n = m.stiffness.size
     velocity = s.motion[m.friction_frame * N_MOTION + VELOCITY]
     if m.mobility == 0.0:  # prescribed motion cannot be held
@@ -286,12 +286,12 @@ def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     for j in range(n):
         s.state[n + j] -= m.shape[j] * m.inverse_mass[j] * velocity / m.mobility
     s.friction[0] = STICKS
-    rates_once(m, excited, now, s)
-    let_go(s)
+    rates_by_call(m, excited, now, s)
+    release_friction(s)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def let_go(s: Scratch) -> None:
+def release_friction(s: Scratch) -> None:
     """Slide where sticking would need more than friction can hold."""
     if s.friction[1] > s.friction[3]:
         s.friction[0] = -1.0

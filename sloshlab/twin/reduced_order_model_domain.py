@@ -82,7 +82,7 @@ def departures(simulation: Simulation) -> list[Departure]:
         if domain is None:
             continue
         cycles = _cycles_seen(simulation, term)
-        excursions = _to_the_end(domain.excursions(_of_training(cycles, term)), simulation, term)
+        excursions = _extended_to_the_end(domain.excursions(_of_training(cycles, term)), simulation, term)
         found += [
             _departure(reason, chosen, term, simulation)
             for reason in REASONS
@@ -112,15 +112,15 @@ def _of_training(cycles: MotionCycles, term: Term) -> MotionCycles:
     return MotionCycles(cycles.start_s / root, cycles.frequency_hz * root, cycles.speed_m_per_s / root)
 
 
-def _to_the_end(excursions: list[Excursion], simulation: Simulation, term: Term) -> list[Excursion]:
+def _extended_to_the_end(excursions: list[Excursion], simulation: Simulation, term: Term) -> list[Excursion]:
     """A motion that dies away has no cycles in the end: too weak stays too weak."""
     if not excursions or excursions[-1].reason != "too weak":
         return excursions
     end_s = simulation.time_s.size / simulation.sampling_rate_hz / math.sqrt(term.values["height_ratio"])
     velocity = simulation.velocity_m_per_s
     after = simulation.time_s >= excursions[-1].stop_s * math.sqrt(term.values["height_ratio"])
-    loudest = float(np.abs(velocity[after]).max(initial=0.0))
-    if loudest > excursions[-1].speed_m_per_s:
+    fastest = float(np.abs(velocity[after]).max(initial=0.0))
+    if fastest > excursions[-1].speed_m_per_s:
         return excursions
     return [*excursions[:-1], replace(excursions[-1], stop_s=end_s)]
 

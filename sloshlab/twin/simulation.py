@@ -134,15 +134,15 @@ class Simulation:
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """What the forces have to say, each on its motion and memory: regions that they were not measured in."""
-        said: list[str] = []
+        lines: list[str] = []
         at = 0
         for term in self.twin.terms:
             n_memory = len(term.kind.memory(term.values, term.table)) + term.kind.n_switches
             if term.kind.remarks is not None:
                 motion = self.places[:, PLACES.index(term.place)]
-                said += term.kind.remarks(term, self.time_s, motion, self.memory[:, at : at + n_memory])
+                lines += term.kind.remarks(term, self.time_s, motion, self.memory[:, at : at + n_memory])
             at += n_memory
-        return tuple(said)
+        return tuple(lines)
 
     def require_done(self) -> Simulation:
         """Itself, if it reached its end.

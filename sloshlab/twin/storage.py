@@ -1,6 +1,6 @@
 """A twin on disk: one TOML file for a person, and one netCDF file for arrays. Never pickle, nothing is evaluated.
 
-A twin names its forces; whoever loads it has imported the modules that register them. Saving a loaded twin gives
+A twin names its forces; modules that register them are imported before it is loaded. Saving a loaded twin gives
 the same bytes.
 """
 

@@ -56,9 +56,11 @@ def _bouncing_ball(motion, parameters, memory, rates):
                 1.0 + parameters[_HARDENING] * overlap * overlap / (radius - abs(overlap))
             )
             contact = stiffness * overlap + parameters[_DAMPING] * closing
+            # towards the wall: damping pulls the ball back before it lets go, as printed; a liquid only pushes
             if (contact > 0.0) == (side == 0):
                 contact *= parameters[_PULLS]
     rates[0], rates[1] = memory[1], -_G - contact / mass
+    # m_b (a + g) of the equation: the term with a is the negative mass of the kind, the weight stands here
     return contact + mass * _G
 
 
@@ -77,6 +79,7 @@ def _ball_at_rest(values: Mapping[str, float]) -> tuple[float, float]:
     radius = values["radius_m"]
     weight = (1.0 - values["beta"]) * values["liquid_mass_kg"] * _G
     low, high = 0.0, radius
+    # bisection, as the spring is infinitely stiff at the radius
     for _ in range(200):
         overlap = 0.5 * (low + high)
         gap = radius - overlap
@@ -156,6 +159,7 @@ def _map_value(numbers, at, omega_bar, u_bar):
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
 def _track(motion, parameters, memory, rates):
     """Frequency from running mean squares of v and a; amplitude from the present v and a."""
+    # the present v and a give an amplitude at every instant, but not a frequency: at a turning point v is zero
     omega = min(max(sqrt(memory[1] / memory[0]) if memory[0] > 0 else 0.0, 1e-3), 1e5)
     rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / parameters[2]
     rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / parameters[2]
@@ -175,7 +179,7 @@ _BREAK_UP, _TABLE = 4, len(_OF_MAPS)
 
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
 def _share_of_map(motion, parameters, memory, rates):
-    """What acts of a map, which is that of liquid long thrown about at levels below saturation."""
+    """Share of a map that acts; the map is that of liquid that is broken up, at levels below saturation."""
     rates[2] = (motion[ACCELERATION] ** 2 - memory[2]) / parameters[_BREAK_UP + AVERAGING]
     level = level_g(memory[2])
     rates[3] = rate_of_break_up(parameters, _BREAK_UP, level, memory[3])

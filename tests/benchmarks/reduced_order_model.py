@@ -93,14 +93,14 @@ def ours() -> dict[str, float]:
     training, validation, rate_hz = signals()
     times: list[float] = []
 
-    def told(epoch: Epoch) -> None:
+    def after_epoch(epoch: Epoch) -> None:
         times.append(time.perf_counter())
         print(f"{epoch.number} {epoch.training_mse:.5f} {epoch.validation_mse:.5f}", flush=True)
 
     started = time.perf_counter()
     model, record = fit(
         "normalised_rbf", {"n_neurons": N_NEURONS}, DELAYS, [training], [validation], sampling_rate_hz=rate_hz,
-        settings=TrainingSettings(input_spread=SPREAD), told=told,
+        settings=TrainingSettings(input_spread=SPREAD), on_epoch=after_epoch,
     )  # fmt: skip
     training_s = time.perf_counter() - started
     n_parameters = model.network.n_parameters

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.array_backend import Array
-from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar, SumsOfJacobian, whole_number
+from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar, SumsOfJacobian, positive_integer
 
 FloatArray = NDArray[np.float64]
 ACTIVATIONS: Final = ("tanh", "radial")
@@ -73,8 +73,8 @@ class Multilayer:
     @classmethod
     def of_settings(cls, settings: Mapping[str, Any]) -> Self:
         """See `Network`."""
-        n_inputs = whole_number("inputs", settings.get("n_inputs"))
-        layers = tuple(whole_number("neurons", size) for size in str(settings.get("layers", "")).split())
+        n_inputs = positive_integer("inputs", settings.get("n_inputs"))
+        layers = tuple(positive_integer("neurons", size) for size in str(settings.get("layers", "")).split())
         return cls(n_inputs, layers, str(settings.get("activation", "tanh")))
 
     def initial(self, regressors: FloatArray, outputs: FloatArray, rng: np.random.Generator) -> FloatArray:

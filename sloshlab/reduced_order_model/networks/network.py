@@ -115,7 +115,7 @@ class Network(Protocol):
         ...
 
 
-def whole_number(what: str, value: object) -> int:
+def positive_integer(what: str, value: object) -> int:
     """A size of a network, checked; `what` it is of is for the message."""
     try:
         number = int(str(value))

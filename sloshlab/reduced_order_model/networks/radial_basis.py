@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sloshlab.reduced_order_model.array_backend import Array
 from sloshlab.reduced_order_model.networks.delay_line_sums import SHORTEST_LINE, DelayLineSums
-from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar, whole_number
+from sloshlab.reduced_order_model.networks.network import NormalSumsSoFar, positive_integer
 from sloshlab.reduced_order_model.networks.pair_sums import PairSums
 
 FloatArray = NDArray[np.float64]
@@ -53,8 +53,8 @@ class _RadialBasisNetwork:
     @classmethod
     def of_settings(cls, settings: Mapping[str, Any]) -> Self:
         """See `Network`."""
-        n_inputs = whole_number("inputs", settings.get("n_inputs"))
-        return cls(n_inputs, whole_number("neurons", settings.get("n_neurons")))
+        n_inputs = positive_integer("inputs", settings.get("n_inputs"))
+        return cls(n_inputs, positive_integer("neurons", settings.get("n_neurons")))
 
     def initial(self, regressors: FloatArray, outputs: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Centres at samples that lie far from each other (k-means++), weights the outputs there."""

@@ -8,9 +8,7 @@ from sloshlab.conditioning.calibration import (
     apparent_mass,
     check_signs,
     identify_dry_mass,
-    inertia_removed,
 )
-from sloshlab.conditioning.combined_channels import mean_acceleration, total_force
 from sloshlab.errors import AnalysisError
 from sloshlab.rig import Liquid, Rig, Tank
 
@@ -107,16 +105,6 @@ def test_static_weight_does_not_matter_in_blocks_of_one_cycle_either():
     run["acceleration_roof_1"] += 9.81
     assert apparent_mass(run).mass_kg == pytest.approx(without, rel=1e-9)
     assert without == pytest.approx(M_DRY, rel=1e-9)
-
-
-def test_inertia_removed_leaves_the_rest_with_its_sign():
-    run = swept_tank(damping_kg_per_s=0.5)
-    run["force_cell_1"][7] = np.nan
-    rest = inertia_removed(total_force(run), mean_acceleration(run), M_DRY).values
-    without = swept_tank(masses_kg=(0.0, 0.0), damping_kg_per_s=0.5)
-    expected = without["force_cell_1"].values + without["force_cell_2"].values
-    assert np.isnan(rest[7])
-    assert np.delete(rest, 7) == pytest.approx(np.delete(expected, 7), abs=1e-12)
 
 
 @pytest.mark.parametrize("damping_kg_per_s", [0.0, 1.0])

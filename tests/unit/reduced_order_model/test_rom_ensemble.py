@@ -130,7 +130,7 @@ def test_an_interrupt_keeps_the_members_so_far():
             raise KeyboardInterrupt
 
     run = noisy_run(1000, 1, 0.1, 0.0)
-    ensemble, records = ensemble_of([run], [noisy_run(600, 2, 0.1, 0.0)], n_members=5, told=stop)
+    ensemble, records = ensemble_of([run], [noisy_run(600, 2, 0.1, 0.0)], n_members=5, on_epoch=stop)
     assert [record.interrupted for record in records] == [False, False, True]
     assert len(ensemble.members) == 3
 

@@ -41,7 +41,7 @@ def feedback_run(n: int, seed: int) -> Run:
     return Run(x, y)
 
 
-def trained(training, validation, delays=Delays.tapped(2), neurons=3, told=None, **settings):
+def trained(training, validation, delays=Delays.tapped(2), neurons=3, on_epoch=None, **settings):
     chosen = TrainingSettings(**{"n_epochs": 60, "n_starts": 3, **settings})
     return fit(
         "normalised_rbf",
@@ -51,7 +51,7 @@ def trained(training, validation, delays=Delays.tapped(2), neurons=3, told=None,
         validation,
         sampling_rate_hz=RATE_HZ,
         settings=chosen,
-        told=told,
+        on_epoch=on_epoch,
     )
 
 
@@ -167,10 +167,10 @@ def test_errors_are_told_in_the_unit_of_the_output_and_regressors_have_the_wante
 def test_no_epoch_raises_the_training_error(delays):
     errors = {}
 
-    def told(epoch):
+    def after_epoch(epoch):
         errors.setdefault(epoch.start, []).append(epoch.training_mse)
 
-    trained([feedback_run(300, 1)], [feedback_run(100, 2)], delays, n_epochs=8, n_starts=2, told=told)
+    trained([feedback_run(300, 1)], [feedback_run(100, 2)], delays, n_epochs=8, n_starts=2, on_epoch=after_epoch)
     assert len(errors) == 2
     for error in errors.values():
         stages = [error[:9], error[9:]] if delays.outputs else [error]
@@ -236,7 +236,7 @@ def test_an_interrupt_keeps_the_best_model_so_far():
         [network_run(200, 1)],
         [network_run(100, 2)],
         sampling_rate_hz=RATE_HZ,
-        told=stop,
+        on_epoch=stop,
     )
     assert record.interrupted
     assert len(record.epochs) == 3
