@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import runpy
 import sys
 import types
 from collections.abc import Iterator, Mapping
@@ -211,7 +212,9 @@ def test_impossible_parameters_are_refused_in_one_line(folder: Path, parameters:
 
 
 def test_every_force_is_documented_with_all_its_parameters() -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "twin.md").read_text(encoding="utf-8")
+    docs = Path(__file__).resolve().parents[3] / "docs"
+    joined_rows = runpy.run_path(str(docs / "table_rows.py"))["joined_rows"]
+    page = joined_rows((docs / "twin.md").read_text(encoding="utf-8"))
     rows = {row.split("|")[1].strip(" `"): row for row in page.splitlines() if row.startswith("| `")}
     built_in = [kind for kind in _KINDS.values() if kind.law.function.__module__.startswith("sloshlab.twin.")]
     assert len(built_in) >= 24
