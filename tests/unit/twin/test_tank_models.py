@@ -215,7 +215,7 @@ def test_every_force_is_documented_with_all_its_parameters() -> None:
     docs = Path(__file__).resolve().parents[3] / "docs"
     joined_rows = runpy.run_path(str(docs / "table_rows.py"))["joined_rows"]
     page = joined_rows((docs / "twin.md").read_text(encoding="utf-8"))
-    rows = {row.split("|")[1].strip(" `"): row for row in page.splitlines() if row.startswith("| `")}
+    rows = {row.split("`")[1]: row for row in page.splitlines() if row.startswith("| `")}
     built_in = [kind for kind in _KINDS.values() if kind.law.function.__module__.startswith("sloshlab.twin.")]
     assert len(built_in) >= 24
     for kind in built_in:
