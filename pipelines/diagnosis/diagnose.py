@@ -9,7 +9,7 @@ from typing import Any
 
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.free_place import require_free_folder
-from pipelines.report.outputs import provenance_of
+from pipelines.report.outputs import provenance_of, report_lines
 from pipelines.report.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.answer import answered
@@ -73,9 +73,7 @@ def diagnose_case(
     lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
     if own:
         lines.append("effects of your own: " + ", ".join(f"{one.block}.{one.name}" for one in own))
-    if report:
-        lines.append(f"report: {target / 'report.html'}")
-    return {"lines": lines, "flags": list(found.split.limits), **facts}
+    return {"lines": lines + report_lines(target, written=report), "flags": list(found.split.limits), **facts}
 
 
 def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from pipelines.liquid_model.comparison import validated
 from pipelines.liquid_model.results import Training, ValidatedModel
 from pipelines.liquid_model.sections import page_of
 from pipelines.liquid_model.training_runs import TrainingRuns
-from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
+from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.report.page import write_page
 from pipelines.report.progress import progress
 from sloshlab import atomic_file
@@ -143,4 +143,4 @@ def _summary(found: ValidatedModel, folder: Path) -> dict[str, Any]:
             "the largest value"
         )
     lines += [f"residual on {run}: {test.verdict}" for run, tests in found.tests.items() for test in tests[:2]]
-    return {"lines": [*lines, f"report: {folder / 'report.html'}"], "flags": list(found.flags), **said}
+    return {"lines": lines + report_lines(folder), "flags": list(found.flags), **said}

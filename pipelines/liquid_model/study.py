@@ -20,7 +20,7 @@ from pipelines.liquid_model.sensitivity_study import (
 )
 from pipelines.liquid_model.study_page import StudiedModels, page_of
 from pipelines.liquid_model.training_runs import RunFiles, training_runs
-from pipelines.report.outputs import provenance_of, write_dataset
+from pipelines.report.outputs import provenance_of, report_lines, write_dataset
 from pipelines.report.page import write_page
 from pipelines.report.progress import amounts
 from sloshlab import atomic_file
@@ -102,7 +102,7 @@ def study(
         atomic_file.write_bytes(complete / BEST_NAME, best.read_bytes())
         write_page(page_of(found), complete)
     return {
-        "lines": [f"picked: {pick.reason}", f"model: {folder / BEST_NAME}", f"report: {folder / 'report.html'}"],
+        "lines": [f"picked: {pick.reason}", f"model: {folder / BEST_NAME}", *report_lines(folder)],
         "flags": list(flags),
         "output": str(folder),
         "picked": pick.best.case.name,

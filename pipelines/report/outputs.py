@@ -79,3 +79,8 @@ def stamp_of(provenance: Mapping[str, Any]) -> dict[str, str]:
     Files of the same inputs then have the same bytes, wherever they are written.
     """
     return {name: json.dumps(provenance.get(name, {}), sort_keys=True) for name in ("inputs", "versions")}
+
+
+def report_lines(folder: Path, *, written: bool = True) -> list[str]:
+    """Where the report is, for the summary of a command; nothing if none was asked for."""
+    return [f"report: {folder / 'report.html'}"] if written else []

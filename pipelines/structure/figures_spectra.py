@@ -45,7 +45,7 @@ def excitation(name: str, experiment: BeamExperiment) -> ReportFigure:
     axes = figure.subplots()
     for colour, (run, random) in zip(ordered_colours(len(runs)), runs, strict=True):
         density = random.spectra.input_psd / GRAVITY_M_PER_S2**2
-        axes.semilogy(random.spectra.frequency_hz, density, color=colour, lw=1.0, label=_label(run))
+        axes.semilogy(random.spectra.frequency_hz, density, color=colour, lw=1.0, label=run.label)
     axes.set_xlim(0, 6 * experiment.modes.frequency_hz[0])
     _floor(axes, [random.spectra.input_psd / GRAVITY_M_PER_S2**2 for _, random in runs])
     axes.set_xlabel("frequency [Hz]")
@@ -58,14 +58,14 @@ def excitation(name: str, experiment: BeamExperiment) -> ReportFigure:
 def densities(name: str, experiment: BeamExperiment) -> ReportFigure:
     """Density of the tank's acceleration at each level, with the mode fitted to it (Fig. 2.41)."""
     runs = random_of(experiment)
-    levels = sorted({_level(run) for run, _ in runs})
+    levels = sorted({run.level_text for run, _ in runs})
     figure = new_figure(0.6 + 1.9 * len(levels))
     grid = figure.subplots(len(levels), 1, sharex=True, squeeze=False)[:, 0]
     low, high = (share * experiment.modes.frequency_hz[0] for share in _SHOWN_RANGE)
     for number, (axes, level) in enumerate(zip(grid, levels, strict=True)):
         shown = []
         for run, random in runs:
-            if _level(run) != level:
+            if run.level_text != level:
                 continue
             lines = (random.spectra.frequency_hz >= low) & (random.spectra.frequency_hz <= high)
             density = random.spectra.output_psd[0, lines] / GRAVITY_M_PER_S2**2
@@ -100,12 +100,12 @@ def frequency_responses(name: str, experiment: BeamExperiment) -> ReportFigure:
     runs = [one for one in random_of(experiment) if one[1].spectra.output_psd[_row(one[1], name_of_first)].any()]
     if not runs:
         raise NothingToDrawError("the first mode does not move")
-    levels = sorted({_level(run) for run, _ in runs})
+    levels = sorted({run.level_text for run, _ in runs})
     figure = new_figure(4.6)
     grid = figure.subplots(2, len(levels), sharex=True, sharey="row", squeeze=False, height_ratios=[2, 1])
     for number, level in enumerate(levels):
         for run, random in runs:
-            if _level(run) == level:
+            if run.level_text == level:
                 _draw_response(grid[:, number], experiment, run, random)
         panel_letter(grid[0, number], number, f"{level} of the root")
         grid[1, number].set_xlabel("frequency [Hz]")
@@ -190,14 +190,6 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
 
 def _row(random: RandomResponse, output: str) -> int:
     return random.spectra.output_names.index(output)
-
-
-def _level(run: BeamRun) -> str:
-    return run.level_text
-
-
-def _label(run: BeamRun) -> str:
-    return f"{run.group}, {run.level_text}"
 
 
 def _welch(random: RandomResponse) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
-from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
+from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.structure.analysis import analyse_beam
 from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, ModeDecay
 from sloshlab import atomic_file
@@ -253,7 +253,7 @@ def _summary(experiment: BeamExperiment, folder: Path, report: bool) -> dict[str
         if run.first_decay is not None and run.first_decay.local_sine_fit.used.any()
     }
     return {
-        "lines": lines + ([f"report: {folder / 'report.html'}"] if report else []),
+        "lines": lines + report_lines(folder, written=report),
         "flags": list(experiment.flags),
         "runs": len(experiment.runs),
         "decays": n_free,

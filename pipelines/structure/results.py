@@ -186,6 +186,11 @@ class BeamRun:
         start = self.attributes.initial_displacement_m
         return "release" if start is None else f"release from {1e3 * start:.3g} mm".replace("-", "−")
 
+    @property
+    def label(self) -> str:
+        """Group and what was done to the structure, for legends and tables."""
+        return f"{self.group}, {self.level_text}"
+
 
 @dataclass(frozen=True)
 class FrozenMode:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.report.outputs import sha256_of
-from pipelines.structure.random_runs import random_response
+from pipelines.structure.random_runs import random_response, rms
 from pipelines.structure.results import BeamRun, BeamSettings, ModeDecay, RandomResponse, group_of
 from pipelines.sweep.stages import require_usable
 from pipelines.twin.simulated_tank_model import departures_of
@@ -140,7 +140,7 @@ def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
 
 
 def _motion(run: Loaded, rig: Rig, is_random: bool) -> _Motion:
-    recording, flags = run.recording, []
+    recording, flags = run.recording, list[str]()
     names = channels(recording, "acceleration")
     tank_names = acceleration_channels(recording)
     if not is_random:
@@ -152,9 +152,9 @@ def _motion(run: Loaded, rig: Rig, is_random: bool) -> _Motion:
             f"{run.path}: random run", got=f"channels {', '.join(names)}", allowed="acceleration_root among them"
         )
     tank = _centred(mean_acceleration(recording, tank_names).values)
-    if not is_random and root is not None and _rms(root) > _LARGEST_ROOT_SHARE * _rms(tank):
+    if not is_random and root is not None and rms(root) > _LARGEST_ROOT_SHARE * rms(tank):
         flags.append(
-            f"{run.attributes.run_id}: the root moves by {100 * _rms(root) / _rms(tank):.0f} % of the tank's "
+            f"{run.attributes.run_id}: the root moves by {100 * rms(root) / rms(tank):.0f} % of the tank's "
             "acceleration in a free run; it is no clamped beam"
         )
     force = None
@@ -176,10 +176,6 @@ def _places_m(recording: xr.Dataset, names: list[str], rig: Rig) -> dict[str, fl
 def _centred(values: npt.NDArray[np.floating]) -> FloatArray:
     numbers = np.asarray(values, dtype=np.float64)
     return np.asarray(numbers - np.nanmean(numbers))
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
 
 
 def _longest_part_without_gaps(run: Loaded, names: list[str]) -> tuple[xr.Dataset, list[str]]:
@@ -216,7 +212,7 @@ def _residual_flags(
     loud = [
         f"{name} {residual:.3g} m/s²"
         for name, residual in zip(response.sensor_names, response.residual_rms_m_per_s2, strict=True)
-        if residual > _LARGEST_RESIDUAL_SHARE * _rms(tank)
+        if residual > _LARGEST_RESIDUAL_SHARE * rms(tank)
     ]
     if not loud:
         return []

@@ -61,5 +61,5 @@ def _random(experiment: BeamExperiment) -> str:
     for run in experiment.random_runs:
         fit = run.random.density_fit if run.random is not None else None
         if fit is not None and not run.is_simulated:
-            parts.append(f"{text(100 * fit.damping_ratio)} % ({run.group}, {run.level_text})")
+            parts.append(f"{text(100 * fit.damping_ratio)} % ({run.label})")
     return f"In random motion ζ₁ is {', '.join(parts)}, from the tank's density alone." if parts else ""
