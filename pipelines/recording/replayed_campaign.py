@@ -164,10 +164,10 @@ def differences(run: Path, recording: Path) -> list[str]:
 
 def window_differences(expected: xr.Dataset, found: xr.Dataset) -> list[str]:
     """How two `windows.nc` differ, bit by bit; only the hashes of the input files may."""
-    texts = [f"{name} is only in one of them" for name in sorted({*expected.variables} ^ {*found.variables})]
-    for name in sorted({*expected.variables} & {*found.variables}):
-        one, other = expected[name], found[name]
-        if one.dtype != other.dtype or _bits(one) != _bits(other) or one.attrs != other.attrs:
+    texts = [f"{name} is only in one of them" for name in sorted(_names(expected) ^ _names(found))]
+    for name in sorted(_names(expected) & _names(found)):
+        wanted, got = expected[name], found[name]
+        if wanted.dtype != got.dtype or _bits(wanted) != _bits(got) or wanted.attrs != got.attrs:
             texts.append(f"{name} differs")
     keys = {*expected.attrs, *found.attrs} - {"inputs"}
     return texts + [
@@ -177,13 +177,17 @@ def window_differences(expected: xr.Dataset, found: xr.Dataset) -> list[str]:
     ]
 
 
+def _names(dataset: xr.Dataset) -> set[str]:
+    return {str(name) for name in dataset.variables}
+
+
 def _bits(variable: xr.DataArray) -> object:
     values = variable.values
     return values.tolist() if values.dtype.kind == "O" else values.tobytes()
 
 
-def _equal(one: Any, other: Any) -> bool:
-    return bool(np.array_equal(one, other))
+def _equal(found: Any, expected: Any) -> bool:
+    return bool(np.array_equal(found, expected))
 
 
 @contextlib.contextmanager

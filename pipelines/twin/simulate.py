@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import xarray as xr
@@ -19,7 +19,7 @@ from sloshlab.errors import InputError
 from sloshlab.modal.rig_beam import scale_remarks
 from sloshlab.recording import read_recording, run_attributes, write_recording
 from sloshlab.rig import Rig
-from sloshlab.twin.recorded_run import Drive, drive_of
+from sloshlab.twin.recorded_run import Block, Drive, drive_of
 from sloshlab.twin.reduced_order_model_domain import departures
 from sloshlab.twin.simulated_channels import SimulatedRun, simulated_run
 from sloshlab.twin.simulation import Simulation
@@ -84,7 +84,7 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
     rig = Rig.from_toml(settings.rig)
     twin = _chosen_twin(settings, rig)
     recording = read_recording(settings.run)
-    drive = drive_of(recording, twin, block=settings.block)  # type: ignore[arg-type]
+    drive = drive_of(recording, twin, block=cast("Block", settings.block))
     n_steps = settings.steps or steps_per_sample(twin, drive.excitation.sampling_rate_hz)
     with amounts("simulating") as watch:
         simulation = drive.twin.simulate(
@@ -99,7 +99,9 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
     write_recording(simulated.recording, settings.output, encoding=_encoding(simulated.recording))
     if settings.save_twin is not None:
         save_twin(twin, settings.save_twin)
-    summary = _summary(settings, rig, recording, drive, simulation, simulated, n_steps)
+    summary = _summary(
+        settings, rig, recording, drive, simulation=simulation, simulated=simulated, n_steps=n_steps
+    )
     return with_tank_model(summary, simulation, left)
 
 
@@ -179,6 +181,7 @@ def _summary(
     rig: Rig,
     recording: xr.Dataset,
     drive: Drive,
+    *,
     simulation: Simulation,
     simulated: SimulatedRun,
     n_steps: int,
