@@ -61,7 +61,7 @@ def map_of_ball(name: str, experiment: BallExperiment, result: LineResult) -> Re
     figure = new_figure(3.2)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     both = [result.maps["w_bar"], result.map_of_ball]
-    largest = max(float(np.nanmax(one.values)) for one in both)
+    largest = max(float(np.nanmax(values.values)) for values in both)
     for axes, values in zip((left, right), both, strict=True):
         mesh = _map(axes, values, largest)
         axes.axhline(result.line.omega_bar, **_TUNED)

@@ -99,9 +99,9 @@ def _other_lines(
     wanted = np.linspace(low, high, _N_OTHER_LINES + 3)[1:-1]
     wanted = np.sort(wanted[np.argsort(np.abs(wanted - omega_bar))[1:]])
     lines = []
-    for one in wanted[:_N_OTHER_LINES]:
+    for omega_bar_of_line in wanted[:_N_OTHER_LINES]:
         try:
-            line = work_line(maps, float(one), 15)
+            line = work_line(maps, float(omega_bar_of_line), 15)
         except AnalysisError:
             continue
         lines.append((line, w_bar_at(ball, rig, np.full(line.u_bar.shape, line.omega_bar), line.u_bar)))

@@ -72,7 +72,7 @@ def diagnose_case(
             write_page(page_of(diagnosis), complete)
     lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
     if own:
-        lines.append("effects of your own: " + ", ".join(f"{one.block}.{one.name}" for one in own))
+        lines.append("effects of your own: " + ", ".join(f"{effect.block}.{effect.name}" for effect in own))
     return {"lines": lines + report_lines(target, written=report), "flags": list(found.split.limits), **facts}
 
 

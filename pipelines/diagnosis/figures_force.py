@@ -58,7 +58,7 @@ def worst_place(diagnosis: Diagnosis) -> str:
         raise NothingToDrawError("this twin has no measured interfaces")
     if not there:
         raise NothingToDrawError("no block lacks a force beyond noise")
-    shares = {one.block: one.share for one in cut.blocks if np.isfinite(one.share)}
+    shares = {block.block: block.share for block in cut.blocks if np.isfinite(block.share)}
     return max(there, key=lambda place: (shares.get(place, 0.0), there[place].size_n / there[place].noise_n))
 
 

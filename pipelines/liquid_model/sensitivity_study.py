@@ -299,8 +299,10 @@ def picked(results: Sequence[CaseResult]) -> Pick:
     if not trained:
         raise AnalysisError("study", got="no case that could be trained", remedy="see the reasons in its table")
     best = trained[0]
-    near = [one for one in trained if one.validation_mse**0.5 <= NEARLY_THE_SAME * best.validation_mse**0.5]
-    lighter = min(near, key=lambda one: one.n_parameters)
+    near = [
+        result for result in trained if result.validation_mse**0.5 <= NEARLY_THE_SAME * best.validation_mse**0.5
+    ]
+    lighter = min(near, key=lambda result: result.n_parameters)
     error = best.validation_mse**0.5
     reason = f"{best.case.name} has the smallest error on the validation runs, {error:.4g} N RMS"
     if len(trained) > 1:

@@ -80,8 +80,8 @@ def study(
             last = f"{done} of {n} cases, {result.case.name}: {math.sqrt(result.validation_mse):.4g} N"
 
         results = sensitivity_study(
-            [one.run() for one in runs.training],
-            [one.run() for one in runs.validation],
+            [signals.run() for signals in runs.training],
+            [signals.run() for signals in runs.validation],
             runs.rate_hz,
             folder,
             settings,

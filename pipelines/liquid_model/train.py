@@ -180,7 +180,7 @@ def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
     """
     save_model(trained.model, output)
     best, quality = trained.record.best, trained.quality
-    forgetting = stability(trained.model, [one.velocity_m_per_s for one in trained.runs.training])
+    forgetting = stability(trained.model, [signals.velocity_m_per_s for signals in trained.runs.training])
     lines = [
         f"model: {output}",
         f"rate: {trained.runs.rate.reason}",

@@ -135,7 +135,7 @@ def _carried_mass(runs: Sequence[Loaded]) -> ApparentMass | None:
         if group_of(run.attributes) == "frozen" and channels(run.recording, "force")
     ]
     return min(
-        frozen, key=lambda one: one.mass_std_kg if math.isfinite(one.mass_std_kg) else math.inf, default=None
+        frozen, key=lambda mass: mass.mass_std_kg if math.isfinite(mass.mass_std_kg) else math.inf, default=None
     )
 
 
@@ -177,7 +177,10 @@ def _updated(rig: Rig, frozen: dict[int, FrozenMode]) -> tuple[UpdatedBeam | Non
         return None, f"{n_modes} frequencies of the frozen liquid were measured; tip mass and stiffness need two"
     measured = np.array([frozen[mode].frequency_hz for mode in range(n_modes)])
     if not (np.diff(measured) > 0).all():
-        return None, f"the measured frequencies {', '.join(f'{one:.4g}' for one in measured)} Hz do not rise"
+        return (
+            None,
+            f"the measured frequencies {', '.join(f'{value:.4g}' for value in measured)} Hz do not rise",
+        )
     return update_beam(uniform_beam(rig), measured), ""
 
 

@@ -183,8 +183,8 @@ def higher_modes(name: str, experiment: BeamExperiment) -> ReportFigure:
     grid = figure.subplots(1, len(modes), squeeze=False)[0]
     for number, (axes, mode) in enumerate(zip(grid, modes, strict=True)):
         shown = []
-        for one, run, decay in found:
-            if one != mode or decay is None:
+        for of_mode, run, decay in found:
+            if of_mode != mode or decay is None:
                 continue
             reading = decay.local_sine_fit
             values, half = values_of(reading, "damping")

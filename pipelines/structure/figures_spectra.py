@@ -97,7 +97,11 @@ def densities(name: str, experiment: BeamExperiment) -> ReportFigure:
 def frequency_responses(name: str, experiment: BeamExperiment) -> ReportFigure:
     """|H₁| of the first modal acceleration over the root with its fit, and the coherence, per level."""
     name_of_first = experiment.modes.names[0]
-    runs = [one for one in random_of(experiment) if one[1].spectra.output_psd[_row(one[1], name_of_first)].any()]
+    runs = [
+        (run, random)
+        for run, random in random_of(experiment)
+        if random.spectra.output_psd[_row(random, name_of_first)].any()
+    ]
     if not runs:
         raise NothingToDrawError("the first mode does not move")
     levels = sorted({run.level_text for run, _ in runs})
@@ -169,7 +173,7 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
             seen[how] = (NEUTRAL_COLOUR, marker)
     if not seen:
         raise NothingToDrawError("no fit of the first mode")
-    for label, (colour, marker) in sorted(seen.items(), key=lambda one: one[1][1] != "D"):
+    for label, (colour, marker) in sorted(seen.items(), key=lambda entry: entry[1][1] != "D"):
         axes.plot([], [], color=colour, marker=marker, ms=5, ls="none", label=label)
     for which, marker in (("experiment", "*"), ("frozen", "x")):
         rms, damping = np.array(TABLE_2_5[which]).T
@@ -203,7 +207,10 @@ def _welch(random: RandomResponse) -> str:
 
 def _floor(axes: Axes, densities_shown: Sequence[FloatArray]) -> None:
     """Six decades below the largest value at most."""
-    largest = max((float(np.nanmax(one)) for one in densities_shown if one.size), default=1.0)
-    smallest = min((float(np.nanmin(one[one > 0])) for one in densities_shown if (one > 0).any()), default=largest)
+    largest = max((float(np.nanmax(density)) for density in densities_shown if density.size), default=1.0)
+    smallest = min(
+        (float(np.nanmin(density[density > 0])) for density in densities_shown if (density > 0).any()),
+        default=largest,
+    )
     plain_log_ticks(axes.yaxis)
     axes.set_ylim(max(0.5 * smallest, 1e-6 * largest), 3 * largest)

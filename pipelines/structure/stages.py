@@ -225,7 +225,7 @@ def _residual_flags(
 def _domain_flags(run: Loaded) -> list[str]:
     """Where the tank model of a simulated run was beyond what it was trained on."""
     name = f"{run.attributes.run_id} ({group_of(run.attributes)})"
-    return [f"{name}: {one}" for one in departures_of(run.attributes.model_extra or {})]
+    return [f"{name}: {departure}" for departure in departures_of(run.attributes.model_extra or {})]
 
 
 def _decays(

@@ -48,7 +48,7 @@ def _ratio(experiment: BeamExperiment) -> str:
     sloshing = experiment.pooled.get(("sloshing", "local sine fit"))
     if frozen is None or sloshing is None:
         return ""
-    log_frozen, log_sloshing = (np.log(one.acceleration_amplitude_m_per_s2) for one in (frozen, sloshing))
+    log_frozen, log_sloshing = (np.log(pooled.acceleration_amplitude_m_per_s2) for pooled in (frozen, sloshing))
     common = (log_sloshing >= log_frozen.min()) & (log_sloshing <= log_frozen.max())
     if not common.any():
         return ""

@@ -285,12 +285,12 @@ def _damping_of_both(measured: BeamRun, simulated: BeamRun) -> tuple[str, str]:
     return text(100 * own), text(100 * of_twin)
 
 
-def mean_at_common_amplitudes(one: InstantaneousDamping, other: InstantaneousDamping) -> tuple[float, float]:
+def mean_at_common_amplitudes(a: InstantaneousDamping, b: InstantaneousDamping) -> tuple[float, float]:
     """Mean ζ of two decays over the bins of the first that lie within the amplitudes of the second.
 
     The second is interpolated over the logarithm of the amplitude; NaN where they have no amplitude in common.
     """
-    first, second = pooled_damping([one]), pooled_damping([other])
+    first, second = pooled_damping([a]), pooled_damping([b])
     at, known = (np.log(pooled.acceleration_amplitude_m_per_s2) for pooled in (first, second))
     common = (at >= known.min()) & (at <= known.max())
     if not common.any():

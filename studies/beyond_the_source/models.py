@@ -67,7 +67,9 @@ class Workshop:
             TrainingSettings(n_epochs=self.n_epochs, seed=seed),
             agitation=agitation,
         )
-        model.facts.update(training=[one.name for one in training], validation_mse_n2=record.best.validation_mse)
+        model.facts.update(
+            training=[signals.name for signals in training], validation_mse_n2=record.best.validation_mse
+        )
         save_model(model, path)
         return model
 
@@ -95,7 +97,7 @@ class Workshop:
             n_members=n_members,
             agitation=agitation,
         )
-        ensemble.facts.update(training=[one.name for one in training])
+        ensemble.facts.update(training=[signals.name for signals in training])
         save_ensemble(ensemble, path)
         return ensemble
 

@@ -137,7 +137,7 @@ def test_facts_and_progress_arrive(tmp_path):
 def test_a_case_that_cannot_be_trained_does_not_stop_the_others(tmp_path):
     still = Run(np.zeros(300), run(1).y)
     results = sensitivity_study([still], [run(3)], 100.0, tmp_path, SETTINGS, cases=CASES[:2], n_workers=1)
-    assert [one.is_trained for one in results] == [False, False]
+    assert [result.is_trained for result in results] == [False, False]
     assert "input of the training runs: got a constant" in results[0].ended
 
 
