@@ -39,6 +39,7 @@ MAP_AMPLITUDE_M = (0.0025, 0.1)
 MAP_FREQUENCY_RAD_PER_S = (1.57, 62.83)
 """Ranges of the source's maps (2.1.2)."""
 _SAME_RELEASE, _GUIDE_AGREES = 0.05, 0.05
+"""Relative differences: of releases that count as one, and of a guide from what the rig states of it."""
 
 
 def ball_from_decays(
@@ -72,6 +73,7 @@ def ball_from_decays(
             measured, rig, initial_displacement_m=release, duration_s=duration, sampling_rate_hz=rate,
             damping_in_flight=settings.damping_in_flight, settings=settings.search, progress=advance,
         )  # fmt: skip
+    # at the rate of the recordings, because the reading of the decrement depends on it
     decay = simulated_decay(found.ball, rig, release, duration, sampling_rate_hz=rate)
     steady = np.geomspace(measured.acceleration_m_per_s2.min(), measured.acceleration_m_per_s2.max(), 30)
     response = _response(found.ball, rig, settings.n_map)

@@ -41,7 +41,7 @@ def ball_from_shaker(paths: Sequence[Path], rig: Rig, rig_path: Path, settings: 
         found = identify_from_line(
             line, rig, damping_in_flight=settings.damping_in_flight, settings=settings.search, progress=advance
         )
-    result = _compared(found.ball, rig, line, maps, experiment.windows, settings)
+    result = _compared(found.ball, rig, line, maps=maps, windows=experiment.windows, settings=settings)
     flags = (*found.flags, *_outside_flags(result), *experiment.flags)
     return BallExperiment(rig, rig_path.name, experiment.inputs, found, line.omega_bar, result, flags)
 
@@ -57,7 +57,13 @@ def _outside_flags(result: LineResult) -> tuple[str, ...]:
 
 
 def _compared(
-    ball: BouncingBall, rig: Rig, line: WorkLine, maps: xr.Dataset, windows: xr.Dataset, settings: BallSettings
+    ball: BouncingBall,
+    rig: Rig,
+    line: WorkLine,
+    *,
+    maps: xr.Dataset,
+    windows: xr.Dataset,
+    settings: BallSettings,
 ) -> LineResult:
     step = -(-windows.sizes["window"] // settings.n_windows)
     used = windows.isel(window=slice(None, None, step))

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 _TOP = 1.35
+"""Of the axis of shares: the numbers stand to the right of the bars."""
 _BOTTOM = 0.1
+"""Where the scale of the excess turns from logarithmic to linear; noise may take it below zero."""
 _PHASES = ("highest\npoint", "falls", "lowest\npoint", "rises", "highest\npoint")
 
 

@@ -40,6 +40,7 @@ from sloshlab.sweep.windows import WindowSettings
 FloatArray = npt.NDArray[np.float64]
 WINDOWS: Final = WindowSettings(half_width_cycles=6, spacing_cycles=24)
 LONGEST_LAG_S: Final = 0.25
+"""Of the correlations of the residual, or as far as the delays of the model reach."""
 LARGEST_SHARE_OUTSIDE: Final = 0.02
 """Of a validation run; start and stop of a run are weaker than what lies between."""
 _MOTION: Final = ("experiment", "acceleration_g", "sweep_start_hz", "sweep_stop_hz", "sweep_duration_s")
@@ -136,6 +137,7 @@ def _with_windows(run: ComparedRun, read: _Read, rig: Rig, dry: DryMass | None) 
     positions = np.arange(signals.force_n.size) * ratio
     dynamic = resampled(run.free, positions, rate_ratio=1 / ratio)
     predicted = signals.inertia_kg * read.signals.acceleration_m_per_s2 - dynamic
+    # what is not predicted is not compared: both forces lose the same samples, and so the same cycles
     measured = np.where(np.isfinite(predicted), signals.force_n - np.nanmean(signals.force_n), np.nan)
     options = SweepOptions(WINDOWS, allow_incomplete=True)
     try:

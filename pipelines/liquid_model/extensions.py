@@ -16,6 +16,7 @@ from sloshlab.reduced_order_model.regressors import Delays
 from sloshlab.reduced_order_model.training import Epoch, TrainingSettings
 
 REST_S: Final = 1.0
+"""Of rest before a sudden start, so that delay lines and memory are filled from the first instant on."""
 
 
 def remembering(model: ReducedOrderModel, starts: Sequence[Path], runs: TrainingRuns) -> ReducedOrderModel:

@@ -22,6 +22,7 @@ from sloshlab.quantities import described
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 
 _N_FIGURES = 11
+"""Of the page, for the progress."""
 
 
 def write_validation(

@@ -75,7 +75,7 @@ def study(
     with amounts("study") as advance:
         last = ""
 
-        def told(result: CaseResult, done: int, n: int) -> None:
+        def on_case(result: CaseResult, done: int, n: int) -> None:
             nonlocal last
             last = f"{done} of {n} cases, {result.case.name}: {math.sqrt(result.validation_mse):.4g} N"
 
@@ -88,8 +88,8 @@ def study(
             cases=CASES[wanted.cases],
             n_workers=wanted.n_workers,
             facts=runs.facts(),
-            told=told,
-            watch=lambda share: advance(share, 1.0, last),
+            on_case=on_case,
+            on_progress=lambda share: advance(share, 1.0, last),
         )
     pick = picked(results)
     best = folder / pick.best.case.name / MODEL_NAME

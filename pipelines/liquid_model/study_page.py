@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 
 _LARGEST_SHOWN: Final = 1.15
+"""Over the smallest error; what is larger lies beyond the axis."""
 
 
 @dataclass(frozen=True)

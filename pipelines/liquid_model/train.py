@@ -212,6 +212,7 @@ def train_and_report(
     wanted: ModelSettings,
     settings: TrainingSettings,
     output: Path,
+    *,
     command: str | None,
 ) -> dict[str, Any]:
     """Train, write the model, and write the report into a folder of its name beside it.
@@ -234,6 +235,7 @@ def train_and_report(
         If a recording, the rig or their combination is bad, or there is no place for the report.
     """
     folder = report_folder(output)
+    # what can be refused is refused before hours of training
     require_new_runs(test, files)
     if command is not None and folder.exists() and not folder.is_dir():
         raise InputError(

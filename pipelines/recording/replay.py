@@ -28,7 +28,9 @@ from sloshlab import atomic_file
 from sloshlab.errors import InputError
 
 _STEP_S = 0.1
+"""Between two looks at the devices."""
 _PATIENCE_S = 5.0
+"""Before a host that has not come is missed; a device that nobody has started yet is no news."""
 _SLOWEST, _FASTEST = 1e-3, 1e4
 
 

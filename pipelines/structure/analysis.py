@@ -25,9 +25,12 @@ from sloshlab.rig import Rig
 
 _TITLES: Final = {"beam": "Sloshing beam", "sdof": "Tank on a guide"}
 _SEGMENTS_PER_RUN: Final = 6
+"""Segments that would lie in the shortest random run without overlap, so that spectra have eleven averages."""
 _SMALLEST_SEGMENT_S: Final = 1.0
 _LARGEST_MASS_DEVIATION: Final = 0.05
+"""Of the mass beyond the force sensor from the rig, before signs, gains and dry mass are doubted."""
 _SMALLEST_WIDTH_IN_LINES: Final = 0.5
+"""Half-power width of the first mode, in lines of the spectrum, below which its damping is flagged."""
 
 
 def checked_settings(*, modes: int | None, n_cycles: int, segment_s: float | None) -> BeamSettings:

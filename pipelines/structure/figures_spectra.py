@@ -27,6 +27,7 @@ TABLE_2_5: Final = {
 }
 """ζ₁ [%] over the RMS [g] of the root in the source; its frozen column is simulated."""
 _SHOWN_RANGE: Final = (0.4, 2.2)
+"""Of the densities, over the believed frequency of the first mode."""
 
 
 def random_of(experiment: BeamExperiment) -> list[tuple[BeamRun, RandomResponse]]:

@@ -21,6 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _SHOWN_S: Final = 4.0
 _AROUND_S: Final = 10.0
+"""Seconds after the start in which no part is chosen to be shown."""
 
 
 def pairs_of(experiment: BeamExperiment, runs: Sequence[BeamRun]) -> list[tuple[BeamRun, list[BeamRun]]]:

@@ -23,6 +23,7 @@ TANK: Final = "tank"
 FIT_RANGE: Final = (0.65, 1.5)
 """Lines that the first mode is fitted to, over its believed frequency."""
 _HIGHER_FIT_RANGE: Final = (0.85, 1.18)
+"""The same of every other mode."""
 
 
 def random_response(

@@ -45,7 +45,9 @@ FloatArray = npt.NDArray[np.float64]
 _FIRST_MODE_RANGE: Final = (0.7, 1.4)
 """Where the first mode is looked for, over its believed frequency; the liquid takes mass away from it."""
 _LARGEST_ROOT_SHARE: Final = 0.05
+"""RMS of the root's acceleration over the tank's in a free run, beyond which the beam is not clamped."""
 _LARGEST_RESIDUAL_SHARE: Final = 0.1
+"""RMS that the modes may leave at a sensor, over that of the tank's acceleration."""
 
 
 @dataclass(frozen=True)
@@ -196,6 +198,7 @@ def _modal_response(
 ) -> tuple[ModalFilter | None, ModalResponse]:
     values = np.stack(list(motion.sensors.values()))
     if is_random and motion.root is not None:
+        # q̈ is to be relative to the root
         values = values - motion.root
     if structure_of(rig).kind == "sdof":
         alike = modal_filter(np.ones((len(values), 1)), sensor_names=list(motion.sensors), mode_names=("guide",))

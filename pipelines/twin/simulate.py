@@ -32,7 +32,9 @@ STEPS_PER_PERIOD: Final = 60
 """Integration steps per second, and per period of the highest mode, at least."""
 
 _MOST_STEPS = 1000
+"""Per sample; a run that needs more is sampled too slowly to drive this twin."""
 _LARGEST_ENERGY_ERROR = 1e-3
+"""Of the energy passed on, before the balance is flagged and more steps are asked for."""
 
 
 @dataclass(frozen=True)
