@@ -21,7 +21,7 @@ _MOST_ROWS = 14
 _SHOWN_CYCLES = 10
 FAINT_COLOUR = "#b8c4d0"
 _EXCESS_OF_NOISE = 1.0
-"""Mean square of weighted residuals of noise alone."""
+"""Mean excess of a band up to which it counts as noise."""
 
 
 def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:

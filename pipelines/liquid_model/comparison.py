@@ -202,6 +202,7 @@ def _ceiling(model: ReducedOrderModel, read: Sequence[_Read], skipped: dict[str,
     pairs = []
     for first in read:
         for second in read:
+            # in both orders: each run stands once for the measurement and once for its repeat
             if first is second or first.motion != second.motion or None in first.motion[:2]:
                 continue
             try:

@@ -286,5 +286,6 @@ def _analysed(recordings: Path, rigs: Path, output: Path) -> xr.Dataset:
     settings = ShakerSettings(WindowSettings())
     experiment = analyse_shaker(*recordings_and_rigs(recordings, rigs), settings)
     write_experiment(experiment, output, command=f"sloshlab shaker {recordings.name}", report=False)
+    # the netCDF library is not made for threads; an interrupt within xarray would leave its lock taken for ever
     with NETCDF_LOCK, interrupt.held():
         return xr.load_dataset(output / "windows.nc", engine="netcdf4", decode_times=False)

@@ -62,6 +62,7 @@ def frequency_response(name: str, runs: Sequence[RunResult]) -> ReportFigure:
         plain_log_ticks(axes.yaxis)
     low, high = (function(response.peak_hz for response in found) for function in (min, max))
     grid[1, 1].set_xlim(low * (1 - _ZOOM), high * (1 + _ZOOM))
+    # limits from what is inside the zoom only
     near = [np.abs(r.accelerance_per_kg)[_near(r, low, high)] for r in found]
     grid[0, 1].set_ylim(
         0.7 * min(float(part.min()) for part in near), 1.5 * max(float(part.max()) for part in near)

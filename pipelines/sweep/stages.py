@@ -256,6 +256,7 @@ def _excerpts(
     wanted = np.array(EXCERPT_FREQUENCIES_HZ)
     if rig is None or frequency.min() > wanted[0] or frequency.max() < wanted[-1]:
         wanted = np.quantile(frequency, [0.25, 0.5, 0.75])
+    # two places may have the same nearest window, which is shown once
     nearest = sorted({int(np.abs(frequency - wanted_hz).argmin()) for wanted_hz in wanted})
     return tuple(_excerpt(windows.isel(window=at), signals, rig, rate_hz, start_time_s) for at in nearest)
 

@@ -88,6 +88,7 @@ class Results:
                 raise InputError(
                     f"{folder / name}", got="no such file", remedy="run sloshlab shaker -o there first"
                 )
+            # an interrupt within xarray would leave its lock taken for ever
             with interrupt.held():
                 found.append(xr.load_dataset(folder / name, decode_times=False))
             if "w_bar" not in found[-1]:

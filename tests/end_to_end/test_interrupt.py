@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 from short_runs import DONE_BUT_FLAGGED, INTERRUPTED, contents, leftovers, shaker_arguments
 
-import pipelines.report
-import pipelines.report.outputs
+import pipelines.sweep.outputs
+import pipelines.sweep.report
 import pipelines.sweep.stages
 from pipelines.command_line import run
 from sloshlab import atomic_file
@@ -23,9 +23,9 @@ from sloshlab import atomic_file
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent to a process of its own")
 PLACES = {
     "after the first run": (pipelines.sweep.stages, "evaluate_windows"),
-    "before windows.nc": (pipelines.report.outputs, "write_dataset"),
+    "before windows.nc": (pipelines.sweep.outputs, "write_dataset"),
     "while a file is closed": (atomic_file.os, "chmod"),
-    "before the report": (pipelines.report, "write_report"),
+    "before the report": (pipelines.sweep.report, "write_report"),
 }
 
 
@@ -85,7 +85,7 @@ def test_interrupt_leaves_earlier_results_alone(laboratory: Path, tmp_path: Path
     def interrupted(*arguments: Any, **options: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipelines.report, "write_report", interrupted)
+    monkeypatch.setattr(pipelines.sweep.report, "write_report", interrupted)
     assert run(arguments_for(laboratory, out)) == INTERRUPTED
     assert contents(out) == {"windows.nc": b"results of yesterday"}
     assert leftovers(tmp_path) == []
