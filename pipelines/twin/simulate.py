@@ -188,8 +188,7 @@ def _summary(
     simulated: SimulatedRun,
     n_steps: int,
 ) -> dict[str, Any]:
-    passed = float(np.abs(simulation.works_j).max(initial=0.0)) + float(simulation.mechanical_energy_j.max())
-    error = float(np.abs(simulation.energy_residual_j).max()) / passed if passed else 0.0
+    error = simulation.relative_energy_error
     flags = [*drive.flags, *simulation.remarks]
     if error > _LARGEST_ENERGY_ERROR:
         flags.append(f"energy balance closes only to {error:.1e} of the energy passed on: give more --steps")
