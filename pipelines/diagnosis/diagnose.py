@@ -32,7 +32,7 @@ def diagnose_case(
     twin: Path | None = None,
     effects: Sequence[Path] = (),
 ) -> dict[str, Any]:
-    """Diagnose a case; write ``verdict.json`` and the report; return what is to be said.
+    """Diagnose a case; write ``verdict.json`` and the report; return the summary of the command.
 
     Parameters
     ----------

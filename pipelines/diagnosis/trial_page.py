@@ -107,7 +107,7 @@ def _failures(score: Score) -> str:
     for mark in score.failures:
         outcome = score.outcomes[mark.case]
         strength = f"{mark.strength:.1f}" if mark.strength else "–"
-        said = mark.answered if outcome.status == "done" else outcome.status.replace("_", " ")
-        rows.append([mark.case, CLASS_WORDS[mark.kind], mark.truth, strength, said, mark.column])
+        answer = mark.answered if outcome.status == "done" else outcome.status.replace("_", " ")
+        rows.append([mark.case, CLASS_WORDS[mark.kind], mark.truth, strength, answer, mark.column])
     text = _table(["case", "class", "hidden", "strength", "answered", "which is"], rows) if rows else "None."
     return "## Every failure\n\n" + text

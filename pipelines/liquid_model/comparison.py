@@ -216,13 +216,13 @@ def _ceiling(model: ReducedOrderModel, read: Sequence[_Read], skipped: dict[str,
 
 def _pair(model: ReducedOrderModel, signals: LiquidSignals, repeat: LiquidSignals) -> CeilingPair:
     repeats = matched_repeats(signals, repeat, model.sampling_rate_hz)
-    said = model.simulate(signals.at_rate(model.sampling_rate_hz).velocity_m_per_s)
+    predicted = model.simulate(signals.at_rate(model.sampling_rate_hz).velocity_m_per_s)
     return CeilingPair(
         repeats,
-        fit_quality(repeats.force_n, said),
+        fit_quality(repeats.force_n, predicted),
         repeats.rms_by_cycle(repeats.force_n),
         repeats.rms_by_cycle(repeats.other_force_n - repeats.force_n),
-        repeats.rms_by_cycle(said - repeats.force_n),
+        repeats.rms_by_cycle(predicted - repeats.force_n),
     )
 
 

@@ -71,10 +71,10 @@ def time_histories(name: str, validated: ValidatedModel) -> ReportFigure:
     grid = figure.subplots(len(places), 2, squeeze=False, width_ratios=(3, 2))
     for row, (word, at) in zip(grid, places, strict=True):
         cycles = run.cycles
-        said = f"{word}: {cycles.acceleration_g[at]:.2g} g, {cycles.frequency_hz[at]:.1f} Hz"
+        title = f"{word}: {cycles.acceleration_g[at]:.2g} g, {cycles.frequency_hz[at]:.1f} Hz"
         for axes, n_cycles in zip(row, (_CYCLES_SHOWN, _CYCLES_ZOOMED), strict=True):
             _excerpt(axes, run, at, n_cycles)
-        row[0].set_title(said)
+        row[0].set_title(title)
         row[1].set_title("zoom")
         row[0].set_ylabel("Δf [N]")
     for axes in grid[-1]:

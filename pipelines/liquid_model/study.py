@@ -52,7 +52,7 @@ class StudySettings:
 def study(
     files: RunFiles, folder: Path, wanted: StudySettings, settings: TrainingSettings, *, command: str
 ) -> dict[str, Any]:
-    """Train all cases, pick one, and write table, figure and the picked model; return what is to be said.
+    """Train all cases, pick one, and write table, figure and the picked model; return the summary of the command.
 
     Parameters
     ----------

@@ -171,7 +171,7 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
 
 
 def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
-    """Write the model; return what is to be said.
+    """Write the model; return the summary of the command.
 
     Parameters
     ----------
@@ -254,9 +254,12 @@ def train_and_report(
     from pipelines.liquid_model.results import Training
 
     training = Training(trained.record, settings, trained.runs.rate.reason)
-    said = write_validation(trained.model, trained.runs, test, folder, command=command, training=training)
-    lines, flags = summary["lines"] + said.pop("lines"), dict.fromkeys([*summary["flags"], *said.pop("flags")])
-    return summary | said | {"lines": lines, "flags": list(flags)}
+    of_report = write_validation(trained.model, trained.runs, test, folder, command=command, training=training)
+    lines, flags = (
+        summary["lines"] + of_report.pop("lines"),
+        dict.fromkeys([*summary["flags"], *of_report.pop("flags")]),
+    )
+    return summary | of_report | {"lines": lines, "flags": list(flags)}
 
 
 def _extension_lines(trained: TrainedModel, output: Path) -> list[str]:

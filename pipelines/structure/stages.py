@@ -212,15 +212,15 @@ def _residual_flags(
 ) -> list[str]:
     if its_filter is None or its_filter.weights.shape[0] == its_filter.weights.shape[1]:
         return []
-    loud = [
+    unexplained = [
         f"{name} {residual:.3g} m/s²"
         for name, residual in zip(response.sensor_names, response.residual_rms_m_per_s2, strict=True)
         if residual > _LARGEST_RESIDUAL_SHARE * rms(tank)
     ]
-    if not loud:
+    if not unexplained:
         return []
     return [
-        f"{run.attributes.run_id}: the modes leave {', '.join(loud)} RMS unexplained, more than "
+        f"{run.attributes.run_id}: the modes leave {', '.join(unexplained)} RMS unexplained, more than "
         f"{100 * _LARGEST_RESIDUAL_SHARE:.0f} % of the tank's acceleration; check gains, places and mode shapes"
     ]
 
