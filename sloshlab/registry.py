@@ -16,7 +16,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import PlainValidator
 from pydantic_core import PydanticCustomError
 
-from sloshlab.errors import InputError
+from sloshlab.errors import InputError, SloshlabError
 
 T = TypeVar("T")
 
@@ -30,7 +30,7 @@ class Registry(Generic[T]):
         What an entry is, for messages.
     group : str
         Entry-point group in which other packages declare entries; empty for none.
-    error : type of InputError
+    error : type
         What is raised for a name that is unknown, or whose entry cannot be imported.
     remedy : str
         What to do about an unknown name.
@@ -46,7 +46,7 @@ class Registry(Generic[T]):
     """
 
     def __init__(
-        self, kind: str, *, group: str = "", error: type[InputError] = InputError, remedy: str = ""
+        self, kind: str, *, group: str = "", error: Callable[..., SloshlabError] = InputError, remedy: str = ""
     ) -> None:
         self.kind = kind
         self.group, self._error, self._remedy = group, error, remedy

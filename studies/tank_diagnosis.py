@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from scipy.signal import butter, sosfiltfilt
 
@@ -235,7 +236,7 @@ def constant_beyond(w_bar: xr.DataArray, level_g: float) -> xr.DataArray:
         Acceleration amplitude ω̄² ū in g; infinite for the map as it is.
     """
     is_beyond = (w_bar["omega_bar"] ** 2 * w_bar["u_bar"]).transpose(*w_bar.dims) >= level_g
-    last_known = w_bar.where(~is_beyond).to_pandas().ffill(axis="columns")
+    last_known = pd.DataFrame(w_bar.where(~is_beyond).to_numpy()).ffill(axis="columns")
     return w_bar.where(~is_beyond, w_bar.copy(data=last_known.to_numpy()))
 
 

@@ -68,7 +68,7 @@ def releases() -> dict[str, Simulation]:
 def twin_figure() -> Figure:
     """Blocks above, decays below."""
     figure = new_figure(4.2)
-    above, below = figure.subfigures(2, 1, height_ratios=(1.0, 1.15))
+    [above], [below] = figure.subfigures(2, 1, height_ratios=(1.0, 1.15), squeeze=False)
     _draw_blocks(above.subplots())
     for axes, colour, (name, result) in zip(
         below.subplots(1, 3, sharey=True), DISTINCT_COLOURS, releases().items(), strict=False

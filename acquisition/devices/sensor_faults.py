@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,7 @@ class SensorFaults:
     def applied(self, start: int, piece: Piece) -> Piece:
         """Counts as the faulty sensors give them; pieces in order, `start` is the first sample's number."""
         counts, samples = piece.counts.copy(), np.arange(start, start + len(piece.counts))
-        act = {"swapped": self._swap, "clipped": self._clip, "stuck": self._stick}
+        act: dict[str, Callable[..., int]] = {"swapped": self._swap, "clipped": self._clip, "stuck": self._stick}
         for name in SENSOR_FAULTS:
             for fault in getattr(self._faults, name):
                 n_changed = act[name](fault, counts, samples)

@@ -39,6 +39,7 @@ MAP_AMPLITUDE_M = (0.0025, 0.1)
 MAP_FREQUENCY_RAD_PER_S = (1.57, 62.83)
 """Ranges of the source's maps (2.1.2)."""
 _SAME_RELEASE, _GUIDE_AGREES = 0.05, 0.05
+"""Relative differences: of releases that count as one, and of a guide from what the rig states of it."""
 
 
 def ball_from_decays(
@@ -72,7 +73,10 @@ def ball_from_decays(
             measured, rig, initial_displacement_m=release, duration_s=duration, sampling_rate_hz=rate,
             damping_in_flight=settings.damping_in_flight, settings=settings.search, progress=advance,
         )  # fmt: skip
+    # at the rate of the recordings, because the reading of the decrement depends on it
     decay = simulated_decay(found.ball, rig, release, duration, sampling_rate_hz=rate)
+    steady = np.geomspace(measured.acceleration_m_per_s2.min(), measured.acceleration_m_per_s2.max(), 30)
+    response = _response(found.ball, rig, settings.n_map)
     result = DecayResult(
         measured=measured,
         simulated=simulated_curve(decay, measured.frequency_hz),
@@ -81,8 +85,10 @@ def ball_from_decays(
         simulated_trace=_simulated_trace(decay, rig),
         shares=damping_shares(found.ball, rig, release, 2 * duration),
         frozen=frozen,
-        **_steady(found.ball, rig, measured),
-        **_response(found.ball, rig, settings.n_map),
+        steady_acceleration_m_per_s2=steady,
+        steady_loss_factor=steady_loss_factor(found.ball, rig, steady),
+        response=response,
+        loop=_loop(found.ball, rig, response),
     )
     omega_bar = 2 * np.pi * measured.frequency_hz / rig.frequency_scale_rad_per_s
     inputs = (*(path for path, _ in described), rig_path)
@@ -164,22 +170,17 @@ def _simulated_trace(decay: Simulation, rig: Rig) -> ForceTrace:
     return ForceTrace(decay.time_s, decay.acceleration_m_per_s2, force - force.mean())
 
 
-def _steady(ball: BouncingBall, rig: Rig, measured: DampingCurve) -> dict[str, FloatArray]:
-    ends = measured.acceleration_m_per_s2.min(), measured.acceleration_m_per_s2.max()
-    acceleration = np.geomspace(*ends, 30)
-    return {
-        "steady_acceleration_m_per_s2": acceleration,
-        "steady_loss_factor": steady_loss_factor(ball, rig, acceleration),
-    }
-
-
-def _response(ball: BouncingBall, rig: Rig, n_map: int) -> dict[str, object]:
-    """The map over the source's ranges, and the loop where η at f₀ is largest."""
+def _response(ball: BouncingBall, rig: Rig, n_map: int) -> xr.Dataset:
+    """The map over the source's ranges."""
     amplitudes = np.geomspace(*MAP_AMPLITUDE_M, n_map)
     frequencies = np.linspace(*MAP_FREQUENCY_RAD_PER_S, n_map) / (2 * np.pi)
     with amounts("maps of the ball") as advance:
-        response = response_map(ball, rig, amplitudes, frequencies, progress=advance)
+        return response_map(ball, rig, amplitudes, frequencies, progress=advance)
+
+
+def _loop(ball: BouncingBall, rig: Rig, response: xr.Dataset) -> tuple[float, float, FloatArray, FloatArray]:
+    """Amplitude, frequency and hysteresis cycle where η at f₀ is largest."""
     frequency = natural_frequency_hz(rig)
     line = response["loss_factor"].interp(frequency_hz=frequency).values
-    amplitude = float(amplitudes[int(np.nanargmax(line))])
-    return {"response": response, "loop": (amplitude, frequency, *hysteresis(ball, rig, amplitude, frequency))}
+    amplitude = float(response["amplitude_m"].values[int(np.nanargmax(line))])
+    return (amplitude, frequency, *hysteresis(ball, rig, amplitude, frequency))

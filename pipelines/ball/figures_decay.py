@@ -11,6 +11,7 @@ from sloshlab.constants import GRAVITY_M_PER_S2
 
 _CYCLES_OF_FORCE = 12
 _STILL_G = 0.2
+"""Below it the tank counts as at rest."""
 _SHARE_COLOURS = dict(zip(("all", "ball", "coulomb", "viscous"), DISTINCT_COLOURS, strict=False))
 _SHARE_NAMES = {"all": "all together", "ball": "ball", "coulomb": "Coulomb friction", "viscous": "viscous damping"}
 

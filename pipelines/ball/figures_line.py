@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-_TUNED = {"color": "#ffd400", "lw": 1.8}
+_TUNED: Final[dict[str, Any]] = {"color": "#ffd400", "lw": 1.8}
 
 
 def tuned_line(name: str, experiment: BallExperiment, result: LineResult) -> ReportFigure:
@@ -47,8 +47,10 @@ def tuned_line(name: str, experiment: BallExperiment, result: LineResult) -> Rep
 
 def _map(axes: Axes, values: xr.DataArray, largest: float) -> Any:
     grid = values.transpose("omega_bar", "u_bar")
-    style = {"cmap": WORK_COLOURS, "vmin": 0.0, "vmax": largest, "shading": "nearest", "rasterized": True}
-    mesh = axes.pcolormesh(grid["u_bar"], grid["omega_bar"], grid.values, **style)
+    mesh = axes.pcolormesh(
+        grid["u_bar"], grid["omega_bar"], grid.values, cmap=WORK_COLOURS, vmin=0.0, vmax=largest,
+        shading="nearest", rasterized=True,
+    )  # fmt: skip
     axes.set(xlabel="ū = u₀/h", ylabel="ω̄ = Ω/√(g/h)")
     axes.grid(False)
     return mesh
@@ -59,7 +61,7 @@ def map_of_ball(name: str, experiment: BallExperiment, result: LineResult) -> Re
     figure = new_figure(3.2)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     both = [result.maps["w_bar"], result.map_of_ball]
-    largest = max(float(np.nanmax(one.values)) for one in both)
+    largest = max(float(np.nanmax(values.values)) for values in both)
     for axes, values in zip((left, right), both, strict=True):
         mesh = _map(axes, values, largest)
         axes.axhline(result.line.omega_bar, **_TUNED)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pipelines.ball.results import BallExperiment, DecayResult
@@ -9,6 +11,9 @@ from pipelines.report.axes import plain_log_ticks
 from pipelines.report.figure import ReportFigure
 from pipelines.report.style import NEUTRAL_COLOUR, WORK_COLOURS, new_figure, ordered_colours, png_bytes
 from sloshlab.constants import GRAVITY_M_PER_S2
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _ISO_LEVELS_G = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 _LINES_RAD_PER_S = (20.0, 30.0, 41.2, 50.0, 60.0)
@@ -66,7 +71,7 @@ def maps(name: str, experiment: BallExperiment, result: DecayResult) -> ReportFi
     return ReportFigure(name, caption, "Fig. 2.12", png_bytes(figure))
 
 
-def _iso_lines(axes: object, amplitude: np.ndarray, omega: np.ndarray) -> None:
+def _iso_lines(axes: Axes, amplitude: np.ndarray, omega: np.ndarray) -> None:
     from matplotlib.patheffects import withStroke
 
     for level in _ISO_LEVELS_G:
@@ -74,9 +79,9 @@ def _iso_lines(axes: object, amplitude: np.ndarray, omega: np.ndarray) -> None:
         inside = (line > omega[0]) & (line < omega[-1])
         if inside.sum() < 3:
             continue
-        axes.plot(1e3 * amplitude[inside], line[inside], color="white", lw=0.8, ls=(0, (5, 3)))  # type: ignore[attr-defined]
+        axes.plot(1e3 * amplitude[inside], line[inside], color="white", lw=0.8, ls=(0, (5, 3)))
         at = np.flatnonzero(inside)[2 * int(inside.sum()) // 3]
-        axes.text(1e3 * amplitude[at], line[at], f"{level:g} g", fontsize=7.5, ha="center", va="center",  # type: ignore[attr-defined]
+        axes.text(1e3 * amplitude[at], line[at], f"{level:g} g", fontsize=7.5, ha="center", va="center",
                   path_effects=[withStroke(linewidth=2.2, foreground="white", alpha=0.9)])  # fmt: skip
 
 

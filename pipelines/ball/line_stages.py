@@ -41,7 +41,7 @@ def ball_from_shaker(paths: Sequence[Path], rig: Rig, rig_path: Path, settings: 
         found = identify_from_line(
             line, rig, damping_in_flight=settings.damping_in_flight, settings=settings.search, progress=advance
         )
-    result = _compared(found.ball, rig, line, maps, experiment.windows, settings)
+    result = _compared(found.ball, rig, line, maps=maps, windows=experiment.windows, settings=settings)
     flags = (*found.flags, *_outside_flags(result), *experiment.flags)
     return BallExperiment(rig, rig_path.name, experiment.inputs, found, line.omega_bar, result, flags)
 
@@ -57,7 +57,13 @@ def _outside_flags(result: LineResult) -> tuple[str, ...]:
 
 
 def _compared(
-    ball: BouncingBall, rig: Rig, line: WorkLine, maps: xr.Dataset, windows: xr.Dataset, settings: BallSettings
+    ball: BouncingBall,
+    rig: Rig,
+    line: WorkLine,
+    *,
+    maps: xr.Dataset,
+    windows: xr.Dataset,
+    settings: BallSettings,
 ) -> LineResult:
     step = -(-windows.sizes["window"] // settings.n_windows)
     used = windows.isel(window=slice(None, None, step))
@@ -99,9 +105,9 @@ def _other_lines(
     wanted = np.linspace(low, high, _N_OTHER_LINES + 3)[1:-1]
     wanted = np.sort(wanted[np.argsort(np.abs(wanted - omega_bar))[1:]])
     lines = []
-    for one in wanted[:_N_OTHER_LINES]:
+    for omega_bar_of_line in wanted[:_N_OTHER_LINES]:
         try:
-            line = work_line(maps, float(one), 15)
+            line = work_line(maps, float(omega_bar_of_line), 15)
         except AnalysisError:
             continue
         lines.append((line, w_bar_at(ball, rig, np.full(line.u_bar.shape, line.omega_bar), line.u_bar)))

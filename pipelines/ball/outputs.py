@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pipelines.ball.results import BallExperiment, DecayResult
-from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
+from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
 from sloshlab import atomic_file
 from sloshlab.bouncing_ball.frequency_error import summary
 from sloshlab.quantities import described
@@ -84,6 +84,9 @@ def _summary(experiment: BallExperiment, folder: Path, report: bool) -> dict[str
         tuned, others = summary(experiment.result.bands)
         numbers |= {"relative_error_tuned": tuned, "relative_error_elsewhere": others}
         lines.append(f"relative error of W̄: {tuned:.2f} at ω̄ = {experiment.omega_bar:g}, {others:.2f} elsewhere")
-    if report:
-        lines.append(f"report: {folder / 'report.html'}")
-    return {"lines": lines, "flags": list(experiment.flags), "output": str(folder), **numbers}
+    return {
+        "lines": lines + report_lines(folder, written=report),
+        "flags": list(experiment.flags),
+        "output": str(folder),
+        **numbers,
+    }

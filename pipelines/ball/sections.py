@@ -10,7 +10,7 @@ from pipelines.report.citations import Citation, citation
 from pipelines.report.numbers import text
 from pipelines.report.page import Page
 from pipelines.report.sections import FigurePlan, SectionPlan
-from pipelines.report.tables import provenance_table
+from pipelines.report.tables import Table, provenance_table
 from sloshlab import __version__
 from sloshlab.bouncing_ball.frequency_error import summary
 
@@ -33,7 +33,7 @@ def page_of(experiment: BallExperiment) -> Page:
     plans = (
         _decay_plans(experiment, result) if isinstance(result, DecayResult) else _line_plans(experiment, result)
     )
-    about_ball = (tables.ball_parameter_table(experiment), tables.search_table(experiment))
+    about_ball: tuple[Table, ...] = (tables.ball_parameter_table(experiment), tables.search_table(experiment))
     if isinstance(result, DecayResult) and result.frozen is not None:
         about_ball = (*about_ball, tables.guide_table(result.frozen))
     found = SectionPlan("The ball", (), about_ball)

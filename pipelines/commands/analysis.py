@@ -34,6 +34,7 @@ def shaker(
     runs: Recordings,
     rig: RigOption,
     output: OutputFolder,
+    *,
     p: HalfWidth = 6,
     m: Spacing = 24,
     boundaries: Annotated[
@@ -61,6 +62,7 @@ def work(
     runs: Recordings,
     output: OutputFolder,
     force: Annotated[str, typer.Option(help="Channel of the force on the structure.", show_default=False)],
+    *,
     acceleration: Annotated[str, typer.Option(help="Channel of the motion, as acceleration.")] = "",
     velocity: Annotated[str, typer.Option(help="Channel of the motion, as velocity.")] = "",
     displacement: Annotated[str, typer.Option(help="Channel of the motion, as displacement.")] = "",
@@ -91,6 +93,7 @@ def beam(
         Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
     ],
     output: OutputFolder,
+    *,
     modes: Annotated[
         int | None, typer.Option(help="Modes that are kept; all of the rig if not given.", show_default=False)
     ] = None,
@@ -131,6 +134,7 @@ def ball(
         Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
     ],
     output: OutputFolder,
+    *,
     omega_bar: Annotated[float, typer.Option(help="On the shaker: ω̄ at which W̄ is matched.")] = 4.0,
     damper: Annotated[str, typer.Option(help="The ball's damper acts in 'contact' or 'always'.")] = "contact",
     lowest_acceleration_g: Annotated[

@@ -15,6 +15,7 @@ def diagnose(
     case: Annotated[
         Path, typer.Argument(metavar="CASE", help="Folder with rig.toml and recordings/*.nc.", show_default=False)
     ],
+    *,
     output: Annotated[
         Path | None,
         typer.Option(

@@ -28,6 +28,7 @@ def virtual(
         ),
     ],
     output: OutputFile,
+    *,
     rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig of the experiment.")] = None,
     configuration: Annotated[str, typer.Option(help=f"One of {', '.join(CONFIGURATIONS)}.")] = SLOSHING,
     acceleration_g: Annotated[float, typer.Option(help="Level of the sweep in g.")] = 3.0,
@@ -99,6 +100,7 @@ def record(
         Path, typer.Option("--rig", metavar="RIG.toml", help="Rig the run belongs to.", show_default=False)
     ],
     output: OutputFile,
+    *,
     duration: Annotated[
         float | None,
         typer.Option(metavar="S", help="Seconds of samples; until the end if not given.", show_default=False),
@@ -143,6 +145,7 @@ def recover(
         Path, typer.Argument(metavar="RUN.journal", help="Journal of a recorder.", show_default=False)
     ],
     output: OutputFile,
+    *,
     align: Annotated[
         str | None,
         typer.Option(help="host, device or counter; as it was recorded if not given.", show_default=False),
@@ -171,6 +174,7 @@ def replay(
     urls: Annotated[
         list[str], typer.Option("--as", metavar="URL", help="Where a device appears.", show_default=False)
     ],
+    *,
     channels: Annotated[
         list[str] | None, typer.Option(metavar="A,B", help="Channels; once per --as.", show_default=False)
     ] = None,

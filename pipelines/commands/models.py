@@ -47,6 +47,7 @@ def train(
     runs: Runs,
     rig: ModelRig,
     output: OutputFile,
+    *,
     still: Still = None,
     test: Test = None,
     model: Annotated[str, typer.Option(help="nfir (no feedback) or noe.")] = "nfir",
@@ -81,7 +82,7 @@ def train(
     )
     settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed)
     command = None if no_report else command_as_given()
-    finish(train_and_report(files, test or [], wanted, settings, output, command), as_json)
+    finish(train_and_report(files, test or [], wanted, settings, output, command=command), as_json)
 
 
 @app.command()
@@ -93,6 +94,7 @@ def validate(
     ],
     rig: ModelRig,
     output: OutputFolder,
+    *,
     still: Still = None,
     test: Test = None,
     as_json: Json = False,
@@ -110,6 +112,7 @@ def study(
     runs: Runs,
     rig: ModelRig,
     output: OutputFolder,
+    *,
     still: Still = None,
     cases: Annotated[str, typer.Option(help="'source': its 24 NFIR and 3 NOE, or 'all': more.")] = "all",
     rate_hz: Rate = None,
@@ -140,6 +143,7 @@ def simulate(
         Path, typer.Option("--input", metavar="RUN.nc", help="Recording that drives it.", show_default=False)
     ],
     output: OutputFile,
+    *,
     block: Annotated[
         str, typer.Option(help="'all' together, or 'tank' or 'structure' alone on its measured input.")
     ] = "all",

@@ -18,6 +18,7 @@ from pipelines.commands.application import (
 @app.command("import")
 def import_(
     sources: Annotated[list[Path], typer.Argument(metavar="SRC...", help="Files of one run.", show_default=False)],
+    *,
     channel_map: Annotated[
         Path | None, typer.Option("--map", metavar="MAP.toml", help="Columns to channels.", show_default=False)
     ] = None,

@@ -29,6 +29,7 @@ Key = Annotated[
 @trial.command()
 def seal(
     output: OutputFolder,
+    *,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 0,
     cases: Annotated[int, typer.Option(help="Number of cases.")] = 60,
     key: Key = None,

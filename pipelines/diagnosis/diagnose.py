@@ -9,7 +9,7 @@ from typing import Any
 
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.free_place import require_free_folder
-from pipelines.report.outputs import provenance_of
+from pipelines.report.outputs import provenance_of, report_lines
 from pipelines.report.progress import amounts
 from sloshlab import atomic_file
 from sloshlab.diagnosis.answer import answered
@@ -32,7 +32,7 @@ def diagnose_case(
     twin: Path | None = None,
     effects: Sequence[Path] = (),
 ) -> dict[str, Any]:
-    """Diagnose a case; write ``verdict.json`` and the report; return what is to be said.
+    """Diagnose a case; write ``verdict.json`` and the report; return the summary of the command.
 
     Parameters
     ----------
@@ -72,10 +72,8 @@ def diagnose_case(
             write_page(page_of(diagnosis), complete)
     lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
     if own:
-        lines.append("effects of your own: " + ", ".join(f"{one.block}.{one.name}" for one in own))
-    if report:
-        lines.append(f"report: {target / 'report.html'}")
-    return {"lines": lines, "flags": list(found.split.limits), **facts}
+        lines.append("effects of your own: " + ", ".join(f"{effect.block}.{effect.name}" for effect in own))
+    return {"lines": lines + report_lines(target, written=report), "flags": list(found.split.limits), **facts}
 
 
 def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:

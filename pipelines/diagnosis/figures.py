@@ -21,6 +21,7 @@ _MOST_ROWS = 14
 _SHOWN_CYCLES = 10
 FAINT_COLOUR = "#b8c4d0"
 _EXCESS_OF_NOISE = 1.0
+"""Mean excess of a band up to which it counts as noise."""
 
 
 def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
@@ -34,7 +35,7 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
         rows.append((words(diagnosis.verdict.best, "\n+ "), diagnosis.verdict.best, REFERENCE_COLOUR))
     if found.ceilings:
         rows.append(("ceiling", min(found.ceilings, key=lambda ceiling: ceiling.held_out), FAINT_COLOUR))
-    values = [one.held_out_rms for _, one, _ in rows]
+    values = [explanation.held_out_rms for _, explanation, _ in rows]
     figure = new_figure(0.6 + 0.36 * len(rows))
     axes = figure.subplots()
     axes.barh(range(len(rows)), values, color=[colour for _, _, colour in rows], height=0.6)
@@ -64,12 +65,21 @@ def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
     found, everything = diagnosis.findings, diagnosis.explanations
     if not everything:
         raise NothingToDrawError("no candidate promised anything")
-    n_singles = sum(len(one.keys) == 1 for one in everything)
-    pairs = [one for one in everything if len(one.keys) > 1][: max(_MOST_ROWS - n_singles, 3)]
-    chosen = [one for one in everything if len(one.keys) == 1 or one in pairs]
-    rows = [*[(words(one, "\n+ "), one) for one in chosen], ("baseline retuned", found.retuned)]
+    n_singles = sum(len(explanation.keys) == 1 for explanation in everything)
+    pairs = [explanation for explanation in everything if len(explanation.keys) > 1][
+        : max(_MOST_ROWS - n_singles, 3)
+    ]
+    chosen = [explanation for explanation in everything if len(explanation.keys) == 1 or explanation in pairs]
+    rows = [
+        *[(words(explanation, "\n+ "), explanation) for explanation in chosen],
+        ("baseline retuned", found.retuned),
+    ]
     left = np.array(
-        [(one.held_out / found.n_held_out, one.fit.misfit / found.n_fitting) for _, one in rows], np.float64
+        [
+            (explanation.held_out / found.n_held_out, explanation.fit.misfit / found.n_fitting)
+            for _, explanation in rows
+        ],
+        np.float64,
     )
     left = np.where(np.isfinite(left), left, np.nan)
     n_lines = sum(label.count("\n") + 1 for label, _ in rows)
@@ -97,7 +107,7 @@ def where(name: str, diagnosis: Diagnosis) -> ReportFigure:
     found = diagnosis.findings
     before = mismatches(found.fitting, found.readings(found.retuned))
     named = named_channels(diagnosis)
-    worst = max(before, key=lambda one: (one.channel in named, one.total))
+    worst = max(before, key=lambda mismatch: (mismatch.channel in named, mismatch.total))
     if worst.total <= 0:
         raise NothingToDrawError("the retuned baseline misses nothing")
     both = [("baseline retuned", worst)]
@@ -108,11 +118,11 @@ def where(name: str, diagnosis: Diagnosis) -> ReportFigure:
     figure = new_figure(3.0)
     panels = np.atleast_1d(figure.subplots(1, len(both), sharey=True))
     largest = float(np.log10(1 + worst.excess[:, : top + 1].max()))
-    for axes, (title, one) in zip(panels, both, strict=True):
+    for axes, (title, mismatch) in zip(panels, both, strict=True):
         mesh = axes.pcolormesh(
-            one.time_s,
-            one.frequency_hz[: top + 1],
-            np.log10(1 + one.excess[:, : top + 1]).T,
+            mismatch.time_s,
+            mismatch.frequency_hz[: top + 1],
+            np.log10(1 + mismatch.excess[:, : top + 1]).T,
             cmap=WORK_COLOURS,
             vmin=0.0,
             vmax=max(largest, 0.1),
@@ -140,9 +150,9 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
     def missed(observation: Observation) -> float:
         return float((observation.residual(readings[observation.run.name][observation.channel]) ** 2).sum())
 
-    observed = max(found.held_out, key=lambda run: sum(missed(one) for one in run))
+    observed = max(found.held_out, key=lambda run: sum(missed(observation) for observation in run))
     run = observed[0].run
-    shown = sorted(observed, key=lambda one: (one.channel not in named, -missed(one)))[:2]
+    shown = sorted(observed, key=lambda observation: (observation.channel not in named, -missed(observation)))[:2]
     steps: list[tuple[str, dict[str, FloatArray], str, Any]] = [
         ("baseline retuned", readings[run.name], NEUTRAL_COLOUR, "-")
     ]
@@ -152,18 +162,18 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
     time = np.asarray(run.recording["time"].values, np.float64)
     figure = new_figure(1.9 * len(shown) + 0.4)
     grid = np.atleast_2d(figure.subplots(len(shown), 2, sharex="col"))
-    for (left, right), one in zip(grid, shown, strict=True):
-        recorded = np.asarray(run.recording[one.channel].values, np.float64)
-        factor, units = _handy(recorded, str(run.recording[one.channel].attrs.get("units", "")))
-        if one is shown[0]:
-            lacking = recorded - steps[0][1][one.channel]
-            stretch = _stretch(time, found.surroundings.frequency_hz, _left(one, lacking))
+    for (left, right), observation in zip(grid, shown, strict=True):
+        recorded = np.asarray(run.recording[observation.channel].values, np.float64)
+        factor, units = _handy(recorded, str(run.recording[observation.channel].attrs.get("units", "")))
+        if observation is shown[0]:
+            lacking = recorded - steps[0][1][observation.channel]
+            stretch = _stretch(time, found.surroundings.frequency_hz, _left(observation, lacking))
         left.plot(time[stretch], factor * recorded[stretch], color=FAINT_COLOUR, lw=2.6, label="recorded")
         for label, simulated, colour, line in steps:
-            values = simulated[one.channel]
+            values = simulated[observation.channel]
             left.plot(time[stretch], factor * values[stretch], color=colour, lw=0.9, ls=line, label=label)
-            right.plot(time, factor * _left(one, recorded - values), color=colour, lw=0.6)
-        left.set_ylabel(f"{plain(one.channel)}\n[{plain(units)}]", fontsize=7)
+            right.plot(time, factor * _left(observation, recorded - values), color=colour, lw=0.6)
+        left.set_ylabel(f"{plain(observation.channel)}\n[{plain(units)}]", fontsize=7)
         right.axvspan(time[stretch][0], time[stretch][-1], color="#f0ead8", zorder=0)
     grid[0, 0].set_title("recorded and simulated, a stretch")
     grid[0, 1].set_title("recorded − simulated")
@@ -209,7 +219,7 @@ def short_tick(value: float) -> str:
 
 
 def _same(found: list[ChannelMismatch], wanted: ChannelMismatch) -> ChannelMismatch:
-    return next(one for one in found if (one.run, one.channel) == (wanted.run, wanted.channel))
+    return next(mismatch for mismatch in found if (mismatch.run, mismatch.channel) == (wanted.run, wanted.channel))
 
 
 def _highest(channel_mismatch: ChannelMismatch) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, new_figure, plain, png_bytes
 from sloshlab.diagnosis.force_character import ForceCharacter
 from sloshlab.diagnosis.latent_force import LatentForce
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FloatArray = NDArray[np.float64]
 _CYCLES = 10
@@ -54,11 +58,11 @@ def worst_place(diagnosis: Diagnosis) -> str:
         raise NothingToDrawError("this twin has no measured interfaces")
     if not there:
         raise NothingToDrawError("no block lacks a force beyond noise")
-    shares = {one.block: one.share for one in cut.blocks if np.isfinite(one.share)}
+    shares = {block.block: block.share for block in cut.blocks if np.isfinite(block.share)}
     return max(there, key=lambda place: (shares.get(place, 0.0), there[place].size_n / there[place].noise_n))
 
 
-def _in_time(axes, latent_force: LatentForce) -> None:  # type: ignore[no-untyped-def]
+def _in_time(axes: Axes, latent_force: LatentForce) -> None:
     spread = latent_force.motion[:, 2].std() / max(latent_force.motion[:, 1].std(), 1e-300)
     n = min(
         latent_force.time_s.size, int(_CYCLES * 2 * np.pi / spread * latent_force.run.attributes.sampling_rate_hz)
@@ -81,7 +85,7 @@ def _in_time(axes, latent_force: LatentForce) -> None:  # type: ignore[no-untype
     axes.legend(loc="upper right", fontsize=7, ncols=2)
 
 
-def _over(axes, latent_force: LatentForce, order: int, label: str) -> None:  # type: ignore[no-untyped-def]
+def _over(axes: Axes, latent_force: LatentForce, order: int, label: str) -> None:
     step = max(1, latent_force.force_n.size // _MOST_POINTS)
     values = latent_force.motion[::step, order] * (1e3 if order == 0 else 1.0)
     axes.plot(values, latent_force.force_n[::step], ".", color=NEUTRAL_COLOUR, ms=1.5, alpha=0.5, rasterized=True)
@@ -97,7 +101,7 @@ def _over(axes, latent_force: LatentForce, order: int, label: str) -> None:  # t
     axes.legend(loc="upper right", fontsize=7)
 
 
-def _work(axes, character: ForceCharacter) -> None:  # type: ignore[no-untyped-def]
+def _work(axes: Axes, character: ForceCharacter) -> None:
     found = character.windows
     axes.errorbar(
         found.level_g, 1e3 * found.work_j, 1.645e3 * found.work_doubt_j, fmt="o", ms=2.5, lw=0.6,

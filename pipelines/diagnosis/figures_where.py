@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 _TOP = 1.35
+"""Of the axis of shares: the numbers stand to the right of the bars."""
 _BOTTOM = 0.1
+"""Where the scale of the excess turns from logarithmic to linear; noise may take it below zero."""
 _PHASES = ("highest\npoint", "falls", "lowest\npoint", "rises", "highest\npoint")
 
 
@@ -38,17 +40,17 @@ def block_shares(name: str, diagnosis: Diagnosis) -> ReportFigure:
     blocks = cut.blocks
     figure = new_figure(0.55 + 0.36 * len(blocks))
     axes = figure.subplots()
-    for row, one in enumerate(blocks):
-        if np.isfinite(one.share):
-            axes.barh(row, one.share, 0.6, color=REFERENCE_COLOUR if one.share > 0.5 else NEUTRAL_COLOUR)
-            axes.plot([one.low, one.high], [row, row], color="black", lw=1.2)
-            label = f"{100 * one.share:.0f} % ({100 * one.low:.0f} … {100 * one.high:.0f})"
-            axes.text(max(one.share, one.high) + 0.015, row, label, va="center", fontsize=8)
+    for row, block in enumerate(blocks):
+        if np.isfinite(block.share):
+            axes.barh(row, block.share, 0.6, color=REFERENCE_COLOUR if block.share > 0.5 else NEUTRAL_COLOUR)
+            axes.plot([block.low, block.high], [row, row], color="black", lw=1.2)
+            label = f"{100 * block.share:.0f} % ({100 * block.low:.0f} … {100 * block.high:.0f})"
+            axes.text(max(block.share, block.high) + 0.015, row, label, va="center", fontsize=8)
         else:
             axes.text(
-                0.015, row, plain(f"cannot tell: {one.remark or 'within noise'}", 88), va="center", fontsize=7.5
+                0.015, row, plain(f"cannot tell: {block.remark or 'within noise'}", 88), va="center", fontsize=7.5
             )
-    axes.set_yticks(range(len(blocks)), [one.block for one in blocks])
+    axes.set_yticks(range(len(blocks)), [block.block for block in blocks])
     axes.set(xlim=(0, _TOP), ylim=(len(blocks) - 0.5, -0.5), xlabel="share of the mismatch beyond noise")
     axes.set_xticks(np.linspace(0, 1, 6), [f"{share} %" for share in range(0, 101, 20)])
     axes.grid(axis="y", visible=False)
@@ -107,7 +109,9 @@ def worst_maps(diagnosis: Diagnosis) -> ResidualMaps:
     if not maps:
         raise NothingToDrawError("nothing was compared")
     wanted = [*named_channels(diagnosis), *diagnosis.examination.where.get("channels", [])]
-    return next((one for channel in wanted for one in maps if one.channel == channel), maps[0])
+    return next(
+        (of_channel for channel in wanted for of_channel in maps if of_channel.channel == channel), maps[0]
+    )
 
 
 def _profiles(axes: Axes, before: Profile | None, after: Profile | None, label: str, words: str) -> None:
@@ -120,9 +124,9 @@ def _profiles(axes: Axes, before: Profile | None, after: Profile | None, label: 
     shown = [(before, NEUTRAL_COLOUR, "baseline retuned")]
     if after is not None:
         shown.append((after, REFERENCE_COLOUR, words))
-    for one, colour, name in shown:
-        known = np.isfinite(one.excess)
-        axes.plot(one.middles[known], one.excess[known], "o-", color=colour, lw=1.2, ms=2.5, label=name)
+    for profile, colour, name in shown:
+        known = np.isfinite(profile.excess)
+        axes.plot(profile.middles[known], profile.excess[known], "o-", color=colour, lw=1.2, ms=2.5, label=name)
     axes.axhline(0.0, color="black", lw=0.8)
     axes.set_yscale("symlog", linthresh=_BOTTOM)
     top = float(np.nanmax(before.excess))
@@ -132,15 +136,15 @@ def _profiles(axes: Axes, before: Profile | None, after: Profile | None, label: 
     axes.minorticks_off()
 
 
-def _cells(axes: Axes, one: ResidualMaps) -> None:
+def _cells(axes: Axes, maps: ResidualMaps) -> None:
     axes.set(xlabel="ω̄ = Ω √(h/g)", ylabel="ū = u₀/h")
-    if one.cells is None or one.omega_bar is None or one.u_bar is None or not np.isfinite(one.cells).any():
+    if maps.cells is None or maps.omega_bar is None or maps.u_bar is None or not np.isfinite(maps.cells).any():
         axes.text(0.5, 0.5, "no single frequency", ha="center", va="center", transform=axes.transAxes, fontsize=8)
         axes.set_yticks([])
         axes.set_xticks([])
         return
-    shown = np.log10(1 + np.maximum(one.cells.T, 0.0))
-    mesh = axes.pcolormesh(one.omega_bar, one.u_bar, shown, cmap=WORK_COLOURS, vmin=0.0, rasterized=True)
+    shown = np.log10(1 + np.maximum(maps.cells.T, 0.0))
+    mesh = axes.pcolormesh(maps.omega_bar, maps.u_bar, shown, cmap=WORK_COLOURS, vmin=0.0, rasterized=True)
     axes.grid(False)
     colour_bar = axes.figure.colorbar(mesh, ax=axes)
     colour_bar.set_label("log₁₀(1 + excess), retuned", fontsize=8)

@@ -26,4 +26,4 @@ class Diagnosis:
         best: dict[frozenset[str], Explanation] = {}
         for explanation in sorted(self.findings.explanations, key=lambda explanation: explanation.fit.cost):
             best.setdefault(frozenset(explanation.keys), explanation)
-        return sorted(best.values(), key=lambda one: one.held_out)
+        return sorted(best.values(), key=lambda explanation: explanation.held_out)

@@ -85,8 +85,8 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
         *[(_named(explanation), explanation) for explanation in diagnosis.explanations],
     ]
     rows = [
-        (label, text(one.fit.cost, 4), text(one.held_out, 4), text(one.held_out_rms, 3))
-        for label, one in sorted(everything, key=lambda pair: pair[1].held_out)
+        (label, text(explanation.fit.cost, 4), text(explanation.held_out, 4), text(explanation.held_out_rms, 3))
+        for label, explanation in sorted(everything, key=lambda pair: pair[1].held_out)
     ]
     header = ("explanation", "cost on fitted runs", "held-out sum of squares", "held-out error / noise floor")
     caption = (
@@ -134,18 +134,18 @@ def cut_table(diagnosis: Diagnosis) -> Table:
         caption = "A twin of the user's own has no blocks that can be fed one by one."
         return Table("Cut at the measured interfaces", header, ((MISSING,) * 7,), caption)
     rows = []
-    for one in cut.blocks:
-        share = f"{100 * one.share:.0f} % ({100 * one.low:.0f} … {100 * one.high:.0f})"
-        unit = " σ" if one.block == "sensor" else " N"
+    for block in cut.blocks:
+        share = f"{100 * block.share:.0f} % ({100 * block.low:.0f} … {100 * block.high:.0f})"
+        unit = " σ" if block.block == "sensor" else " N"
         rows.append(
             (
-                one.block,
-                one.input,
-                one.output,
-                share if math.isfinite(one.share) else "cannot tell",
-                text(one.size, 3) + (unit if math.isfinite(one.size) else ""),
-                text(one.noise, 2) + (unit if math.isfinite(one.noise) else ""),
-                one.remark or (MISSING if math.isfinite(one.share) else "within noise"),
+                block.block,
+                block.input,
+                block.output,
+                share if math.isfinite(block.share) else "cannot tell",
+                text(block.size, 3) + (unit if math.isfinite(block.size) else ""),
+                text(block.noise, 2) + (unit if math.isfinite(block.noise) else ""),
+                block.remark or (MISSING if math.isfinite(block.share) else "within noise"),
             )
         )
     caption = (
@@ -235,11 +235,11 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
     chosen = diagnosis.explanations[:_MOST_EXPLANATIONS]
     alternatives = {alternative.keys for alternative in diagnosis.verdict.alternatives}
     rows = []
-    for one in chosen:
+    for explanation in chosen:
         for_: list[str] = []
         against: list[str] = []
         open_: list[str] = []
-        for candidate in one.fit.candidates:
+        for candidate in explanation.fit.candidates:
             on = examination.evidence_on(candidate.effect)
             for_ += on.speaks_for
             against += on.speaks_against
@@ -248,11 +248,11 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
             if candidate.effect.block == "sensor" and suspect:
                 own = candidate.channel.partition("<")[0]
                 (for_ if own == suspect else against).append(f"{suspect} contradicts the others")
-        gain = found.retuned.held_out - one.held_out
+        gain = found.retuned.held_out - explanation.held_out
         rows.append(
             (
-                _named(one),
-                _standing(diagnosis, one, alternatives),
+                _named(explanation),
+                _standing(diagnosis, explanation, alternatives),
                 text(gain, 3),
                 "; ".join(dict.fromkeys(for_)) or MISSING,
                 "; ".join(dict.fromkeys(against)) or MISSING,
@@ -282,7 +282,7 @@ def remains_table(diagnosis: Diagnosis) -> Table:
     if diagnosis.verdict.best is not None:
         steps.append((extended_label(diagnosis), diagnosis.verdict.best))
     readings = [found.readings(step) for _, step in steps]
-    names = dict.fromkeys(one.channel for run in found.held_out for one in run)
+    names = dict.fromkeys(observation.channel for run in found.held_out for observation in run)
     rows = []
     for name in names:
         shown = []
@@ -310,7 +310,7 @@ def limits_table(diagnosis: Diagnosis) -> Table:
     limits = list(diagnosis.findings.split.limits)
     cut = diagnosis.examination.cut
     if cut is not None:
-        limits += [f"{one.block}: {one.remark}" for one in cut.blocks if one.remark]
+        limits += [f"{block.block}: {block.remark}" for block in cut.blocks if block.remark]
         limits += [cut.remark] if cut.remark else []
     for place, character in diagnosis.examination.characters.items():
         undecided = [answer.question for answer in character.answers if answer.finding == CANNOT_TELL]

@@ -22,7 +22,7 @@ MOST_WORKERS = 64
 
 
 def seal_trial(folder: Path, *, seed: int, n_cases: int, key: Path | None, development: bool) -> dict[str, Any]:
-    """Draw and seal a trial; return what is to be said.
+    """Draw and seal a trial; return the summary of the command.
 
     Raises
     ------
@@ -36,8 +36,8 @@ def seal_trial(folder: Path, *, seed: int, n_cases: int, key: Path | None, devel
             allowed="--key FILE outside the trial for a sealed trial, --development without a key",
         )
     secret = None if key is None else made_or_read_key(key, folder)
-    with progress("drawing cases", n_cases) as said:
-        commitments = seal(folder, seed=seed, n_cases=n_cases, key=secret, said=said)
+    with progress("drawing cases", n_cases) as advance:
+        commitments = seal(folder, seed=seed, n_cases=n_cases, key=secret, said=advance)
     lines = [f"{len(commitments.cases)} cases in {folder / 'cases'}, commitments in {folder / 'commitments.json'}"]
     if key is not None:
         lines.append(f"key: {key}; keep it away from whoever diagnoses")
@@ -45,7 +45,7 @@ def seal_trial(folder: Path, *, seed: int, n_cases: int, key: Path | None, devel
 
 
 def run_cases(folder: Path, *, n_workers: int, time_limit_s: float, reports: bool) -> dict[str, Any]:
-    """Diagnose every case that has not been; return what is to be said.
+    """Diagnose every case that has not been; return the summary of the command.
 
     Raises
     ------
@@ -59,10 +59,10 @@ def run_cases(folder: Path, *, n_workers: int, time_limit_s: float, reports: boo
     require_no_key(folder, sys.argv, os.environ)
     n_cases = len(read_commitments(folder).cases)
     command = (*DIAGNOSE,) if reports else (*DIAGNOSE, "--no-report")
-    with progress("diagnosing cases", n_cases) as said:
+    with progress("diagnosing cases", n_cases) as advance:
 
         def finished(outcome: Outcome) -> None:
-            said(f"{outcome.case} {outcome.status} in {outcome.wall_s:.0f} s")
+            advance(f"{outcome.case} {outcome.status} in {outcome.wall_s:.0f} s")
 
         outcomes = run_trial(
             folder, n_workers=n_workers, time_limit_s=time_limit_s, command=command, finished=finished
@@ -75,7 +75,7 @@ def run_cases(folder: Path, *, n_workers: int, time_limit_s: float, reports: boo
 
 
 def score_trial(folder: Path, output: Path, *, key: Path | None) -> dict[str, Any]:
-    """Open the truths, score, write page, figures and `scores.json`; return what is to be said.
+    """Open the truths, score, write page, figures and `scores.json`; return the summary of the command.
 
     Raises
     ------

@@ -137,18 +137,18 @@ def gains(score: Score) -> Figure | None:
     chosen = [gain for gain in score.gains if gain.ceiling > 0]
     if not chosen:
         return None
-    chosen = sorted(chosen, key=lambda one: (CLASSES.index(one.kind), -one.retuned / one.ceiling))
+    chosen = sorted(chosen, key=lambda gain: (CLASSES.index(gain.kind), -gain.retuned / gain.ceiling))
     figure = new_figure(0.9 + 0.145 * len(chosen))
     axes = figure.subplots()
     rows = np.arange(len(chosen))
-    before = np.array([one.retuned / one.ceiling for one in chosen])
-    after = np.array([one.after / one.ceiling for one in chosen])
+    before = np.array([gain.retuned / gain.ceiling for gain in chosen])
+    after = np.array([gain.after / gain.ceiling for gain in chosen])
     axes.hlines(rows, np.minimum(before, after), np.maximum(before, after), color="#bbbbbb", lw=1.2)
     axes.plot(before, rows, "o", color=NEUTRAL_COLOUR, ms=4, label="retuned baseline")
     axes.plot(after, rows, "s", color=REFERENCE_COLOUR, ms=3.5, label="as diagnosed")
     axes.axvline(1.0, color="black", lw=0.8, ls="--")
     axes.set_yticks(
-        rows, [f"{one.case.removeprefix('case_')} {CLASS_WORDS[one.kind]}" for one in chosen], fontsize=6.5
+        rows, [f"{gain.case.removeprefix('case_')} {CLASS_WORDS[gain.kind]}" for gain in chosen], fontsize=6.5
     )
     axes.set(xscale="log", xlabel="error on held-out runs / that of the non-parametric ceiling")
     largest = float(max(before.max(), after.max(), 1.2))

@@ -66,9 +66,9 @@ def _numbers(score: Score) -> str:
         ["Brier score, mean (0 … 2)", _number(score.brier_score)],
         ["held-out error after naming over the ceiling, median", _number(score.after_over_ceiling)],
         ["strength at which half of the effects are detected", _number(score.curve.half) if score.curve else "–"],
-        ["processor time per case, median and largest", _spread([one.processor_s for one in done], "s")],
-        ["wall time per case, median and largest", _spread([one.wall_s for one in done], "s")],
-        ["memory per case, largest", _spread([one.memory_mib for one in done], "MiB")],
+        ["processor time per case, median and largest", _spread([outcome.processor_s for outcome in done], "s")],
+        ["wall time per case, median and largest", _spread([outcome.wall_s for outcome in done], "s")],
+        ["memory per case, largest", _spread([outcome.memory_mib for outcome in done], "MiB")],
     ]
     return _table(["", ""], rows)
 
@@ -107,7 +107,7 @@ def _failures(score: Score) -> str:
     for mark in score.failures:
         outcome = score.outcomes[mark.case]
         strength = f"{mark.strength:.1f}" if mark.strength else "–"
-        said = mark.answered if outcome.status == "done" else outcome.status.replace("_", " ")
-        rows.append([mark.case, CLASS_WORDS[mark.kind], mark.truth, strength, said, mark.column])
+        answer = mark.answered if outcome.status == "done" else outcome.status.replace("_", " ")
+        rows.append([mark.case, CLASS_WORDS[mark.kind], mark.truth, strength, answer, mark.column])
     text = _table(["case", "class", "hidden", "strength", "answered", "which is"], rows) if rows else "None."
     return "## Every failure\n\n" + text

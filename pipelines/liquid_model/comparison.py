@@ -40,6 +40,7 @@ from sloshlab.sweep.windows import WindowSettings
 FloatArray = npt.NDArray[np.float64]
 WINDOWS: Final = WindowSettings(half_width_cycles=6, spacing_cycles=24)
 LONGEST_LAG_S: Final = 0.25
+"""Of the correlations of the residual, or as far as the delays of the model reach."""
 LARGEST_SHARE_OUTSIDE: Final = 0.02
 """Of a validation run; start and stop of a run are weaker than what lies between."""
 _MOTION: Final = ("experiment", "acceleration_g", "sweep_start_hz", "sweep_stop_hz", "sweep_duration_s")
@@ -86,16 +87,16 @@ def validated(
         If a recording is bad.
     """
     domain = ValidityDomain.of_facts(model.facts["domain"])
-    compared = [_compared("training", one, model, domain) for one in runs.training]
+    compared = [_compared("training", signals, model, domain) for signals in runs.training]
     advance("training")
-    read = {"validation": [], "test": []}  # type: dict[str, list[_Read]]
+    read: dict[str, list[_Read]] = {"validation": [], "test": []}
     for role, paths in (("validation", runs.files.validation), ("test", test)):
         for path in paths:
             recording = sloshing_run(path, runs.rig)
-            one = _Read(path, recording, signals_of(recording, runs.rig, runs.dry))
-            read[role].append(one)
-            at_rate = _compared(role, one.signals.at_rate(model.sampling_rate_hz), model, domain)
-            compared.append(_with_windows(at_rate, one, runs.rig, runs.dry))
+            read_run = _Read(path, recording, signals_of(recording, runs.rig, runs.dry))
+            read[role].append(read_run)
+            at_rate = _compared(role, read_run.signals.at_rate(model.sampling_rate_hz), model, domain)
+            compared.append(_with_windows(at_rate, read_run, runs.rig, runs.dry))
             advance(path.name)
     skipped: dict[str, str] = {}
     maps = _maps(compared, runs.rig, runs.files.rig.name, skipped)
@@ -136,6 +137,7 @@ def _with_windows(run: ComparedRun, read: _Read, rig: Rig, dry: DryMass | None) 
     positions = np.arange(signals.force_n.size) * ratio
     dynamic = resampled(run.free, positions, rate_ratio=1 / ratio)
     predicted = signals.inertia_kg * read.signals.acceleration_m_per_s2 - dynamic
+    # what is not predicted is not compared: both forces lose the same samples, and so the same cycles
     measured = np.where(np.isfinite(predicted), signals.force_n - np.nanmean(signals.force_n), np.nan)
     options = SweepOptions(WINDOWS, allow_incomplete=True)
     try:
@@ -198,12 +200,13 @@ def _map_error(measured: RigResult, predicted: RigResult, name: str) -> MapError
 def _ceiling(model: ReducedOrderModel, read: Sequence[_Read], skipped: dict[str, str]) -> tuple[CeilingPair, ...]:
     """Every ordered pair of runs of one stated motion."""
     pairs = []
-    for one in read:
-        for other in read:
-            if one is other or one.motion != other.motion or None in one.motion[:2]:
+    for first in read:
+        for second in read:
+            # in both orders: each run stands once for the measurement and once for its repeat
+            if first is second or first.motion != second.motion or None in first.motion[:2]:
                 continue
             try:
-                pairs.append(_pair(model, one.signals, other.signals))
+                pairs.append(_pair(model, first.signals, second.signals))
             except AnalysisError as error:
                 skipped["ceiling"] = str(error)
     if not pairs:
@@ -211,15 +214,15 @@ def _ceiling(model: ReducedOrderModel, read: Sequence[_Read], skipped: dict[str,
     return tuple(pairs)
 
 
-def _pair(model: ReducedOrderModel, one: LiquidSignals, other: LiquidSignals) -> CeilingPair:
-    repeats = matched_repeats(one, other, model.sampling_rate_hz)
-    said = model.simulate(one.at_rate(model.sampling_rate_hz).velocity_m_per_s)
+def _pair(model: ReducedOrderModel, signals: LiquidSignals, repeat: LiquidSignals) -> CeilingPair:
+    repeats = matched_repeats(signals, repeat, model.sampling_rate_hz)
+    predicted = model.simulate(signals.at_rate(model.sampling_rate_hz).velocity_m_per_s)
     return CeilingPair(
         repeats,
-        fit_quality(repeats.force_n, said),
+        fit_quality(repeats.force_n, predicted),
         repeats.rms_by_cycle(repeats.force_n),
         repeats.rms_by_cycle(repeats.other_force_n - repeats.force_n),
-        repeats.rms_by_cycle(said - repeats.force_n),
+        repeats.rms_by_cycle(predicted - repeats.force_n),
     )
 
 

@@ -16,6 +16,7 @@ from sloshlab.reduced_order_model.regressors import Delays
 from sloshlab.reduced_order_model.training import Epoch, TrainingSettings
 
 REST_S: Final = 1.0
+"""Of rest before a sudden start, so that delay lines and memory are filled from the first instant on."""
 
 
 def remembering(model: ReducedOrderModel, starts: Sequence[Path], runs: TrainingRuns) -> ReducedOrderModel:
@@ -37,7 +38,7 @@ def remembering(model: ReducedOrderModel, starts: Sequence[Path], runs: Training
     require_new_runs(starts, runs.files)
     signals = [signals_of(sloshing_run(path, runs.rig), runs.rig, runs.dry) for path in starts]
     rested = [from_rest(signal, runs.rate_hz, rest_s=REST_S) for signal in signals]
-    found = with_break_up(model, [one.run() for one in (*runs.training, *rested)])
+    found = with_break_up(model, [signals.run() for signals in (*runs.training, *rested)])
     found.facts["sudden_starts"] = [path.name for path in starts]
     return found
 
@@ -68,8 +69,8 @@ def trained_ensemble(
             model.network.kind,
             network,
             Delays(model.delays.inputs, model.delays.outputs),
-            [one.run() for one in runs.training],
-            [one.run() for one in runs.validation],
+            [signals.run() for signals in runs.training],
+            [signals.run() for signals in runs.validation],
             sampling_rate_hz=runs.rate_hz,
             settings=settings,
             n_members=n_members,

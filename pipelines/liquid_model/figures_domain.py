@@ -30,10 +30,20 @@ def domain(name: str, validated: ValidatedModel) -> ReportFigure:
     training, judged = validated.of_role("training"), validated.judged
     for axes, kind in zip(panels, ("u_bar", "g"), strict=True):
         for run in training:
-            _points(axes, validated, run.cycles, kind, _TRAINING_COLOUR, "cycle of the training", 2.0)
+            _points(
+                axes, validated, run.cycles, kind, colour=_TRAINING_COLOUR, label="cycle of the training", size=2.0
+            )
         _limits(axes, validated, kind)
         for run in judged:
-            _points(axes, validated, _outside(run), kind, REFERENCE_COLOUR, "cycle of another run, outside", 5.0)
+            _points(
+                axes,
+                validated,
+                _outside(run),
+                kind,
+                colour=REFERENCE_COLOUR,
+                label="cycle of another run, outside",
+                size=5.0,
+            )
         axes.set_xscale("log")
         plain_log_ticks(axes.xaxis)
         axes.set_xlabel("ū = u₀/h" if kind == "u_bar" else "acceleration [g]")
@@ -71,7 +81,14 @@ def _abscissa(validated: ValidatedModel, frequency_hz: FloatArray, speed: FloatA
 
 
 def _points(
-    axes: Axes, validated: ValidatedModel, cycles: MotionCycles, kind: str, colour: str, label: str, size: float
+    axes: Axes,
+    validated: ValidatedModel,
+    cycles: MotionCycles,
+    kind: str,
+    *,
+    colour: str,
+    label: str,
+    size: float,
 ) -> None:
     ordinate = 2 * math.pi * cycles.frequency_hz / validated.rig.frequency_scale_rad_per_s
     abscissa = _abscissa(validated, cycles.frequency_hz, cycles.speed_m_per_s, kind)

@@ -53,7 +53,7 @@ def compared_maps(name: str, validated: ValidatedModel, *, quantity: str, counte
         dots = "; dots: windows"
     error = maps.errors["beta" if signed else "w_bar"]
     over_u = not quantity.endswith("v_bar")
-    said = (
+    sentence = (
         f" The difference is {error.rms:.3f} RMS over the measured region, {100 * error.relative_rms:.1f} "
         "% of the "
         f"largest |{symbol}| measured ({error.largest:.2f}); its mean is {error.mean:+.3f}."
@@ -64,7 +64,7 @@ def compared_maps(name: str, validated: ValidatedModel, *, quantity: str, counte
     caption = (
         f"{meaning} over {'ū' if over_u else 'v̄'} and ω̄ from the measured force, from the force that the model "
         f"predicts for the same motion, and their difference; {maps.source}, the same cycles and the same "
-        f"interpolation for both. Dashed: lines of constant acceleration{dots}.{said}"
+        f"interpolation for both. Dashed: lines of constant acceleration{dots}.{sentence}"
     )
     return ReportFigure(name, caption, counterpart, png_bytes(figure))
 

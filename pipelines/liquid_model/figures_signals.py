@@ -21,10 +21,12 @@ MEASURED_COLOUR: Final = "#111111"
 LEVELS: Final = (("low", 0.15), ("medium", 0.5), ("large", 0.9))
 """Names and shares of the largest acceleration at which time histories are shown."""
 _LEVEL_TOLERANCE: Final = 0.12
+"""Relative distance from the wanted level within which a cycle may begin what is shown."""
 _CYCLES_SHOWN: Final = 12
 _CYCLES_ZOOMED: Final = 3
 _MOST_POINTS: Final = 3000
 _STRONGEST: Final = 0.98
+"""Quantile of the levels of a run that counts as its strongest."""
 
 
 def validation_run(validated: ValidatedModel) -> ComparedRun:
@@ -41,9 +43,9 @@ def whole_run(name: str, validated: ValidatedModel) -> ReportFigure:
     figure = new_figure(4.2)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     force = run.signals.dynamic_force_n
-    _envelope(panels[0], force, run, MEASURED_COLOUR, "measured")
-    _envelope(panels[0], run.free, run, REFERENCE_COLOUR, "predicted, free run", alpha=0.65)
-    _envelope(panels[1], run.residual, run, "#3b5b7a", "measured − predicted")
+    _envelope(panels[0], force, run, colour=MEASURED_COLOUR, label="measured")
+    _envelope(panels[0], run.free, run, colour=REFERENCE_COLOUR, label="predicted, free run", alpha=0.65)
+    _envelope(panels[1], run.residual, run, colour="#3b5b7a", label="measured − predicted")
     for axes in panels:
         axes.set_ylabel("Δf [N]")
     panels[1].set_xlabel("time [s]")
@@ -69,10 +71,10 @@ def time_histories(name: str, validated: ValidatedModel) -> ReportFigure:
     grid = figure.subplots(len(places), 2, squeeze=False, width_ratios=(3, 2))
     for row, (word, at) in zip(grid, places, strict=True):
         cycles = run.cycles
-        said = f"{word}: {cycles.acceleration_g[at]:.2g} g, {cycles.frequency_hz[at]:.1f} Hz"
+        title = f"{word}: {cycles.acceleration_g[at]:.2g} g, {cycles.frequency_hz[at]:.1f} Hz"
         for axes, n_cycles in zip(row, (_CYCLES_SHOWN, _CYCLES_ZOOMED), strict=True):
             _excerpt(axes, run, at, n_cycles)
-        row[0].set_title(said)
+        row[0].set_title(title)
         row[1].set_title("zoom")
         row[0].set_ylabel("Δf [N]")
     for axes in grid[-1]:
@@ -128,7 +130,7 @@ def _excerpt(axes: Axes, run: ComparedRun, at: int, n_cycles: int) -> None:
 
 
 def _envelope(
-    axes: Axes, values: FloatArray, run: ComparedRun, colour: str, label: str, alpha: float = 1.0
+    axes: Axes, values: FloatArray, run: ComparedRun, *, colour: str, label: str, alpha: float = 1.0
 ) -> None:
     """Range of the values in intervals that are too short to be seen."""
     step = max(1, -(-values.size // _MOST_POINTS))

@@ -110,10 +110,10 @@ def windows_compared(name: str, validated: ValidatedModel) -> ReportFigure:
     panels = figure.subplots(1, 2)
     acceleration = maps.measured.windows["acceleration_g"].values
     for axes, quantity, symbol in zip(panels, ("w_bar", "beta"), ("W̄", "β"), strict=True):
-        true, said = (side.windows[quantity].values for side in (maps.measured, maps.predicted))
-        limits = float(np.nanmin([true, said])), float(np.nanmax([true, said]))
+        measured, predicted = (side.windows[quantity].values for side in (maps.measured, maps.predicted))
+        limits = float(np.nanmin([measured, predicted])), float(np.nanmax([measured, predicted]))
         axes.plot(limits, limits, color="#777777", lw=0.9)
-        points = axes.scatter(true, said, c=acceleration, s=5, cmap="plasma", lw=0, rasterized=True)
+        points = axes.scatter(measured, predicted, c=acceleration, s=5, cmap="plasma", lw=0, rasterized=True)
         axes.set(xlabel=f"{symbol} measured", ylabel=f"{symbol} predicted")
     figure.colorbar(points, ax=list(panels), label="acceleration [g]", location="right", aspect=28)
     caption = (

@@ -14,7 +14,7 @@ from pipelines.liquid_model.comparison import validated
 from pipelines.liquid_model.results import Training, ValidatedModel
 from pipelines.liquid_model.sections import page_of
 from pipelines.liquid_model.training_runs import TrainingRuns
-from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
+from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.report.page import write_page
 from pipelines.report.progress import progress
 from sloshlab import atomic_file
@@ -22,6 +22,7 @@ from sloshlab.quantities import described
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 
 _N_FIGURES = 11
+"""Of the page, for the progress."""
 
 
 def write_validation(
@@ -34,7 +35,7 @@ def write_validation(
     training: Training | None = None,
     model_file: Path | None = None,
 ) -> dict[str, Any]:
-    """Compare a model with recordings and write the report; return what is to be said.
+    """Compare a model with recordings and write the report; return the summary of the command.
 
     Parameters
     ----------
@@ -123,24 +124,26 @@ def _residual(found: ValidatedModel) -> xr.Dataset:
 
 
 def _summary(found: ValidatedModel, folder: Path) -> dict[str, Any]:
-    said: dict[str, Any] = {"report": str(folder / "report.html")}
+    summary: dict[str, Any] = {"report": str(folder / "report.html")}
     lines = []
     if found.ceiling:
         pairs = found.ceiling
-        said["ceiling_percent"] = float(np.mean([pair.repeats.fit_of_ideal_model().fit_percent for pair in pairs]))
-        said["repeat_percent"] = float(np.mean([pair.repeats.fit().fit_percent for pair in pairs]))
-        said["model_on_repeats_percent"] = float(np.mean([pair.model.fit_percent for pair in pairs]))
+        summary["ceiling_percent"] = float(
+            np.mean([pair.repeats.fit_of_ideal_model().fit_percent for pair in pairs])
+        )
+        summary["repeat_percent"] = float(np.mean([pair.repeats.fit().fit_percent for pair in pairs]))
+        summary["model_on_repeats_percent"] = float(np.mean([pair.model.fit_percent for pair in pairs]))
         lines.append(
-            f"on repeats: fit {said['model_on_repeats_percent']:.1f} %, one repeat for another "
-            f"{said['repeat_percent']:.1f} %, ideal model {said['ceiling_percent']:.1f} %"
+            f"on repeats: fit {summary['model_on_repeats_percent']:.1f} %, one repeat for another "
+            f"{summary['repeat_percent']:.1f} %, ideal model {summary['ceiling_percent']:.1f} %"
         )
     if found.maps is not None:
         for name, error in found.maps.errors.items():
-            said[f"{name}_map_error"] = error.relative_rms
+            summary[f"{name}_map_error"] = error.relative_rms
         lines.append(
-            f"maps: RMS error of W̄ {100 * said['w_bar_map_error']:.1f} %, of β "
-            f"{100 * said['beta_map_error']:.1f} % of "
+            f"maps: RMS error of W̄ {100 * summary['w_bar_map_error']:.1f} %, of β "
+            f"{100 * summary['beta_map_error']:.1f} % of "
             "the largest value"
         )
     lines += [f"residual on {run}: {test.verdict}" for run, tests in found.tests.items() for test in tests[:2]]
-    return {"lines": [*lines, f"report: {folder / 'report.html'}"], "flags": list(found.flags), **said}
+    return {"lines": lines + report_lines(folder), "flags": list(found.flags), **summary}

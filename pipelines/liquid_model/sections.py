@@ -17,6 +17,7 @@ from pipelines.liquid_model import (
 )
 from pipelines.liquid_model.results import ValidatedModel
 from pipelines.report.citations import SCIPY, SOURCE, XARRAY, Citation
+from pipelines.report.figure import ReportFigure
 from pipelines.report.page import Page
 from pipelines.report.sections import FigurePlan, SectionPlan
 from pipelines.report.tables import provenance_table
@@ -71,8 +72,8 @@ def page_of(validated: ValidatedModel) -> Page:
 def planned_sections(validated: ValidatedModel) -> tuple[SectionPlan, ...]:
     """The sections; a part without data says why."""
 
-    def plans(**draw: partial) -> tuple[FigurePlan, ...]:  # type: ignore[type-arg]
-        return tuple(FigurePlan(name, partial(one, validated=validated)) for name, one in draw.items())
+    def plans(**figures: partial[ReportFigure]) -> tuple[FigurePlan, ...]:
+        return tuple(FigurePlan(name, partial(draw, validated=validated)) for name, draw in figures.items())
 
     maps = {
         "w_bar_map": ("w_bar", "Fig. 2.29"),

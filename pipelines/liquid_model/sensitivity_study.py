@@ -141,8 +141,8 @@ def sensitivity_study(
     cases: Sequence[StudyCase] = SOURCE_CASES,
     n_workers: int = 2,
     facts: Mapping[str, Any] | None = None,
-    told: Callable[[CaseResult, int, int], None] | None = None,
-    watch: Callable[[float], None] | None = None,
+    on_case: Callable[[CaseResult, int, int], None] | None = None,
+    on_progress: Callable[[float], None] | None = None,
 ) -> list[CaseResult]:
     """Train every case that has not been trained yet; return all results, the best by validation error first.
 
@@ -158,9 +158,9 @@ def sensitivity_study(
         Processes; each computes on one core.
     facts : mapping, optional
         Kept with every model.
-    told : callable, optional
+    on_case : callable, optional
         Takes a result, how many are done, and how many there are.
-    watch : callable, optional
+    on_progress : callable, optional
         Takes the share of the whole study that is done, by the time it takes.
 
     Raises
@@ -193,16 +193,16 @@ def sensitivity_study(
 
     def progressed(number: int, share: float) -> None:
         shares[missing[number].case] = share
-        if watch is not None:
+        if on_progress is not None:
             done = sum(case.cost * shares.get(case, 1.0) for case in cases)
-            watch(done / everything)
+            on_progress(done / everything)
 
     def finished(number: int, outcome: Outcome) -> None:
         case = missing[number].case
         results[case] = outcome.result if not outcome.error else _failed(case, outcome.error)
         progressed(number, 1.0)
-        if told is not None:
-            told(results[case], len(results), len(tasks))
+        if on_case is not None:
+            on_case(results[case], len(results), len(tasks))
 
     with _one_thread_each():
         work_through(train_case, missing, n_workers, progressed=progressed, finished=finished)
@@ -299,8 +299,10 @@ def picked(results: Sequence[CaseResult]) -> Pick:
     if not trained:
         raise AnalysisError("study", got="no case that could be trained", remedy="see the reasons in its table")
     best = trained[0]
-    near = [one for one in trained if one.validation_mse**0.5 <= NEARLY_THE_SAME * best.validation_mse**0.5]
-    lighter = min(near, key=lambda one: one.n_parameters)
+    near = [
+        result for result in trained if result.validation_mse**0.5 <= NEARLY_THE_SAME * best.validation_mse**0.5
+    ]
+    lighter = min(near, key=lambda result: result.n_parameters)
     error = best.validation_mse**0.5
     reason = f"{best.case.name} has the smallest error on the validation runs, {error:.4g} N RMS"
     if len(trained) > 1:

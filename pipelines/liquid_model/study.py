@@ -20,7 +20,7 @@ from pipelines.liquid_model.sensitivity_study import (
 )
 from pipelines.liquid_model.study_page import StudiedModels, page_of
 from pipelines.liquid_model.training_runs import RunFiles, training_runs
-from pipelines.report.outputs import provenance_of, write_dataset
+from pipelines.report.outputs import provenance_of, report_lines, write_dataset
 from pipelines.report.page import write_page
 from pipelines.report.progress import amounts
 from sloshlab import atomic_file
@@ -52,7 +52,7 @@ class StudySettings:
 def study(
     files: RunFiles, folder: Path, wanted: StudySettings, settings: TrainingSettings, *, command: str
 ) -> dict[str, Any]:
-    """Train all cases, pick one, and write table, figure and the picked model; return what is to be said.
+    """Train all cases, pick one, and write table, figure and the picked model; return the summary of the command.
 
     Parameters
     ----------
@@ -75,21 +75,21 @@ def study(
     with amounts("study") as advance:
         last = ""
 
-        def told(result: CaseResult, done: int, n: int) -> None:
+        def on_case(result: CaseResult, done: int, n: int) -> None:
             nonlocal last
             last = f"{done} of {n} cases, {result.case.name}: {math.sqrt(result.validation_mse):.4g} N"
 
         results = sensitivity_study(
-            [one.run() for one in runs.training],
-            [one.run() for one in runs.validation],
+            [signals.run() for signals in runs.training],
+            [signals.run() for signals in runs.validation],
             runs.rate_hz,
             folder,
             settings,
             cases=CASES[wanted.cases],
             n_workers=wanted.n_workers,
             facts=runs.facts(),
-            told=told,
-            watch=lambda share: advance(share, 1.0, last),
+            on_case=on_case,
+            on_progress=lambda share: advance(share, 1.0, last),
         )
     pick = picked(results)
     best = folder / pick.best.case.name / MODEL_NAME
@@ -102,7 +102,7 @@ def study(
         atomic_file.write_bytes(complete / BEST_NAME, best.read_bytes())
         write_page(page_of(found), complete)
     return {
-        "lines": [f"picked: {pick.reason}", f"model: {folder / BEST_NAME}", f"report: {folder / 'report.html'}"],
+        "lines": [f"picked: {pick.reason}", f"model: {folder / BEST_NAME}", *report_lines(folder)],
         "flags": list(flags),
         "output": str(folder),
         "picked": pick.best.case.name,

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 
 _LARGEST_SHOWN: Final = 1.15
+"""Over the smallest error; what is larger lies beyond the axis."""
 
 
 @dataclass(frozen=True)
@@ -110,11 +111,13 @@ def sensitivity(name: str, found: StudiedModels) -> ReportFigure:
 def _families(found: StudiedModels) -> dict[str, list[CaseResult]]:
     """Cases that differ in neurons only, those with many first."""
     families: dict[str, list[CaseResult]] = {}
-    for one in sorted(found.trained, key=lambda one: (one.case.structure, one.case.delays, one.case.neurons)):
-        case = one.case
+    for result in sorted(
+        found.trained, key=lambda result: (result.case.structure, result.case.delays, result.case.neurons)
+    ):
+        case = result.case
         kind = "" if case.network == "normalised_rbf" else f" {case.network}"
         delays = f"{case.delays}+{case.output_delays}" if case.output_delays else f"{case.delays}"
-        families.setdefault(f"{case.structure.upper()}{kind}, {delays} delays", []).append(one)
+        families.setdefault(f"{case.structure.upper()}{kind}, {delays} delays", []).append(result)
     return families
 
 
@@ -138,8 +141,8 @@ def _as_in_the_source(axes: Axes, found: StudiedModels) -> None:
     looks = _looks(found)
     for name, own in _families(found).items():
         colour, marker = looks[name]
-        neurons = [one.case.neurons for one in own]
-        axes.plot(neurons, [one.mean_mse for one in own], color=colour, marker=marker, label=name)
+        neurons = [result.case.neurons for result in own]
+        axes.plot(neurons, [result.mean_mse for result in own], color=colour, marker=marker, label=name)
     axes.set(xlabel="neurons", ylabel="mean square error [N²]")
 
 
@@ -147,8 +150,8 @@ def _over_parameters(axes: Axes, found: StudiedModels) -> None:
     looks = _looks(found)
     for name, own in _families(found).items():
         colour, marker = looks[name]
-        parameters = [one.n_parameters for one in own]
-        errors = [one.validation_mse**0.5 for one in own]
+        parameters = [result.n_parameters for result in own]
+        errors = [result.validation_mse**0.5 for result in own]
         axes.plot(parameters, errors, color=colour, marker=marker)
     best = found.pick.best
     ring: dict[str, Any] = {"mfc": "none", "mec": REFERENCE_COLOUR, "ms": 11, "mew": 1.6, "zorder": 5}
@@ -156,7 +159,7 @@ def _over_parameters(axes: Axes, found: StudiedModels) -> None:
     low_n, high_n = axes.get_ylim()
     axes.set_ylim(low_n, min(high_n, _LARGEST_SHOWN * best.validation_mse**0.5))
     axes.set(xlabel="parameters", ylabel="RMS error, validation [N]", xscale="log")
-    sizes = np.array([one.n_parameters for one in found.trained])
+    sizes = np.array([result.n_parameters for result in found.trained])
     low, high = sizes.min() / 2, 2 * sizes.max()
     ticks = [tick for tick in (10, 30, 100, 300, 1000, 3000, 10000) if low < tick < high]
     axes.set_xticks(ticks, [str(tick) for tick in ticks])

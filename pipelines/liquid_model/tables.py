@@ -92,10 +92,10 @@ def _within(runs: tuple[ComparedRun, ...], low_g: float, high_g: float) -> tuple
             inside = (level >= low_g) & (level < high_g)
             forces.append(run.signals.dynamic_force_n[inside])
             simulated.append(run.free[inside])
-    force, said = (np.concatenate(parts) if parts else np.zeros(0) for parts in (forces, simulated))
-    if np.isfinite(force + said).sum() < _FEWEST_SAMPLES:
+    force, predicted = (np.concatenate(parts) if parts else np.zeros(0) for parts in (forces, simulated))
+    if np.isfinite(force + predicted).sum() < _FEWEST_SAMPLES:
         return None
-    return float(np.nanstd(force)), fit_quality(force, said)
+    return float(np.nanstd(force)), fit_quality(force, predicted)
 
 
 def ceiling_table(validated: ValidatedModel) -> Table:

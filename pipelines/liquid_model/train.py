@@ -155,8 +155,8 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
             wanted.network,
             wanted.network_settings(),
             wanted.delay_lines(),
-            [one.run() for one in runs.training],
-            [one.run() for one in runs.validation],
+            [signals.run() for signals in runs.training],
+            [signals.run() for signals in runs.validation],
             sampling_rate_hz=runs.rate_hz,
             settings=settings,
             agitation=wanted.agitation(),
@@ -171,7 +171,7 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
 
 
 def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
-    """Write the model; return what is to be said.
+    """Write the model; return the summary of the command.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
     """
     save_model(trained.model, output)
     best, quality = trained.record.best, trained.quality
-    forgetting = stability(trained.model, [one.velocity_m_per_s for one in trained.runs.training])
+    forgetting = stability(trained.model, [signals.velocity_m_per_s for signals in trained.runs.training])
     lines = [
         f"model: {output}",
         f"rate: {trained.runs.rate.reason}",
@@ -212,6 +212,7 @@ def train_and_report(
     wanted: ModelSettings,
     settings: TrainingSettings,
     output: Path,
+    *,
     command: str | None,
 ) -> dict[str, Any]:
     """Train, write the model, and write the report into a folder of its name beside it.
@@ -234,6 +235,7 @@ def train_and_report(
         If a recording, the rig or their combination is bad, or there is no place for the report.
     """
     folder = report_folder(output)
+    # what can be refused is refused before hours of training
     require_new_runs(test, files)
     if command is not None and folder.exists() and not folder.is_dir():
         raise InputError(
@@ -252,9 +254,12 @@ def train_and_report(
     from pipelines.liquid_model.results import Training
 
     training = Training(trained.record, settings, trained.runs.rate.reason)
-    said = write_validation(trained.model, trained.runs, test, folder, command=command, training=training)
-    lines, flags = summary["lines"] + said.pop("lines"), dict.fromkeys([*summary["flags"], *said.pop("flags")])
-    return summary | said | {"lines": lines, "flags": list(flags)}
+    of_report = write_validation(trained.model, trained.runs, test, folder, command=command, training=training)
+    lines, flags = (
+        summary["lines"] + of_report.pop("lines"),
+        dict.fromkeys([*summary["flags"], *of_report.pop("flags")]),
+    )
+    return summary | of_report | {"lines": lines, "flags": list(flags)}
 
 
 def _extension_lines(trained: TrainedModel, output: Path) -> list[str]:

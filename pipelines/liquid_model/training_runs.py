@@ -94,7 +94,9 @@ class TrainingRuns:
     @cached_property
     def domain(self) -> ValidityDomain:
         """Where a model of these runs knows what it says."""
-        return ValidityDomain.of([motion_cycles(one.velocity_m_per_s, self.rate_hz) for one in self.training])
+        return ValidityDomain.of(
+            [motion_cycles(signals.velocity_m_per_s, self.rate_hz) for signals in self.training]
+        )
 
     @property
     def flags(self) -> tuple[str, ...]:
@@ -142,8 +144,8 @@ def training_runs(files: RunFiles, rate_hz: float | None = None) -> TrainingRuns
         dry,
         rate,
         wanted,
-        [one.at_rate(wanted) for one in training],
-        [one.at_rate(wanted) for one in validation],
+        [signals.at_rate(wanted) for signals in training],
+        [signals.at_rate(wanted) for signals in validation],
     )
 
 

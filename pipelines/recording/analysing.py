@@ -49,8 +49,11 @@ def analyse_runs(paths: Sequence[Path], rigs: Sequence[Path], output: Path, comm
 
 def _pipelines() -> str:
     references = dict.fromkeys(experiment.pipeline for experiment in EXPERIMENTS if experiment.pipeline)
-    groups = [experiment_names(lambda known, its=reference: known.pipeline == its) for reference in references]
-    return "; or ".join(", ".join(names) for names in groups)
+    return "; or ".join(", ".join(_names_of(reference)) for reference in references)
+
+
+def _names_of(pipeline: str) -> Sequence[str]:
+    return experiment_names(lambda experiment: experiment.pipeline == pipeline)
 
 
 def _require_channels(path: Path, experiment: Experiment) -> None:

@@ -25,5 +25,5 @@ def import_run(sources: Sequence[Path], channel_map: Path, output: Path, rig: Pa
 def describe_sources(sources: Sequence[Path]) -> dict[str, Any]:
     """List columns, units, rates and traps of files, no map needed."""
     described = [describe_source(source) for source in sources]
-    lines = [line for one in described for line in one.lines()]
-    return {"lines": lines, "flags": [], "sources": [one.to_dict() for one in described]}
+    lines = [line for source in described for line in source.lines()]
+    return {"lines": lines, "flags": [], "sources": [source.to_dict() for source in described]}

@@ -39,6 +39,7 @@ from sloshlab.rig import Rig
 LONGEST_DURATION_S: Final = 30 * 86_400.0
 _MOST_SOURCES: Final = 64
 _SAMPLES_READ_BACK: Final = 1 << 20
+"""At a time, of one channel, which bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ def record(
     with opened([open_source(url) for url in settings.sources]) as sources:
         infos = [source.info for source in sources]
         require_rate(metadata["attributes"], infos[0].sampling_rate_hz)
+        # whatever the assembly would refuse: found after the recording, no command could make one of its journal
         require_recordable(infos, metadata["attributes"], f"recording {settings.output}")
         require_alignable(infos, settings.align, metadata["redundant"])
         longest_s = longest_duration_s(infos, settings.align)

@@ -28,7 +28,9 @@ from sloshlab import atomic_file
 from sloshlab.errors import InputError
 
 _STEP_S = 0.1
+"""Between two looks at the devices."""
 _PATIENCE_S = 5.0
+"""Before a host that has not come is missed; a device that nobody has started yet is no news."""
 _SLOWEST, _FASTEST = 1e-3, 1e4
 
 
@@ -208,13 +210,15 @@ class _Reminder:
         awaited = [player.awaited for player in players]
         if awaited != self._seen:
             self._seen, self._since_s, self._has_told = awaited, time.monotonic(), False
-        has_begun = any(one.n_missing < one.n_hosts for one in awaited)
+        has_begun = any(waited_for.n_missing < waited_for.n_hosts for waited_for in awaited)
         if self._has_told or not has_begun or time.monotonic() - self._since_s < _PATIENCE_S:
             return
         self._has_told = True
-        for device, one in zip(self._devices, awaited, strict=True):
-            if one.n_missing > 0:
-                self._say(f"waiting: {device} for {one.n_missing} of {one.n_hosts} hosts; Ctrl-C ends")
+        for device, waited_for in zip(self._devices, awaited, strict=True):
+            if waited_for.n_missing > 0:
+                self._say(
+                    f"waiting: {device} for {waited_for.n_missing} of {waited_for.n_hosts} hosts; Ctrl-C ends"
+                )
 
 
 def _run(players: Sequence[Player], reminder: _Reminder) -> None:

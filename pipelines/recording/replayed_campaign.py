@@ -164,10 +164,10 @@ def differences(run: Path, recording: Path) -> list[str]:
 
 def window_differences(expected: xr.Dataset, found: xr.Dataset) -> list[str]:
     """How two `windows.nc` differ, bit by bit; only the hashes of the input files may."""
-    texts = [f"{name} is only in one of them" for name in sorted({*expected.variables} ^ {*found.variables})]
-    for name in sorted({*expected.variables} & {*found.variables}):
-        one, other = expected[name], found[name]
-        if one.dtype != other.dtype or _bits(one) != _bits(other) or one.attrs != other.attrs:
+    texts = [f"{name} is only in one of them" for name in sorted(_names(expected) ^ _names(found))]
+    for name in sorted(_names(expected) & _names(found)):
+        wanted, got = expected[name], found[name]
+        if wanted.dtype != got.dtype or _bits(wanted) != _bits(got) or wanted.attrs != got.attrs:
             texts.append(f"{name} differs")
     keys = {*expected.attrs, *found.attrs} - {"inputs"}
     return texts + [
@@ -177,13 +177,17 @@ def window_differences(expected: xr.Dataset, found: xr.Dataset) -> list[str]:
     ]
 
 
+def _names(dataset: xr.Dataset) -> set[str]:
+    return {str(name) for name in dataset.variables}
+
+
 def _bits(variable: xr.DataArray) -> object:
     values = variable.values
     return values.tolist() if values.dtype.kind == "O" else values.tobytes()
 
 
-def _equal(one: Any, other: Any) -> bool:
-    return bool(np.array_equal(one, other))
+def _equal(found: Any, expected: Any) -> bool:
+    return bool(np.array_equal(found, expected))
 
 
 @contextlib.contextmanager
@@ -282,5 +286,6 @@ def _analysed(recordings: Path, rigs: Path, output: Path) -> xr.Dataset:
     settings = ShakerSettings(WindowSettings())
     experiment = analyse_shaker(*recordings_and_rigs(recordings, rigs), settings)
     write_experiment(experiment, output, command=f"sloshlab shaker {recordings.name}", report=False)
+    # the netCDF library is not made for threads; an interrupt within xarray would leave its lock taken for ever
     with NETCDF_LOCK, interrupt.held():
         return xr.load_dataset(output / "windows.nc", engine="netcdf4", decode_times=False)

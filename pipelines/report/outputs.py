@@ -29,6 +29,7 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
             encoding[str(name)] = {"dtype": "S1", "char_dim_name": f"{name}_length"}
         elif variable.size >= _SMALLEST_COMPRESSED_SIZE and variable.dtype.kind == "f":
             encoding[str(name)] = {"zlib": True, "complevel": 4, "shuffle": True, "_FillValue": np.nan}
+    # the netCDF library is not made for threads; an interrupt within xarray would leave its lock taken for ever
     with atomic_file.replaced(path) as temporary, NETCDF_LOCK, interrupt.held():
         stored.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
 
@@ -79,3 +80,8 @@ def stamp_of(provenance: Mapping[str, Any]) -> dict[str, str]:
     Files of the same inputs then have the same bytes, wherever they are written.
     """
     return {name: json.dumps(provenance.get(name, {}), sort_keys=True) for name in ("inputs", "versions")}
+
+
+def report_lines(folder: Path, *, written: bool = True) -> list[str]:
+    """Where the report is, for the summary of a command; nothing if none was asked for."""
+    return [f"report: {folder / 'report.html'}"] if written else []

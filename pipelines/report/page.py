@@ -64,6 +64,7 @@ class Section:
 def write_page(page: Page, folder: Path, *, progress: Progress | None = None) -> Path:
     """Write `figures/*.png` and `report.html`; nothing is written before every figure is drawn."""
     sections = drawn_sections(page.plans, progress)
+    # a file name need not be Unicode; it must not stop the report
     html = page_html(page, sections).encode("utf-8", errors="replace")
     for figure in _figures(sections):
         atomic_file.write_bytes(folder / "figures" / f"{figure.name}.png", figure.png)
@@ -95,6 +96,7 @@ def page_html(page: Page, sections: Sequence[Section]) -> str:
     from jinja2 import Environment, StrictUndefined
 
     files = resources.files("pipelines.report")
+    # names of runs and rigs come from files: they are text, never markup
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(files.joinpath("page.html.j2").read_text(encoding="utf-8"))
     return template.render(

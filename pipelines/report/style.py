@@ -139,9 +139,11 @@ def plain(text: object, longest: int = 40) -> str:
     ('run 7', ' _hidden', 'xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx…')
     """
     line = " ".join(str(text).split())
+    # a missing glyph would be a warning and an empty box
     shown = "".join(letter if ord(letter) in _glyphs() else "?" for letter in line[:longest])
     if len(line) > longest:
         shown = shown[: longest - 1] + "…"
+    # matplotlib leaves labels with a leading underscore out of legends
     return f" {shown}" if shown.startswith("_") else shown
 
 

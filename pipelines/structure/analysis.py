@@ -25,9 +25,12 @@ from sloshlab.rig import Rig
 
 _TITLES: Final = {"beam": "Sloshing beam", "sdof": "Tank on a guide"}
 _SEGMENTS_PER_RUN: Final = 6
+"""Segments that would lie in the shortest random run without overlap, so that spectra have eleven averages."""
 _SMALLEST_SEGMENT_S: Final = 1.0
 _LARGEST_MASS_DEVIATION: Final = 0.05
+"""Of the mass beyond the force sensor from the rig, before signs, gains and dry mass are doubted."""
 _SMALLEST_WIDTH_IN_LINES: Final = 0.5
+"""Half-power width of the first mode, in lines of the spectrum, below which its damping is flagged."""
 
 
 def checked_settings(*, modes: int | None, n_cycles: int, segment_s: float | None) -> BeamSettings:
@@ -135,7 +138,7 @@ def _carried_mass(runs: Sequence[Loaded]) -> ApparentMass | None:
         if group_of(run.attributes) == "frozen" and channels(run.recording, "force")
     ]
     return min(
-        frozen, key=lambda one: one.mass_std_kg if math.isfinite(one.mass_std_kg) else math.inf, default=None
+        frozen, key=lambda mass: mass.mass_std_kg if math.isfinite(mass.mass_std_kg) else math.inf, default=None
     )
 
 
@@ -177,7 +180,10 @@ def _updated(rig: Rig, frozen: dict[int, FrozenMode]) -> tuple[UpdatedBeam | Non
         return None, f"{n_modes} frequencies of the frozen liquid were measured; tip mass and stiffness need two"
     measured = np.array([frozen[mode].frequency_hz for mode in range(n_modes)])
     if not (np.diff(measured) > 0).all():
-        return None, f"the measured frequencies {', '.join(f'{one:.4g}' for one in measured)} Hz do not rise"
+        return (
+            None,
+            f"the measured frequencies {', '.join(f'{value:.4g}' for value in measured)} Hz do not rise",
+        )
     return update_beam(uniform_beam(rig), measured), ""
 
 

@@ -46,7 +46,7 @@ def over_amplitude(name: str, experiment: BeamExperiment, quantity: Quantity) ->
     grid = figure.subplots(1, len(runs), sharey=quantity == "frequency", squeeze=False)[0]
     for number, (axes, run) in enumerate(zip(grid, runs, strict=True)):
         _draw_readings(axes, run, quantity)
-        panel_letter(axes, number, f"{run.group}, {run.level_text}")
+        panel_letter(axes, number, run.label)
         axes.set_xlabel("amplitude of acceleration a [g]")
     grid[0].set_ylabel(_LABELS[quantity])
     legend_above(figure, list(grid))
@@ -183,8 +183,8 @@ def higher_modes(name: str, experiment: BeamExperiment) -> ReportFigure:
     grid = figure.subplots(1, len(modes), squeeze=False)[0]
     for number, (axes, mode) in enumerate(zip(grid, modes, strict=True)):
         shown = []
-        for one, run, decay in found:
-            if one != mode or decay is None:
+        for of_mode, run, decay in found:
+            if of_mode != mode or decay is None:
                 continue
             reading = decay.local_sine_fit
             values, half = values_of(reading, "damping")

@@ -176,7 +176,7 @@ def random_signals(name: str, experiment: BeamExperiment) -> ReportFigure:
         draw_line(axes, run.time_s, in_g(run.tank_acceleration), NEUTRAL_COLOUR, "tank")
         if run.root_acceleration is not None:
             draw_line(axes, run.time_s, in_g(run.root_acceleration), "#e69f00", "root")
-        panel_letter(axes, number, f"{run.group}, {run.level_text}")
+        panel_letter(axes, number, run.label)
         axes.set_xlim(run.time_s[0], run.time_s[-1])
     grid[-1].set_xlabel("time [s]")
     figure.supylabel("acceleration [g]", fontsize=9)
@@ -187,7 +187,7 @@ def random_signals(name: str, experiment: BeamExperiment) -> ReportFigure:
 
 def arrange_time(axes: Axes, number: int, run: BeamRun) -> None:
     """Title and abscissa of a time history."""
-    panel_letter(axes, number, f"{run.group}, {run.level_text}")
+    panel_letter(axes, number, run.label)
     axes.set_xlabel("time [s]")
     axes.set_xlim(run.time_s[0], run.time_s[0] + _shown_s(run))
 

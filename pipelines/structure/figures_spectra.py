@@ -27,6 +27,7 @@ TABLE_2_5: Final = {
 }
 """ζ₁ [%] over the RMS [g] of the root in the source; its frozen column is simulated."""
 _SHOWN_RANGE: Final = (0.4, 2.2)
+"""Of the densities, over the believed frequency of the first mode."""
 
 
 def random_of(experiment: BeamExperiment) -> list[tuple[BeamRun, RandomResponse]]:
@@ -45,7 +46,7 @@ def excitation(name: str, experiment: BeamExperiment) -> ReportFigure:
     axes = figure.subplots()
     for colour, (run, random) in zip(ordered_colours(len(runs)), runs, strict=True):
         density = random.spectra.input_psd / GRAVITY_M_PER_S2**2
-        axes.semilogy(random.spectra.frequency_hz, density, color=colour, lw=1.0, label=_label(run))
+        axes.semilogy(random.spectra.frequency_hz, density, color=colour, lw=1.0, label=run.label)
     axes.set_xlim(0, 6 * experiment.modes.frequency_hz[0])
     _floor(axes, [random.spectra.input_psd / GRAVITY_M_PER_S2**2 for _, random in runs])
     axes.set_xlabel("frequency [Hz]")
@@ -58,14 +59,14 @@ def excitation(name: str, experiment: BeamExperiment) -> ReportFigure:
 def densities(name: str, experiment: BeamExperiment) -> ReportFigure:
     """Density of the tank's acceleration at each level, with the mode fitted to it (Fig. 2.41)."""
     runs = random_of(experiment)
-    levels = sorted({_level(run) for run, _ in runs})
+    levels = sorted({run.level_text for run, _ in runs})
     figure = new_figure(0.6 + 1.9 * len(levels))
     grid = figure.subplots(len(levels), 1, sharex=True, squeeze=False)[:, 0]
     low, high = (share * experiment.modes.frequency_hz[0] for share in _SHOWN_RANGE)
     for number, (axes, level) in enumerate(zip(grid, levels, strict=True)):
         shown = []
         for run, random in runs:
-            if _level(run) != level:
+            if run.level_text != level:
                 continue
             lines = (random.spectra.frequency_hz >= low) & (random.spectra.frequency_hz <= high)
             density = random.spectra.output_psd[0, lines] / GRAVITY_M_PER_S2**2
@@ -97,15 +98,19 @@ def densities(name: str, experiment: BeamExperiment) -> ReportFigure:
 def frequency_responses(name: str, experiment: BeamExperiment) -> ReportFigure:
     """|H₁| of the first modal acceleration over the root with its fit, and the coherence, per level."""
     name_of_first = experiment.modes.names[0]
-    runs = [one for one in random_of(experiment) if one[1].spectra.output_psd[_row(one[1], name_of_first)].any()]
+    runs = [
+        (run, random)
+        for run, random in random_of(experiment)
+        if random.spectra.output_psd[_row(random, name_of_first)].any()
+    ]
     if not runs:
         raise NothingToDrawError("the first mode does not move")
-    levels = sorted({_level(run) for run, _ in runs})
+    levels = sorted({run.level_text for run, _ in runs})
     figure = new_figure(4.6)
     grid = figure.subplots(2, len(levels), sharex=True, sharey="row", squeeze=False, height_ratios=[2, 1])
     for number, level in enumerate(levels):
         for run, random in runs:
-            if _level(run) == level:
+            if run.level_text == level:
                 _draw_response(grid[:, number], experiment, run, random)
         panel_letter(grid[0, number], number, f"{level} of the root")
         grid[1, number].set_xlabel("frequency [Hz]")
@@ -169,7 +174,7 @@ def damping_over_rms(name: str, experiment: BeamExperiment) -> ReportFigure:
             seen[how] = (NEUTRAL_COLOUR, marker)
     if not seen:
         raise NothingToDrawError("no fit of the first mode")
-    for label, (colour, marker) in sorted(seen.items(), key=lambda one: one[1][1] != "D"):
+    for label, (colour, marker) in sorted(seen.items(), key=lambda entry: entry[1][1] != "D"):
         axes.plot([], [], color=colour, marker=marker, ms=5, ls="none", label=label)
     for which, marker in (("experiment", "*"), ("frozen", "x")):
         rms, damping = np.array(TABLE_2_5[which]).T
@@ -192,14 +197,6 @@ def _row(random: RandomResponse, output: str) -> int:
     return random.spectra.output_names.index(output)
 
 
-def _level(run: BeamRun) -> str:
-    return run.level_text
-
-
-def _label(run: BeamRun) -> str:
-    return f"{run.group}, {run.level_text}"
-
-
 def _welch(random: RandomResponse) -> str:
     spectra = random.spectra.normalisation
     return (
@@ -211,7 +208,10 @@ def _welch(random: RandomResponse) -> str:
 
 def _floor(axes: Axes, densities_shown: Sequence[FloatArray]) -> None:
     """Six decades below the largest value at most."""
-    largest = max((float(np.nanmax(one)) for one in densities_shown if one.size), default=1.0)
-    smallest = min((float(np.nanmin(one[one > 0])) for one in densities_shown if (one > 0).any()), default=largest)
+    largest = max((float(np.nanmax(density)) for density in densities_shown if density.size), default=1.0)
+    smallest = min(
+        (float(np.nanmin(density[density > 0])) for density in densities_shown if (density > 0).any()),
+        default=largest,
+    )
     plain_log_ticks(axes.yaxis)
     axes.set_ylim(max(0.5 * smallest, 1e-6 * largest), 3 * largest)

@@ -21,6 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _SHOWN_S: Final = 4.0
 _AROUND_S: Final = 10.0
+"""Seconds after the start in which no part is chosen to be shown."""
 
 
 def pairs_of(experiment: BeamExperiment, runs: Sequence[BeamRun]) -> list[tuple[BeamRun, list[BeamRun]]]:
@@ -69,7 +70,7 @@ def random_against_twins(name: str, experiment: BeamExperiment) -> ReportFigure:
     figure = new_figure(0.9 + 1.5 * len(pairs))
     grid = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for number, (axes, (measured, simulated)) in enumerate(zip(grid, pairs, strict=True)):
-        start = _loudest_part_s(measured)
+        start = _part_with_largest_response_s(measured)
         for run in (measured, *simulated):
             _draw_part(axes, experiment, run, start, run is measured)
         panel_letter(axes, number, f"{measured.group}, {measured.level_text}")
@@ -98,7 +99,7 @@ def _error(measured: FloatArray, simulated: FloatArray) -> float:
     return float(np.sqrt(np.nanmean((measured - simulated) ** 2) / np.nanmean(measured**2)))
 
 
-def _loudest_part_s(run: BeamRun) -> float:
+def _part_with_largest_response_s(run: BeamRun) -> float:
     """Where the part begins that is shown: half of it lies before the largest response."""
     later = run.time_s - run.time_s[0] >= min(_AROUND_S, 0.3 * float(run.time_s[-1] - run.time_s[0]))
     at = float(run.time_s[np.nanargmax(np.where(later, np.abs(run.tank_acceleration), -1.0))])

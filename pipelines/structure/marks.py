@@ -9,6 +9,7 @@ from pipelines.report.axes import power_of_ten
 from pipelines.report.style import DISTINCT_COLOURS, legend_columns
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -58,7 +59,7 @@ def amplitude_axis(axes: Axes, shown: tuple[float, float] | None = None) -> None
 
 def legend_above(figure: Figure, axes: Axes | Sequence[Axes], *, columns: int = 4) -> None:
     """One legend for all panels, each label once."""
-    entries: dict[str, object] = {}
+    entries: dict[str, Artist] = {}
     for axis in axes if isinstance(axes, Sequence) else [axes]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
-from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
+from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.structure.analysis import analyse_beam
 from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, ModeDecay
 from sloshlab import atomic_file
@@ -64,14 +64,14 @@ def modal_dataset(experiment: BeamExperiment) -> xr.Dataset:
 def _readings(runs: Sequence[BeamRun], index: int, point: str) -> dict[str, Any]:
     """Variables of one method over its points, all runs and modes behind each other."""
     found: list[tuple[int, ModeDecay, InstantaneousDamping]] = [
-        (number, one, one.decay.readings[index])
+        (number, read, read.decay.readings[index])
         for number, run in enumerate(runs)
-        for one in run.decays
-        if one.decay is not None
+        for read in run.decays
+        if read.decay is not None
     ]
     sets = [reading.to_dataset() for _, _, reading in found]
     joined = {
-        f"{_prefix(point)}{name}": (point, _joined([one[source].values for one in sets]))
+        f"{_prefix(point)}{name}": (point, _joined([dataset[source].values for dataset in sets]))
         for name, (source, _) in _VALUES.items()
     }
     start_s = [float(runs[number].time_s[0]) for number, _, _ in found]
@@ -80,7 +80,7 @@ def _readings(runs: Sequence[BeamRun], index: int, point: str) -> dict[str, Any]
         **joined,
         f"{point}_time_s": (point, _joined(times)),
         f"{point}_run": (point, _repeated([(number, reading) for number, _, reading in found])),
-        f"{point}_mode": (point, _repeated([(one.mode + 1, reading) for _, one, reading in found])),
+        f"{point}_mode": (point, _repeated([(read.mode + 1, reading) for _, read, reading in found])),
         f"{point}_trust": (point, _joined([reading.trust.astype(object) for _, _, reading in found], object)),
     }
 
@@ -91,7 +91,10 @@ def _joined(parts: list[Any], kind: type = float) -> Any:
 
 def _repeated(parts: list[tuple[int, InstantaneousDamping]]) -> Any:
     return np.concatenate(
-        [np.array([], dtype=np.int32), *(np.full(one.time_s.size, number, np.int32) for number, one in parts)]
+        [
+            np.array([], dtype=np.int32),
+            *(np.full(reading.time_s.size, number, np.int32) for number, reading in parts),
+        ]
     )
 
 
@@ -177,7 +180,7 @@ def spectra_dataset(experiment: BeamExperiment) -> xr.Dataset:
     for run in experiment.random_runs:
         random = run.random
         assert random is not None
-        fits = [one.fit for one in random.fits]
+        fits = [mode_fit.fit for mode_fit in random.fits]
         density = random.density_fit
         modal = xr.Dataset(
             {
@@ -253,7 +256,7 @@ def _summary(experiment: BeamExperiment, folder: Path, report: bool) -> dict[str
         if run.first_decay is not None and run.first_decay.local_sine_fit.used.any()
     }
     return {
-        "lines": lines + ([f"report: {folder / 'report.html'}"] if report else []),
+        "lines": lines + report_lines(folder, written=report),
         "flags": list(experiment.flags),
         "runs": len(experiment.runs),
         "decays": n_free,

@@ -23,6 +23,7 @@ TANK: Final = "tank"
 FIT_RANGE: Final = (0.65, 1.5)
 """Lines that the first mode is fitted to, over its believed frequency."""
 _HIGHER_FIT_RANGE: Final = (0.85, 1.18)
+"""The same of every other mode."""
 
 
 def random_response(
@@ -65,8 +66,8 @@ def random_response(
     density_fit, reason = _first_mode_alone(spectra, modes.frequency_hz[0])
     return RandomResponse(
         spectra=spectra,
-        root_rms_g=_rms(root) / GRAVITY_M_PER_S2,
-        tank_rms_g=_rms(tank) / GRAVITY_M_PER_S2,
+        root_rms_g=rms(root) / GRAVITY_M_PER_S2,
+        tank_rms_g=rms(tank) / GRAVITY_M_PER_S2,
         tank_peak_g=float(np.nanmax(np.abs(tank))) / GRAVITY_M_PER_S2,
         fits=tuple(_fitted(spectra, modes, mode) for mode in range(len(modes.names))),
         density_fit=density_fit,
@@ -74,7 +75,8 @@ def random_response(
     )
 
 
-def _rms(values: FloatArray) -> float:
+def rms(values: FloatArray) -> float:
+    """Root of the mean square of what is not lost."""
     return float(np.sqrt(np.nanmean(values**2)))
 
 

@@ -186,6 +186,11 @@ class BeamRun:
         start = self.attributes.initial_displacement_m
         return "release" if start is None else f"release from {1e3 * start:.3g} mm".replace("-", "−")
 
+    @property
+    def label(self) -> str:
+        """Group and what was done to the structure, for legends and tables."""
+        return f"{self.group}, {self.level_text}"
+
 
 @dataclass(frozen=True)
 class FrozenMode:
@@ -265,7 +270,7 @@ class BeamExperiment:
         """Runs with spectra, weakest first, recordings before the twins that they drove."""
         found = [(run.random.root_rms_g, run.is_simulated, run) for run in self.runs if run.random is not None]
         # a twin's root is that of its recording but for rounding
-        return tuple(run for *_, run in sorted(found, key=lambda one: (float(f"{one[0]:.3g}"), one[1])))
+        return tuple(run for *_, run in sorted(found, key=lambda entry: (float(f"{entry[0]:.3g}"), entry[1])))
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -298,11 +303,11 @@ def group_of(attributes: RunAttributes) -> str:
     more = attributes.model_extra or {}
     if not more.get("simulated_from"):
         return attributes.configuration
-    forces = [one.strip() for one in str(more.get("simulated_forces", "")).split(",")]
+    forces = [force.strip() for force in str(more.get("simulated_forces", "")).split(",")]
     liquid = [
         force.removesuffix("(tank)").strip().replace("_", " ") for force in forces if force.endswith("(tank)")
     ]
-    liquid = [_SHORT.get(one, one) for one in liquid]
+    liquid = [_SHORT.get(name, name) for name in liquid]
     rig, what = PurePath(attributes.rig).stem, ", ".join(liquid) or "frozen"
     return f"twin {what}" if rig == what else f"twin {rig}: {what}"
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.report.outputs import sha256_of
-from pipelines.structure.random_runs import random_response
+from pipelines.structure.random_runs import random_response, rms
 from pipelines.structure.results import BeamRun, BeamSettings, ModeDecay, RandomResponse, group_of
 from pipelines.sweep.stages import require_usable
 from pipelines.twin.simulated_tank_model import departures_of
@@ -45,7 +45,9 @@ FloatArray = npt.NDArray[np.float64]
 _FIRST_MODE_RANGE: Final = (0.7, 1.4)
 """Where the first mode is looked for, over its believed frequency; the liquid takes mass away from it."""
 _LARGEST_ROOT_SHARE: Final = 0.05
+"""RMS of the root's acceleration over the tank's in a free run, beyond which the beam is not clamped."""
 _LARGEST_RESIDUAL_SHARE: Final = 0.1
+"""RMS that the modes may leave at a sensor, over that of the tank's acceleration."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
 
 
 def _motion(run: Loaded, rig: Rig, is_random: bool) -> _Motion:
-    recording, flags = run.recording, []
+    recording, flags = run.recording, list[str]()
     names = channels(recording, "acceleration")
     tank_names = acceleration_channels(recording)
     if not is_random:
@@ -152,9 +154,9 @@ def _motion(run: Loaded, rig: Rig, is_random: bool) -> _Motion:
             f"{run.path}: random run", got=f"channels {', '.join(names)}", allowed="acceleration_root among them"
         )
     tank = _centred(mean_acceleration(recording, tank_names).values)
-    if not is_random and root is not None and _rms(root) > _LARGEST_ROOT_SHARE * _rms(tank):
+    if not is_random and root is not None and rms(root) > _LARGEST_ROOT_SHARE * rms(tank):
         flags.append(
-            f"{run.attributes.run_id}: the root moves by {100 * _rms(root) / _rms(tank):.0f} % of the tank's "
+            f"{run.attributes.run_id}: the root moves by {100 * rms(root) / rms(tank):.0f} % of the tank's "
             "acceleration in a free run; it is no clamped beam"
         )
     force = None
@@ -178,10 +180,6 @@ def _centred(values: npt.NDArray[np.floating]) -> FloatArray:
     return np.asarray(numbers - np.nanmean(numbers))
 
 
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
-
-
 def _longest_part_without_gaps(run: Loaded, names: list[str]) -> tuple[xr.Dataset, list[str]]:
     """A decay is read up to a gap or after it, never across."""
     whole = np.all([np.isfinite(run.recording[name].values) for name in names], axis=0)
@@ -200,6 +198,7 @@ def _modal_response(
 ) -> tuple[ModalFilter | None, ModalResponse]:
     values = np.stack(list(motion.sensors.values()))
     if is_random and motion.root is not None:
+        # q̈ is to be relative to the root
         values = values - motion.root
     if structure_of(rig).kind == "sdof":
         alike = modal_filter(np.ones((len(values), 1)), sensor_names=list(motion.sensors), mode_names=("guide",))
@@ -213,15 +212,15 @@ def _residual_flags(
 ) -> list[str]:
     if its_filter is None or its_filter.weights.shape[0] == its_filter.weights.shape[1]:
         return []
-    loud = [
+    unexplained = [
         f"{name} {residual:.3g} m/s²"
         for name, residual in zip(response.sensor_names, response.residual_rms_m_per_s2, strict=True)
-        if residual > _LARGEST_RESIDUAL_SHARE * _rms(tank)
+        if residual > _LARGEST_RESIDUAL_SHARE * rms(tank)
     ]
-    if not loud:
+    if not unexplained:
         return []
     return [
-        f"{run.attributes.run_id}: the modes leave {', '.join(loud)} RMS unexplained, more than "
+        f"{run.attributes.run_id}: the modes leave {', '.join(unexplained)} RMS unexplained, more than "
         f"{100 * _LARGEST_RESIDUAL_SHARE:.0f} % of the tank's acceleration; check gains, places and mode shapes"
     ]
 
@@ -229,7 +228,7 @@ def _residual_flags(
 def _domain_flags(run: Loaded) -> list[str]:
     """Where the tank model of a simulated run was beyond what it was trained on."""
     name = f"{run.attributes.run_id} ({group_of(run.attributes)})"
-    return [f"{name}: {one}" for one in departures_of(run.attributes.model_extra or {})]
+    return [f"{name}: {departure}" for departure in departures_of(run.attributes.model_extra or {})]
 
 
 def _decays(

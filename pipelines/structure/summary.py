@@ -48,7 +48,7 @@ def _ratio(experiment: BeamExperiment) -> str:
     sloshing = experiment.pooled.get(("sloshing", "local sine fit"))
     if frozen is None or sloshing is None:
         return ""
-    log_frozen, log_sloshing = (np.log(one.acceleration_amplitude_m_per_s2) for one in (frozen, sloshing))
+    log_frozen, log_sloshing = (np.log(pooled.acceleration_amplitude_m_per_s2) for pooled in (frozen, sloshing))
     common = (log_sloshing >= log_frozen.min()) & (log_sloshing <= log_frozen.max())
     if not common.any():
         return ""
@@ -61,5 +61,5 @@ def _random(experiment: BeamExperiment) -> str:
     for run in experiment.random_runs:
         fit = run.random.density_fit if run.random is not None else None
         if fit is not None and not run.is_simulated:
-            parts.append(f"{text(100 * fit.damping_ratio)} % ({run.group}, {run.level_text})")
+            parts.append(f"{text(100 * fit.damping_ratio)} % ({run.label})")
     return f"In random motion ζ₁ is {', '.join(parts)}, from the tank's density alone." if parts else ""

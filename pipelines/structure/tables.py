@@ -14,7 +14,7 @@ from pipelines.structure.figures_twin import pairs_of, relative_error
 from pipelines.structure.results import CONFIGURATIONS, METHODS, BeamExperiment, BeamRun, in_g
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping
-from sloshlab.modal.pooled_decays import pooled_damping
+from sloshlab.modal.pooled_decays import mean_at_common_amplitudes
 
 _AMPLITUDES_G: Final = (6.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5, 0.25)
 
@@ -283,20 +283,6 @@ def _damping_of_both(measured: BeamRun, simulated: BeamRun) -> tuple[str, str]:
         return MISSING, MISSING
     own, of_twin = mean_at_common_amplitudes(readings[0], readings[1])
     return text(100 * own), text(100 * of_twin)
-
-
-def mean_at_common_amplitudes(one: InstantaneousDamping, other: InstantaneousDamping) -> tuple[float, float]:
-    """Mean ζ of two decays over the bins of the first that lie within the amplitudes of the second.
-
-    The second is interpolated over the logarithm of the amplitude; NaN where they have no amplitude in common.
-    """
-    first, second = pooled_damping([one]), pooled_damping([other])
-    at, known = (np.log(pooled.acceleration_amplitude_m_per_s2) for pooled in (first, second))
-    common = (at >= known.min()) & (at <= known.max())
-    if not common.any():
-        return float("nan"), float("nan")
-    of_second = np.interp(at[common], known, second.damping_ratio)
-    return float(first.damping_ratio[common].mean()), float(of_second.mean())
 
 
 def run_table(runs: Sequence[BeamRun]) -> Table:

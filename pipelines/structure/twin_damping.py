@@ -19,6 +19,7 @@ CYCLES_LEFT_OUT: Final = 2.0
 _METHOD: Final = 0
 """The logarithmic decrement, as in the source; it alone has a value per cycle."""
 _MEASURED_REPEATS: Final = 2
+"""Releases at an amplitude, at least: with one the scatter of the liquid is not known."""
 _SCATTER_ALLOWED: Final = 0.3
 """Half a 90 % interval of the mean over ζ beyond which the repeats do not say what a model should meet."""
 

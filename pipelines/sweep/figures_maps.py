@@ -191,7 +191,7 @@ def scaled_map(
     symbol = "W̄" if quantity.startswith("w_bar") else "β"
     figure = new_figure(4.9)
     axes = figure.subplots()
-    crossed = draw_scaled(figure, axes, rig, runs, quantity, symbol, twins=True)
+    crossed = draw_scaled(figure, axes, rig, runs, quantity, label=symbol, twins=True)
     meaning = (
         "Dissipated work per cycle over m_l u₀² Ω²"
         if symbol == "W̄"
@@ -214,8 +214,8 @@ def draw_scaled(
     rig: RigResult,
     runs: Sequence[RunResult],
     quantity: str,
-    label: str,
     *,
+    label: str,
     twins: bool,
 ) -> bool:
     """Arrange and draw one non-dimensional map; returns whether the 2ω₂₀ line is on it."""
@@ -281,7 +281,7 @@ def over_velocity(name: str, rig: RigResult, runs: Sequence[RunResult]) -> Repor
     figure = new_figure(6.6)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, quantity, label in zip(panels, ("w_bar_over_v_bar", "beta_over_v_bar"), ("W̄", "β"), strict=True):
-        draw_scaled(figure, axes, rig, runs, quantity, label, twins=False)
+        draw_scaled(figure, axes, rig, runs, quantity, label=label, twins=False)
     panels[0].set_xlabel("")
     caption = (
         f"The same two maps for {rig_text(rig)} over the velocity amplitude v̄: W̄ above, β below. Lines "

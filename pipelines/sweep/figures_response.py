@@ -62,6 +62,7 @@ def frequency_response(name: str, runs: Sequence[RunResult]) -> ReportFigure:
         plain_log_ticks(axes.yaxis)
     low, high = (function(response.peak_hz for response in found) for function in (min, max))
     grid[1, 1].set_xlim(low * (1 - _ZOOM), high * (1 + _ZOOM))
+    # limits from what is inside the zoom only
     near = [np.abs(r.accelerance_per_kg)[_near(r, low, high)] for r in found]
     grid[0, 1].set_ylim(
         0.7 * min(float(part.min()) for part in near), 1.5 * max(float(part.max()) for part in near)
@@ -106,14 +107,14 @@ def loudest_response(name: str, runs: Sequence[RunResult]) -> ReportFigure:
     figure = new_figure(5.0)
     upper, lower = figure.subplots(2, 1, sharex=True)
     for colour, response in zip(ordered_colours(len(found)), found, strict=True):
-        label = f"{response.label}: {response.loudest_hz:.2f} Hz, {response.work_peak_hz:.2f} Hz"
+        label = f"{response.label}: {response.strongest_hz:.2f} Hz, {response.work_peak_hz:.2f} Hz"
         style: dict[str, Any] = {"color": colour, "marker": ".", "ms": 2.5, "lw": 1.0}
         mark: dict[str, Any] = {"color": colour, "marker": "v", "ms": 7, "mec": "white", "mew": 0.6, "ls": "none"}
-        upper.plot(response.frequency_hz, response.acceleration_g / response.loudest_g, label=label, **style)
+        upper.plot(response.frequency_hz, response.acceleration_g / response.strongest_g, label=label, **style)
         lower.plot(response.frequency_hz, response.work_j / abs(response.work_peak_j), **style)
-        upper.plot(response.loudest_hz, 1.0, **mark)
+        upper.plot(response.strongest_hz, 1.0, **mark)
         lower.plot(response.work_peak_hz, np.sign(response.work_peak_j), **mark)
-    centres = [centre for response in found for centre in (response.loudest_hz, response.work_peak_hz)]
+    centres = [centre for response in found for centre in (response.strongest_hz, response.work_peak_hz)]
     lower.set_xlim(min(centres) * (1 - 2 * _ZOOM), max(centres) * (1 + 2 * _ZOOM))
     upper.set(ylabel="acceleration over its largest", ylim=(0, 1.12))
     lower.set(ylabel="work per cycle over its largest", ylim=(-0.25, 1.12), xlabel="frequency Ω/2π [Hz]")

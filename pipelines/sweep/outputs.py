@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pipelines.report.outputs import provenance_of, stamp_of, write_dataset
+from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.sweep.results import SweepExperiment
 from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 from sloshlab import atomic_file
@@ -51,7 +51,7 @@ def write_experiment(
     left_out = f"; {n_unsteady} left out, their amplitude changes too quickly" if n_unsteady else ""
     lines = [f"windows: {folder / 'windows.nc'} ({n_windows} windows{left_out})", f"maps: {folder / 'maps.nc'}"]
     return {
-        "lines": lines + ([f"report: {folder / 'report.html'}"] if report else []),
+        "lines": lines + report_lines(folder, written=report),
         "flags": list(experiment.flags),
         "runs": len(experiment.runs),
         "windows": n_windows,

@@ -86,6 +86,7 @@ def reference_runs(
     chosen: dict[int, RunResult] = {}
     for level in levels_g:
         distance = [abs(math.log2(level_g(run) / level)) for run in candidates]
+        # among equally near levels an upward sweep first, then the order given
         order = sorted(
             range(len(candidates)), key=lambda i: (round(distance[i], 3), not goes_up(candidates[i]), i)
         )

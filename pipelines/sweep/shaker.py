@@ -31,8 +31,11 @@ from sloshlab.rig import Rig
 from sloshlab.sweep.windows import WindowSettings
 
 _LARGEST_PLAUSIBLE_GAIN_ERROR = 0.05
+"""Of force over acceleration; beyond it the calibration is flagged."""
 _LARGEST_BIAS_OF_W_BAR = 0.02
+"""W̄ that a delay may feign before it is flagged; a delay is not taken out."""
 _FREQUENCY_OF_BIAS_HZ = 20.0
+"""Where sweeps end; the bias grows with frequency."""
 
 
 @dataclass(frozen=True)
@@ -184,6 +187,7 @@ def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
 def _dry_recording(run: _Run, rig: Rig) -> xr.Dataset:
     with naming(run.path):
         recording = read_recording(run.path)
+        # a dead force cell in an empty run would halve the dry mass unnoticed
         require_usable(recording, run.path)
         check_signs(recording, rig)
     return recording
@@ -211,6 +215,8 @@ def sweep_signals(
     gain = 1.0 if dry is None else dry.gain_ratio
     mass = (dry.mass_kg if dry is not None else rig.tank.dry_mass_kg) + rig.liquid_mass_kg
     force = total_force(recording).values
+    # by g before anything else, so that force and acceleration are on one scale; in place and in its own type,
+    # because long recordings cost memory traffic
     force /= gain
     signals = SweepSignals(
         force_n=force,

@@ -111,12 +111,12 @@ def _work_sentences(experiment: SweepExperiment) -> tuple[str, ...]:
         return tuple(lines)
     if len(found) > 1:
         weak, strong = found[0], found[-1]
-        change = 100 * (strong.loudest_hz / weak.loudest_hz - 1)
+        change = 100 * (strong.strongest_hz / weak.strongest_hz - 1)
         word = "softens" if change < -0.5 else "stiffens" if change > 0.5 else "keeps its frequency"
         lines.append(
-            f"The largest acceleration moves from {weak.loudest_hz:.2f} Hz ({weak.label}, "
-            f"{weak.loudest_g:.2g} g) to "
-            f"{strong.loudest_hz:.2f} Hz ({strong.label}, {strong.loudest_g:.2g} g), {signed(change)} %: the "
+            f"The largest acceleration moves from {weak.strongest_hz:.2f} Hz ({weak.label}, "
+            f"{weak.strongest_g:.2g} g) to "
+            f"{strong.strongest_hz:.2f} Hz ({strong.label}, {strong.strongest_g:.2g} g), {signed(change)} %: the "
             f"mode {word}. The largest work per cycle near it moves from {weak.work_peak_hz:.2f} Hz to "
             f"{strong.work_peak_hz:.2f} Hz."
         )

@@ -292,8 +292,8 @@ def resonance_table(runs: Sequence[RunResult]) -> Table:
         rows.append(
             (
                 run.attributes.run_id,
-                text(response.loudest_hz, 4),
-                text(response.loudest_g, 3),
+                text(response.strongest_hz, 4),
+                text(response.strongest_g, 3),
                 text(response.work_peak_hz, 4),
                 text(response.peak_hz, 4),
                 text(response.peak_per_kg, 3),

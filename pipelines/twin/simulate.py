@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import xarray as xr
@@ -19,7 +19,7 @@ from sloshlab.errors import InputError
 from sloshlab.modal.rig_beam import scale_remarks
 from sloshlab.recording import read_recording, run_attributes, write_recording
 from sloshlab.rig import Rig
-from sloshlab.twin.recorded_run import Drive, drive_of
+from sloshlab.twin.recorded_run import Block, Drive, drive_of
 from sloshlab.twin.reduced_order_model_domain import departures
 from sloshlab.twin.simulated_channels import SimulatedRun, simulated_run
 from sloshlab.twin.simulation import Simulation
@@ -32,7 +32,9 @@ STEPS_PER_PERIOD: Final = 60
 """Integration steps per second, and per period of the highest mode, at least."""
 
 _MOST_STEPS = 1000
+"""Per sample; a run that needs more is sampled too slowly to drive this twin."""
 _LARGEST_ENERGY_ERROR = 1e-3
+"""Of the energy passed on, before the balance is flagged and more steps are asked for."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
     rig = Rig.from_toml(settings.rig)
     twin = _chosen_twin(settings, rig)
     recording = read_recording(settings.run)
-    drive = drive_of(recording, twin, block=settings.block)  # type: ignore[arg-type]
+    drive = drive_of(recording, twin, block=cast("Block", settings.block))
     n_steps = settings.steps or steps_per_sample(twin, drive.excitation.sampling_rate_hz)
     with amounts("simulating") as watch:
         simulation = drive.twin.simulate(
@@ -99,7 +101,9 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
     write_recording(simulated.recording, settings.output, encoding=_encoding(simulated.recording))
     if settings.save_twin is not None:
         save_twin(twin, settings.save_twin)
-    summary = _summary(settings, rig, recording, drive, simulation, simulated, n_steps)
+    summary = _summary(
+        settings, rig, recording, drive, simulation=simulation, simulated=simulated, n_steps=n_steps
+    )
     return with_tank_model(summary, simulation, left)
 
 
@@ -179,12 +183,12 @@ def _summary(
     rig: Rig,
     recording: xr.Dataset,
     drive: Drive,
+    *,
     simulation: Simulation,
     simulated: SimulatedRun,
     n_steps: int,
 ) -> dict[str, Any]:
-    passed = float(np.abs(simulation.works_j).max(initial=0.0)) + float(simulation.mechanical_energy_j.max())
-    error = float(np.abs(simulation.energy_residual_j).max()) / passed if passed else 0.0
+    error = simulation.relative_energy_error
     flags = [*drive.flags, *simulation.remarks]
     if error > _LARGEST_ENERGY_ERROR:
         flags.append(f"energy balance closes only to {error:.1e} of the energy passed on: give more --steps")

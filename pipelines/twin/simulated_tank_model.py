@@ -22,7 +22,7 @@ def departure_attributes(left: Sequence[Departure]) -> dict[str, str]:
     ----------
     left : sequence of Departure
     """
-    return {OUTSIDE: _SEPARATOR.join(str(one) for one in left)} if left else {}
+    return {OUTSIDE: _SEPARATOR.join(str(departure) for departure in left)} if left else {}
 
 
 def departures_of(attributes: Mapping[str, Any]) -> list[str]:
@@ -51,8 +51,8 @@ def with_tank_model(summary: dict[str, Any], simulation: Simulation, left: Seque
     terms = [term for term in simulation.twin.terms if term.name == NAME]
     if not terms:
         return summary
-    flags = [*summary["flags"], *(str(one) for one in left)]
+    flags = [*summary["flags"], *(str(departure) for departure in left)]
     if without_domain(simulation):
         flags.append("the tank model does not tell where it was trained; whether it is valid here is not known")
     lines = [*summary["lines"], *(line for term in terms for line in description_of(term))]
-    return {**summary, "lines": lines, "flags": flags, "outside_domain": [asdict(one) for one in left]}
+    return {**summary, "lines": lines, "flags": flags, "outside_domain": [asdict(departure) for departure in left]}

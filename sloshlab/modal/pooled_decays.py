@@ -111,6 +111,20 @@ def pooled_damping(
     )
 
 
+def mean_at_common_amplitudes(a: InstantaneousDamping, b: InstantaneousDamping) -> tuple[float, float]:
+    """Mean ζ of two decays over the bins of the first that lie within the amplitudes of the second.
+
+    The second is interpolated over the logarithm of the amplitude; NaN where they have no amplitude in common.
+    """
+    first, second = pooled_damping([a]), pooled_damping([b])
+    at, known = (np.log(pooled.acceleration_amplitude_m_per_s2) for pooled in (first, second))
+    common = (at >= known.min()) & (at <= known.max())
+    if not common.any():
+        return float("nan"), float("nan")
+    of_second = np.interp(at[common], known, second.damping_ratio)
+    return float(first.damping_ratio[common].mean()), float(of_second.mean())
+
+
 @dataclass(frozen=True)
 class DampingDeviation:
     """A model's ζ beside the mean of repeated measurements, at common amplitudes.

@@ -28,7 +28,7 @@ class FrequencyResponse:
         ü/F at the excitation frequency [m s-2 N-1 = kg-1].
     work_j : ndarray, shape (n,)
         Dissipated work per cycle.
-    loudest_hz, loudest_g : float
+    strongest_hz, strongest_g : float
         Where the acceleration is largest, and that value.
     peak_hz, peak_per_kg : float
         Where |ü/F| is largest in the neighbourhood of the largest acceleration, and that value.
@@ -40,8 +40,8 @@ class FrequencyResponse:
     acceleration_g: FloatArray
     accelerance_per_kg: npt.NDArray[np.complex128]
     work_j: FloatArray
-    loudest_hz: float
-    loudest_g: float
+    strongest_hz: float
+    strongest_g: float
     peak_hz: float
     peak_per_kg: float
     work_peak_hz: float
@@ -69,13 +69,13 @@ def frequency_response_of(windows: xr.Dataset) -> FrequencyResponse | None:
         return None
     windows, accelerance = windows.isel(window=usable), 1 / apparent[usable]
     frequency, acceleration, work = (windows[name].values for name in ("frequency_hz", "acceleration_g", "work_j"))
-    loudest, level = vertex(frequency, acceleration)
+    strongest, level = vertex(frequency, acceleration)
     # |ü/F| of a mode far away may be larger than that of the mode which is shaken hardest
-    near = np.abs(np.log(frequency / loudest)) < _NEIGHBOURHOOD
+    near = np.abs(np.log(frequency / strongest)) < _NEIGHBOURHOOD
     peak, work_peak = (
         vertex(frequency, np.where(near, values, -np.inf)) for values in (np.abs(accelerance), work)
     )
-    return FrequencyResponse(frequency, acceleration, accelerance, work, loudest, level, *peak, *work_peak)
+    return FrequencyResponse(frequency, acceleration, accelerance, work, strongest, level, *peak, *work_peak)
 
 
 def force_amplitude_n(windows: xr.Dataset) -> FloatArray:

@@ -131,6 +131,12 @@ class Simulation:
         given = self.works_j[:, 0 : 2 * n : 2].sum(axis=1) + self.works_j[:, 2 * n :].sum(axis=1)
         return np.asarray(self.mechanical_energy_j - self.mechanical_energy_j[0] - given)
 
+    @property
+    def relative_energy_error(self) -> float:
+        """Largest residual of the energy over what was passed on: largest work and largest energy together."""
+        passed = float(np.abs(self.works_j).max(initial=0.0)) + float(self.mechanical_energy_j.max())
+        return float(np.abs(self.energy_residual_j).max()) / passed if passed else 0.0
+
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """What the forces have to say, each on its motion and memory: regions that they were not measured in."""

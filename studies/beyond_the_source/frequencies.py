@@ -42,7 +42,7 @@ def frequency_lines(recordings: Recordings, workshop: Workshop) -> list[str]:
     known = {"validation: slow run": slow_validation, "validation: random": validation[1]}
     lines = ["fit of the force and predicted over recorded work, mean ± standard deviation of the starts"]
     lines.append(f"  {'run':26s}" + "".join(f"{name:>34s}" for name in kinds))
-    for name, run in {**known, **{one.name: one for one in unseen}}.items():
+    for name, run in {**known, **{signals.name: signals for signals in unseen}}.items():
         lines.append(
             f"  {name.removeprefix('fill_0.50_'):26s}" + "".join(_cell(models, run) for models in kinds.values())
         )

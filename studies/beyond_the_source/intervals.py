@@ -37,7 +37,9 @@ def interval_lines(recordings: Recordings, workshop: Workshop) -> list[str]:
     runs |= {decay.name: decay for decay in recordings.decays(14.6)}
     for name, run in runs.items():
         ranges = [ensemble.predicted_range(run.velocity_m_per_s, probability) for probability in PROBABILITIES]
-        covered = "".join(f"{100 * one.coverage(run.dynamic_force_n):6.1f} %" for one in ranges)
+        covered = "".join(
+            f"{100 * predicted_range.coverage(run.dynamic_force_n):6.1f} %" for predicted_range in ranges
+        )
         half = float(np.nanmean(ranges[1].upper - ranges[1].lower)) / 2
         alone = float(np.sqrt(np.nanmean(ranges[1].members_std ** 2)))
         rms = float(np.sqrt(np.nanmean(run.dynamic_force_n**2)))

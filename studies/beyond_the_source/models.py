@@ -61,13 +61,15 @@ class Workshop:
             KIND,
             {"n_neurons": N_NEURONS},
             self._delays(agitation),
-            [one.run() for one in training],
-            [one.run() for one in validation],
+            [signals.run() for signals in training],
+            [signals.run() for signals in validation],
             sampling_rate_hz=RATE_HZ,
             settings=TrainingSettings(n_epochs=self.n_epochs, seed=seed),
             agitation=agitation,
         )
-        model.facts.update(training=[one.name for one in training], validation_mse_n2=record.best.validation_mse)
+        model.facts.update(
+            training=[signals.name for signals in training], validation_mse_n2=record.best.validation_mse
+        )
         save_model(model, path)
         return model
 
@@ -88,14 +90,14 @@ class Workshop:
             KIND,
             {"n_neurons": N_NEURONS},
             self._delays(agitation),
-            [one.run() for one in training],
-            [one.run() for one in validation],
+            [signals.run() for signals in training],
+            [signals.run() for signals in validation],
             sampling_rate_hz=RATE_HZ,
             settings=TrainingSettings(n_epochs=self.n_epochs),
             n_members=n_members,
             agitation=agitation,
         )
-        ensemble.facts.update(training=[one.name for one in training])
+        ensemble.facts.update(training=[signals.name for signals in training])
         save_ensemble(ensemble, path)
         return ensemble
 

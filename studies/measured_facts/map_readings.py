@@ -9,6 +9,8 @@ import numpy as np
 import xarray as xr
 
 from sloshlab.errors import InputError
+from sloshlab.maps.map_readings import mean_along_acceleration, region_near_largest
+from sloshlab.viscous_equivalent import maximum_of
 from studies.measured_facts.published import (
     BEAM,
     FILLING_LEVEL,
@@ -83,27 +85,12 @@ def facts_of(maps: xr.Dataset) -> FactsOfMap:
         From `half_filled`.
     """
     work = maps["w_bar"]
-    row, column = np.unravel_index(int(np.nanargmax(work.values)), work.shape)
-    largest = MeasuredWork(
-        float(maps["omega_bar"][row]), float(maps["u_bar"][column]), float(work.values[row, column])
-    )
-    columns = np.flatnonzero((work.values >= SHARE_OF_LARGEST * largest.w_bar).any(axis=0))
-    u_bar = maps["u_bar"].values
+    largest = MeasuredWork(*maximum_of(work))
+    region = region_near_largest(work, SHARE_OF_LARGEST)
     return FactsOfMap(
         largest,
         float(work.interp(omega_bar=BEAM.omega_bar, u_bar=BEAM.u_bar)),
-        (float(u_bar[columns[0]]), float(u_bar[columns[-1]])),
+        (region.lowest_u_bar, region.highest_u_bar),
         float(np.nanmax(maps["beta"].values)),
-        _mean_along_weakest(maps["beta"]),
+        mean_along_acceleration(maps["beta"], WEAKEST_G),
     )
-
-
-def _mean_along_weakest(beta: xr.DataArray) -> float:
-    """Mean over ω̄ of the first value at or beyond 0.25 g that lies within two cells of it."""
-    u_bar, omega_bar = beta["u_bar"].values, beta["omega_bar"].values
-    cell = float(np.median(np.diff(u_bar)))
-    found = []
-    for row, wanted in zip(beta.values, WEAKEST_G / omega_bar**2, strict=True):
-        known = np.flatnonzero(np.isfinite(row) & (u_bar >= wanted) & (u_bar <= wanted + 2 * cell))
-        found += [float(row[known[0]])] if known.size else []
-    return float(np.mean(found)) if found else float("nan")

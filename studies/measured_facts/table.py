@@ -17,6 +17,7 @@ import xarray as xr
 
 from sloshlab import interrupt
 from sloshlab.errors import InputError
+from sloshlab.maps.map_readings import Region, region_near_largest
 from studies.measured_facts.map_readings import facts_of, half_filled
 from studies.measured_facts.published import (
     BEAM,
@@ -87,6 +88,7 @@ class Results:
                 raise InputError(
                     f"{folder / name}", got="no such file", remedy="run sloshlab shaker -o there first"
                 )
+            # an interrupt within xarray would leave its lock taken for ever
             with interrupt.held():
                 found.append(xr.load_dataset(folder / name, decode_times=False))
             if "w_bar" not in found[-1]:
@@ -108,10 +110,10 @@ class Results:
         self, acceleration_g: float, fill_level: float = FILLING_LEVEL, band: tuple[float, float] = FULL_BAND
     ) -> xr.Dataset:
         """Windows near one acceleration, between two frequencies ω̄."""
-        one = self.at(fill_level)
-        near = np.abs(one.acceleration_g / acceleration_g - 1) < _LEVEL_TOLERANCE
-        inside = (one.omega_bar > band[0]) & (one.omega_bar < band[1])
-        return one.isel(window=np.flatnonzero(near & inside))
+        windows = self.at(fill_level)
+        near = np.abs(windows.acceleration_g / acceleration_g - 1) < _LEVEL_TOLERANCE
+        inside = (windows.omega_bar > band[0]) & (windows.omega_bar < band[1])
+        return windows.isel(window=np.flatnonzero(near & inside))
 
 
 def facts(results: Results) -> Iterator[Fact]:
@@ -171,18 +173,17 @@ def _yes(value: bool | None) -> str:
     return "not measured" if value is None else "yes" if value else "no"
 
 
-def _map_arrays(dataset: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    w_bar = dataset.w_bar.transpose("omega_bar", "u_bar").where(
-        dataset.measured.transpose("omega_bar", "u_bar").astype(bool)
-    )
-    return dataset.omega_bar.to_numpy(), dataset.u_bar.to_numpy(), w_bar.to_numpy()
+def _measured(maps: xr.Dataset) -> xr.DataArray:
+    """W̄ over ω̄ and ū, NaN where it was not measured."""
+    w_bar, measured = (maps[name].transpose("omega_bar", "u_bar") for name in ("w_bar", "measured"))
+    return w_bar.where(measured.astype(bool))
 
 
 def _maximum(results: Results) -> Iterator[Fact]:
-    one = results.map_of(FILLING_LEVEL)
-    if one is None:
+    maps = results.map_of(FILLING_LEVEL)
+    if maps is None:
         return
-    found = facts_of(half_filled(one)).largest
+    found = facts_of(half_filled(maps)).largest
     omega_bar, u_bar = found.omega_bar, found.u_bar
     yield Fact(
         "maximum of W̄",
@@ -197,19 +198,19 @@ def _maximum(results: Results) -> Iterator[Fact]:
 
 
 def _reference_points(results: Results) -> Iterator[Fact]:
-    one = results.map_of(FILLING_LEVEL)
-    if one is None:
+    maps = results.map_of(FILLING_LEVEL)
+    if maps is None:
         return
-    value = facts_of(half_filled(one)).w_bar_of_beam
+    value = facts_of(half_filled(maps)).w_bar_of_beam
     yield Fact(
         f"W̄ at ω̄ = {BEAM.omega_bar:g} (10.7 Hz), ū = {BEAM.u_bar:g}",
         f"{BEAM.w_bar:g}",
         f"{value:.2f}",
         bool(abs(value / BEAM.w_bar - 1) < NEAR) if np.isfinite(value) else None,
     )
-    omega_bar, u_bar, w_bar = _map_arrays(one)
-    row = w_bar[np.abs(omega_bar - BEAM.omega_bar).argmin()]
-    from_1_g = np.isfinite(row) & (u_bar * BEAM.omega_bar**2 >= THRESHOLD_G)
+    w_bar = _measured(maps)
+    row = w_bar.to_numpy()[np.abs(maps.omega_bar.to_numpy() - BEAM.omega_bar).argmin()]
+    from_1_g = np.isfinite(row) & (maps.u_bar.to_numpy() * BEAM.omega_bar**2 >= THRESHOLD_G)
     mean = float(row[from_1_g].mean()) if from_1_g.any() else np.nan
     yield Fact(
         f"mean over ū at ω̄ = {BEAM.omega_bar:g}, from {THRESHOLD_G:g} g up",
@@ -220,8 +221,8 @@ def _reference_points(results: Results) -> Iterator[Fact]:
 
 
 def _effective_mass(results: Results) -> Iterator[Fact]:
-    one = results.at(FILLING_LEVEL)
-    negative = float((one.beta < 0).mean()) if one.sizes["window"] else np.nan
+    windows = results.at(FILLING_LEVEL)
+    negative = float((windows.beta < 0).mean()) if windows.sizes["window"] else np.nan
     yield Fact("β < 0", "everywhere", f"in {100 * negative:.0f} % of the windows", negative > 0.95)
     quiet = _mean(results.level(WEAKEST_G, band=(0.0, np.inf)).beta)
     yield Fact(
@@ -232,30 +233,26 @@ def _effective_mass(results: Results) -> Iterator[Fact]:
     )
 
 
-def _isoline(results: Results, fill_level: float) -> tuple[float, float, float, float] | None:
-    """Lowest, mean and highest ū of the region above 85 % of the maximum, and its share of the measured region."""
-    one = results.map_of(fill_level)
-    if one is None:
-        return None
-    _, u_bar, w_bar = _map_arrays(one)
-    above = w_bar >= SHARE_OF_LARGEST * np.nanmax(w_bar)
-    places = np.broadcast_to(u_bar, w_bar.shape)[above]
-    return float(places.min()), float(places.mean()), float(places.max()), above.sum() / np.isfinite(w_bar).sum()
+def _region(results: Results, fill_level: float) -> Region | None:
+    maps = results.map_of(fill_level)
+    return None if maps is None else region_near_largest(_measured(maps), SHARE_OF_LARGEST)
 
 
 def _fill_levels(results: Results) -> Iterator[Fact]:
-    lines = {fill: _isoline(results, fill) for fill in (0.25, 0.5, 0.75)}
-    known = {fill: line for fill, line in lines.items() if line is not None}
+    regions = {fill: _region(results, fill) for fill in (0.25, 0.5, 0.75)}
+    known = {fill: region for fill, region in regions.items() if region is not None}
     lowest, highest = ISOLINE_U_BAR
-    for fill, (low, mean, high, share) in known.items():
+    for fill, region in known.items():
         yield Fact(
             f"region above {100 * SHARE_OF_LARGEST:.0f} % of the maximum, α = {fill:g}",
             f"ū = {lowest:g} … {highest:g}",
-            f"ū = {low:.2f} … {high:.2f}, mean {mean:.2f}, {100 * share:.0f} % of the measured region",
-            bool(lowest <= mean <= highest),
+            f"ū = {region.lowest_u_bar:.2f} … {region.highest_u_bar:.2f}, mean {region.mean_u_bar:.2f}, "
+            f"{100 * region.share:.0f} % of the measured region",
+            bool(lowest <= region.mean_u_bar <= highest),
         )
     if len(known) == 3:
-        means, shares = ([known[fill][k] for fill in (0.25, 0.5, 0.75)] for k in (1, 3))
+        means = [known[fill].mean_u_bar for fill in (0.25, 0.5, 0.75)]
+        shares = [known[fill].share for fill in (0.25, 0.5, 0.75)]
         moves = bool(means[0] > means[1] > means[2])
         widens = bool(shares[0] < shares[1] < shares[2])
         listed = " > ".join(f"{mean:.2f}" for mean in means)
@@ -281,22 +278,22 @@ def _work(results: Results) -> Iterator[Fact]:
 
 
 def _work_at(results: Results, fill_level: float, level: float, frequency_hz: float) -> float:
-    one = results.at(fill_level)
-    near = (np.abs(one.acceleration_g / level - 1) < _LEVEL_TOLERANCE) & (
-        np.abs(one.frequency_hz - frequency_hz) < 0.5
+    windows = results.at(fill_level)
+    near = (np.abs(windows.acceleration_g / level - 1) < _LEVEL_TOLERANCE) & (
+        np.abs(windows.frequency_hz - frequency_hz) < 0.5
     )
-    return _mean(one.work_j[np.flatnonzero(near)])
+    return _mean(windows.work_j[np.flatnonzero(near)])
 
 
 def _repeats(results: Results) -> Iterator[Fact]:
-    one = results.level(3.0)
-    names = [name for name in np.unique(one.run) if "sweep_3" in name]
+    windows = results.level(3.0)
+    names = [name for name in np.unique(windows.run) if "sweep_3" in name]
     if len(names) < 2:
         return
     bins = np.linspace(*FULL_BAND, 7)
     means = []
     for name in names:
-        run = one.isel(window=np.flatnonzero(one.run == name))
+        run = windows.isel(window=np.flatnonzero(windows.run == name))
         place = np.digitize(run.omega_bar, bins)
         means.append([_mean(run.w_bar[np.flatnonzero(place == k)]) for k in range(1, len(bins))])
     spread = float(np.sqrt(np.nanmean(np.nanvar(np.array(means), axis=0, ddof=1))))

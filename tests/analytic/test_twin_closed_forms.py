@@ -334,6 +334,7 @@ def test_energy_closes_with_every_kind_of_force() -> None:
     finer = twin.simulate(harmonic(0.001, 9.0, 1.0, 20000.0), initial_displacement_m=0.01, n_substeps=2)
     assert np.abs(result.energy_residual_j).max() < 1e-6 * passed
     assert np.abs(finer.energy_residual_j).max() < 0.15 * np.abs(result.energy_residual_j).max()
+    assert 0 < finer.relative_energy_error < 0.2 * result.relative_energy_error < 1e-6
 
 
 def test_friction_holds_a_beam_of_several_modes_at_one_place() -> None:

@@ -122,8 +122,8 @@ def _beam_recording(
     channels: dict[str, Any] = {"acceleration_root": (root, 0.0)}
     channels |= {name: (value, PLACES_M[name]) for name, value in values.items()}
     variables = {
-        name: _channel(one + generator.normal(0, 0.01, one.size), "acceleration", x_m=place)
-        for name, (one, place) in channels.items()
+        name: _channel(values + generator.normal(0, 0.01, values.size), "acceleration", x_m=place)
+        for name, (values, place) in channels.items()
     }
     force = (DRY_KG + LIQUID_KG) * values["acceleration_tip"]
     variables["force_interface"] = _channel(force + generator.normal(0, 0.005, force.size), "force")

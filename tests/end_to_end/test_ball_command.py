@@ -134,17 +134,17 @@ def test_a_decay_without_usable_damping(tmp_path: Path, rig: Path, capsys: pytes
 
 def test_decays_of_different_releases(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     acceleration, _ = ball_decay()
-    one = write_decay(tmp_path / "one.nc", acceleration)
+    first = write_decay(tmp_path / "one.nc", acceleration)
     two = write_decay(tmp_path / "two.nc", acceleration, initial_displacement_m=0.05)
-    line = refused(capsys, "ball", one, two, "--rig", rig, "-o", tmp_path / "out")
+    line = refused(capsys, "ball", first, two, "--rig", rig, "-o", tmp_path / "out")
     assert "initial_displacement_m of the decays: got 0.03, 0.05" in line
 
 
 def test_runs_of_different_experiments(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     acceleration, _ = ball_decay()
-    one = write_decay(tmp_path / "one.nc", acceleration)
+    first = write_decay(tmp_path / "one.nc", acceleration)
     two = write_decay(tmp_path / "two.nc", acceleration, experiment="beam_free")
-    line = refused(capsys, "ball", one, two, "--rig", rig, "-o", tmp_path / "out")
+    line = refused(capsys, "ball", first, two, "--rig", rig, "-o", tmp_path / "out")
     assert "runs for a ball: got beam_free, sdof_free" in line
 
 

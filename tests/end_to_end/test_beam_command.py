@@ -104,15 +104,15 @@ def test_damping_grows_with_the_amplitude_as_written_down(results: Path, point: 
 def test_random_runs_give_the_damping_that_was_filtered_in(results: Path) -> None:
     with xr.open_dataset(results / "spectra.nc") as spectra:
         for run_id, damping in (("random_frozen", 0.0032), ("random_sloshing", 0.025)):
-            one = spectra.sel(run=run_id)
-            assert float(one["natural_frequency_hz"][0]) == pytest.approx(10.87, rel=0.01)
-            low, high = float(one["damping_ratio_low"][0]), float(one["damping_ratio_high"][0])
+            of_run = spectra.sel(run=run_id)
+            assert float(of_run["natural_frequency_hz"][0]) == pytest.approx(10.87, rel=0.01)
+            low, high = float(of_run["damping_ratio_low"][0]), float(of_run["damping_ratio_high"][0])
             # 60 s are few: the interval is wide, and must hold the truth once widened by half
             assert low - 0.5 * (high - low) < damping < high + 0.5 * (high - low)
-            alone, std = float(one["density_damping_ratio"]), float(one["density_damping_ratio_std"])
+            alone, std = float(of_run["density_damping_ratio"]), float(of_run["density_damping_ratio_std"])
             assert abs(alone - damping) < 3 * std
             assert std < 0.5 * damping
-            assert np.isnan(one["natural_frequency_hz"].values[1:]).all()
+            assert np.isnan(of_run["natural_frequency_hz"].values[1:]).all()
         assert spectra.sizes["run"] == 2
         assert float(spectra["coherence"].min()) >= 0
         assert float(spectra["coherence"].max()) <= 1

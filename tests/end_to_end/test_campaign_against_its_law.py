@@ -65,10 +65,10 @@ def test_the_campaign_is_done_and_its_lost_samples_are_flagged(campaign: Campaig
 @pytest.mark.parametrize("fill_level", FILL_LEVELS)
 @pytest.mark.parametrize(("suffix", "amplitude"), [("", "u_bar"), ("_over_v_bar", "v_bar")])
 def test_maps_are_within_three_percent_of_the_law(fill_level, suffix, amplitude, campaign: Campaign) -> None:
-    one = campaign.of(fill_level)
-    omega_bar, u_bar = grid_of(one, amplitude)
+    maps = campaign.of(fill_level)
+    omega_bar, u_bar = grid_of(maps, amplitude)
     for name, law in (("w_bar", dissipated_work), ("beta", effective_mass)):
-        error = relative_rms(one[name + suffix].values, law(omega_bar, u_bar, fill_level))
+        error = relative_rms(maps[name + suffix].values, law(omega_bar, u_bar, fill_level))
         assert error < 0.03, f"{name}{suffix} at α = {fill_level}: {error:.4f}"
 
 
@@ -184,10 +184,10 @@ def test_regimes_agree_with_the_generator_where_it_is_unambiguous(fill_level: fl
 @pytest.mark.parametrize("fill_level", FILL_LEVELS)
 def test_nothing_is_drawn_far_from_the_windows(fill_level: float, campaign: Campaign) -> None:
     """Every drawn point has windows of a run above and one below, or lies on a run."""
-    one, windows = campaign.of(fill_level), campaign.windows_of(fill_level)
-    omega_bar, u_bar = grid_of(one, "u_bar")
-    drawn = np.isfinite(one.w_bar.values)
-    np.testing.assert_array_equal(drawn, one.measured.values == 1)
+    maps, windows = campaign.of(fill_level), campaign.windows_of(fill_level)
+    omega_bar, u_bar = grid_of(maps, "u_bar")
+    drawn = np.isfinite(maps.w_bar.values)
+    np.testing.assert_array_equal(drawn, maps.measured.values == 1)
     level = np.log2(u_bar * omega_bar**2)
     measured = np.log2(windows.acceleration_g.values)
     nearest = np.abs(omega_bar[drawn][:, None] - windows.omega_bar.values) < 0.3
@@ -200,16 +200,16 @@ def test_nothing_is_drawn_far_from_the_windows(fill_level: float, campaign: Camp
 @pytest.mark.parametrize("fill_level", FILL_LEVELS)
 def test_work_map_and_non_dimensional_map_are_one(fill_level: float, campaign: Campaign) -> None:
     """W(f, u₀) = W̄ m_l (Ωu₀)²; two grids, so the comparison interpolates."""
-    one = campaign.of(fill_level)
+    maps = campaign.of(fill_level)
     mass_kg = 1000.0 * fill_level * 0.0272 * 0.1172 * 0.078
-    frequency, amplitude = np.meshgrid(one.frequency_hz, one.amplitude_m, indexing="ij")
+    frequency, amplitude = np.meshgrid(maps.frequency_hz, maps.amplitude_m, indexing="ij")
     speed2 = (2 * np.pi * frequency * amplitude) ** 2
-    scaled = xr.DataArray(one.work_j.values / (mass_kg * speed2), dims=("frequency_hz", "amplitude_m"),
-                          coords={"frequency_hz": one.frequency_hz, "amplitude_m": one.amplitude_m})  # fmt: skip
+    scaled = xr.DataArray(maps.work_j.values / (mass_kg * speed2), dims=("frequency_hz", "amplitude_m"),
+                          coords={"frequency_hz": maps.frequency_hz, "amplitude_m": maps.amplitude_m})  # fmt: skip
     there = scaled.interp(
-        frequency_hz=one.omega_bar * FREQUENCY_SCALE_RAD_PER_S / (2 * np.pi), amplitude_m=one.u_bar * 0.0272
+        frequency_hz=maps.omega_bar * FREQUENCY_SCALE_RAD_PER_S / (2 * np.pi), amplitude_m=maps.u_bar * 0.0272
     )
-    difference = (there - one.w_bar).values
+    difference = (there - maps.w_bar).values
     both = np.isfinite(difference)
     assert both.sum() > 1000
     assert np.abs(difference[both]).max() < 0.02

@@ -87,8 +87,8 @@ def decay(start_m: float, duration_s: float, cubic: float = 0.0, seed: int = 0, 
 def case(folder: Path, *runs: xr.Dataset, rig: str = RIG) -> Path:
     (folder / "recordings").mkdir(parents=True)
     (folder / "rig.toml").write_text(rig, encoding="utf-8")
-    for i, one in enumerate(runs):
-        one.to_netcdf(folder / "recordings" / f"run_{i}.nc")
+    for i, recording in enumerate(runs):
+        recording.to_netcdf(folder / "recordings" / f"run_{i}.nc")
     return folder
 
 

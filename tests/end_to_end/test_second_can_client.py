@@ -97,18 +97,18 @@ def test_the_log_of_another_program_is_the_same_recording(repository: Path, tmp_
 
 def assert_same_recording(recorded: Path, imported: Path) -> None:
     """Counts, type, times, flags and attributes, bit by bit; the exceptions are named above."""
-    one, other = stored(recorded), stored(imported)
-    assert {*one.variables} == {*other.variables}
-    for name in one.variables:
-        assert one[name].dtype == other[name].dtype, name
-        np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=str(name))
+    ours, theirs = stored(recorded), stored(imported)
+    assert {*ours.variables} == {*theirs.variables}
+    for name in ours.variables:
+        assert ours[name].dtype == theirs[name].dtype, name
+        np.testing.assert_array_equal(ours[name].values, theirs[name].values, err_msg=str(name))
         if name == "time":
-            assert one[name].attrs["units"] == other[name].attrs["units"] == "s"
+            assert ours[name].attrs["units"] == theirs[name].attrs["units"] == "s"
         elif name != "quality":  # its legend is longer where the recorder may set more bits
-            expected = {"add_offset": 0.0, **one[name].attrs}
-            found = {key: value for key, value in other[name].attrs.items() if key not in OF_AN_IMPORTED_CHANNEL}
+            expected = {"add_offset": 0.0, **ours[name].attrs}
+            found = {key: value for key, value in theirs[name].attrs.items() if key not in OF_AN_IMPORTED_CHANNEL}
             np.testing.assert_equal(found, expected, err_msg=str(name))
-    assert {*one.attrs} - {*other.attrs} <= OF_THE_RECORDER
-    assert {*other.attrs} - {*one.attrs} <= OF_THE_IMPORT
-    for key in {*one.attrs} & {*other.attrs}:
-        assert one.attrs[key] == other.attrs[key], key
+    assert {*ours.attrs} - {*theirs.attrs} <= OF_THE_RECORDER
+    assert {*theirs.attrs} - {*ours.attrs} <= OF_THE_IMPORT
+    for key in {*ours.attrs} & {*theirs.attrs}:
+        assert ours.attrs[key] == theirs.attrs[key], key

@@ -99,8 +99,8 @@ def test_the_report_has_everything_and_says_what_the_model_does(folder, tmp_path
     said_again = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert said_again["w_bar_map_error"] == pytest.approx(said["w_bar_map_error"], rel=1e-12)
     first, second = ((place / "maps.nc") for place in (tmp_path / "ROM", again))
-    with xr.open_dataset(first) as one, xr.open_dataset(second) as other:
-        xr.testing.assert_identical(one.drop_attrs(), other.drop_attrs())
+    with xr.open_dataset(first) as trained, xr.open_dataset(second) as trained_again:
+        xr.testing.assert_identical(trained.drop_attrs(), trained_again.drop_attrs())
     assert "training curve was written when it was trained" in (again / "report.html").read_text(encoding="utf-8")
 
 

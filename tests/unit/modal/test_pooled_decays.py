@@ -7,7 +7,7 @@ import pytest
 
 from sloshlab.errors import AnalysisError
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping, Trust, mean_over_decay
-from sloshlab.modal.pooled_decays import damping_deviation, pooled_damping
+from sloshlab.modal.pooled_decays import damping_deviation, mean_at_common_amplitudes, pooled_damping
 
 
 def reading(
@@ -122,3 +122,19 @@ def test_values_from_a_time_on() -> None:
     assert later.time_s.tolist() == [1.0, 2.0]
     assert later.damping_ratio.tolist() == [0.02, 0.01]
     assert later.method == "local sine fit"
+
+
+def test_only_amplitudes_that_both_pass_through_count_and_each_once() -> None:
+    """Thirty stretches at 1 m/s² count as one; those at 1000 m/s² are not reached by the twin."""
+    measured = reading(
+        np.concatenate([[1000.0, 100.0, 10.0], np.ones(30)]),
+        np.concatenate([[0.9, 0.03, 0.02], np.full(30, 0.01)]),
+    )
+    # 5 % at 100 and 1 % at 1 m/s²: 3 % at 10 m/s², half way on the logarithm
+    twin = reading(np.array([100.0, 1.0]), np.array([0.05, 0.01]))
+    assert mean_at_common_amplitudes(measured, twin) == pytest.approx((0.02, 0.03))
+
+
+def test_without_a_common_amplitude_there_is_no_mean() -> None:
+    apart = reading(np.array([100.0]), np.array([0.05])), reading(np.array([1.0]), np.array([0.01]))
+    assert np.isnan(mean_at_common_amplitudes(*apart)).all()

@@ -74,7 +74,7 @@ def shaker_run(
     windows = described(windows.assign({name: ("window", values) for name, values in scaled.items()}))
     excerpts = tuple(
         excerpt(float(frequency[at]), float(level[at]), mass)
-        for at in sorted({int(np.argmin(np.abs(frequency - one))) for one in (9, 13, 17)})
+        for at in sorted({int(np.argmin(np.abs(frequency - wanted_hz))) for wanted_hz in (9, 13, 17)})
     )
     return _run(run_id, windows, LAW, excerpts, rig_name, experiment, level_g, flags)
 

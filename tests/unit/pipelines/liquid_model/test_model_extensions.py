@@ -39,7 +39,7 @@ def trained(folder: Path, output: Path, **more):
         [folder / "training.nc", folder / "validation.nc"], [folder / "empty.nc"], folder / "rig.toml"
     )
     wanted = ModelSettings("nfir", 6, 0, 4, rate_hz=128.0, **more)
-    return train_and_report(files, [], wanted, SETTINGS, output, None)
+    return train_and_report(files, [], wanted, SETTINGS, output, command=None)
 
 
 def test_memory_and_ensemble_are_written(folder, tmp_path):

@@ -35,7 +35,7 @@ def study(tmp_path_factory):
     folder, told = tmp_path_factory.mktemp("study"), []
     results = sensitivity_study(
         [run(1), run(2)], [run(3)], 100.0, folder, SETTINGS, cases=CASES,
-        told=lambda result, done, n: told.append((result.case, done, n)),
+        on_case=lambda result, done, n: told.append((result.case, done, n)),
     )  # fmt: skip
     return folder, results, told
 
@@ -57,7 +57,7 @@ def test_nothing_is_trained_twice(study):
     before = {case.name: (folder / case.name / RESULT_NAME).stat().st_mtime_ns for case in CASES}
     told = []
     again = sensitivity_study(
-        [run(1), run(2)], [run(3)], 100.0, folder, SETTINGS, cases=CASES, told=lambda *one: told.append(one)
+        [run(1), run(2)], [run(3)], 100.0, folder, SETTINGS, cases=CASES, on_case=lambda *args: told.append(args)
     )
     assert again == results
     assert not told
@@ -71,7 +71,13 @@ def test_other_signals_or_a_damaged_result_are_trained_anew(study, tmp_path):
         if damaged:
             (tmp_path / case.name / RESULT_NAME).write_text("{")
         sensitivity_study(
-            [run(1)], [validation], 100.0, tmp_path, SETTINGS, cases=[case], told=lambda *one: told.append(one)
+            [run(1)],
+            [validation],
+            100.0,
+            tmp_path,
+            SETTINGS,
+            cases=[case],
+            on_case=lambda *case: told.append(case),
         )
     assert len(told) == 3
 
@@ -126,7 +132,7 @@ def test_facts_and_progress_arrive(tmp_path):
     shares = []
     sensitivity_study(
         [run(1)], [run(3)], 100.0, tmp_path, SETTINGS, cases=CASES[:2], n_workers=1, facts={"fill_level": 0.5},
-        watch=shares.append,
+        on_progress=shares.append,
     )  # fmt: skip
     assert load_model(tmp_path / CASES[0].name / MODEL_NAME).facts["fill_level"] == 0.5
     assert shares == sorted(shares)
@@ -137,7 +143,7 @@ def test_facts_and_progress_arrive(tmp_path):
 def test_a_case_that_cannot_be_trained_does_not_stop_the_others(tmp_path):
     still = Run(np.zeros(300), run(1).y)
     results = sensitivity_study([still], [run(3)], 100.0, tmp_path, SETTINGS, cases=CASES[:2], n_workers=1)
-    assert [one.is_trained for one in results] == [False, False]
+    assert [result.is_trained for result in results] == [False, False]
     assert "input of the training runs: got a constant" in results[0].ended
 
 

@@ -126,7 +126,7 @@ def test_a_recording_holds_every_count_and_says_what_it_is(place: Path) -> None:
     summary = record(settings_for(place, attributes=given), open_source=opening(FakeSource("fake:a", complete())))
     assert summary["flags"] == []
     assert summary["reason"] == "end"
-    assert [one["n_samples"] for one in summary["sources"]] == [N_SAMPLES]
+    assert [source["n_samples"] for source in summary["sources"]] == [N_SAMPLES]
     assert np.array_equal(stored_counts(place / "run.nc"), true_counts(0, N_SAMPLES))
     with netCDF4.Dataset(place / "run.nc") as file:
         assert (file.run_id, file.experiment, file.configuration) == ("run", "shaker_sweep", "sloshing")

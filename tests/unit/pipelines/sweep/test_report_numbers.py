@@ -38,13 +38,13 @@ def runs_at(*levels: float, **options: object) -> list[RunResult]:
 def test_accelerance_peak_of_a_softening_oscillator_per_level() -> None:
     stiffness = (82_000.0, 78_000.0, 74_000.0)
     found = responses(selection.by_level(work_experiment(stiffness).runs))
-    assert [round(one.peak_hz, 3) for one in found] == pytest.approx(
+    assert [round(response.peak_hz, 3) for response in found] == pytest.approx(
         [resonance_hz(k) for k in stiffness], abs=0.004
     )
     assert found[0].peak_hz > found[1].peak_hz > found[2].peak_hz
     # the work of a viscous damper under a constant force, πcΩu₀² with u₀ = F/|Z|, is largest near ω₀
     natural = [math.sqrt(k / MASS_KG) / (2 * math.pi) for k in stiffness]
-    assert [one.work_peak_hz for one in found] == pytest.approx(natural, rel=0.002)
+    assert [response.work_peak_hz for response in found] == pytest.approx(natural, rel=0.002)
 
 
 def test_peaks_of_other_modes_do_not_count() -> None:
@@ -55,19 +55,19 @@ def test_peaks_of_other_modes_do_not_count() -> None:
         1e-6,
     )  # a force that almost vanishes, far off
     spike["work_j"][10] = 1e3
-    [one] = responses([dataclasses.replace(run, windows=spike)])
-    assert one.peak_hz == pytest.approx(resonance_hz(82_000.0), abs=0.004)
-    assert one.work_peak_hz == pytest.approx(one.peak_hz, rel=0.01)
+    [response] = responses([dataclasses.replace(run, windows=spike)])
+    assert response.peak_hz == pytest.approx(resonance_hz(82_000.0), abs=0.004)
+    assert response.work_peak_hz == pytest.approx(response.peak_hz, rel=0.01)
 
 
 def test_accelerance_tends_to_one_over_the_mass_far_above_resonance() -> None:
     # ü/F = 1/(m − k/Ω² − jc/Ω): its phase is above zero, which is acceleration ahead of a mass's
-    one = responses(work_experiment((8_000.0, 7_000.0, 6_000.0)).runs)[0]
-    top = int(np.argmax(one.frequency_hz))
+    response = responses(work_experiment((8_000.0, 7_000.0, 6_000.0)).runs)[0]
+    top = int(np.argmax(response.frequency_hz))
     omega = 2 * math.pi * 15.0
     expected = 1 / complex(MASS_KG - 8_000.0 / omega**2, -60.0 / omega)
-    assert one.accelerance_per_kg[top] == pytest.approx(expected, rel=1e-9)
-    assert one.accelerance_per_kg[top].imag > 0
+    assert response.accelerance_per_kg[top] == pytest.approx(expected, rel=1e-9)
+    assert response.accelerance_per_kg[top].imag > 0
 
 
 def test_summary_says_that_the_mode_softens() -> None:
@@ -131,10 +131,11 @@ def test_every_table_row_is_as_long_as_its_header() -> None:
 
 
 def test_dry_mass_without_identified_gain_says_so() -> None:
-    [one] = shaker_experiment((0.5,), (2.0,)).rigs
-    assert one.dry_mass is not None
-    alone = dataclasses.replace(one, dry_mass=dataclasses.replace(one.dry_mass, gain_ratio_std=math.nan))
-    unknown = dataclasses.replace(one, dry_mass=None)
+    [rig_result] = shaker_experiment((0.5,), (2.0,)).rigs
+    identified = rig_result.dry_mass
+    assert identified is not None
+    alone = dataclasses.replace(rig_result, dry_mass=dataclasses.replace(identified, gain_ratio_std=math.nan))
+    unknown = dataclasses.replace(rig_result, dry_mass=None)
     rows = tables.dry_mass_table([alone, unknown]).rows
     assert rows[0][4] == "taken as 1"
     assert rows[1][1:3] == ("0.6100", "–")
@@ -220,8 +221,8 @@ def test_planes_put_a_point_where_the_definitions_do() -> None:
 
 
 def test_a_map_is_drawn_inside_the_measured_region_only() -> None:
-    [one] = shaker_experiment((0.5,), (2.0,)).rigs
-    field = figures_maps.scaled_field(one.maps.dataset, "w_bar", one.rig, "W̄")
+    [rig_result] = shaker_experiment((0.5,), (2.0,)).rigs
+    field = figures_maps.scaled_field(rig_result.maps.dataset, "w_bar", rig_result.rig, "W̄")
     with drawing_style():
         figure = new_figure(4.0)
         axes = figure.subplots()
@@ -248,10 +249,10 @@ def _rendered(figure: object) -> np.ndarray:
 
 
 def test_a_map_without_a_finite_value_gives_a_reason() -> None:
-    [one] = shaker_experiment((0.5,), (2.0,)).rigs
-    empty = one.maps.dataset.assign(w_bar=one.maps.dataset["w_bar"] * np.nan)
+    [rig_result] = shaker_experiment((0.5,), (2.0,)).rigs
+    empty = rig_result.maps.dataset.assign(w_bar=rig_result.maps.dataset["w_bar"] * np.nan)
     with pytest.raises(NothingToDrawError, match="no finite value"):
-        figures_maps.scaled_field(empty, "w_bar", one.rig, "W̄")
+        figures_maps.scaled_field(empty, "w_bar", rig_result.rig, "W̄")
 
 
 def test_shades_keep_zero_in_the_middle_for_both_signs_and_contain_the_range() -> None:
