@@ -11,6 +11,7 @@ from pipelines.command_line import run
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD
 from pipelines.sweep.folder import recordings_and_rigs
 from sloshlab.errors import InputError, SloshlabError
+from sloshlab.experiments import experiment_names
 
 _MINUTES_PER_BALL: Final = 1
 
@@ -25,11 +26,13 @@ def shaker_arguments(folder: Path, output: Path, rigs_folder: Path | None = None
 def main() -> int:
     """Run ``EXPERIMENT FOLDER OUTPUT``."""
     experiment, folder, output = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
-    if experiment not in EXPERIMENTS:
-        print(f"unknown experiment {experiment!r}; allowed: {', '.join(EXPERIMENTS)}", file=sys.stderr)  # noqa: T201
+    analysed = experiment_names(lambda known: bool(known.pipeline))
+    if experiment not in (*_FOLDERS, *analysed):
+        allowed = ", ".join((*_FOLDERS, *analysed))
+        print(f"unknown experiment {experiment!r}; allowed: {allowed}", file=sys.stderr)  # noqa: T201
         return 2
     try:
-        return EXPERIMENTS[experiment](folder, output)
+        return _FOLDERS.get(experiment, _any)(folder, output)
     except SloshlabError as error:
         print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
         return INPUT_IS_BAD
@@ -169,7 +172,15 @@ def _replay(folder: Path, output: Path) -> int:
     return 1 if summary["flags"] else 0
 
 
-EXPERIMENTS: Final = {
+def _any(folder: Path, output: Path) -> int:
+    """All runs of a folder by the pipeline of their experiment; a flagged result is a result."""
+    recordings, rigs = recordings_and_rigs(folder)
+    options = [part for rig in rigs for part in ("--rig", str(rig))]
+    code = run(["analyse", *map(str, recordings), *options, "-o", str(output)])
+    return 0 if code == DONE_BUT_FLAGGED else code
+
+
+_FOLDERS: Final = {
     "shaker": _shaker,
     "beam": _beam,
     "sdof": _beam,
@@ -178,6 +189,7 @@ EXPERIMENTS: Final = {
     "study": _study,
     "replay": _replay,
 }
+"""What the make targets run; an experiment of the registry with a pipeline needs no line here."""
 
 
 if __name__ == "__main__":

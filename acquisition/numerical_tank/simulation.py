@@ -116,11 +116,6 @@ class NumericalTank:
         return int(self._counters[stepping.STEPS_DONE])
 
     @property
-    def n_crossings(self) -> int:
-        """How often a particle changed places with its image behind a wall."""
-        return int(self._counters[stepping.CROSSINGS])
-
-    @property
     def time_s(self) -> float:
         """Time since the start."""
         return self.n_steps * self.setup.step_s

@@ -78,11 +78,6 @@ class BitField:
             byte, top = byte + 1, 7
 
     @property
-    def last_byte(self) -> int:
-        """Number of the last byte that the field reaches into."""
-        return max(piece.byte for piece in self.pieces())
-
-    @property
     def lowest(self) -> int:
         """Smallest value."""
         return -(1 << (self.length - 1)) if self.signed else 0
