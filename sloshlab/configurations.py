@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
-
-from sloshlab.registry import one_of
+from typing import Final
 
 SLOSHING: Final = "sloshing"
 """Liquid that is free to move."""
@@ -16,5 +14,3 @@ EMPTY: Final = "empty"
 CONFIGURATIONS: Final = (SLOSHING, FROZEN, EMPTY)
 STILL_CONFIGURATIONS: Final = (EMPTY, FROZEN)
 """Nothing moves in the tank: such runs tell its dry mass."""
-
-Configuration = Annotated[str, one_of(lambda: CONFIGURATIONS)]

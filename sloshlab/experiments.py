@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final, Literal
 
 from sloshlab import channel_names
-from sloshlab.registry import Registry, one_of
+from sloshlab.registry import Registry
 
 Moves = Literal["shaker", "release", "root", "anything"]
 
@@ -216,6 +216,3 @@ def experiment_names(suits: Callable[[Experiment], bool] = lambda experiment: Tr
 def recorded_experiments() -> tuple[str, ...]:
     """Names that the attribute `experiment` of a recording may have."""
     return experiment_names(lambda experiment: experiment.is_recorded)
-
-
-RecordedExperiment = Annotated[str, one_of(recorded_experiments)]

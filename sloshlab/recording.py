@@ -18,11 +18,12 @@ import xarray as xr
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from sloshlab import atomic_file, interrupt
-from sloshlab.configurations import Configuration
+from sloshlab.configurations import CONFIGURATIONS
 from sloshlab.errors import RecordingError, UnitsError
-from sloshlab.experiments import EXPERIMENTS, RecordedExperiment
+from sloshlab.experiments import EXPERIMENTS, recorded_experiments
 from sloshlab.file_structure import require_sound_structure
 from sloshlab.netcdf_lock import NETCDF_LOCK
+from sloshlab.registry import one_of
 from sloshlab.units import SI_UNITS, ChannelQuantity, factor_to_si
 
 FORMAT: Final = "1"
@@ -45,6 +46,10 @@ _QUALITY_MEANINGS: Final = {
 
 _TIME_CHUNK = 1 << 18
 _DECODING_BLOCK = 1 << 20
+
+RecordedExperiment = Annotated[str, one_of(recorded_experiments)]
+Configuration = Annotated[str, one_of(lambda: CONFIGURATIONS)]
+"""Fields that take a name of their vocabulary."""
 
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]

@@ -13,9 +13,6 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Generic, TypeVar
 
-from pydantic import PlainValidator
-from pydantic_core import PydanticCustomError
-
 from sloshlab.errors import InputError, SloshlabError
 
 T = TypeVar("T")
@@ -155,11 +152,13 @@ def loaded(reference: str) -> Any:
     return getattr(importlib.import_module(module), attribute)
 
 
-def one_of(names: Callable[[], Sequence[str]]) -> PlainValidator:
+def one_of(names: Callable[[], Sequence[str]]) -> Any:
     """Validator of a pydantic field that takes the names of a vocabulary, whatever it holds by then.
 
     A wrong value is refused in the words that pydantic has for a ``Literal`` of the same names.
     """
+    from pydantic import PlainValidator
+    from pydantic_core import PydanticCustomError
 
     def checked(value: object) -> object:
         allowed = names()

@@ -15,9 +15,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from acquisition.files.file_format import FormatName
-from sloshlab.configurations import Configuration
 from sloshlab.errors import ChannelMapError
-from sloshlab.experiments import RecordedExperiment
+from sloshlab.recording import Configuration, RecordedExperiment
 from sloshlab.units import SI_UNITS, ChannelQuantity
 
 _LARGEST_MAP_BYTES = 1_000_000
