@@ -87,6 +87,7 @@ def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-
     n = constants.n
     reach = constants.support + constants.skin
     square = reach * reach
+    # one cell more on each side for the images, which stand at most one reach outside
     n_x, n_z = int(constants.length / reach) + 3, int(constants.height / reach) + 3
     cells = _Cells(reach, n_x, n_z)
     start, order, cell_of = _sort_into_cells(particles, 0, n, cells)
@@ -97,6 +98,7 @@ def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-
     count = 0
     for i in range(n):
         pairs.start[i] = count
+        # no particle lists more than all others: one check per particle instead of one per pair
         if count + n_all > pairs.j.size:
             return False
         cell, row = cell_of[i], cell_of[i] % n_z
@@ -104,6 +106,7 @@ def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-
         count = _list_range(
             particles, pairs, _Slots(order, count), Partners(i, slot[i] + 1, start[cell + high]), square
         )
+        # looking at each pair once halves the time of a listing, which violent motion needs every few steps
         if cell + n_z < n_x * n_z:
             first, last = start[cell + n_z - low], start[cell + n_z + high]
             count = _list_range(particles, pairs, _Slots(order, count), Partners(i, first, last), square)

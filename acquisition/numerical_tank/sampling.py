@@ -49,6 +49,7 @@ def filter_weights(n_means: int) -> FloatArray:
     n_means : int
         Means in a sample.
     """
+    # even: a sample lies between the middles of two means, and a symmetric filter has no phase only so
     n_weights = 2 * HALF_LENGTH_SAMPLES * n_means
     window = ("kaiser", float(kaiser_beta(_ATTENUATION_DB)))
     return np.asarray(firwin(n_weights, 1 / n_means, window=window), np.float64)

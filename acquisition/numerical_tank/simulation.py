@@ -269,6 +269,7 @@ class NumericalTank:
         targets |= {"sums": self._sums, "counters": self._counters, "start": np.zeros(3)}
         for name, target in targets.items():
             given = arrays[name]
+            # the file may belong to another tank; an array of another shape would be broadcast without a word
             if given.shape != target.shape or given.dtype != target.dtype or not np.isfinite(given).all():
                 raise InputError(
                     f"checkpoint, {name}",
@@ -282,6 +283,7 @@ class NumericalTank:
     def _relist(self) -> None:
         """List the pairs as they were listed last, at the positions of that time."""
         n, particles = self.setup.n_particles, self._particles
+        # listed at the present positions the pairs would have another order, and their sums another rounding
         x, z = particles.x[:n].copy(), particles.z[:n].copy()
         particles.x[:n], particles.z[:n] = particles.x_listed[:n], particles.z_listed[:n]
         self._list()

@@ -82,6 +82,7 @@ def _kick(particles, constants, body_x, body_z):  # type: ignore[no-untyped-def]
         new_x = vx + constants.step * (particles.ax[i] + body_x)
         new_z = vz + constants.step * (particles.az[i] + body_z)
         particles.vx[i], particles.vz[i] = new_x, new_z
+        # force times mean velocity is exactly what the kinetic energy changes by, so that the account closes
         sum_x += 0.5 * (vx + new_x)
         sum_z += 0.5 * (vz + new_z)
         square = new_x * new_x + new_z * new_z
@@ -201,6 +202,7 @@ def end_step(flow, tank, viscosity, force, totals):  # type: ignore[no-untyped-d
     counters[CROSSINGS] += crossings
     # written so that a speed that is not a number counts as too fast
     if not largest <= constants.largest_speed * constants.largest_speed:
+        # the step is not counted: what is handed out as valid ends before it
         counters[PARTICLE] = fastest
         return TOO_FAST
     counters[STEPS_DONE] += 1

@@ -181,6 +181,7 @@ def _check(structure: Structure) -> None:
         _check_number(name, getattr(structure, name))
     if not structure.shape_at_tank.any():
         raise InputError("mode shapes at the tank", got="only zeros", allowed="one other than zero at least")
+    # modal masses measured without the liquid, or of shapes scaled otherwise, leave a mass below zero here
     if not math.isfinite(structure.included_mass_kg) or np.linalg.eigvalsh(structure.mass_matrix_kg)[0] <= 0:
         raise InputError(
             "modal masses without the liquid",

@@ -25,6 +25,7 @@ STREAM_BITS: Final = 8
 FD_LENGTHS: Final = (8, 12, 16, 20, 24, 32, 48, 64)
 """Lengths of a CAN FD frame from 8 bytes up."""
 
+# checksum 2, counter 4, clock 4, flags 1, number of samples 1
 _FD_HEADER_BYTES = 12
 _CRC = BitField("crc_16", 0, 16)
 
@@ -272,6 +273,8 @@ def _sample_fields(channels: Sequence[Channel], first_byte: int, n_samples: int)
 def _classic_message(
     number: int, channels: Sequence[Channel], indices: tuple[int, ...], has_clock: bool
 ) -> SampleMessage:
+    # The multiplexor is the low bits of the counter, so that byte 2 is its low byte in every frame; eight frames
+    # in a row carry all of it, the whole clock and the flags.
     multiplexor = BitField("sample_counter_0", 16, 3)
     page = [Selected(BitField(f"sample_counter_{bit}", 24, 8), bit, (n,)) for n, bit in enumerate((8, 16, 24))]
     clock = [Selected(BitField(f"device_clock_{bit}", 24, 8), bit, (bit // 8 + 3,)) for bit in (0, 8, 16, 24)]

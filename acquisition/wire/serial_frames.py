@@ -23,6 +23,7 @@ from acquisition.wire import cobs
 from sloshlab.errors import InputError
 
 VERSION: Final = 1
+# bounds the memory that any sender can make the host use for a frame
 LONGEST_BODY: Final = 65_535
 """Bytes of header, payload and CRC together; what is longer is garbage."""
 
@@ -193,6 +194,7 @@ def _bounded_rest(data: bytes | bytearray | memoryview, start: int) -> tuple[byt
 
 def _frame(body: memoryview, n_bytes: int) -> Frame | FrameError:
     content = body[: -_CRC.size]
+    # the checksum first: nothing that a damaged frame says is believed
     if _CRC.unpack(body[-_CRC.size :])[0] != zlib.crc32(content):
         return FrameError(FrameErrorKind.CORRUPT, f"checksum of a frame of {len(body)} bytes", n_bytes)
     try:
@@ -261,6 +263,7 @@ def _counts(payload: memoryview, n_samples: int, n_channels: int, width: int) ->
 def _unpack_24_bits(payload: cobs.ByteArray, counts: CountArray) -> None:
     for k in range(counts.size):
         low, middle, high = payload[3 * k], payload[3 * k + 1], payload[3 * k + 2]
+        # numpy has no integers of 24 bits; the last line gives bit 23 its weight of −2²³
         unsigned = np.int32(low) | (np.int32(middle) << 8) | (np.int32(high) << 16)
         counts[k] = (unsigned ^ 0x800000) - 0x800000
 
@@ -311,6 +314,7 @@ def _content_without_samples(frame: Frame) -> tuple[bytes, bytes]:
 
 def _closed(header: bytes, payload: bytes | memoryview) -> bytes:
     content = b"".join((header, payload))
+    # the checksum is stuffed with the rest, since it may hold zeros itself
     return cobs.encode(content + _CRC.pack(zlib.crc32(content))) + b"\0"
 
 
