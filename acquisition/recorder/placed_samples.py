@@ -105,6 +105,7 @@ class PlacedSamples:
             place = int(group.index[k])
             new = self._counts(number, k)[low - place : high - place]
             here = slice(low - start, high - start)
+            # entries come in the order of arrival: what is known was there first, and the first copy is kept
             known = is_there[here]
             if not known.any():
                 counts[here] = new
@@ -135,9 +136,11 @@ class _Ordered:
 
     def __init__(self, group: GroupPlacement) -> None:
         self.group = group
+        # stable, so that copies stay in the order of arrival
         order = np.argsort(group.start, kind="stable")
         self._order = order[group.stop[order] > group.start[order]]
         self._starts = group.start[self._order]
+        # ascending even where entries overlap, as a search needs it
         self._reached = np.maximum.accumulate(group.stop[self._order])
 
     def between(self, start: int, stop: int) -> list[int]:

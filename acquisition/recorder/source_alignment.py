@@ -32,6 +32,7 @@ LATENCY_DIFFERENCE_S: Final = 0.25
 UNKNOWN_START_S: Final = 30.0
 """How far starts are sought apart where host times mean nothing."""
 
+# beyond what quartzes differ by: those of two devices are some 100 ppm apart
 UNKNOWN_DRIFT_PPM: Final = 500.0
 _MOST_PAIRS_TRIED = 6
 _LARGEST_STEP_DIFFERENCE = 1e-9
@@ -175,6 +176,7 @@ def aligned_by_device_clock(base: SourcePlacement, other: SourcePlacement) -> So
     """
     base_start, base_step, base_rms = _device_time(base)
     start, step, rms = _device_time(other)
+    # seconds of the base's own clock: its sample k has the time k/rate exactly, whatever its quartz does
     unit = base_step * base.info.sampling_rate_hz
     error_s = 2 * math.hypot(base_rms, rms)
     return SourceAlignment(AlignmentMethod.DEVICE, (start - base_start) / unit, step / unit, error_s)
@@ -196,6 +198,7 @@ def aligned_by_host(
     pairs : sequence of (str, str)
         A channel of `base` and one of `other` with the same motion.
     """
+    # a phase knows a delay only up to a period, so arrivals bound the search
     prior, largest_delay_s, largest_drift_ppm = _by_arrival(base, other)
     delays = []
     for names in itertools.islice(pairs, _MOST_PAIRS_TRIED):
@@ -208,6 +211,7 @@ def aligned_by_host(
         except AnalysisError:
             continue
         delays.append((*names, delay))
+    # an ambiguous delay is not used, however small its residual
     delays.sort(key=lambda delay: (delay[2].status is not AlignmentStatus.ALIGNED, delay[2].error_s))
     if not delays or delays[0][2].status is not AlignmentStatus.ALIGNED:
         return replace(prior, delays=tuple(delays))
@@ -276,6 +280,7 @@ def _device_time(placement: SourcePlacement) -> tuple[float, float, float]:
         )
     time = (ticks - ticks[0]) / placement.info.clock_hz
     middle = places.mean()
+    # about the middle: far from zero a fit loses digits
     slope, height = np.polyfit(places - middle, time, 1)
     rms = float(np.sqrt(np.mean((time - height - slope * (places - middle)) ** 2)))
     return float(ticks[0] / placement.info.clock_hz + height - slope * middle), float(slope), rms

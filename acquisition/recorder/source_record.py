@@ -19,6 +19,7 @@ _TOLD_AT_ONCE: Final = frozenset(
         TroubleKind.OVERRUN,
     }
 )
+# a line that breaks again and again must not fill the terminal; all are counted and in the journal
 _MOST_TOLD_PER_KIND: Final = 20
 
 

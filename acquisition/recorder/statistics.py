@@ -189,6 +189,7 @@ class LossMeter:
             self._stream, self._next_counter = block.stream, block.counter
         end = block.counter + n_samples
         if block.counter < self._next_counter:
+            # a copy looks like a late block; the count for a person never goes below zero
             self.n_lost -= min(self.n_lost, n_samples)
         else:
             self.n_lost += block.counter - self._next_counter
@@ -225,6 +226,7 @@ class DriftMeter:
         host_s = (block.host_monotonic_ns - self._origin[1]) * 1e-9
         difference_s = (counter - self._origin[0]) / self._rate_hz - host_s
         self._n += 1
+        # running means and squares about them (Welford): sums of squares of times would cancel after hours
         before_host_s = host_s - self._mean_host_s
         before_difference_s = difference_s - self._mean_difference_s
         self._mean_host_s += before_host_s / self._n

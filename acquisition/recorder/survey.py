@@ -23,7 +23,9 @@ SHORTEST_STUCK_SAMPLES: Final = 64
 SHORTEST_STUCK_S: Final = 0.25
 """A count that stays the same for less than both is no sign of anything."""
 
+# a channel that is constant in pieces must not fill the memory
 MOST_RUNS_KEPT: Final = 100_000
+# far above the motion that clocks are aligned by; 51.2 kHz would make the correlations fifty times as long
 THINNED_RATE_HZ: Final = 1000.0
 
 # a sensor is stuck if another one swings by ten counts and eight times its noise, so much that this one, in the
@@ -183,6 +185,7 @@ class _Tracker:
         n_channels = len(info.channels)
         self._info = info
         self._shortest = max(SHORTEST_STUCK_SAMPLES, math.ceil(SHORTEST_STUCK_S * info.sampling_rate_hz))
+        # ranges of cells bound the swing of the other channels during a run without another reading of the samples
         self._cell = max(8, self._shortest // 4)
         n_cells = n_samples // self._cell + 1
         self._cells = np.empty((2, n_channels, n_cells), np.int32)
@@ -236,6 +239,7 @@ class _Tracker:
         if value <= low or value >= high:
             return False  # clipped is something else
         first, last = -(-start // self._cell), stop // self._cell
+        # cells that lie wholly within the run; the shortest has three of them
         lowest = self._cells[0, :, first:last].min(axis=1).astype(np.float64)
         swing = self._cells[1, :, first:last].max(axis=1) - lowest
         own_std = self._std(k)
