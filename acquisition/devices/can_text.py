@@ -15,6 +15,7 @@ _HEX: Final = np.frombuffer(b"0123456789ABCDEF", np.uint8)
 _DLC: Final = np.zeros(65, np.uint8)
 for _code, _length in enumerate((0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)):
     _DLC[_length] = _HEX[_code]
+# seconds since 1970 have ten digits until the year 2286
 _STAMP_DIGITS = 10
 
 
@@ -44,6 +45,7 @@ def socketcand_text(frames: FrameArray, stamps_s: NDArray[np.float64]) -> bytes:
     text[:, 11] = text[:, 29] = ord(" ")
     text[:, 12:29] = _stamps(stamps_s)
     text[:, 30 : 30 + 2 * longest] = _data(frames["data"])
+    # frames of different lengths are cut out of one rectangle: frame by frame they would need a core
     used = np.ones(text.shape, bool)
     used[:, 29] = ~is_error
     used[:, 30 : 30 + 2 * longest] = np.arange(2 * longest) < 2 * frames["length"].astype(np.int64)[:, None]

@@ -33,6 +33,7 @@ TimeOrNever = Annotated[float, Field(ge=0)]
 
 
 class _Table(BaseModel):
+    # a misspelt fault must not pass for a device without it
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 
 

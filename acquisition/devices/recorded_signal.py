@@ -152,6 +152,7 @@ def _storage(path: Path, n_samples: int, n_channels: int) -> NDArray[np.int32]:
         )
     if size <= _LARGEST_IN_MEMORY:
         return np.empty((n_samples, n_channels), np.int32)
+    # has no name: a process that is killed leaves nothing behind
     with tempfile.TemporaryFile() as unnamed:  # the mapping keeps it alive
         return np.memmap(unnamed, np.int32, mode="w+", shape=(n_samples, n_channels))
 
@@ -177,6 +178,7 @@ def _stored(path: Path, name: str, variable: Any, attributes: Mapping[str, Any])
     dtype = np.dtype(variable.dtype)
     shift = 1 << (8 * dtype.itemsize - 1) if dtype.kind == "u" else 0
     fill = attributes.get("_FillValue", attributes.get("missing_value"))
+    # by the readings and not by the stored type: 24 bits of most recordings take a quarter less of the line
     lowest, highest = (value - shift for value in _extremes(variable, fill))
     missing = None if fill is None else int(fill) - shift
     bits = _width(8 * dtype.itemsize, lowest, highest)
@@ -187,6 +189,7 @@ def _stored(path: Path, name: str, variable: Any, attributes: Mapping[str, Any])
         )
     limit = 1 << (bits - 1)
     if missing is not None and not -limit <= missing < limit:
+        # a fill value beyond these bits cannot be sent: a count that no reading has stands for it
         missing = -limit if lowest > -limit else limit - 1
         if missing == highest:
             raise RecordingError(f"{path}: {name}", got="no count free for missing readings", allowed="one")

@@ -53,6 +53,7 @@ def simulated_device(
     faults = faults or Faults()
     faults.require_channels(signal.channels, can_announce=found.can_announce)
     clock = DeviceClock(signal.sampling_rate_hz, **faults.clock.model_dump())
+    # clock first, then sensors, then frames: as the signal passes through a real device
     clocked = ClockedSignal(signal, clock, seed=seed + faults.seed)
     truth = Truth()
     sensor_faults = SensorFaults(faults, signal.channels, clock, truth)
