@@ -107,6 +107,7 @@ def _raw(channel: Any, values: np.ndarray) -> RawCounts | None:
     if slope is None or counts[0].dtype.kind not in "iu":
         return None
     intercept = _number(properties, f"NI_Scale[{n_scales - 1}]_Linear_Y_Intercept") or 0.0
+    # other scalings (tables, polynomials, several in a row) are not linear: then the scaled values are kept
     if not np.array_equal(counts[0] * slope + intercept, values):
         return None
     return RawCounts(counts[0], slope, intercept)

@@ -152,6 +152,7 @@ def rows_of(name: str, values: np.ndarray) -> list[tuple[str, np.ndarray]]:
     squeezed = np.squeeze(values)
     if squeezed.ndim == 1:
         return [(name, squeezed)]
+    # of a square matrix nothing tells which side is time: nothing is guessed
     if squeezed.ndim != 2 or squeezed.shape[0] == squeezed.shape[1]:
         return []
     rows = squeezed if squeezed.shape[0] < squeezed.shape[1] else squeezed.T
