@@ -34,6 +34,7 @@ VerticalMotion = Callable[[FloatArray], FloatArray]
 Progress = Callable[[float], None]
 """Takes the share of the work that is done, 0 … 1."""
 
+# of computing: what a kill or a power cut costs
 SAVED_EVERY_S: Final = 20.0
 _BLOCK_S: Final = 0.1
 
@@ -129,6 +130,7 @@ class _Computation(LongComputation):
         self._steps_per_mean = setup.steps_per_sample // self._n_means
         # the filter of the last sample needs half its length beyond it
         self._means = np.zeros((n_samples - 1 + HALF_LENGTH_SAMPLES) * self._n_means)
+        # whole means in a block, so that a checkpoint never falls within one
         self._at_once = max(round(_BLOCK_S / (self._steps_per_mean * setup.step_s)), 1)
         self._n_done = 0
         self._motion = motion

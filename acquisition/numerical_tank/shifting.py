@@ -133,6 +133,8 @@ def _rarefaction(particles, i, missing):  # type: ignore[no-untyped-def]
     if missing >= -LITTLE:
         return missing
     share = (_roundness(particles, i) - ROUND[0]) / (ROUND[1] - ROUND[0])
+    # a sheet or a thread has neighbours on one line and is as thin as it should be; a foam has them all around and
+    # is drawn together
     return missing * min(max(share, 0.0), 1.0)
 
 
@@ -200,6 +202,7 @@ def _away_from_surface(particles, i, constants):  # type: ignore[no-untyped-def]
     """Take the part across the surface from the shift of a particle that feels one."""
     nx, nz = particles.nx[i], particles.nz[i]
     size = math.hypot(nx, nz) * constants.smoothing
+    # inside the liquid Σ V ∇W is nearly zero, and its direction is that of the disorder
     if size <= NEAR_SURFACE[0]:
         return particles.qx[i], particles.qz[i]
     share = min((size - NEAR_SURFACE[0]) / (NEAR_SURFACE[1] - NEAR_SURFACE[0]), 1.0)

@@ -157,10 +157,13 @@ def begin_step(flow, force):  # type: ignore[no-untyped-def]
     half = constants.half * constants.step
     _move(particles, n, half)
     place_images(particles, images, n)
+    # images before any sum over pairs: their places decide which pairs are in reach, their velocities the rate of
+    # density
     mirror_velocity(particles, images, n)
     measure_pairs(particles, pairs, constants)
     rate_of_density(particles, pairs, constants)
     _compress(particles, n, half)
+    # after the density has been brought to the middle, where the pressures of the forces belong
     mirror_density(particles, images, n)
     viscosity = accelerate(particles, pairs, constants, n_all)
     correct_gradient(particles, n)
@@ -176,6 +179,7 @@ def _finish_motion(flow, body_x, body_z, sums):  # type: ignore[no-untyped-def]
     half = constants.half * constants.step
     sum_x, sum_z, largest, fastest = _kick(particles, constants, body_x, body_z)
     mirror_velocity(particles, images, n)
+    # anew, with the velocities after the kick: half a step with either makes the step symmetric in time
     rate_of_density(particles, pairs, constants)
     _compress(particles, n, half)
     sums[DENSITY_DIFFUSION] += _diffuse(particles, constants)

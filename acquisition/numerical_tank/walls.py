@@ -118,6 +118,7 @@ def exchange_with_images(particles: Particles, constants: Constants):  # type: i
         particles.x[i], crossed = _into_box(particles.x[i], constants.length)
         if crossed:
             particles.vx[i] = -particles.vx[i]
+            # after the change of sign: what the wall gave the particle
             impulse_x += 2.0 * particles.vx[i]
             count += 1
         particles.z[i], crossed = _into_box(particles.z[i], constants.height)

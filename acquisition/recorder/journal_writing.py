@@ -37,6 +37,7 @@ SYNCHRONISATION_INTERVAL_NS: Final = 500_000_000
 DESCRIPTION_INTERVAL_NS: Final = 30_000_000_000
 """Metadata and sources are repeated this often, so that no single damage makes the samples unreadable."""
 
+# the clock fit needs the earliest arrivals of a run, not every one; each entry costs 32 bytes
 SHORTEST_ENTRY_NS: Final = 40_000_000
 """Blocks that were read closer together than this share their times."""
 
@@ -204,6 +205,7 @@ class JournalWriter:
         place = {"identity": self._identity, "sequence": self._sequence, "offset": self.n_bytes}
         self._write(packed_block(block_type, source, payload, **place))
         self._sequence += 1
+        # troubles and ends reach the disk with the samples after them, or at the close
         if block_type is not BlockType.SAMPLES:
             return
         now = self._monotonic_ns()

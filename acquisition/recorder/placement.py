@@ -270,6 +270,7 @@ def _last_counter(
         most = last + max(last - first, math.ceil(LONGEST_MISSING_TAIL_S * rate_hz))
         return (max(last, taken), 0) if taken <= most else (last, taken - last)
     # a recorder that stopped in the middle of a set of messages lost nothing
+    # after a crash the last samples of a group are kept: what the others lack there was lost
     if is_complete and max(lasts) - min(lasts) <= ragged:
         last = min(lasts)
     return last, 0

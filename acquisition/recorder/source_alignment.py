@@ -178,6 +178,7 @@ def aligned_by_device_clock(base: SourcePlacement, other: SourcePlacement) -> So
     start, step, rms = _device_time(other)
     # seconds of the base's own clock: its sample k has the time k/rate exactly, whatever its quartz does
     unit = base_step * base.info.sampling_rate_hz
+    # two standard deviations
     error_s = 2 * math.hypot(base_rms, rms)
     return SourceAlignment(AlignmentMethod.DEVICE, (start - base_start) / unit, step / unit, error_s)
 

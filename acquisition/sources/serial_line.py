@@ -17,6 +17,7 @@ from urllib.parse import urlsplit
 
 from sloshlab.errors import SourceError
 
+# bounds what one read and its frames take of memory, whatever is sent
 MOST_BYTES_AT_ONCE: Final = 1 << 18
 """One `read` returns no more than about this."""
 
@@ -193,6 +194,7 @@ def _socket_line(target: str, name: str) -> Line:
         ) from error
     # commands are small, and waiting for more would delay them
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    # so that a read takes all that is waiting and never waits for more
     connection.setblocking(False)
     return DescriptorLine(name, connection.fileno(), connection.recv, connection.sendall, connection.close)
 

@@ -206,6 +206,7 @@ def amplitude_shape_from_means(
     from scipy.integrate import quad
     from scipy.optimize import fsolve
 
+    # from the onset at 1 g on: with the amplitudes below no law could have the published mean
     low, high = 1.0 / omega_bar**2, min(6.0 / omega_bar**2, stroke_limit_u_bar)
 
     def misses(shape: FloatArray) -> list[float]:

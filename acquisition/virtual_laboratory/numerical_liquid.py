@@ -124,6 +124,7 @@ class NumericalLiquid:
             time_s = np.arange(round(motion.duration_s * sampling_rate_hz)) / sampling_rate_hz
             force_n = -mass_kg * motion.at(time_s).acceleration
             return force_n, {"liquid": configuration, "seed": seed, "sloshlab_version": __version__}
+        # the same seed as for the shaker's imperfections: repeats differ in both
         setup = numerical_setup(
             rig, layers_per_height=self.layers_per_height, seed=seed, sampling_rate_hz=sampling_rate_hz
         )

@@ -69,6 +69,7 @@ class BitField:
             weight += n_bits
 
     def _big_endian_pieces(self) -> Iterator[Piece]:
+        # in DBC files big-endian fields start at their most significant bit and go on at bit 7 of the next byte
         byte, top = divmod(self.start_bit, 8)
         left = self.length
         while left:

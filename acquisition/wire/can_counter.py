@@ -26,6 +26,7 @@ from acquisition.wire.can_bits import IntArray
 from acquisition.wire.can_layout import SampleMessage
 from sloshlab.errors import SourceError
 
+# one of the two facts that the proof of a place rests on; the other is that a counter only grows
 LATEST_FRAMES: Final = 64
 """A frame may arrive after others that are up to so many frames ahead of it."""
 
