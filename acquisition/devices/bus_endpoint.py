@@ -126,6 +126,7 @@ class BusEndpoint(Endpoint):
         now_s = self._now_s()
         if self._next_s > now_s:
             self._sleep(self._next_s - now_s)
+        # never from the past: after a pause frames must not come in a burst that the bus would lose
         self._next_s = max(self._next_s, now_s) + n_frames / self._frames_per_s
 
     def _messages(self, frames: FrameArray) -> list[Any]:

@@ -12,6 +12,7 @@ from acquisition.devices.frames import FrameArray, FrameKind
 ByteArray = NDArray[np.uint8]
 
 _HEX: Final = np.frombuffer(b"0123456789ABCDEF", np.uint8)
+# the length code of CAN: one digit also for the lengths of CAN FD beyond 8
 _DLC: Final = np.zeros(65, np.uint8)
 for _code, _length in enumerate((0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)):
     _DLC[_length] = _HEX[_code]

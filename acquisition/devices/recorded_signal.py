@@ -132,6 +132,7 @@ def _read(
             lost[rows] = True
             for k, column in enumerate(columns):
                 storage[rows, k], missing = column.read(file.variables[chosen[k]], rows)
+                # lost only where all channels are: the counter of the device then jumps over the sample
                 lost[rows] &= missing
     return tuple(column.channel for column in columns), storage, lost
 
@@ -215,6 +216,7 @@ def _quantised(path: Path, name: str, variable: Any, attributes: Mapping[str, An
     largest = max(abs(lowest), abs(highest))
     if not np.isfinite(largest):
         raise RecordingError(f"{path}: {name}", got="infinite values", allowed="numbers, NaN where lost")
+    # full scale is the largest value, so that the lowest count stays free for missing readings
     step = (largest or 1.0) / (2 ** (QUANTISED_BITS - 1) - 1)
     scale = step * float(attributes.get("scale_factor", 1.0))
     missing = -(1 << (QUANTISED_BITS - 1))

@@ -35,6 +35,7 @@ class SerialAppearance(Appearance):
         As for `appearance`.
     """
 
+    # a serial frame tells its own size, a calibration frame may come at any time, and bytes go where there is room
     takes_samples_per_frame = can_announce = offers_bytes = True
 
     def __init__(self, url: SourceURL, *, number: int, expose: str | None = None) -> None:

@@ -82,6 +82,7 @@ class Signal(ABC):
             Band-limited interpolation, rounded to counts again. Where the interpolation rests on a missing
             reading there is none.
         """
+        # as many samples on either side as the interpolation rests on
         start = max(int(np.floor(positions.min())) - MARGIN, 0)
         stop = min(int(np.ceil(positions.max())) + MARGIN + 1, self.n_samples)
         known = self.piece(start, stop)

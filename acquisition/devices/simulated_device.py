@@ -100,6 +100,7 @@ def stream_numbers(seed: int) -> Iterator[int]:
     generator = np.random.default_rng([seed, 12])
     last = 0
     while True:
+        # by the seed, so that a replay with faults can be repeated
         drawn = int(generator.integers(1, 256))
         if drawn != last:
             last = drawn

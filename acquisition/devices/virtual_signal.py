@@ -118,6 +118,7 @@ class VirtualSignal(Signal):
         columns = []
         for channel in self._channels:
             limit = round((channel.range_max or 0.0) / channel.scale_factor)
+            # rounded and clipped as the converter of the recording does
             columns.append(np.clip(np.rint(readings[channel.name] / channel.scale_factor), -limit, limit))
         return Piece.of(np.stack(columns, axis=1))
 

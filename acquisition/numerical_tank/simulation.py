@@ -81,6 +81,7 @@ class NumericalTank:
         real = self._particles.x.dtype.type
         self._table, self._scale = table.astype(real), real((table.size - 1) / surface_gradient(0.0))
         self._sums = np.zeros(len(energy.TERMS))
+        # arrays and no numbers: the compiled loops add to them, and a checkpoint copies them
         self._counters = np.zeros(3, np.int64)
         self._put_at_rest()
         self._start = self._stored()
@@ -201,6 +202,7 @@ class NumericalTank:
         valid : object
             What was computed before.
         """
+        # where there was no room no particle was too fast: the most crowded place is where it happened
         crowded = int(np.argmax(self._particles.packing[: self.setup.n_particles]))
         which = crowded if status == stepping.NO_ROOM else int(self._counters[stepping.PARTICLE])
         place = float(self._particles.x[which]), float(self._particles.z[which])

@@ -227,6 +227,7 @@ def stored_energy_j(structure: Structure, motion: Motion, step_s: float) -> floa
     """
     q, p, stiffness = motion.q, motion.p, structure.stiffness_n_per_m
     kinetic = 0.5 * p @ structure.mass_matrix_kg @ p
+    # with the term of second order the account closes to rounding and not to the square of the step
     potential = 0.5 * stiffness @ q**2 - step_s**2 / 8 * stiffness @ p**2
     return float(kinetic + potential)
 

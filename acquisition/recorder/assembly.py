@@ -250,6 +250,7 @@ def _survey(
 ) -> SourceSurvey:
     info = samples.placement.info
     factor = thinned_by(info.sampling_rate_hz)
+    # a thinned copy of these alone, to compare the sensors of one tank after the recording
     rigid = [c.name for c in info.channels if c.quantity == "acceleration" and experiment.startswith("shaker_")]
     # whole means of the thinned copy in each stretch
     n_each = max(1, samples_at_once(len(info.channels)) // factor) * factor

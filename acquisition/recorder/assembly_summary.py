@@ -245,6 +245,7 @@ def _lost(losses: Sequence[Loss], n_messages: int, rate_hz: float) -> str:
     )
     if n_messages == 1:
         return text
+    # each message of a CAN device has frames of its own, which are lost by themselves
     by_message = [sum(loss.n_samples for loss in losses if loss.group == k) for k in range(n_messages)]
     if all(n == n_samples for n in by_message):
         return f"{text}, in each of its {n_messages} messages"

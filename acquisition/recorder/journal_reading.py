@@ -351,7 +351,9 @@ def _entries_of_all_groups(found: _Collected, scan: Scan) -> dict[tuple[int, int
 def _entries(source: int, group: int, n_channels: int, blocks: list[_SamplesBlock]) -> Entries:
     rows = np.concatenate([block.rows for block in blocks]) if blocks else np.empty(0, ENTRY)
     n_each = np.array([len(block.rows) for block in blocks], np.int64)
+    # sums of 32-bit numbers would come round
     n_samples = rows["n_samples"].astype(np.int64)
+    # samples of a block are consecutive: those of the second entry follow those of the first
     before = _samples_before(n_samples, n_each)
     width = np.repeat(_column(blocks, "bytes_per_count"), n_each)
     return Entries(

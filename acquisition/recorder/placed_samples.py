@@ -127,6 +127,7 @@ class PlacedSamples:
             return kept[1]
         entry: Entry = self._groups[number].group.entries[k]
         counts = self._journal.counts(entry)
+        # one entry per group; more would grow with the run
         self._kept[number] = (k, counts)
         return counts
 

@@ -149,6 +149,7 @@ def _create(dataset: Any, variable: Variable, size: int) -> None:
         compression="zlib",
         complevel=COMPRESSION_LEVEL,
         shuffle=True,
+        # as long as a stretch is written at once, so that no chunk is compressed twice
         chunksizes=(chunk,),
         fill_value=False if variable.fill is None else variable.fill,
     )

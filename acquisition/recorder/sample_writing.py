@@ -24,6 +24,7 @@ FlagArray = NDArray[np.uint8]
 def samples_at_once(n_channels: int, rate_ratio: float = 1.0) -> int:
     """Samples per stretch, so that memory does not grow with channels; whole chunks where possible."""
     n = int(VALUES_AT_ONCE / (max(1, n_channels) * max(1.0, rate_ratio)))
+    # whole chunks, as each is compressed once and never read again
     return max(1024, n // SAMPLES_PER_CHUNK * SAMPLES_PER_CHUNK or n)
 
 
@@ -83,6 +84,7 @@ def _write_own_counts(file: RecordingFile, part: Part) -> None:
 def _filled(part: Part, stretch: Stretch, read: NDArray[np.bool_], column: int) -> NDArray[Any]:
     dtype, fill = part.stored[column]
     counts = stretch.counts[:, column].astype(dtype)
+    # after the change of type: the fill value may not fit into 32 bits
     counts[~read[:, column]] = fill
     return counts
 

@@ -116,6 +116,7 @@ def require_alignable(infos: Sequence[SourceInfo], align: str, redundant: Sequen
         elif align == "device":
             _require_clock(infos[0])
             _require_clock(other)
+    # before anything is recorded: a misspelt name would be noticed after the run
     own, *others = ({channel.name for channel in info.channels} for info in infos)
     for first, second in redundant:
         if not any((first in own and second in names) or (second in own and first in names) for names in others):
@@ -233,6 +234,7 @@ def common_motion_pairs(
 
 
 def _rigid_accelerometers(placement: SourcePlacement) -> list[str]:
+    # roof and control move as one, as the tank is rigid; a tip or a beam does not
     names = [channel.name for channel in placement.info.channels]
     return [name for name in names if name.startswith((ACCELERATION_ROOF, ACCELERATION_CONTROL))]
 
@@ -242,6 +244,7 @@ def _by_arrival(base: SourcePlacement, other: SourcePlacement) -> tuple[SourceAl
     clocks = [placement.main_stream.clock for placement in (base, other)]
     if any(clock.status is ClockStatus.NOT_REAL_TIME for clock in clocks):
         together = SourceAlignment(AlignmentMethod.NONE, 0.0, 1.0 / other.info.sampling_rate_hz, None)
+        # at least half of the shorter run overlaps then
         shortest_s = min(placement.n_samples / placement.info.sampling_rate_hz for placement in (base, other))
         return together, min(UNKNOWN_START_S, 0.5 * shortest_s), UNKNOWN_DRIFT_PPM
     base_start, base_step = _host_time(base, clocks[0].host_origin_ns)

@@ -86,6 +86,7 @@ class SourceRecord:
         """
         if self._first_block_ns is None:
             return 0.0
+        # waiting for the first sample does not count: it leaves no gap
         return max(self.recorded_s, (self._monotonic_ns() - self._first_block_ns) * 1e-9)
 
     @property

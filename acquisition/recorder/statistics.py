@@ -243,6 +243,7 @@ class DriftMeter:
         scatter = max(0.0, self._difference_squares - slope * self._products) / (self._n - 2)
         uncertainty = math.sqrt(scatter / self._host_squares)
         found = Drift(slope * 1e6, uncertainty * 1e6)
+        # a drift that is played, or not known yet, means nothing
         is_known = found.uncertainty_ppm <= _LARGEST_UNCERTAINTY_PPM and abs(found.ppm) <= LARGEST_DRIFT_SHOWN_PPM
         return found if is_known else None
 
@@ -261,8 +262,10 @@ class SourceMeters:
 
     def arrived(self, block: Block) -> None:
         """Count a block as soon as it is there."""
+        # each CAN message has a counter of its own
         loss = self.losses[block.group]
         loss.update(block)
+        # one clock for the device: its first group stands for all
         if block.group == 0:
             if self._first is None:
                 self._first = block.host_monotonic_ns, loss.n_received

@@ -174,6 +174,7 @@ def surveyed(
 def _means(counts: NDArray[np.int32], read: NDArray[np.bool_], factor: int) -> FloatArray:
     n = counts.size // factor
     means = counts[: n * factor].reshape(n, factor).mean(axis=1)
+    # a mean over part of its samples would belong to another time
     means[~read[: n * factor].reshape(n, factor).all(axis=1)] = np.nan
     return np.asarray(means, dtype=np.float64)
 
@@ -236,6 +237,7 @@ class _Tracker:
     def _is_stuck(self, k: int, start: int, stop: int, value: int) -> bool:
         """Whether another channel moved so much that this one, as it moves elsewhere, must have moved too."""
         low, high = self._limits[k]
+        # a sensor at its limit stands still, too
         if value <= low or value >= high:
             return False  # clipped is something else
         first, last = -(-start // self._cell), stop // self._cell
@@ -246,6 +248,8 @@ class _Tracker:
         for other in range(len(self._runs)):
             if other == k or swing[other] < max(_MOVES_COUNTS, _NOISE_FACTOR * self._noise(other)):
                 continue
+            # in the proportion in which both move elsewhere: a force cell need not move by as many counts as an
+            # accelerometer
             expected = swing[other] * own_std / self._std(other)
             if own_std == 0 or expected >= max(_MUST_MOVE_COUNTS, _NOISE_FACTOR / 2 * self._noise(k)):
                 return True
@@ -322,6 +326,7 @@ def _scan(scanned, measures, findings):  # type: ignore[no-untyped-def]
     counts, arrived, read, first_place = scanned
     limits, shortest, cell = measures
     extremes, totals, sums, run, cells = findings
+    # as many runs of the shortest length as fit, and for each channel one that began before
     found = np.empty((counts.size // shortest + counts.shape[1] + 1, 4), np.int64)
     n_found = 0
     for k in range(counts.shape[1]):

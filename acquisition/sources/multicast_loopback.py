@@ -17,6 +17,7 @@ from sloshlab.errors import SourceError
 DEFAULT_GROUP: Final = "239.74.163.2"
 """python-can's own group for IPv4."""
 
+# a million bytes hold a second of 8000 frames of some 100 bytes
 RECEIVE_BUFFER_BYTES: Final = 8 << 20
 """Asked for; the system may give less (on Linux net.core.rmem_max)."""
 

@@ -25,6 +25,7 @@ BACKENDS: Final[Registry[Callable[[SourceURL], Source]]] = Registry(
 )
 """By the scheme of a URL: classes or functions that make a source of it."""
 for _scheme, _backend in {
+    # as text: a backend and its libraries are loaded when a URL asks for them
     "can": "acquisition.sources.can_source:CanSource",
     "file": "acquisition.sources.file_source:FileSource",
     "serial": "acquisition.sources.serial_source:SerialSource",

@@ -83,6 +83,7 @@ class LiquidLaw:
         distance = (
             x**2 / (2 * self.frequency_width**2) + self.amplitude_stiffness * (np.expm1(c * y) - c * y) / c**2
         )
+        # far from the peak the exponential is too small for a float, and no work is right
         with np.errstate(under="ignore"):
             return np.asarray(self.work_peak * onset / onset_peak * np.exp(-slope * relative - distance))
 
@@ -139,6 +140,7 @@ def liquid_law(fill_level: float) -> LiquidLaw:
     if fill_level in LAWS:
         return LAWS[fill_level]
     z = (fill_level - 0.5) / 0.25
+    # parabolas meet the three laws exactly, which are all that is known
     weights = {0.25: z * (z - 1) / 2, 0.50: 1 - z**2, 0.75: z * (z + 1) / 2}
     return LiquidLaw(
         **{

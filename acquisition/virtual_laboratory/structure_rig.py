@@ -196,6 +196,7 @@ def _on_a_guide(
             got=f"{rig.tank.dry_mass_kg:g}",
             allowed=f"structure.mass_kg = {mass_kg:g}, the same moving mass",
         )
+    # what is drawn is the frequency, as that is what a laboratory measures
     true_stiffness = stiffness * laboratory.frequency_factors[0] ** 2
     structure = Structure(
         (Mode(dry_mass_kg, true_stiffness, 0.0, 1.0, dry_mass_kg),),

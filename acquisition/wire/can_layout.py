@@ -234,6 +234,7 @@ COMMAND: Final = ControlMessage("host_command", COMMAND_ID, False, 8, (_CRC, Bit
 
 def _classic_groups(numbered: Sequence[tuple[int, Channel]]) -> list[list[int]]:
     """Pairs of 16-bit channels; wider ones alone. Groups are in the order of their first channel."""
+    # four bytes are left for counts beside checksum, counter and the byte that is sent in turn
     groups: list[list[int]] = []
     half: list[int] | None = None
     for index, channel in numbered:
@@ -253,6 +254,7 @@ def _fd_groups(numbered: Sequence[tuple[int, Channel]]) -> list[list[int]]:
     left = 0
     for index, channel in numbered:
         width = channel.bits // 8
+        # one sample of each channel must fit, as the counter is that of the whole message
         if width > left:
             groups.append([])
             left = FD_LENGTHS[-1] - _FD_HEADER_BYTES
@@ -297,6 +299,7 @@ def _fd_message(
 ) -> SampleMessage:
     row = sum(channel.bits for channel in channels) // 8
     n_samples = (FD_LENGTHS[-1] - _FD_HEADER_BYTES) // row
+    # CAN FD has a few lengths only; the rest of the frame stays zero
     needed = _FD_HEADER_BYTES + n_samples * row
     return SampleMessage(
         name=f"samples_{number}",

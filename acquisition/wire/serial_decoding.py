@@ -293,6 +293,7 @@ class SerialDecoder:
                 detail = f"stream {stream} after stream {next(reversed(self._streams))}"
                 self._deliveries.append(Trouble(TroubleKind.RESTARTED, detail, 1, host.monotonic_ns))
             self._n_streams += 1
+            # each start becomes a stream in the journal and a gap in the recording
             if self._n_streams > MOST_STREAMS:
                 raise SourceError(
                     f"source {self._url}",

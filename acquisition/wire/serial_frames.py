@@ -188,6 +188,7 @@ def _bounded_rest(data: bytes | bytearray | memoryview, start: int) -> tuple[byt
 
     One byte more than any frame has is kept: with it the run stays known as too long until its zero comes.
     """
+    # whoever never sends a zero costs no more memory than the longest frame
     keep = min(len(data), start + _LONGEST_RUN + 1)
     return bytes(data[start:keep]), len(data) - keep
 
@@ -282,6 +283,7 @@ def encode_frame(frame: Frame) -> bytes:
     '03 81 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 05 b9 b0 2e f4 00'
     """
     if isinstance(frame, SamplesFrame):
+        # the clock of the first sample is the one that is sent
         ticks = np.full(len(frame.counts), frame.clock_ticks, np.uint64)
         (encoded,) = encode_samples(
             frame.stream,

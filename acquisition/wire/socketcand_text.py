@@ -78,6 +78,7 @@ def parse_socketcand(text: bytes) -> SocketcandText:
     n_garbage_bytes = len(_HARMLESS.sub(b"", others)) + len(_HARMLESS.sub(b"", between))
     # a peer that never closes a message must not fill the memory
     if len(rest) > LONGEST_MESSAGE_BYTES:
+        # counted at once: the end that would count it may never come
         n_garbage_bytes, rest = n_garbage_bytes + len(rest), b""
     return SocketcandText(batch, rest, n_error_frames, n_garbage_bytes)
 
