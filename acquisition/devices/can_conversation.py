@@ -66,6 +66,7 @@ class SocketcandConversation(Conversation):
             return b"< error could not open bus >"
         if message == b"rawmode":
             host.listens = host.has_started = True
+            # the device starts at once; only its frames wait
             host.listens_from_s = self._now_s() + GRACE_S
             return b"< ok >"
         if message == b"echo":

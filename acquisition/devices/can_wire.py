@@ -98,6 +98,7 @@ class CanWire(Wire):
     def flag_lost_data(self, frames: FrameArray, chosen: int) -> bool:
         """Set the bit of lost data in one frame, in place; False if the frame carries no flags."""
         message = self._messages.get(int(frames["id"][chosen]))
+        # only one in eight classic frames carries the flags: the next that does will say it
         if message is None or message.flags is None or frames["kind"][chosen] != FrameKind.SAMPLES:
             return False
         row = frames["data"][chosen : chosen + 1, : message.length]

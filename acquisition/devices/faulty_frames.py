@@ -81,6 +81,7 @@ class FrameFaults:
 
     def _struck(self, name: str, fault: FrameFault, frames: FrameArray) -> Mask:
         """Which frames a fault strikes: one number is drawn for each frame with samples."""
+        # calibration, status and end are never struck
         struck = frames["kind"] == FrameKind.SAMPLES
         drawn = np.ones(len(frames))
         # for every frame, also where the probability is 0: which frames are struck depends on the seed alone

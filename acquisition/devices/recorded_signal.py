@@ -57,6 +57,7 @@ class RecordedSignal(Signal):
         if self._rate_hz > HIGHEST_SAMPLING_RATE_HZ:
             allowed = f"≤ {HIGHEST_SAMPLING_RATE_HZ:g}"
             raise RecordingError(f"{path}: sampling_rate_hz", got=f"{self._rate_hz:g}", allowed=allowed)
+        # with a damaged heap the HDF5 library would never come to an end
         require_sound_structure(path)
         try:
             self._channels, self._counts, self._lost = _read(path, names)
@@ -115,6 +116,7 @@ def _read(
 ) -> tuple[tuple[Channel, ...], NDArray[np.int32], NDArray[np.bool_]]:
     import netCDF4
 
+    # beside a source that reads in another thread the library ended the process
     with NETCDF_LOCK, netCDF4.Dataset(path, mode="r") as file:
         file.set_auto_maskandscale(False)
         there = [name for name, variable in file.variables.items() if _is_channel(name, variable)]

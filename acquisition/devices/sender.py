@@ -193,6 +193,7 @@ class Sender:
             del self._backlog[: self.endpoint.offer(bytes(self._backlog))]
 
     def _send(self, frames: FrameArray, stream: int) -> None:
+        # as fast as possible nothing is due, so that the device waits for its host instead of losing frames
         if not self.laboratory.is_paced:
             self._await_listener()
         if self.endpoint.is_heard and self.endpoint.send(frames, is_given_up=self.is_given_up):

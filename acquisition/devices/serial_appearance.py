@@ -73,6 +73,7 @@ class SerialAppearance(Appearance):
         """One host at the end of a stream of bytes."""
         listener: Listener
         if self._is_socket:
+            # one host, as at the end of a cable
             listener, url = ListeningSocket(self._host, self._port, most=1), "serial:socket://{at}"
         else:
             listener, url = PseudoTerminal(Path(self.url.target)), f"serial:{quote(self.url.target)}"

@@ -114,6 +114,7 @@ class VirtualSignal(Signal):
 
     def piece_at(self, positions: FloatArray) -> Piece:
         """The rig at any instants, read by its sensors."""
+        # the motion itself at these instants, not an interpolation of what was sampled
         readings = self._truth.readings(positions / self._rate_hz)
         columns = []
         for channel in self._channels:

@@ -25,7 +25,7 @@ from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage
 from acquisition.wire.can_receiver import CanReceiver
 from sloshlab.errors import FileFormatError, SourceError
 
-# taken apart together, as one by one they would cost minutes for a long log
+# taken apart together, which is far cheaper than one by one
 _FRAMES_AT_ONCE: Final = 8192
 _STARTED_FOR_US_S: Final = 1.0
 """A stream whose first sample has a counter below this began with the log: what is missing then was lost."""

@@ -144,6 +144,7 @@ def _take(message: Any, log: _Log, database: Any, wanted_bus: int | None, device
     for signal, value in decoded.items():
         key = (name, signal, message.channel)
         stamps = log.times[key]
+        # counted and kept: the time base refuses time that runs back, and names the place
         if stamps and message.timestamp < stamps[-1]:
             log.n_backwards += 1
         stamps.append(float(message.timestamp))

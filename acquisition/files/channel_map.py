@@ -41,6 +41,7 @@ _RECORDING_KEYS = frozenset(
     ]
 )
 
+# TOML knows nan and inf, with which no channel can be converted
 FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 ColumnReference = str | int | tuple[str, int]

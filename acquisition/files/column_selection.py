@@ -118,6 +118,7 @@ def with_time_column(named: NamedTable, settings: SourceSection) -> NamedTable:
         if column is clock:
             continue
         same = column.values.size == time_s.size
+        # the resolution of the file's own clock says nothing about this one
         others.append(replace(column, time_s=time_s, time_resolution_s=0.0) if same else column)
     if others and not any(column.time_s is time_s for column in others):
         raise ChannelMapError(

@@ -76,6 +76,7 @@ def _decoded(path: Path, encoding: str | None) -> tuple[str, list[str]]:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and encoding in (None, "utf-16"):
         chosen = "utf-16"
     elif encoding in (None, "utf-8"):
+        # with or without the mark that Windows programs write at the beginning
         chosen = "utf-8-sig"
     else:
         chosen = encoding

@@ -155,5 +155,6 @@ def _agreed(path: Path, stated: str, found: str | None) -> str:
 def _looks_like_text(start: bytes) -> bool:
     if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return True
+    # text has tabs and line ends, but no other control characters
     control = sum(byte < 9 or 13 < byte < 32 for byte in start)
     return control == 0

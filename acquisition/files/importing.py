@@ -70,6 +70,7 @@ def import_recording(sources: Sequence[Path], map_path: Path, *, rig: Path | Non
     map_path = Path(map_path)
     channel_map = read_channel_map(map_path)
     if rig is not None:
+        # read and thrown away: a rig that cannot be read is refused before files are converted
         Rig.from_toml(rig)
     paths = [Path(source) for source in sources]
     _check_join(paths, channel_map)

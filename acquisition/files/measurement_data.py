@@ -156,6 +156,7 @@ def _check_links(path: Path) -> int:
         if address + _BLOCK.size > len(content) or len(seen) > _MOST_BLOCKS:
             raise _damaged(path, f"a link to byte {address} of {len(content)}")
         kind, length, n_links = _BLOCK.unpack_from(content, address)
+        # links and block must lie within the file before any of them is followed
         if not kind.startswith(b"##") or _BLOCK.size + 8 * n_links > length or address + length > len(content):
             raise _damaged(path, f"a broken block at byte {address}")
         links = struct.unpack_from(f"<{n_links}Q", content, address + _BLOCK.size)

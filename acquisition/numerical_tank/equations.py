@@ -26,6 +26,8 @@ from numba import njit
 
 from acquisition.numerical_tank.particles import Constants, Pairs, Particles, Partners
 
+# Numba's cache notices changes of the file of a compiled function, not of the functions that it calls: after an
+# edit here or in another module of this folder its `__pycache__` must be removed, or older code is run.
 FAST = {"contract", "arcp", "nsz"}
 """Freedoms given to the compiler. Not numbers (NaN) keep their meaning."""
 

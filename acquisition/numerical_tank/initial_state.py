@@ -74,6 +74,7 @@ def constants_of(setup: TankSetup) -> Constants:
         "smallest_determinant": 0.2,
         "spacing_kernel": setup.particle_volume_m2 * float(kernel(spacing, h)),
         "lattice_packing": _lattice_packing(setup),
+        # of a correction every n_slow steps, so that its rate does not depend on how often it is made
         "relaxation": numerics.packing_strength * numerics.n_slow * setup.step_s / h,
         "largest_speed": speed,
     }

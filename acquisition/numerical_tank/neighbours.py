@@ -49,6 +49,7 @@ def _sort_into_cells(particles, first, last, cells):  # type: ignore[no-untyped-
     cell_of = np.empty(last - first, np.int32)
     start = np.zeros(n_x * n_z + 1, np.int32)
     for i in range(first, last):
+        # int cuts towards zero: what lies beyond the left wall or the floor would share the first cell inside
         column = min(max(int(particles.x[i] / cell) + 1, 0), n_x - 1) if particles.x[i] >= 0 else 0
         row = min(max(int(particles.z[i] / cell) + 1, 0), n_z - 1) if particles.z[i] >= 0 else 0
         cell_of[i - first] = column * n_z + row

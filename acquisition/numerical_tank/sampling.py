@@ -38,6 +38,7 @@ def oversampling(steps_per_sample: int) -> int:
     (7, 4, 3)
     """
     divisors = (k for k in range(LEAST_OVERSAMPLING, steps_per_sample) if steps_per_sample % k == 0)
+    # a divisor, so that means and samples begin together
     return next(divisors, steps_per_sample)
 
 

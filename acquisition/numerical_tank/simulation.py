@@ -28,6 +28,8 @@ FloatArray = NDArray[np.float64]
 
 _IMAGES_PER_PARTICLE = 3
 _PAIRS_PER_PARTICLE = 60
+# The gradient of s and its correction are those of the step before, which saves a sum over pairs; the places at
+# which pairs were listed decide the order of sums.
 _KEPT = ("x", "z", "vx", "vz", "s", "gx", "gz", "bxx", "bxz", "bzz", "x_listed", "z_listed")
 """What a later step depends on; all else is made anew in every step."""
 _REASONS = {

@@ -110,6 +110,7 @@ def _force_on_walls(particles, images, constants, force):  # type: ignore[no-unt
     n = constants.n
     all_x, all_z, floor, roof = 0.0, 0.0, 0.0, 0.0
     for k in range(images.number[0]):
+        # pair forces are equal and opposite: what the images feel is what the liquid does to the walls
         all_x += particles.ax[n + k]
         all_z += particles.az[n + k]
         if images.bz[k] < 0:

@@ -151,6 +151,7 @@ class Structure:
 
     def natural_frequencies_hz(self) -> FloatArray:
         """Return the undamped natural frequencies [Hz] of the structure alone, ascending."""
+        # by a symmetric problem, whose eigenvalues are real to the last digit
         lower = np.linalg.inv(np.linalg.cholesky(self.mass_matrix_kg))
         squares = np.linalg.eigvalsh(lower @ np.diag(self.stiffness_n_per_m) @ lower.T)
         return np.asarray(np.sqrt(squares) / (2 * math.pi))

@@ -56,6 +56,7 @@ def out_of_order(counter: IntArray, n_samples: IntArray) -> NDArray[np.bool_]:
 def _chain(weight: IntArray, rank: IntArray, n_before: IntArray) -> NDArray[np.bool_]:
     """The heaviest chain; block j may follow block i if rank[i] < n_before[j]. A Fenwick tree of maxima."""
     n = len(weight)
+    # the best chain that ends below a rank is found in log n: comparing all pairs would be n²
     tree = np.full(rank.max() + 2, -1, np.int64)
     total = np.zeros(n, np.int64)
     before = np.full(n, -1, np.int64)

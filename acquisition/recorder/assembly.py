@@ -275,6 +275,7 @@ def _n_samples(parts: Sequence[Part], options: AssemblyOptions) -> int:
     """Length of the time base: the first source's, or with a common trigger that of the longest."""
     if options.align != "counter":
         return parts[0].placement.n_samples
+    # with a common trigger any device may have been read longest; otherwise the first is the time base
     return max(part.placement.n_samples + part.shift for part in parts)
 
 

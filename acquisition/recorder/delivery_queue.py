@@ -74,6 +74,7 @@ class DeliveryQueue:
         """Everything under way, in order; after `timeout_s` maybe nothing."""
         with self._changed:
             self._changed.wait_for(lambda: bool(self._waiting), timeout_s)
+            # everything at once, so that readers wait for a lock once per batch and not once per delivery
             taken = [item for item, _ in self._waiting]
             self._waiting.clear()
             self._n_bytes = [0] * len(self._n_bytes)

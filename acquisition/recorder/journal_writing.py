@@ -177,6 +177,8 @@ class JournalWriter:
             return
         try:
             if not self._is_broken:
+                # only a recorder that ended properly writes it: without it a reader says that something may be
+                # missing
                 self._append(BlockType.CLOSING, 0, packed_text(closing or {}))
                 self._force_to_disk()
         finally:

@@ -283,6 +283,7 @@ def _following(before: Stream, here: Stream, rate_hz: float) -> Stream:
     # gap was is unknown.
     if ClockStatus.NOT_REAL_TIME in (before.clock.status, here.clock.status):
         return _at(here, end + 1, None)
+    # each clock counts from an origin of its own, so that float64 keeps its digits
     origins_s = (here.clock.host_origin_ns - before.clock.host_origin_ns) * 1e-9
     host_s = origins_s + here.clock.host_s(here.first_counter)
     period_s = before.clock.period_s if before.clock.status is ClockStatus.FITTED else 1.0 / rate_hz

@@ -199,6 +199,7 @@ class Recorder:
     def _write(self) -> None:
         try:
             self._write_until_finished()
+            # what still waits to be joined, before the last block says that all is there
             self._joiner.write_all()
             # only here is the journal closed with its last block: it vouches that everything is in it
             reason = self._reason or StopReason.SOURCES_FAILED
@@ -213,7 +214,7 @@ class Recorder:
     def _give_up(self, message: str) -> None:
         self._storage_error = message
         self._stop(StopReason.STORAGE)
-        # first, so that readers that wait for space let go
+        # before the readers are waited for: those that wait for space let go
         self._queue.close()
         for reader in self._readers:
             reader.join(_READER_DEADLINE_NS * 1e-9)
@@ -229,6 +230,7 @@ class Recorder:
             with self._lock:
                 self._joiner.write_due()
             self._decide()
+            # a driver that does not return keeps only its own samples from being complete
             if self._stopped_ns is not None and self._monotonic_ns() - self._stopped_ns > _READER_DEADLINE_NS:
                 self._leave_hanging_readers()
 

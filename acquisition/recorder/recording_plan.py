@@ -163,6 +163,7 @@ def _resampled_variables(part: Part) -> list[Variable]:
     values, counts = [], []
     for name, channel, (dtype, fill) in zip(part.names, part.channels, part.stored, strict=True):
         resampled = {**attributes_of(channel), "resampled_from": f"counts_{name}"}
+        # Nothing is lost by resampling: the counts as they were taken stand beside the values.
         values.append(Variable(name, "time", np.float32, resampled, math.nan))
         described = {"units": channel.units, "channel": name, **place, **_scaling(channel)}
         counts.append(Variable(f"counts_{name}", dimension, dtype, described, fill))

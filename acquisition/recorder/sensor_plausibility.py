@@ -25,6 +25,7 @@ LARGEST_DELAY_S: Final = 2e-3
 
 def doubtful_sensors(parts: Sequence[Part], experiment: str) -> list[str]:
     """One remark per accelerometer of the tank that disagrees with the first one; shaker experiments only."""
+    # on the shaker the tank is rigid, so that its accelerometers read the same; elsewhere nothing need agree
     if not experiment.startswith("shaker_"):
         return []
     recording = _thinned_recording(parts)

@@ -88,6 +88,7 @@ def _prepare_socket(fileno: int, group: str, exposed: bool) -> None:
         same.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         if exposed:
             return
+        # sent by this interface and joined there, or nothing of what is sent would come back
         interface = socket.inet_aton(_LOOPBACK_ADDRESS)
         same.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
         same.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + interface)

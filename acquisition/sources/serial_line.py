@@ -185,6 +185,7 @@ def _socket_line(target: str, name: str) -> Line:
     if not address[0] or not address[1]:
         raise SourceError(name, got="no host and port", allowed="socket://HOST:PORT")
     try:
+        # not by pyserial's socket://, which leaks the socket when the other end went first
         connection = socket.create_connection(address, _CONNECT_TIMEOUT_S)
     except (OSError, UnicodeError) as error:  # the latter for host names that cannot be one
         raise SourceError(
@@ -211,6 +212,7 @@ def _port_line(target: str, baudrate: int, name: str) -> Line:
         raise _cannot_open(name, error) from error
     if os.name == "posix" and type(port) is serial.Serial:
         descriptor = port.fileno()
+        # by the descriptor: pyserial's read waits for a number of bytes, or until its time is over
         return DescriptorLine(name, descriptor, lambda n: os.read(descriptor, n), port.write, port.close)
     return PolledLine(name, port)
 

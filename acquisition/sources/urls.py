@@ -174,6 +174,7 @@ class URLOptions:
         text = self.text(name)
         if text is None:
             return default
+        # by a pattern: Python's int takes underscores, digits of other scripts and numbers of any length
         if not re.fullmatch(r"[+-]?[0-9]{1,18}", text) or not lowest <= int(text) <= highest:
             raise self.error(name, text, f"a whole number, {lowest} … {highest}")
         return int(text)

@@ -98,6 +98,7 @@ class LiquidLaw:
         )
 
 
+# the mean of β over the band is then −β_q at 0.25 g, whatever its tilt
 _OMEGA_BAR_CENTRE: Final = 4.1356
 """ω̄ at 12.5 Hz, the middle of the 5…20 Hz band, for the tank of 27.2 mm height."""
 

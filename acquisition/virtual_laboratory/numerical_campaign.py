@@ -40,6 +40,7 @@ COMMAND: Final = "sloshlab virtual campaign --liquid numerical -o raw_data/numer
 _SAMPLING_RATE_HZ: Final = 512.0
 _FIRST_SEED: Final = 500
 """Other seeds than those of the campaign whose liquid follows a law."""
+# of a quarter filled at h/16 four layers would be left; six of h/24 are as many as of 3/8 at h/16
 _SHALLOWEST_FILL: Final = 0.375  # a shallower liquid is computed more finely
 
 

@@ -29,7 +29,7 @@ IMPACT_PHASE_RAD: Final = 1.35 * np.pi
 _LONGEST_STROKE_M = 0.5
 # far finer than anything that the slow laws, wanders and ripples do
 _KNOT_STEP_S = 0.05
-# a power mean joins stroke limit and level smoothly: a corner would be a jump of the acceleration's derivative
+# a power mean joins stroke limit and level smoothly: a corner of the amplitude would be a jump of the velocity
 _JOIN_SHARPNESS = 20.0
 _START_RAMP_S, _STOP_RAMP_S = 1.5, 1.0
 _VFA_HALF_SWEEPS, _VFA_AMPLITUDE_HALF_SWEEPS = 5, 12
@@ -318,7 +318,7 @@ def _ramps(time_s: FloatArray, duration_s: float) -> FloatArray:
 
 def _to_and_fro(x: FloatArray) -> FloatArray:
     """A rounded triangle wave: 0 at even x, 1 at odd x, mostly straight between."""
-    # 0.985 rounds the turns: at 1 it is a triangle, whose turns jump
+    # 0.985 rounds the turns: at 1 it is a triangle with corners
     return np.asarray(0.5 - np.arcsin(0.985 * np.cos(np.pi * x)) / (2 * np.arcsin(0.985)))
 
 

@@ -263,6 +263,7 @@ def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
             encoding[str(name)].update(
                 dtype="int16", scale_factor=channel.encoding["scale_factor"], _FillValue=np.int16(LOST_COUNT)
             )
+    # no time and no flag is ever missing
     encoding["time"]["_FillValue"] = None
     if "quality" in run:
         encoding["quality"]["_FillValue"] = None
@@ -332,6 +333,7 @@ def _readings(
     forces = cell_forces(external_force_n, time_s, laboratory)
     truths = dict(zip(FORCE_CELLS, forces, strict=True))
     truths.update(dict.fromkeys(ACCELEROMETERS, moved.acceleration))
+    # one after the other in the order of the channels: the recordings of raw_data, made again, are the same bytes
     generator = np.random.default_rng([seed, 2])
     return {
         name: reading(

@@ -103,6 +103,7 @@ def n_steps_of(setup: TankSetup, n_samples: int) -> int:
     setup : TankSetup
     n_samples : int
     """
+    # the filter of the last sample needs half its length beyond it
     return (n_samples + HALF_LENGTH_SAMPLES) * setup.steps_per_sample
 
 

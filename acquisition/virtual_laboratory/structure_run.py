@@ -273,6 +273,7 @@ def _largest_speed_m_per_s(plan: _Plan, setup: TankSetup, duration_s: float) -> 
     fastest_hz = structure.with_mass_at_tank(frozen_mass_kg).natural_frequencies_hz()[-1]
     # after a release the first cycles are the fastest
     period_s = min(duration_s, 1.0) if plan.base is None else plan.base.duration_s
+    # twenty steps in a cycle of the fastest mode, far from where the leapfrog becomes unstable
     n_steps = math.ceil(period_s * 20 * fastest_hz)
     carried = FrozenTank(frozen_mass_kg, structure, period_s / n_steps)
     carried.deflect(plan.initial_displacement_m)

@@ -114,7 +114,7 @@ class BitField:
             part = data[:, byte] if n_bits == 8 else (data[:, byte] >> shift) & ((1 << n_bits) - 1)
             value |= part.astype(np.int64) << weight
         if self.signed:
-            # value is not negative yet: its top bit, 0 or 1, is worth −2^length more
+            # not negative yet: a top bit of 1 takes 2^length away
             value -= (value >> (self.length - 1)) << self.length
         return value
 

@@ -299,6 +299,7 @@ class CounterTracker:
         proved = counters[counters >= 0]
         if not len(proved):
             return False
+        # ahead of everything before it: a late frame is no jump back
         before = np.maximum.accumulate(proved)
         start = self.highest if self.highest is not None else int(before[0])
         before = np.concatenate([[start], before[:-1]])
@@ -346,7 +347,7 @@ class CounterTracker:
         _, first = np.unique(found, return_index=True)
         is_new = np.zeros(len(proved), np.bool_)
         is_new[first] = True
-        # a copy may come in another batch, but not later than a frame may be
+        # a copy may come in another batch, but not later than any frame may be
         is_new &= ~np.isin(counters[proved], self._recent)
         counters = counters.copy()
         counters[proved[~is_new]] = _NONE
@@ -400,6 +401,8 @@ def _smallest_from(bound: int, value: int, known: int) -> int:
     wrong = (bound ^ value) & known
     if wrong == 0:
         return bound
+    # Above its highest wrong bit the number may stay the bound's. The lowest bit from there up that may be raised
+    # makes it larger; below it all is as small as the known bits allow.
     bit: int = _highest_bit(wrong)
     while bit < 62:
         weight = 1 << bit
@@ -417,6 +420,7 @@ def _largest_to(bound: int, value: int, known: int) -> int:
     wrong = (bound ^ value) & known
     if wrong == 0:
         return bound
+    # the mirror image: a bit that may be lowered is lowered, and below it all is as large as the known bits allow
     bit: int = _highest_bit(wrong)
     while bit < 62:
         weight = 1 << bit

@@ -133,6 +133,8 @@ class SampleMessage:
         """
         if self.multiplexor is None:
             return np.zeros(len(counter), np.int64)
+        # which part of the counter is sent follows from the counter itself, so that no state is needed to make
+        # frames
         part = next((part for part in self.counter if part.field == self.multiplexor), None)
         if part is None:
             raise SourceError(

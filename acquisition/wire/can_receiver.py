@@ -217,6 +217,7 @@ class CanReceiver:
         return [Trouble(TroubleKind.UNCERTAIN_COUNTER, detail, n_frames, now_ns)]
 
     def _restarted(self, stream: int, now_ns: int) -> list[Delivery]:
+        # before the end is told, which stands behind its samples
         deliveries = self._flushed(now_ns)
         if self._ending_since_ns is not None:
             deliveries += self._end()
@@ -226,6 +227,7 @@ class CanReceiver:
         for group in self._groups:
             group.tracker.restart()
         self._n_restarts += 1
+        # numbers of streams have 8 bits and may be drawn again
         self._stream = stream + _STREAMS * self._n_restarts
         self._n_end_seen, self._ended = 0, None
         return deliveries

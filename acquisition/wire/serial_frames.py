@@ -358,6 +358,7 @@ def encode_samples(
     [34, 32]
     """
     ticks = np.asarray(clock_ticks, np.uint64)
+    # once for all frames, before any is made
     _require_expressible(counts, bytes_per_count, samples_per_frame)
     n_channels = counts.shape[1]
     packed = memoryview(_packed(counts, bytes_per_count))
