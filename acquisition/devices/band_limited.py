@@ -14,6 +14,7 @@ MARGIN: Final = 64
 """Samples on either side of an instant that its value rests on."""
 
 _KAISER_BETA = 14.0  # with this margin the error is below 1e-6 up to 0.45 of the sampling rate
+# 128 weights per instant and channel: bounds the memory of long pieces
 _ROWS_AT_ONCE = 2048
 
 

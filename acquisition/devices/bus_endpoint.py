@@ -12,6 +12,7 @@ from acquisition.devices.endpoint import Endpoint
 from acquisition.devices.frames import FrameArray, FrameKind
 from sloshlab.errors import SourceError
 
+# a bus where others talk without end must not keep the device from its own frames
 _UNREAD_AT_ONCE: Final = 100
 _BURST_FRAMES = 64
 _LONGEST_STALL_S = 10.0
@@ -111,6 +112,7 @@ class BusEndpoint(Endpoint):
         import can
 
         try:
+            # python-can's virtual bus waits here while the queue of a listener is full
             self._bus.send(message, timeout=_LONGEST_STALL_S)
         except can.CanError as error:
             if is_given_up():
@@ -124,6 +126,7 @@ class BusEndpoint(Endpoint):
         now_s = self._now_s()
         if self._next_s > now_s:
             self._sleep(self._next_s - now_s)
+        # never from the past: after a pause frames must not come in a burst that the bus would lose
         self._next_s = max(self._next_s, now_s) + n_frames / self._frames_per_s
 
     def _messages(self, frames: FrameArray) -> list[Any]:

@@ -127,10 +127,13 @@ class SocketcandAppearance(CanAppearance):
 
     def endpoint(self, laboratory: LaboratoryTime, describe: Callable[[], bytes], start: StartRule) -> Endpoint:
         """Several hosts at a TCP port."""
+        # the line "ready" must name an address that can be opened from this computer
         host = "127.0.0.1" if self._host in ("0.0.0.0", "::") else self._host
         url = f"can:socketcand?host={host}&port={{at}}&channel={quote(self._bus)}&dbc={self._quoted_dbc}"
 
         def stamped(frames: FrameArray) -> bytes:
+            # stamped with the time at which a frame was due, not that of sending, as a real bus would have carried
+            # it then
             return socketcand_text(frames, laboratory.utc_s(frames["due_s"]))
 
         return StreamEndpoint(

@@ -52,6 +52,7 @@ class SocketcandConversation(Conversation):
     def answer(self, host: Host, data: bytes) -> bytes:
         """Answer every ``< … >`` in `data`."""
         *messages, rest = (host.unread + data).split(b">")
+        # nothing of what a host sends is kept longer than a line
         host.refused = len(rest) > LONGEST_LINE
         host.unread = rest[:LONGEST_LINE]
         return b"".join(self._answer_to(host, message.strip().removeprefix(b"<").strip()) for message in messages)
@@ -60,10 +61,12 @@ class SocketcandConversation(Conversation):
         if message == b"open " + self._bus:
             return b"< ok >"
         if message.startswith(b"open "):
+            # let go only after the answer has been sent: a client that asked for another bus is to learn why
             host.refused = True
             return b"< error could not open bus >"
         if message == b"rawmode":
             host.listens = host.has_started = True
+            # the device starts at once; only its frames wait
             host.listens_from_s = self._now_s() + GRACE_S
             return b"< ok >"
         if message == b"echo":
@@ -103,6 +106,7 @@ class SlcanConversation(Conversation):
             return b"F00\r"
         elif _SLCAN_OTHER_FRAME.fullmatch(line):
             return b"z\r"
+        # settings of bit rate, filter and time stamps mean nothing here; a real adapter says yes to them
         elif line and line[:1] not in b"SsYZMmXWQU":
             return b"\a"
         return b"\r"

@@ -12,9 +12,11 @@ from acquisition.devices.frames import FrameArray, FrameKind
 ByteArray = NDArray[np.uint8]
 
 _HEX: Final = np.frombuffer(b"0123456789ABCDEF", np.uint8)
+# the length code of CAN: one digit also for the lengths of CAN FD beyond 8
 _DLC: Final = np.zeros(65, np.uint8)
 for _code, _length in enumerate((0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)):
     _DLC[_length] = _HEX[_code]
+# seconds since 1970 have ten digits until the year 2286
 _STAMP_DIGITS = 10
 
 
@@ -44,6 +46,7 @@ def socketcand_text(frames: FrameArray, stamps_s: NDArray[np.float64]) -> bytes:
     text[:, 11] = text[:, 29] = ord(" ")
     text[:, 12:29] = _stamps(stamps_s)
     text[:, 30 : 30 + 2 * longest] = _data(frames["data"])
+    # frames of different lengths are cut out of one rectangle: frame by frame they would need a core
     used = np.ones(text.shape, bool)
     used[:, 29] = ~is_error
     used[:, 30 : 30 + 2 * longest] = np.arange(2 * longest) < 2 * frames["length"].astype(np.int64)[:, None]

@@ -38,6 +38,7 @@ class CanWire(Wire):
         self.channels = layout.channels
         self.n_groups = len(layout.messages)
         self.samples_per_frame = max(message.samples_per_frame for message in layout.messages)
+        # classic frames in rows of 8 bytes: most of 64 would be copied for nothing
         self._type = can_frame(64 if layout.fd else 8)
         self._messages: dict[int, SampleMessage] = {m.arbitration_id: m for m in layout.messages}
 
@@ -61,6 +62,7 @@ class CanWire(Wire):
             part["data"][:, : message.length] = data
             parts.append(part)
         made = np.concatenate(parts)
+        # A frame can leave when its last sample has been taken; stable, so that messages keep their order.
         return made[np.argsort(made["counter"] + made["n_samples"], kind="stable")]
 
     def description(self, stream: int, counter: int) -> FrameArray:
@@ -96,6 +98,7 @@ class CanWire(Wire):
     def flag_lost_data(self, frames: FrameArray, chosen: int) -> bool:
         """Set the bit of lost data in one frame, in place; False if the frame carries no flags."""
         message = self._messages.get(int(frames["id"][chosen]))
+        # only one in eight classic frames carries the flags: the next that does will say it
         if message is None or message.flags is None or frames["kind"][chosen] != FrameKind.SAMPLES:
             return False
         row = frames["data"][chosen : chosen + 1, : message.length]
@@ -105,6 +108,7 @@ class CanWire(Wire):
         message.flags.field.write(row, LOST_DATA)
         if message.crc is not None:
             value = checksums(message.arbitration_id, row, message.crc)
+            # `write` only sets bits
             for piece in message.crc.pieces():
                 row[:, piece.byte] = 0
             message.crc.write(row, value)

@@ -99,17 +99,21 @@ class PseudoTerminal(Listener, Connection):
         master, slave = os.openpty()
         self._master = master
         try:
+            # before any host comes: a terminal that echoes or changes line ends would spoil frames
             tty.setraw(slave, termios.TCSANOW)
+            # a host that does not read must not stop the device
             os.set_blocking(master, False)
             self._made_link(os.ttyname(slave))
         except OSError as error:
             self.close()
             raise SourceError(f"serial port {self._link}", got=error.strerror or str(error)) from error
         finally:
+            # open here it would be a host that never leaves
             os.close(slave)
         return str(self._link)
 
     def _made_link(self, target: str) -> None:
+        # left behind by a device that was killed; a link that leads anywhere is not touched
         if self._link.is_symlink() and not self._link.exists():
             self._link.unlink()
         if self._link.exists():
@@ -129,6 +133,7 @@ class PseudoTerminal(Listener, Connection):
             return False
         waiting = select.poll()
         waiting.register(self._master, 0)
+        # a pseudo-terminal has no event for being opened: the hang-up that it shows until then is all there is
         return not any(events & select.POLLHUP for _, events in waiting.poll(0))
 
     def waiting_on(self) -> int | None:
@@ -171,6 +176,8 @@ class PseudoTerminal(Listener, Connection):
         except OSError:
             return True
         try:
+            # The device's side tells only what it could write. Bytes that are unread when it closes are lost, so
+            # the end of a run waits for this.
             n_waiting = array.array("i", [0])
             fcntl.ioctl(slave, termios.FIONREAD, n_waiting)
             return n_waiting[0] == 0
@@ -231,6 +238,7 @@ class SocketConnection(Connection):
     def close(self) -> None:
         """Close so that what was sent still arrives: unread bytes of the host would break the connection."""
         with contextlib.suppress(OSError):
+            # TCP answers a close with unread bytes by a reset, which throws away what the host has not read yet
             while self._socket.recv(_AT_ONCE):
                 pass
         with contextlib.suppress(OSError):
@@ -281,6 +289,7 @@ class ListeningSocket(Listener):
         except OSError as error:
             raise SourceError(f"listening on {where}", got=error.strerror or str(error)) from error
         try:
+            # a port that was in use a moment ago is held back by the system for minutes
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listening.bind((self._host, self._port))
             listening.listen(_MOST_WAITING)
@@ -295,6 +304,7 @@ class ListeningSocket(Listener):
     def arrived(self) -> list[Connection]:
         """New connections, within the limit."""
         new: list[Connection] = []
+        # at most so many at once: a flood of connections must not keep the device from its frames
         for _ in range(MOST_CONNECTIONS):
             if self._is_full() and not self._has_waited_enough():
                 break

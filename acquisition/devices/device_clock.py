@@ -57,6 +57,7 @@ class DeviceClock:
 
     def sample_at(self, time_s: float) -> int:
         """Number of the first sample that is taken at or after a time."""
+        # less a little: a time that is a whole number of steps must not be rounded up by its last digit
         return max(0, int(np.ceil((time_s - self.offset_s) * self.true_rate_hz - 1e-9)))
 
     def ticks(self, counters: NDArray[np.int64]) -> NDArray[np.uint64]:
@@ -67,6 +68,7 @@ class DeviceClock:
         >>> DeviceClock(512.0).ticks(np.array([0, 1, 2, 512])).tolist()
         [0, 1953, 3906, 1000000]
         """
+        # by the nominal rate: oscillator and counter of a device drift together
         return np.asarray(np.floor(counters * (CLOCK_HZ / self.sampling_rate_hz))).astype(np.uint64)
 
 
@@ -112,4 +114,5 @@ class ClockedSignal(Signal):
         true_s = self._clock.offset_s + np.arange(start, stop) / self._clock.true_rate_hz
         if self._clock.jitter_s:
             true_s += self._clock.jitter_s * self._generator.standard_normal(stop - start)
+        # jitter may reach beyond either end of what is known
         return self._true.piece_at(np.clip(true_s * self.sampling_rate_hz, 0, self._true.n_samples - 1))

@@ -17,7 +17,9 @@ from acquisition.devices.frames import FrameArray
 LONGEST_STALL_S: Final = 30.0
 """Where several hosts listen, one that takes nothing for so long is let go."""
 
+# a host that asks and never reads would fill the memory with answers
 _LARGEST_ANSWERS_BYTES = 1 << 20
+# a pseudo-terminal must be asked again and again whether somebody has opened it
 _LISTENING_STEP_S = 0.01
 _STEP_S = 0.05
 
@@ -159,6 +161,7 @@ class StreamEndpoint(Endpoint):
     @property
     def is_started(self) -> bool:
         """Once as many hosts as are waited for have asked at the same time."""
+        # kept once true: a host that goes later does not stop a device that runs
         self._is_started = self._is_started or self._runs_freely or self._n_missing <= 0
         return self._is_started
 
@@ -240,6 +243,7 @@ class StreamEndpoint(Endpoint):
             return False
         del line.unsent[:n_sent]
         if n_sent:
+            # any byte taken is progress: a slow but steady host is not let go
             line.stalled_since_s = None
         if not line.unsent:
             line.n_answer_bytes = 0
@@ -280,6 +284,7 @@ class StreamEndpoint(Endpoint):
             return
         elif line.stalled_since_s is None:
             line.stalled_since_s = self._now_s()
+        # A single host may take as long as it likes; one of several must not hold up the others.
         elif n_lines > 1 and self._now_s() - line.stalled_since_s > LONGEST_STALL_S:
             self._let_go(line)
 
@@ -287,6 +292,7 @@ class StreamEndpoint(Endpoint):
         """Send what the first listening host takes at once."""
         for line in self._lines:
             if self._listens(line):
+                # answers first, whole: bytes of a frame within one would spoil both
                 if line.unsent and (not self._flush(line) or line.unsent):
                     return 0
                 with memoryview(data) as view:

@@ -26,13 +26,16 @@ same word. Recordings have no flag for an exchange."""
 _LARGEST_FILE_BYTES: Final = 1 << 20
 _LATEST_S = 1e7
 
+# Every number has limits and every list a length: the file is a person's, and a slip must end in one line.
 Probability = Annotated[float, Field(ge=0, le=1)]
 Counters = Annotated[tuple[Annotated[int, Field(ge=0, lt=1 << 62)], ...], Field(max_length=100_000)]
 Time = Annotated[float, Field(ge=0, le=_LATEST_S, allow_inf_nan=False)]
+# infinite where a fault lasts to the end
 TimeOrNever = Annotated[float, Field(ge=0)]
 
 
 class _Table(BaseModel):
+    # a misspelt fault must not pass for a device without it
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 
 

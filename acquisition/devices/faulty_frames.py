@@ -31,6 +31,7 @@ class FrameFaults:
 
     def __init__(self, faults: Faults, wire: Wire, *, seed: int, truth: Truth) -> None:
         self._faults, self._wire, self._truth = faults, wire, truth
+        # a generator for each fault: adding one does not change which frames another strikes
         self._chance = {name: np.random.default_rng([seed, 21, k]) for k, name in enumerate(_NAMES)}
         self._damage = np.random.default_rng([seed, 22])
         self._held: FrameArray | None = None
@@ -57,6 +58,8 @@ class FrameFaults:
         dropped = self._struck("drop", self._faults.drop, frames)
         struck = {name: self._struck(name, getattr(self._faults, name), frames) & ~dropped for name in _NAMES[1:]}
         self._note(frames, {"drop": dropped, **struck}, stream)
+        # places between whole numbers: half behind a frame for what is late, a quarter for a copy, a quarter
+        # before for noise
         at[struck["reorder"]] += self._faults.reorder.distance + 0.5
         for chosen in np.flatnonzero(struck["corrupt"]):
             self._wire.corrupted(frames, int(chosen), self._faults.corrupt.n_bits, self._damage)
@@ -78,8 +81,10 @@ class FrameFaults:
 
     def _struck(self, name: str, fault: FrameFault, frames: FrameArray) -> Mask:
         """Which frames a fault strikes: one number is drawn for each frame with samples."""
+        # calibration, status and end are never struck
         struck = frames["kind"] == FrameKind.SAMPLES
         drawn = np.ones(len(frames))
+        # for every frame, also where the probability is 0: which frames are struck depends on the seed alone
         drawn[struck] = self._chance[name].random(int(struck.sum()))
         chosen = drawn < fault.probability
         if fault.at_counters:
@@ -104,8 +109,10 @@ class FrameFaults:
         everything = np.concatenate([*held, *parts])
         at = np.concatenate([self._held_places, *places])
         order = np.argsort(at, kind="stable")
+        # what comes after frames that do not exist yet is held back, across blocks as well
         leaving = at[order] < self._n_seen - 0.5
         self._held, self._held_places = everything[order[~leaving]], at[order[~leaving]]
         frames: FrameArray = everything[order[leaving]]
+        # a late frame leaves no earlier than those that it waited for
         frames["due_s"] = np.maximum.accumulate(frames["due_s"]) if len(frames) else frames["due_s"]
         return frames

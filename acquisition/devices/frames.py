@@ -21,6 +21,7 @@ _PLACE: Final[list[tuple[str, Any]]] = [
 """Kind of frame; group of channels, unwrapped counter of the first sample and number of samples of a frame with
 samples; when the frame leaves, on the laboratory's clock."""
 
+# frames differ in length: an array of bytes would be as wide as the longest
 SERIAL_FRAME: Final = np.dtype([*_PLACE, ("bytes", object)])
 """``bytes``: the frame with the zero that ends it."""
 

@@ -61,6 +61,7 @@ class LaboratoryTime:
         """Say that one device has been started, or never will be; each says so once."""
         with self._lock:
             self._n_awaited -= 1
+            # physical time begins for all devices with the last of them, so that they measure the same
             if self._n_awaited == 0:
                 self._began_utc_s = self._utc_s()
                 self._began_s = self.monotonic_s()

@@ -75,10 +75,12 @@ class PatternSignal(Signal):
     def piece(self, start: int, stop: int) -> Piece:
         """Samples start … stop − 1."""
         mixed: NDArray[np.uint64] = np.empty((stop - start, len(self._channels)), np.uint64)
+        # 256 s + c: at most 256 channels, so that no two counts share a number
         mixed[:] = np.arange(start, stop, dtype=np.uint64)[:, None] << np.uint64(8)
         mixed += np.arange(len(self._channels), dtype=np.uint64) + _STEP
         for shift, factor in zip((30, 27), _MIXERS, strict=True):
             mixed ^= mixed >> np.uint64(shift)
             mixed *= factor
         mixed ^= mixed >> np.uint64(31)
+        # the upper bits, by a shift that keeps the sign
         return Piece.of(mixed.view(np.int64) >> (64 - self._bits))

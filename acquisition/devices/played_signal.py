@@ -47,6 +47,7 @@ def _pattern(source: str, channels: Sequence[str] | None) -> Signal:
     n_channels = options.integer("channels", 8, lowest=1, highest=MOST_CHANNELS)
     bits = int(options.choice("bits", "24", ("16", "24", "32")))
     options.refuse_others()
+    # the counts of a pattern are published by the number of the channel: a choice would renumber them
     if channels is not None:
         raise InputError("--channels", got=",".join(channels), allowed="nothing for a pattern")
     return PatternSignal(

@@ -25,6 +25,7 @@ from acquisition.samples.channel import Channel
 LINGER_S: Final = 10.0
 """So long the device waits at its end for the hosts to read everything and to go."""
 
+# bounds what is prepared at once, and how late a device notices that it is to stop
 _LONGEST_BLOCK_SAMPLES = 8192
 _PACED_BLOCK_S, _UNPACED_BLOCK_S = 0.25, 1.0
 _DESCRIBED_EVERY_S = 1.0  # as both protocols say
@@ -163,6 +164,7 @@ class Player:
             self._end()
         finally:
             if not self._has_arrived:
+                # devices that never start must say so, too, or the others would wait for them without end
                 self.laboratory.arrive()
             self.endpoint.close()
 
@@ -191,6 +193,7 @@ class Player:
         """Samples prepared at once: a fraction of a second in real time, whole frames, one description."""
         block_s = min(_PACED_BLOCK_S * self.laboratory.speed, _UNPACED_BLOCK_S)
         samples = max(1, min(int(block_s * self.signal.sampling_rate_hz), _LONGEST_BLOCK_SAMPLES))
+        # whole frames, so that blocks do not show in how samples are divided into frames
         length = max(samples // self.wire.samples_per_frame, 1) * self.wire.samples_per_frame
         inner = [sample for sample in sorted(self.announcements) if stretch.first < sample < stretch.last]
         for first, last in zip([stretch.first, *inner], [*inner, stretch.last], strict=True):
@@ -200,6 +203,7 @@ class Player:
     def _announce(self, start: int) -> None:
         if start in self.announcements:
             self.wire.described_as(self.announcements[start])
+            # the new description is sent with the next frames, not a second later
             self._described_second = -1
 
     def _taken(self, start: int, stop: int) -> Piece:
@@ -227,6 +231,7 @@ class Player:
 
     def _pass_unplugged(self, stretch: Stretch, fault: DisconnectFault) -> None:
         """Lose the connection; the counter runs on, or starts anew if the device lost power."""
+        # what was sent before the plug was pulled arrives: a fault takes samples of its own interval only
         self.sender.await_read()
         self.endpoint.unplug()
         for group in range(self.wire.n_groups):
@@ -239,12 +244,14 @@ class Player:
             )
         for start, stop in self._blocks(stretch):
             self._announce(start)
+            # the counter runs on, and stuck sensors and jitter go on as if the plug were in
             if not fault.restart:
                 self._taken(start, stop)
         self._wait_unplugged(fault)
         self.endpoint.plug_in()
         self.progress.next_sample = stretch.last
         if fault.restart:
+            # the counter of the next sample is 0
             self.progress = Progress(next(self.streams), -stretch.last, stretch.last)
         self._described_second = -1
 
@@ -258,6 +265,7 @@ class Player:
 
     def _end(self) -> None:
         """Say that the stream is complete, and wait until the hosts have read it or gone."""
+        # no stream was begun that could end
         if not self.laboratory.has_begun:
             return
         frames = self.wire.end(self.progress.stream, self.progress.counter)

@@ -57,6 +57,7 @@ class RecordedSignal(Signal):
         if self._rate_hz > HIGHEST_SAMPLING_RATE_HZ:
             allowed = f"≤ {HIGHEST_SAMPLING_RATE_HZ:g}"
             raise RecordingError(f"{path}: sampling_rate_hz", got=f"{self._rate_hz:g}", allowed=allowed)
+        # with a damaged heap the HDF5 library would never come to an end
         require_sound_structure(path)
         try:
             self._channels, self._counts, self._lost = _read(path, names)
@@ -115,6 +116,7 @@ def _read(
 ) -> tuple[tuple[Channel, ...], NDArray[np.int32], NDArray[np.bool_]]:
     import netCDF4
 
+    # beside a source that reads in another thread the library ended the process
     with NETCDF_LOCK, netCDF4.Dataset(path, mode="r") as file:
         file.set_auto_maskandscale(False)
         there = [name for name, variable in file.variables.items() if _is_channel(name, variable)]
@@ -132,6 +134,7 @@ def _read(
             lost[rows] = True
             for k, column in enumerate(columns):
                 storage[rows, k], missing = column.read(file.variables[chosen[k]], rows)
+                # lost only where all channels are: the counter of the device then jumps over the sample
                 lost[rows] &= missing
     return tuple(column.channel for column in columns), storage, lost
 
@@ -152,6 +155,7 @@ def _storage(path: Path, n_samples: int, n_channels: int) -> NDArray[np.int32]:
         )
     if size <= _LARGEST_IN_MEMORY:
         return np.empty((n_samples, n_channels), np.int32)
+    # has no name: a process that is killed leaves nothing behind
     with tempfile.TemporaryFile() as unnamed:  # the mapping keeps it alive
         return np.memmap(unnamed, np.int32, mode="w+", shape=(n_samples, n_channels))
 
@@ -177,6 +181,7 @@ def _stored(path: Path, name: str, variable: Any, attributes: Mapping[str, Any])
     dtype = np.dtype(variable.dtype)
     shift = 1 << (8 * dtype.itemsize - 1) if dtype.kind == "u" else 0
     fill = attributes.get("_FillValue", attributes.get("missing_value"))
+    # by the readings and not by the stored type: 24 bits of most recordings take a quarter less of the line
     lowest, highest = (value - shift for value in _extremes(variable, fill))
     missing = None if fill is None else int(fill) - shift
     bits = _width(8 * dtype.itemsize, lowest, highest)
@@ -187,6 +192,7 @@ def _stored(path: Path, name: str, variable: Any, attributes: Mapping[str, Any])
         )
     limit = 1 << (bits - 1)
     if missing is not None and not -limit <= missing < limit:
+        # a fill value beyond these bits cannot be sent: a count that no reading has stands for it
         missing = -limit if lowest > -limit else limit - 1
         if missing == highest:
             raise RecordingError(f"{path}: {name}", got="no count free for missing readings", allowed="one")
@@ -212,6 +218,7 @@ def _quantised(path: Path, name: str, variable: Any, attributes: Mapping[str, An
     largest = max(abs(lowest), abs(highest))
     if not np.isfinite(largest):
         raise RecordingError(f"{path}: {name}", got="infinite values", allowed="numbers, NaN where lost")
+    # full scale is the largest value, so that the lowest count stays free for missing readings
     step = (largest or 1.0) / (2 ** (QUANTISED_BITS - 1) - 1)
     scale = step * float(attributes.get("scale_factor", 1.0))
     missing = -(1 << (QUANTISED_BITS - 1))

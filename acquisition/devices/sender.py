@@ -19,7 +19,9 @@ HOST_GONE_S: Final = 20.0
 STEP_S: Final = 0.05
 """How long to wait for something at most before looking again."""
 
+# frames leave in bunches: one by one they would cost a core
 _COALESCED_S = 0.004
+# what is already on its way to a host that said stop may still arrive
 _STOPPED_PATIENCE_S = 2.0
 _READ_PATIENCE_S, _EMPTY_FOR_S = 5.0, 0.25
 
@@ -106,6 +108,7 @@ class Sender:
                 self._send_carried(stream)
         except StoppedError as stopped:
             unsent = frames[position:]
+            # the end that is announced names the first sample that was not sent
             counters = unsent["counter"][np.isin(unsent["kind"], (FrameKind.SAMPLES, FrameKind.SPOILED))]
             stopped.next_counter = int(counters.min()) if len(counters) else None
             raise
@@ -151,6 +154,7 @@ class Sender:
     def _wait_s(self, due_s: float) -> float:
         """Until the next frame is due, and long enough that frames are sent in bunches."""
         waiting_s = (due_s - self.laboratory.now_s()) / self.laboratory.speed
+        # what comes out of a slow line is due at times of its own
         longest_s = _COALESCED_S if self.line is not None else STEP_S
         return min(max(waiting_s, _COALESCED_S), longest_s)
 
@@ -176,6 +180,7 @@ class Sender:
 
     def _offer_frames(self, frames: FrameArray, stream: int) -> None:
         if not self.endpoint.is_heard:
+            # bytes that nobody took when the plug was pulled do not reach the next host
             self._backlog.clear()
             self._note_unheard(frames, stream)
             return
@@ -188,6 +193,7 @@ class Sender:
             del self._backlog[: self.endpoint.offer(bytes(self._backlog))]
 
     def _send(self, frames: FrameArray, stream: int) -> None:
+        # as fast as possible nothing is due, so that the device waits for its host instead of losing frames
         if not self.laboratory.is_paced:
             self._await_listener()
         if self.endpoint.is_heard and self.endpoint.send(frames, is_given_up=self.is_given_up):

@@ -98,6 +98,7 @@ class SensorFaults:
         rows, k = self._during(fault, samples), self._numbers[fault.channel]
         channel = self._channels[k]
         ends = sorted((sign * fault.limit - channel.add_offset) / channel.scale_factor for sign in (-1.0, 1.0))
+        # a limit that is a whole count must not lose one by its last digit
         lowest, highest = math.ceil(ends[0] - 1e-9), math.floor(ends[1] + 1e-9)
         clipped = np.clip(counts[rows, k], lowest, highest)
         n_changed = int((clipped != counts[rows, k]).sum())
@@ -107,6 +108,7 @@ class SensorFaults:
     def _stick(self, fault: StuckFault, counts: CountArray, samples: NDArray[np.int64]) -> int:
         rows, k = self._during(fault, samples), self._numbers[fault.channel]
         if rows.any():
+            # kept over blocks: the sensor stays at the count of its first stuck sample
             held = self._held.setdefault(fault, int(counts[np.argmax(rows), k]))
             counts[rows, k] = held
         return int(rows.sum())
@@ -120,4 +122,5 @@ def _as_if_from(counts: CountArray, own: Channel, other: Channel) -> CountArray:
         values = counts * own.scale_factor + own.add_offset
         converted = np.rint((values - other.add_offset) / other.scale_factor)
     limit = 1 << (other.bits - 1)
+    # the lowest count is left out, as it may stand for a missing reading
     return np.clip(converted, 1 - limit, limit - 1).astype(np.int32)

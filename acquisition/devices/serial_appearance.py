@@ -35,6 +35,7 @@ class SerialAppearance(Appearance):
         As for `appearance`.
     """
 
+    # a serial frame tells its own size, a calibration frame may come at any time, and bytes go where there is room
     takes_samples_per_frame = can_announce = offers_bytes = True
 
     def __init__(self, url: SourceURL, *, number: int, expose: str | None = None) -> None:
@@ -72,6 +73,7 @@ class SerialAppearance(Appearance):
         """One host at the end of a stream of bytes."""
         listener: Listener
         if self._is_socket:
+            # one host, as at the end of a cable
             listener, url = ListeningSocket(self._host, self._port, most=1), "serial:socket://{at}"
         else:
             listener, url = PseudoTerminal(Path(self.url.target)), f"serial:{quote(self.url.target)}"

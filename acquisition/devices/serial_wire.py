@@ -23,6 +23,7 @@ from acquisition.wire.serial_frames import (
 )
 from sloshlab.errors import InputError
 
+# ten samples at 512 Hz: that many and more per frame are good measure
 _USUAL_FRAME_S = 0.02
 _REPEATS_OF_END = 3  # one lost frame must not hide the end
 _FRAME_OVERHEAD_BYTES = 28  # header and checksum
@@ -93,6 +94,7 @@ class SerialWire(Wire):
 
     def corrupted(self, frames: FrameArray, chosen: int, n_bits: int, generator: np.random.Generator) -> None:
         """Flip bits of one frame, in place; not of the zero that ends it."""
+        # damage of the zero would join two frames: that is a fault of its own, as of an overrun
         body = np.frombuffer(frames["bytes"][chosen][:-1], np.uint8).copy()
         bits = generator.choice(8 * body.size, size=min(n_bits, 8 * body.size), replace=False)
         np.bitwise_xor.at(body, bits // 8, (1 << (bits % 8)).astype(np.uint8))

@@ -82,11 +82,14 @@ class Signal(ABC):
             Band-limited interpolation, rounded to counts again. Where the interpolation rests on a missing
             reading there is none.
         """
+        # as many samples on either side as the interpolation rests on
         start = max(int(np.floor(positions.min())) - MARGIN, 0)
         stop = min(int(np.ceil(positions.max())) + MARGIN + 1, self.n_samples)
         known = self.piece(start, stop)
         missing = self._missing(known)
+        # zeros in place of the lost: whatever touches them is marked as missing below
         counts = interpolated(np.where(missing, 0, known.counts), positions - start)
+        # by the magnitude of the weights, which otherwise cancel
         blurred = interpolated(missing.astype(np.float64), positions - start, absolute=True) > 1e-9
         limits = np.array([1 << (channel.bits - 1) for channel in self.channels])
         rounded = np.clip(np.rint(counts), 1 - limits, limits - 1).astype(np.int32)

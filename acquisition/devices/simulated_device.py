@@ -53,6 +53,7 @@ def simulated_device(
     faults = faults or Faults()
     faults.require_channels(signal.channels, can_announce=found.can_announce)
     clock = DeviceClock(signal.sampling_rate_hz, **faults.clock.model_dump())
+    # clock first, then sensors, then frames: as the signal passes through a real device
     clocked = ClockedSignal(signal, clock, seed=seed + faults.seed)
     truth = Truth()
     sensor_faults = SensorFaults(faults, signal.channels, clock, truth)
@@ -99,6 +100,7 @@ def stream_numbers(seed: int) -> Iterator[int]:
     generator = np.random.default_rng([seed, 12])
     last = 0
     while True:
+        # by the seed, so that a replay with faults can be repeated
         drawn = int(generator.integers(1, 256))
         if drawn != last:
             last = drawn

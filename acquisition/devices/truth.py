@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+# a long run with many faults must not fill the memory with places
 MOST_ENTRIES: Final = 200_000
 """Touched places kept one by one; more are only counted."""
 

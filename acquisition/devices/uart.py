@@ -96,6 +96,7 @@ class Uart:
         self._drain(due_s)
         room = self._room(n_waiting_bytes)
         survives = len(whole) <= room and not self._is_torn
+        # the flag is set in a frame that gets through whole, else nobody would see it
         if survives and self._has_lost and self._wire.flag_lost_data(frames, k):
             self._has_lost, whole = False, frames["bytes"][k]
         # what finds no room is lost, not delayed: a UART does not make its writer wait
@@ -105,6 +106,7 @@ class Uart:
             self._free_from_s = self._line.done_s(max(due_s, self._free_from_s), len(data))
             self._inside.append((self._free_from_s, len(data)))
             self._n_inside += len(data)
+            # a cut frame has no zero at its end: the host reads it and the next one as one frame, and rejects both
             self._is_torn = len(data) < len(whole)
             frames["due_s"][k] = self._free_from_s
         if len(data) < len(whole):
@@ -167,6 +169,7 @@ class TransmitQueue:
             if is_samples and group in self._lossy_groups and self._wire.flag_lost_data(frames, k):
                 self._lossy_groups.discard(group)
             n = int(frames["length"][k])
+            # 47 bits of frame around the data and, on average, one stuff bit per ten bits that may be stuffed
             self._free_from_s = self._line.done_s(max(due_s, self._free_from_s), 47 + 8 * n + (34 + 8 * n) // 10)
             self._inside.append(self._free_from_s)
             frames["due_s"][k] = self._free_from_s

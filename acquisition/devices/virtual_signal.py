@@ -114,10 +114,12 @@ class VirtualSignal(Signal):
 
     def piece_at(self, positions: FloatArray) -> Piece:
         """The rig at any instants, read by its sensors."""
+        # the motion itself at these instants, not an interpolation of what was sampled
         readings = self._truth.readings(positions / self._rate_hz)
         columns = []
         for channel in self._channels:
             limit = round((channel.range_max or 0.0) / channel.scale_factor)
+            # rounded and clipped as the converter of the recording does
             columns.append(np.clip(np.rint(readings[channel.name] / channel.scale_factor), -limit, limit))
         return Piece.of(np.stack(columns, axis=1))
 
@@ -138,6 +140,7 @@ class _Truth:
             stop_hz=last,
             duration_s=settings["duration_s"],
         )
+        # the one laboratory of all virtual runs: gains and offsets do not depend on the seed of the run
         self._laboratory = Laboratory.drawn(0) if settings["imperfect"] else Laboratory.perfect()
         self._shaker: VirtualShaker = virtual_shaker(
             rig,

@@ -22,6 +22,7 @@ from sloshlab.errors import FileFormatError, SourceError
 from sloshlab.units import SI_UNITS
 
 LARGEST_DATABASE_BYTES: Final = 4 << 20
+# A shorter counter comes round too soon to prove anything: 16 bits at 1000 Hz after 65 s already.
 FEWEST_COUNTER_BITS: Final = 16
 MOST_COUNTER_BITS: Final = 48
 MOST_CLOCK_BITS: Final = 62
@@ -30,6 +31,7 @@ MOST_CLOCK_BITS: Final = 62
 _TEXT_ATTRIBUTES: Final = {"block_from": "BlockFrom", "block_to": "BlockTo", "sensor_serial": "SensorSerial"}
 _FLOAT_ATTRIBUTES: Final = {"noise_std": "NoiseStd", "x_m": "XM", "range_min": "RangeMin", "range_max": "RangeMax"}
 _FRAME_FORMATS: Final = ["StandardCAN", "ExtendedCAN", *["reserved"] * 12, "StandardCAN_FD", "ExtendedCAN_FD"]
+# DBC files mark identifiers of 29 bits by this bit of the number
 _EXTENDED: Final = 1 << 31
 _SAMPLE_NAME: Final = re.compile(rf"((?:{'|'.join(SI_UNITS)})_[A-Za-z0-9_]+?)(?:__([0-9]{{1,2}}))?")
 _PART_NAME: Final = re.compile(r"(sample_counter|device_clock)_([0-9]{1,2})")
@@ -77,6 +79,7 @@ def write_dbc(layout: CanLayout, path: Path) -> None:
     SourceError
         As `dbc_text`.
     """
+    # cantools and others read DBC files as cp1252
     text = dbc_text(layout).encode("cp1252")
     with replaced(path) as temporary:
         temporary.write_bytes(text)
@@ -99,6 +102,7 @@ def _require_possible(layout: CanLayout) -> tuple[Channel, ...]:
                 got=repr(channel.name[:60]),
                 allowed="<quantity>_<place> that does not end in __ and digits",
             )
+        # a quote would end the text in the file, and what follows would be read as a statement of its own
         if channel.sensor_serial is not None and re.search(r'["\\]', channel.sensor_serial):
             raise SourceError(
                 f"channel {channel.name}: sensor_serial",
@@ -136,6 +140,7 @@ def _signal_line(field: BitField, mark: str = "", channel: Channel | None = None
     if channel is not None:
         scale, offset, units = repr(channel.scale_factor), repr(channel.add_offset), channel.units
         both = channel.range_min is not None and channel.range_max is not None
+        # 0|0 says "no limits" in DBC files; with one end alone known, attributes say which
         limits = f"{channel.range_min!r}|{channel.range_max!r}" if both else "0|0"
     order = "0" if field.big_endian else "1"
     sign = "-" if field.signed else "+"
@@ -203,6 +208,7 @@ def read_layout(source: Path | str) -> CanLayout:
         with ReaderGuard(Path(name), "DBC", loggers=("cantools",)):
             import cantools
 
+            # strict: signals that overlap or leave their message are refused
             database = cantools.database.load_string(text, database_format="dbc", strict=True)
     except FileFormatError as error:
         raise SourceError(error.what, got=error.got, allowed=error.allowed, remedy=error.remedy) from error
@@ -225,6 +231,7 @@ def _text_of(source: Path | str) -> str:
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError:
+        # the usual encoding of DBC files, where units and comments are beyond ASCII
         return content.decode("cp1252", errors="replace")
 
 
@@ -331,6 +338,7 @@ class _DatabaseReader:
 
     def _crc(self, message: Any, signals: dict[str, Any]) -> BitField | None:
         crc = self._always("crc_16", message, signals)
+        # the sum leaves out the two bytes in which it stands; bits of other signals there would not be protected
         if crc is not None and (crc.length != 16 or len(crc.pieces()) != 2):
             self._refuse(f"{message.name}.crc_16", f"bit {crc.start_bit}, {crc.length} bits", "two whole bytes")
         return crc
@@ -347,6 +355,7 @@ class _DatabaseReader:
         parts.sort(key=lambda part: part.bit)
         reached = 0
         for part in parts:
+            # with a hole in the counter no place can be proved
             if part.bit != reached:
                 self._refuse(
                     f"{message.name}.{part.field.name}", f"bit {part.bit}", f"bit {reached}, which is missing"
@@ -368,6 +377,7 @@ class _DatabaseReader:
         if message.counter[0].selectors:
             self._refuse(f"{message.name}.sample_counter_0", "multiplexed", "in every frame")
         latched = any(part.selectors for part in message.clock)
+        # only then does a frame tell at which sample the clock was taken
         if latched and (message.multiplexor is None or message.multiplexor.name != "sample_counter_0"):
             self._refuse(
                 f"{message.name}: device clock", "multiplexed by another signal", "sample_counter_0 as multiplexor"
@@ -394,7 +404,9 @@ class _DatabaseReader:
 
     def _channel(self, place: str, name: str, found: dict[int, Any]) -> Channel:
         first = found[0]
+        # counts are signed: an unsigned signal needs a bit more
         needed_bits = first.length + (0 if first.is_signed else 1)
+        # a channel that is multiplexed would have no count for the other samples
         if any(signal.is_float or signal.multiplexer_ids for signal in found.values()) or needed_bits > 32:
             self._refuse(
                 place, f"{first.length} bits, float or multiplexed", "integer of ≤ 32 bits in every frame"

@@ -25,6 +25,7 @@ from acquisition.wire.can_layout import CanLayout, ControlMessage, SampleMessage
 from acquisition.wire.can_receiver import CanReceiver
 from sloshlab.errors import FileFormatError, SourceError
 
+# taken apart together, which is far cheaper than one by one
 _FRAMES_AT_ONCE: Final = 8192
 _STARTED_FOR_US_S: Final = 1.0
 """A stream whose first sample has a counter below this began with the log: what is missing then was lost."""
@@ -45,6 +46,7 @@ class DeviceLog:
         self._receiver = CanReceiver(layout)
         controls = [control for control in (layout.status, layout.command) if control is not None]
         everything: list[SampleMessage | ControlMessage] = [*layout.messages, *controls]
+        # both, as an identifier of 11 bits and one of 29 may have the same number
         self._keys = {(message.arbitration_id, message.extended) for message in everything}
         self._pending: list[Any] = []
         self._buses: set[Any] = set()
@@ -100,6 +102,7 @@ class DeviceLog:
         pending, self._pending = self._pending, []
         if not pending:
             return
+        # they serve to notice silences in which a counter may have come round, never to place samples
         stamps_ns = np.array([round(message.timestamp * 1e9) for message in pending], np.int64)
         self._keep(self._receiver.take(FrameBatch.from_messages(pending), stamps_ns, stamps_ns))
         error = self._receiver.failure
@@ -138,6 +141,7 @@ class DeviceLog:
         check_declared(
             self._path,
             "samples with gaps",
+            # before the arrays: a wrong counter may span years
             12 * (stop - first) * len(self._layout.channels),
             LARGEST_DECODED_BYTES,
         )
@@ -162,6 +166,8 @@ class DeviceLog:
             is_there = is_there & (counts != channel.missing_count)
         values = counts.astype(np.float64) * channel.scale_factor + channel.add_offset
         values[~is_there] = np.nan
+        # the device's integers beside the lost ones as well, so that the recording is the one that the recorder
+        # makes
         stored: CountArray | NDArray[np.int16] = counts.astype(np.int16) if channel.bits == 16 else counts.copy()
         return Column(
             f"{message}.{channel.name}",

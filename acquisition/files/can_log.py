@@ -25,6 +25,7 @@ from sloshlab.errors import FileFormatError
 _LARGEST_LOG_BYTES = 1 << 30
 _LARGEST_DATABASE_BYTES = 32 << 20
 _MOST_FRAMES = 50_000_000
+# frames wait for the bus; from half a step on a time stamp could be that of the next sample
 _JITTER_ALLOWED_STEPS = 0.4
 _BLF_RESOLUTION_S = 5e-7
 """python-can gives BLF times as seconds since 1970 in float64."""
@@ -143,6 +144,7 @@ def _take(message: Any, log: _Log, database: Any, wanted_bus: int | None, device
     for signal, value in decoded.items():
         key = (name, signal, message.channel)
         stamps = log.times[key]
+        # counted and kept: the time base refuses time that runs back, and names the place
         if stamps and message.timestamp < stamps[-1]:
             log.n_backwards += 1
         stamps.append(float(message.timestamp))
@@ -151,11 +153,13 @@ def _take(message: Any, log: _Log, database: Any, wanted_bus: int | None, device
 
 def _decoded(found: Any, data: bytes, log: _Log) -> dict[str, float]:
     try:
+        # numbers and not the names of choices; half a frame must not become zeros
         signals = found.decode(data, decode_choices=False, scaling=True, allow_truncated=False)
     except (ValueError, KeyError, TypeError, ArithmeticError, struct.error) as error:
         log.undecodable[f"{found.name}: {type(error).__name__}: {error}"[:120]] += 1
         return {}
     except Exception as error:
+        # cantools' errors are children of Exception alone; any other error is not about the frame
         if not type(error).__module__.startswith("cantools"):
             raise
         log.undecodable[f"{found.name}: {error}"[:120]] += 1
@@ -175,6 +179,7 @@ def _columns(log: _Log, database: Any, kind: str) -> list[Column]:
     units: dict[tuple[str, str], str | None] = {}
     if database is not None:
         units = {(m.name, s.name): s.unit for m in database.values() for s in m.signals}
+    # BLF times are seconds since 1970, in which float64 holds no step to 1e-6
     origin = log.first_time_s if kind == "blf" and log.first_time_s is not None else 0.0
     clocks: dict[bytes, np.ndarray] = {}
     n_called = Counter(signal for _, signal, _ in log.times)
@@ -234,6 +239,7 @@ def _check_blf(path: Path) -> None:
     header_size = struct.unpack_from("<I", content, 4)[0]
     if not 72 <= header_size <= 4096:
         raise _damaged(path, f"a header of {header_size} bytes")
+    # objects may cross the borders of containers, so that all of them are put together first
     inner = bytearray()
     position = header_size
     while position + _OBJECT_HEADER.size <= len(content):
@@ -257,6 +263,7 @@ def _container(path: Path, body: bytes) -> bytes:
         raise _damaged(path, f"compression method {method}")
     try:
         stream = zlib.decompressobj()
+        # bounded: a few kilobytes may declare terabytes
         data = stream.decompress(body[16:], _LARGEST_LOG_BYTES)
     except zlib.error as error:
         raise _damaged(path, f"a log container that cannot be opened ({error})") from error

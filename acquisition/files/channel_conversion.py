@@ -13,8 +13,10 @@ from acquisition.files.table import Column, FloatArray
 from sloshlab.errors import ChannelMapError, UnitsError
 from sloshlab.units import SI_UNITS, factor_to_si
 
+# a reading at the limit may miss it by the last digit of the conversion
 _LIMIT_TOLERANCE = 1e-9
 _IN_UNITS = ("range_min", "range_max", "noise_std")
+# names of UDUNITS; its "g" is the gram
 _GRAVITY_NAMES = ("gravity", "standard_free_fall", "gn")
 
 
@@ -71,8 +73,10 @@ def with_declared(section: ChannelSection, column: Column) -> ChannelSection:
     """
     declared = dict(column.declared)
     is_same = column.units is not None and (section.units is None or same_units(section.units, column.units))
+    # a range in volts is none in newtons
     if section.calibration is not None or not is_same:
         declared = {key: value for key, value in declared.items() if key not in _IN_UNITS}
+    # one end of the map and one of the file would be a range that nobody stated
     if section.range_min is not None or section.range_max is not None:
         declared = {key: value for key, value in declared.items() if not key.startswith("range_")}
     known = {key: value for key, value in declared.items() if key in ChannelSection.model_fields}
@@ -138,6 +142,7 @@ def _converted(units: str, other: str, place: str) -> float:
     try:
         source, target = cf_units.Unit(units), cf_units.Unit(other)
         usable = source.is_convertible(target) and not source.is_time_reference() and not source.is_unknown()
+        # units with an offset, as degrees, are refused: a factor alone would be wrong
         if usable and source.convert(0.0, target) == 0.0:
             return float(source.convert(1.0, target))
     except (ValueError, TypeError) as error:
@@ -182,6 +187,7 @@ def channel_attributes(channel: str, section: ChannelSection, column: Column, sc
         if value is not None
     }
     if section.sign < 0:
+        # turned round, upward positive: the lowest reading is the largest value
         limits = {("range_max" if key == "range_min" else "range_min"): value for key, value in limits.items()}
     attributes.update(limits)
     if section.noise_std is not None:

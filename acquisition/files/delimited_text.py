@@ -22,6 +22,7 @@ from sloshlab.errors import FileFormatError
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?")
 _MISSING = ("", "nan", "na", "n/a", "null", "-")
 _UNITS_IN_NAME = re.compile(r"^(?P<name>.*\S)\s*[\[(](?P<units>[^\])]{1,40})[\])]\s*$")
+# enough for any header; the whole of a long file would be split several times
 _N_LINES_LOOKED_AT = 200
 _LONGEST_LINE = 1 << 20
 _MOST_COLUMNS = 10_000
@@ -75,6 +76,7 @@ def _decoded(path: Path, encoding: str | None) -> tuple[str, list[str]]:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and encoding in (None, "utf-16"):
         chosen = "utf-16"
     elif encoding in (None, "utf-8"):
+        # with or without the mark that Windows programs write at the beginning
         chosen = "utf-8-sig"
     else:
         chosen = encoding
@@ -85,6 +87,7 @@ def _decoded(path: Path, encoding: str | None) -> tuple[str, list[str]]:
             raise FileFormatError(
                 f"source {path}: encoding", got=f"bytes that are not {chosen}", allowed="text in its encoding"
             ) from error
+        # what Windows programs write; only names and units can be wrong by it
         text = content.decode("cp1252", errors="replace")
         traps.append("the text is not UTF-8; it is read as cp1252 (state encoding in [source] to be sure)")
     if "\x00" in text:
@@ -128,6 +131,7 @@ def _layout(text: str, settings: SourceSection, path: Path) -> Layout:
 
 
 def _separators(lines: list[str], settings: SourceSection, path: Path) -> tuple[str, str]:
+    # in this order where several explain the lines equally well: a comma may be a decimal mark, a blank anything
     delimiters = [settings.delimiter] if settings.delimiter else ["\t", ";", ",", "|", " "]
     decimals = [settings.decimal] if settings.decimal else [".", ","]
     filled = [line for line in lines if line.strip()]
@@ -140,6 +144,8 @@ def _separators(lines: list[str], settings: SourceSection, path: Path) -> tuple[
                 continue
             n_pure = sum(_is_pure_row(row, decimal) for row in rows)
             width = max(set(widths), key=lambda w: (widths.count(w), w))
+            # rows wholly of numbers first, then equal widths: "1,5;2,5" splits at commas as well, but not into
+            # numbers
             score = (n_pure, widths.count(width), width)
             if best is None or score > best[0]:
                 best = (score, delimiter, decimal)
@@ -235,9 +241,12 @@ def _parsed(text: str, layout: Layout, path: Path):  # type: ignore[no-untyped-d
             index_col=False,
             skip_blank_lines=True,
             skipinitialspace=layout.delimiter != " ",
+            # pandas' faster conversion is off by the last digit, and values are compared exactly
             float_precision="round_trip",
             na_values=list(_MISSING),
+            # in one piece, or the type of a column could change within it
             low_memory=False,
+            # a row with too many cells is damage, not noise
             on_bad_lines="error",
         )
 
@@ -251,6 +260,7 @@ def _numbers(series: object, n_header_rows: int) -> tuple[np.ndarray | None, str
     if pd.api.types.is_numeric_dtype(series):
         return as_float64(series.to_numpy()), ""
     text = series.astype("string").str.strip()
+    # Fortran writes 1.5D+03
     fortran = text.str.replace("D", "E", regex=False).str.replace("d", "e", regex=False)
     numbers = pd.to_numeric(fortran, errors="coerce")
     bad = numbers.isna() & text.notna() & ~text.str.lower().isin(_MISSING)

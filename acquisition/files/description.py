@@ -120,6 +120,7 @@ def _rate(
     """Rate of a column [Hz], None where the file does not tell; columns of one clock share the work."""
     if column.time_s is None and column.step_s is None:
         return None
+    # columns of one clock share its array, and traps of that clock are said once
     key = id(column.time_s)
     if column.time_s is not None and key in rates:
         return rates[key]

@@ -35,6 +35,7 @@ FILE_FORMATS: Final[Registry[FileFormat]] = Registry("format")
 for _name, _format in {
     "csv": FileFormat("delimited_text"),
     "mat": FileFormat("matlab5", (".mat",)),
+    # a map says "mat" for both versions; the content tells which
     "mat73": FileFormat("matlab73", can_be_stated=False),
     "uff": FileFormat("universal58", (".uff", ".unv")),
     "tdms": FileFormat("labview_tdms", (".tdms",), (b"TDSm",)),

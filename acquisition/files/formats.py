@@ -15,6 +15,7 @@ from acquisition.files.table import Table
 from sloshlab.errors import FileFormatError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
+# each with its reason: what looks like a damaged file of another format would send a person the wrong way
 _REFUSED: Final[dict[bytes, str]] = {
     b"\x93NUMPY": "a NumPy .npy array (it can carry pickled code, states no units and no rate)",
     b"PK\x03\x04": "a zip archive",
@@ -68,6 +69,7 @@ def file_format(path: Path, stated: str | None = None) -> str:
     """
     with path.open("rb") as stream:
         start = stream.read(_N_BYTES_LOOKED_AT)
+        # MAT v7.3 has 512 bytes of its own before the HDF5 signature
         stream.seek(512)
         has_hdf5_userblock = stream.read(8) == _HDF5
     for magic, description in _REFUSED.items():
@@ -142,6 +144,7 @@ def _agreed(path: Path, stated: str, found: str | None) -> str:
         return "mat73"
     if stated == "netcdf" and found == "mat73":
         return "netcdf"
+    # a stated format that contradicts the content is a mistake; any text may be read as CSV
     if found not in (None, stated) and stated != "csv":
         raise FileFormatError(
             f"source {path}: format", got=f"format = '{stated}' for a {found} file", allowed=f"'{found}'"
@@ -152,5 +155,6 @@ def _agreed(path: Path, stated: str, found: str | None) -> str:
 def _looks_like_text(start: bytes) -> bool:
     if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return True
+    # text has tabs and line ends, but no other control characters
     control = sum(byte < 9 or 13 < byte < 32 for byte in start)
     return control == 0

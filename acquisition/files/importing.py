@@ -70,6 +70,7 @@ def import_recording(sources: Sequence[Path], map_path: Path, *, rig: Path | Non
     map_path = Path(map_path)
     channel_map = read_channel_map(map_path)
     if rig is not None:
+        # read and thrown away: a rig that cannot be read is refused before files are converted
         Rig.from_toml(rig)
     paths = [Path(source) for source in sources]
     _check_join(paths, channel_map)
@@ -85,6 +86,7 @@ def import_recording(sources: Sequence[Path], map_path: Path, *, rig: Path | Non
     quality = _quality(converted, tables, channel_map, time)
     origin = _Origin(channel_map, map_path, paths, tables, rig)
     recording = _recording(converted, quality, time, origin)
+    # by the reader's own rules, so that nothing is written that cannot be read
     validate_recording(recording, name=f"map {map_path}")
     traps += [trap for named in tables for trap in named.table.traps]
     traps += time_traps + list(time.traps) + [trap for channel in converted for trap in channel.traps]
@@ -120,6 +122,7 @@ def _check_join(paths: Sequence[Path], channel_map: ChannelMap) -> None:
 def _tables(paths: Sequence[Path], channel_map: ChannelMap, map_path: Path) -> tuple[list[NamedTable], list[str]]:
     settings = channel_map.source
     if settings.database is not None:
+        # relative to the map, whatever the folder in which the command is run
         settings = settings.model_copy(update={"database": str(map_path.parent / settings.database)})
     tables = [with_time_column(NamedTable(path.name, read_table(path, settings)), settings) for path in paths]
     if len(tables) > 1 and settings.join == "time":
@@ -161,6 +164,7 @@ def _converted_channel(selected: Selected, section: ChannelSection, first: int, 
         raise RecordingError(
             f"channels.{selected.channel}", got="no number in the whole column", allowed="numbers"
         )
+    # from the numbers of the file: conversion and delay would move them off the limit
     clipped = _placed(clipped_samples(column.values, scaling, section), selected, first, time.n_points, False)
     values = _placed(in_si, selected, first, time.n_points, np.nan)
     compensated_s = section.delay_s if section.delay == "compensate" else 0.0
@@ -168,6 +172,7 @@ def _converted_channel(selected: Selected, section: ChannelSection, first: int, 
         n_before = int(np.isnan(values).sum())
         values = delay_compensated(values, compensated_s * time.rate_hz)
         n_more = int(np.isnan(values).sum()) - n_before
+        # flags belong to whole samples
         clipped = _moved(clipped, round(compensated_s * time.rate_hz))
         traps.append(
             f"{selected.channel}: compensating its delay costs {n_more} samples at ends and gaps; they are lost"
@@ -216,12 +221,14 @@ def _moved(flags: NDArray[np.bool_], n_steps: int) -> NDArray[np.bool_]:
 
 def _raw_encoding(column: Column, scaling: Scaling, values: FloatArray, compensated_s: float) -> dict[str, Any]:
     raw = column.raw
+    # delayed values are no counts any more
     if raw is None or compensated_s or raw.counts.dtype.name not in ("int16", "int32", "uint16", "int8", "uint8"):
         return {}
     if raw.scale_factor * scaling.factor == 0 or np.isinf(column.values).any():
         return {}
     limits = np.iinfo(raw.counts.dtype)
     used = raw.counts[~np.isnan(column.values)]
+    # a fill value that a reading has would make it a lost one
     unused = [code for code in (limits.min, limits.max) if not (used == code).any()]
     if not unused:
         return {}
@@ -309,6 +316,7 @@ def _recording(
             attributes[key] = value
     attributes.update(run.attributes)
     attributes["source_files"] = ", ".join(path.name for path in origin.paths)
+    # names are reused; the hash tells which file it was
     attributes["source_sha256"] = ", ".join(_sha256(path) for path in origin.paths)
     attributes["import_map"] = f"{origin.map_path.name} {_sha256(origin.map_path)}"
     coordinate = ("time", time.times(), {"units": "s", "long_name": "time from the trigger"})

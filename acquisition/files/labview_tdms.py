@@ -74,6 +74,7 @@ def _column(label: str, channel: Any) -> tuple[Column | None, str]:
         return None, "empty"
     properties = channel.properties
     values = channel[:]
+    # time stamps as a channel: seconds since the first, which a map may name as the time
     if values.dtype.kind == "M":
         seconds = (values - values[0]) / np.timedelta64(1, "ns") * 1e-9
         return Column(label, as_float64(seconds), units="s", aliases=(channel.name,)), ""
@@ -100,6 +101,7 @@ def _raw(channel: Any, values: np.ndarray) -> RawCounts | None:
     properties = channel.properties
     if isinstance(counts, np.ndarray):
         counts = {0: counts}
+    # a DAQmx channel may have several raw sources, none of which is its counts alone
     if list(counts) != [0]:
         return None
     n_scales = properties.get("NI_Number_Of_Scales")
@@ -107,6 +109,7 @@ def _raw(channel: Any, values: np.ndarray) -> RawCounts | None:
     if slope is None or counts[0].dtype.kind not in "iu":
         return None
     intercept = _number(properties, f"NI_Scale[{n_scales - 1}]_Linear_Y_Intercept") or 0.0
+    # other scalings (tables, polynomials, several in a row) are not linear: then the scaled values are kept
     if not np.array_equal(counts[0] * slope + intercept, values):
         return None
     return RawCounts(counts[0], slope, intercept)

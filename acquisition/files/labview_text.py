@@ -37,12 +37,14 @@ def read(path: Path, settings: SourceSection) -> Table:
     checked_size(path, _LARGEST_BYTES)
     text, traps = _decoded(path)
     with ReaderGuard(path, "LVM") as guard:
+        # From text: given a file name, lvm_read looks for a pickle beside it and loads that instead.
         content = lvm_read.read_str(text)
         parts = [content[number] for number in range(int(content["Segments"]))]
         shapes = [np.atleast_2d(part["data"]).shape for part in parts]
     if not any(size for _, size in shapes):
         raise FileFormatError(f"source {path}", got="no rows of numbers", allowed="a complete LVM file")
     layout = str(content.get("X_Columns", "One")).strip()
+    # from the text, since the parsed number no longer shows how many digits were written
     roundings = _step_roundings(text, str(content.get("Decimal_Separator", ".")))
     unusable: dict[str, str] = {}
     missing: list[str] = []
@@ -103,6 +105,7 @@ def _split(part: Mapping[str, Any], layout: str, label: str, traps: list[str], m
             return [slice(a, b) for a, b in itertools.pairwise(edges)]
         if declared and n_rows > declared:
             traps.append(f"{label}the header declares {declared} samples, {n_rows} rows follow; X_Value runs on")
+    # without X_Value nothing tells how much time lies between two hits: they must not be joined
     elif declared and n_rows > declared > 1:
         n_pieces = -(-n_rows // declared)
         hits = "two hits" if n_pieces == 2 else f"{n_pieces} hits"
@@ -154,6 +157,7 @@ def _columns(record: _Record, rows: slice, unusable: dict[str, str], traps: list
         elif is_clock:
             clock = values
         else:
+            # the lists of the header count the channels, not the column of X_Value
             at = position if layout == "No" else position - 1
             columns.append(_column(record, Column(name, values, time_s=clock), at, traps))
     return columns

@@ -32,6 +32,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     """
     h5py = library("h5py", "reading MAT v7.3 files")
     checked_size(path)
+    # a damaged heap would keep the HDF5 library for ever
     require_sound_heaps(path, what=f"source {path}")
     found = Found()
     with ReaderGuard(path, "MAT v7.3") as guard, h5py.File(path, "r") as source:
@@ -39,6 +40,7 @@ def read(path: Path, settings: SourceSection) -> Table:
         _listed(h5py, source, datasets, found)
         total = 0
         for name, dataset in datasets:
+            # HDF5 compresses: what is declared counts, not the size of the file
             total += _decoded_bytes(dataset)
             check_declared(path, f"variable {name[:60]!r}", total)
         for name, dataset in datasets:
@@ -50,9 +52,11 @@ def _listed(
     h5py: Any, group: Any, datasets: list[tuple[str, Any]], found: Found, *, prefix: str = "", depth: int = 0
 ) -> None:
     for key in group:
+        # MATLAB's own: cells and objects are reached by references into it
         if key.startswith("#") and not prefix:
             continue
         name = prefix + key
+        # a link may lead into any file of the computer
         if not isinstance(group.get(key, getlink=True), h5py.HardLink):
             found.unusable[name] = "a link, not followed"
         elif depth > _DEEPEST or len(datasets) > _MOST_VARIABLES:
@@ -75,6 +79,7 @@ def _decoded_bytes(dataset: Any) -> int:
 def _collected(h5py: Any, source: Any, name: str, dataset: Any, found: Found) -> None:
     class_name = dataset.attrs.get("MATLAB_class", b"")
     class_text = class_name.decode("latin-1") if isinstance(class_name, bytes) else str(class_name)
+    # data in other files, without any link
     if dataset.external or dataset.is_virtual:
         found.unusable[name] = "data outside the file, not followed"
     elif dataset.attrs.get("MATLAB_empty", 0) or dataset.shape is None:
@@ -86,6 +91,7 @@ def _collected(h5py: Any, source: Any, name: str, dataset: Any, found: Found) ->
     elif dataset.dtype.kind not in "fiub":
         found.unusable[name] = f"{class_text or dataset.dtype}, not real numbers"
     else:
+        # MATLAB stores columns first
         collect(name, np.asarray(dataset[()]).T, found)
 
 

@@ -14,6 +14,7 @@ from acquisition.files.reading_limits import ReaderGuard, check_declared, checke
 from acquisition.files.table import Column, Table, as_float64, unique_names
 from sloshlab.errors import FileFormatError
 
+# type 3 is a formula, which would be evaluated
 _NUMERIC_CONVERSIONS = frozenset({0, 1, 2, 4, 5})
 """None, linear, rational, and tables from number to number."""
 
@@ -55,6 +56,7 @@ def read(path: Path, settings: SourceSection) -> Table:
         for group in source.groups:
             described = group.channel_group
             total += described.cycles_nr * (described.samples_byte_nr + described.invalidation_bytes_nr + 8)
+            # deflate cannot make more than about a thousand bytes of one
             check_declared(path, "channel groups", total, max(1100 * size, 1 << 20))
             check_declared(path, "channel groups", total)
         _check_records(path, source.groups, n_data_bytes)
@@ -119,6 +121,7 @@ def _column(name: str, group_name: str, signal: Any, values: np.ndarray) -> Colu
     invalid = getattr(signal, "invalidation_bits", None)
     if invalid is not None:
         numbers = np.where(np.asarray(invalid, dtype=bool), np.nan, numbers)
+    # stamps in float32 are as coarse as their spacing at the end of the run
     stamps = np.asarray(signal.timestamps)
     resolution = float(np.spacing(np.abs(stamps).max())) if stamps.dtype == np.float32 and stamps.size else 0.0
     units = str(signal.unit or "").strip()
@@ -146,12 +149,14 @@ def _check_links(path: Path) -> int:
     waiting = [_FIRST_BLOCK]
     while waiting:
         address = waiting.pop()
+        # links may share blocks; only chains must not lead back
         if address in seen:
             continue
         seen.add(address)
         if address + _BLOCK.size > len(content) or len(seen) > _MOST_BLOCKS:
             raise _damaged(path, f"a link to byte {address} of {len(content)}")
         kind, length, n_links = _BLOCK.unpack_from(content, address)
+        # links and block must lie within the file before any of them is followed
         if not kind.startswith(b"##") or _BLOCK.size + 8 * n_links > length or address + length > len(content):
             raise _damaged(path, f"a broken block at byte {address}")
         links = struct.unpack_from(f"<{n_links}Q", content, address + _BLOCK.size)
@@ -174,6 +179,7 @@ def _check_records(path: Path, groups: Any, n_data_bytes: int) -> None:
         record_bytes = described.samples_byte_nr
         n_needed += described.cycles_nr * (record_bytes + described.invalidation_bytes_nr)
         for channel in group.channels:
+            # computed from the number of the record: it has no bytes
             if channel.channel_type == _VIRTUAL_MASTER:
                 continue
             last = channel.byte_offset + (channel.bit_offset + channel.bit_count + 7) // 8

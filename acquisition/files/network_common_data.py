@@ -46,6 +46,7 @@ def read(path: Path, settings: SourceSection) -> Table:
             others.unusable[name] = f"a group; state group = {name!r} to read it"
         total = 0
         for variable in group.variables.values():
+            # in Python's integers: a product of declared sizes can come round in 64 bits
             total += 8 * int(np.prod([len(d) for d in variable.get_dims()], dtype=object))
             check_declared(path, f"variable {variable.name!r}", total)
         clocks = {
@@ -98,6 +99,7 @@ def _series(
     if clocks.get(name) is not None and variable.dimensions == (name,):
         others.unusable[name] = "the time coordinate"
         return
+    # after unpacking by the library, which masks fill values
     values = np.ma.filled(np.ma.asarray(variable[...]).astype(np.float64), np.nan)
     series = rows_of(name, values)
     if not series:

@@ -17,6 +17,7 @@ from sloshlab.errors import FileFormatError, MissingExtraError, SloshlabError
 LARGEST_TEXT_BYTES: Final = 1 << 30
 LARGEST_BINARY_BYTES: Final = 6 << 30
 LARGEST_DECODED_BYTES: Final = 6 << 30
+# a reader may warn at every sample
 _MOST_WARNINGS_KEPT = 5
 
 
@@ -33,6 +34,7 @@ def checked_size(path: Path, largest_bytes: int = LARGEST_BINARY_BYTES) -> int:
             kind = "a folder" if path.is_dir() else "no such file"
             raise FileFormatError(f"source {path}", got=kind, allowed="a file")
         size = path.stat().st_size
+        # opened once, so that a missing permission is told here and not by a reader
         with path.open("rb"):
             pass
     except FileFormatError:
@@ -78,6 +80,7 @@ def library(name: str, purpose: str) -> ModuleType:
     """
     try:
         with warnings.catch_warnings():
+            # what a library warns of when it is imported is nothing that its user can mend
             warnings.simplefilter("ignore")
             return importlib.import_module(name)
     except ImportError as error:
@@ -116,6 +119,7 @@ class ReaderGuard:
         self._caught = self._stack.enter_context(warnings.catch_warnings(record=True))
         warnings.simplefilter("always")
         warnings.simplefilter("ignore", ResourceWarning)
+        # some readers print, and standard output belongs to the command
         self._stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
         self._records: list[str] = []
         for name in self._loggers:
@@ -131,6 +135,7 @@ class ReaderGuard:
         self.traps.extend(distinct[:_MOST_WARNINGS_KEPT])
         if len(distinct) > _MOST_WARNINGS_KEPT:
             self.traps.append(f"{len(distinct) - _MOST_WARNINGS_KEPT} more warnings of the reader")
+        # Ctrl-C and the end of the process pass through
         if error is None or isinstance(error, SloshlabError) or not isinstance(error, Exception):
             return
         reason = " ".join(str(error).split())[:160] or type(error).__name__

@@ -123,6 +123,7 @@ def unique_names(names: list[str]) -> list[str]:
     for name in names:
         seen[name] = seen.get(name, 0) + 1
         candidate = name if seen[name] == 1 else f"{name} ({seen[name]})"
+        # a file may itself have a column called "x (2)"
         while candidate in unique:
             seen[name] += 1
             candidate = f"{name} ({seen[name]})"
@@ -152,6 +153,7 @@ def rows_of(name: str, values: np.ndarray) -> list[tuple[str, np.ndarray]]:
     squeezed = np.squeeze(values)
     if squeezed.ndim == 1:
         return [(name, squeezed)]
+    # of a square matrix nothing tells which side is time: nothing is guessed
     if squeezed.ndim != 2 or squeezed.shape[0] == squeezed.shape[1]:
         return []
     rows = squeezed if squeezed.shape[0] < squeezed.shape[1] else squeezed.T
@@ -185,6 +187,7 @@ def simplest_decimal_between(low: float, high: float) -> float:
     middle = 0.5 * (low + high)
     if not (0 < low <= high) or not math.isfinite(high):
         return middle
+    # a float has no more than 17 digits to choose among
     for digits in range(1, 17):
         candidate = float(f"{middle:.{digits - 1}e}")
         if low <= candidate <= high:

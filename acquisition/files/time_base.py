@@ -16,8 +16,10 @@ LARGEST_LOST_FRACTION: Final = 0.5
 """A grid of which a larger part than this would be gaps is refused."""
 
 _FINEST_DECIMALS = 12
+# a wrong stamp may lie years ahead
 _LARGEST_INDEX = 2**40
 _MOST_GAPS = 200_000
+# one or two longer steps are lost samples; more, in a regular pattern, may be rounding alone
 _FEWEST_ODD_STEPS = 3
 _HALF = 0.5 * 1.01
 """Rounding moves a stamp by half a unit."""
@@ -70,6 +72,7 @@ def stored_resolution(time_s: FloatArray) -> float:
     spacing = float(np.spacing(largest))
     for decimals in range(_FINEST_DECIMALS + 1):
         unit = 10.0**-decimals
+        # finer decimals cannot be told from the spacing of the floats themselves
         if unit < 8 * spacing:
             break
         if np.abs(time_s - np.round(time_s, decimals)).max() <= 2 * spacing:
@@ -187,6 +190,7 @@ def _whole_steps(
         return None
     counts = np.rint(steps / unit)
     spacing = float(np.spacing(np.abs(offset).max()))
+    # stamps that are written as coarsely as the step cannot show whether a step is a whole multiple
     noise = resolution if resolution < 0.01 * unit else 0.0
     if np.abs(steps - counts * unit).max() > 1e-6 * unit + 8 * spacing + 2 * noise:
         return None
@@ -214,6 +218,7 @@ def _with_gaps(
     """Runs without a gap are consecutive; each run starts where the mean of its stamps says."""
     steps = np.diff(offset)
     typical = 1 / rate_hz if rate_hz else _typical_step(steps, resolution)
+    # beyond what rounding of both ends of a step can do
     edges = np.concatenate([[0], np.flatnonzero(steps > 1.5 * typical + resolution) + 1, [offset.size]])
     if edges.size > _MOST_GAPS:
         raise RecordingError(
@@ -221,6 +226,7 @@ def _with_gaps(
         )
     if offset[-1] / typical > _LARGEST_INDEX:
         raise RecordingError(f"{name}: time", got=f"a gap of {steps.max():.3g} s", allowed="a shorter gap")
+    # from the longest run without a gap: the typical step is too coarse to count across gaps
     longest = int(np.diff(edges).argmax())
     run = offset[edges[longest] : edges[longest + 1]]
     rate = rate_hz or 1 / typical
@@ -228,6 +234,7 @@ def _with_gaps(
         rate = _simplest_rate(run - run[0], np.arange(run.size), resolution)
     index = np.arange(offset.size, dtype=np.int64)
     for first, last in itertools.pairwise(edges):
+        # the mean of a run is known more finely than its stamps are written
         phase = float(np.mean(offset[first:last] - np.arange(last - first) / rate)) * rate
         index[first:last] += round(phase) - first
     index -= index[0]
@@ -254,4 +261,5 @@ def _simplest_rate(offset: FloatArray, index: NDArray[np.int64], resolution: flo
         return mean
     simplest = simplest_decimal_between(n_steps / (duration + resolution), n_steps / (duration - resolution))
     before, after = _half_range(offset, index, mean), _half_range(offset, index, simplest)
+    # the simple number only where the stamps fit it as well: a real rate need not be a round one
     return simplest if after <= max(before, _HALF * resolution) else mean

@@ -21,6 +21,7 @@ _FUNCTIONS = {
     2: "auto spectrum", 3: "cross spectrum", 4: "frequency response function", 5: "transmissibility",
     6: "coherence", 9: "power spectral density", 12: "spectrum",
 }  # fmt: skip
+# of E13.5, the format of abscissa values: a step such as 1/2048 s is rounded
 _DIGITS_WRITTEN = 6
 _END_MARK = re.compile(rb"(?m)^ {4}-1[ \r]*$")
 
@@ -91,6 +92,7 @@ def _unusable(data: Mapping[str, Any]) -> str:
 
 def _shortage(number: int, data: dict[str, Any], traps: list[str]) -> str:
     """What is missing from the set; a surplus is cut off and reported."""
+    # pyuff takes all numbers up to the end mark, whatever the header declares
     declared, there = int(data["num_pts"]), int(np.size(data["data"]))
     if there > declared >= 2:
         traps.append(f"set {number}: {there - declared} numbers after the {declared} declared are left out")
@@ -102,6 +104,7 @@ def _shortage(number: int, data: dict[str, Any], traps: list[str]) -> str:
 
 def _has_open_set(path: Path) -> bool:
     """Whether text of a data set follows the last end mark."""
+    # pyuff passes over a set without an end mark in silence
     content = path.read_bytes()
     tail = content[max(0, content.rfind(b"    -1\n    58"), content.rfind(b"    -1\r\n    58")) :]
     return b"    58" in tail[:20] and len(_END_MARK.findall(tail)) < 2 and not tail.rstrip().endswith(b"-1")

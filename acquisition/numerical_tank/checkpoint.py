@@ -26,6 +26,7 @@ from sloshlab.atomic_file import write_bytes
 from sloshlab.errors import InputError
 
 MAGIC: Final = b"sloshlab numerical tank checkpoint, version 1\n"
+# looked at before the file is read into memory
 LARGEST_FILE_BYTES: Final = 256 * 2**20
 _HASH_BYTES: Final = 32
 _EXTRA: Final = "extra_"
@@ -99,6 +100,7 @@ def _arrays(path: Path) -> dict[str, Any]:
     if not content.startswith(MAGIC):
         raise InputError(f"{path}", got="another file", allowed="a checkpoint of the numerical tank, version 1")
     digest, body = content[len(MAGIC) : len(MAGIC) + _HASH_BYTES], content[len(MAGIC) + _HASH_BYTES :]
+    # before anything is unpacked: a damaged archive may declare any sizes
     if hashlib.sha256(body).digest() != digest:
         raise InputError(f"{path}", got="a damaged checkpoint", remedy="go on from an earlier one")
     try:
@@ -111,6 +113,7 @@ def _arrays(path: Path) -> dict[str, Any]:
 
 
 def _setup(text: bytes) -> TankSetup:
+    # built anew by their classes, so that all checks of a setup are made again
     values = json.loads(text.decode())
     return TankSetup(
         **{

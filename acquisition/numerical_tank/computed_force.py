@@ -34,6 +34,7 @@ VerticalMotion = Callable[[FloatArray], FloatArray]
 Progress = Callable[[float], None]
 """Takes the share of the work that is done, 0 … 1."""
 
+# of computing: what a kill or a power cut costs
 SAVED_EVERY_S: Final = 20.0
 _BLOCK_S: Final = 0.1
 
@@ -114,6 +115,7 @@ def computed_force(
     except KeyboardInterrupt as interrupt:
         if path is None:
             raise
+        # steps whose forces were not stored cannot be saved: the older checkpoint is better
         if run.is_consistent:
             run.save(path)
         raise _interrupted(run, path, duration_s) from interrupt
@@ -126,7 +128,9 @@ class _Computation(LongComputation):
     def __init__(self, setup: TankSetup, motion: VerticalMotion, n_samples: int) -> None:
         self._n_means = oversampling(setup.steps_per_sample)
         self._steps_per_mean = setup.steps_per_sample // self._n_means
+        # the filter of the last sample needs half its length beyond it
         self._means = np.zeros((n_samples - 1 + HALF_LENGTH_SAMPLES) * self._n_means)
+        # whole means in a block, so that a checkpoint never falls within one
         self._at_once = max(round(_BLOCK_S / (self._steps_per_mean * setup.step_s)), 1)
         self._n_done = 0
         self._motion = motion
@@ -158,6 +162,7 @@ class _Computation(LongComputation):
             if error.valid is None:
                 raise
             forces, trouble = error.valid, str(error)
+        # the static weight is taken away: the liquid at rest has no force
         means = averaged(forces.vertical_n, self._steps_per_mean) + self._weight_n
         self._means[self._n_done : self._n_done + means.size] = means
         self._n_done += means.size
@@ -180,6 +185,7 @@ class _Computation(LongComputation):
             remedy = "remove it, or give another name"
             raise InputError(f"{path}", got="the checkpoint of another run", remedy=remedy)
         means, computing_s = extra.get("means", np.zeros(0)), extra.get("computing_s", np.zeros(0))
+        # forces and state were saved together and must end at the same step
         if means.size * self._steps_per_mean != tank.n_steps or means.size > self._means.size:
             raise InputError(f"{path}", got="a checkpoint without all forces", remedy="remove it")
         self.tank, self._n_done, self.computing_s = tank, means.size, float(computing_s.sum())
@@ -197,6 +203,7 @@ def _n_samples(setup: TankSetup, duration_s: float) -> int:
 def _identity(setup: TankSetup, motion: VerticalMotion, n_samples: int) -> NDArray[np.uint8]:
     """Hash of all that determines the run: setup, and motion at the times of the samples."""
     digest = hashlib.sha256(json.dumps(asdict(setup), sort_keys=True).encode())
+    # a function has no bytes of its own; its values at the samples stand for it
     digest.update(np.ascontiguousarray(motion(np.arange(n_samples) / (setup.sampling_rate_hz or 1.0))).tobytes())
     return np.frombuffer(digest.digest(), np.uint8)
 

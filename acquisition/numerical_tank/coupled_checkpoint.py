@@ -61,6 +61,7 @@ def load(path: str | os.PathLike[str]) -> tuple[CoupledTank, dict[str, NDArray[A
             allowed="that of a tank on a structure",
             remedy="start the run again",
         ) from error
+    # the tank that was read takes the place of the one at rest
     coupled.tank = tank
     return coupled, {name.removeprefix(_BESIDE): arrays[name] for name in arrays if name.startswith(_BESIDE)}
 

@@ -188,9 +188,11 @@ def _advance_coupled(flow, totals, structure, interface, course):  # type: ignor
             return NO_ROOM
         viscosity = begin_step(flow, walls)
         in_middle = per_particle * walls[FORCE_Z] + weight
+        # the impulses of particles that reached a wall after the force of the step before was told
         forces[k] = in_middle + carried[0]
         tank_z = step_structure(structure, forces[k], base[k], rows[k])
         status = end_step(flow, (0.0, tank_z), viscosity, walls, totals)
+        # end_step has added the impulses at the walls to the force
         carried[0] = per_particle * walls[FORCE_Z] + weight - in_middle
         energies[HANDED_OVER] += system.step * in_middle * _mean_velocity(system, rows[k])
         energies[HANDED_OVER] += system.step * carried[0] * _velocity(system, motion)

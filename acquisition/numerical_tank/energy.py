@@ -132,7 +132,9 @@ def account(
     """
     scale = np.full(len(TERMS), mass_kg_per_m)
     scale[[TANK_WORK, VISCOSITY]] *= step_s
+    # both change s, whose energy is ½ m c₀² s²
     scale[[DENSITY_DIFFUSION, PACKING]] *= speed_of_sound_m_per_s**2
+    # shifts change heights and no velocity: what they cost is potential energy alone
     scale[SHIFT] *= g_m_per_s2
     work, viscosity, diffusion, packing, shift = (float(value) for value in sums * scale)
     kinetic, potential, elastic = stored_j_per_m

@@ -125,5 +125,6 @@ def averaged(values: FloatArray, n_steps: int) -> FloatArray:
     >>> averaged(np.array([1.0, 3.0, 5.0, 7.0, 9.0]), 2).tolist()
     [2.0, 6.0]
     """
+    # a group that is not complete would be a mean over another time
     whole = values.shape[0] // n_steps * n_steps
     return np.asarray(values[:whole].reshape(-1, n_steps).mean(axis=1))

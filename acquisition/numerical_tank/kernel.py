@@ -91,7 +91,9 @@ def coverage_table(n: int = 65) -> FloatArray:
     depth, line = _half_plane(801)
     step = depth[1] - depth[0]
     filled = 0.5 + np.concatenate([[0.0], np.cumsum((line[1:] + line[:-1]) / 2 * step)])
+    # the quadrature misses 1 deep inside by a little, and any difference there would be taken for compression
     filled = 0.5 + (filled - 0.5) * 0.5 / (filled[-1] - 0.5)
+    # N falls with depth; interpolation wants it ascending
     return np.asarray(np.interp(np.linspace(0.0, line[0], n), line[::-1], filled[::-1]))
 
 

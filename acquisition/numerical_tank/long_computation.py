@@ -70,10 +70,12 @@ class LongComputation(ABC):
                 start_s = monotonic_s()
                 stopped = self.advance()
                 self.computing_s += monotonic_s() - start_s
+                # only here, after the block has stored what it computed, so that the latest state can be saved
                 if stopping:
                     raise KeyboardInterrupt
                 if progress is not None:
                     progress(self.share)
+                # an unstable state is none to go on from
                 if path is not None and not stopped and monotonic_s() - saved_s >= saved_every_s:
                     self.save(path)
                     saved_s = monotonic_s()

@@ -49,6 +49,7 @@ def _sort_into_cells(particles, first, last, cells):  # type: ignore[no-untyped-
     cell_of = np.empty(last - first, np.int32)
     start = np.zeros(n_x * n_z + 1, np.int32)
     for i in range(first, last):
+        # int cuts towards zero: what lies beyond the left wall or the floor would share the first cell inside
         column = min(max(int(particles.x[i] / cell) + 1, 0), n_x - 1) if particles.x[i] >= 0 else 0
         row = min(max(int(particles.z[i] / cell) + 1, 0), n_z - 1) if particles.z[i] >= 0 else 0
         cell_of[i - first] = column * n_z + row
@@ -87,6 +88,7 @@ def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-
     n = constants.n
     reach = constants.support + constants.skin
     square = reach * reach
+    # one cell more on each side for the images, which stand at most one reach outside
     n_x, n_z = int(constants.length / reach) + 3, int(constants.height / reach) + 3
     cells = _Cells(reach, n_x, n_z)
     start, order, cell_of = _sort_into_cells(particles, 0, n, cells)
@@ -97,6 +99,7 @@ def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-
     count = 0
     for i in range(n):
         pairs.start[i] = count
+        # no particle lists more than all others: one check per particle instead of one per pair
         if count + n_all > pairs.j.size:
             return False
         cell, row = cell_of[i], cell_of[i] % n_z
@@ -104,6 +107,7 @@ def _list_pairs(particles, pairs, constants, n_all):  # type: ignore[no-untyped-
         count = _list_range(
             particles, pairs, _Slots(order, count), Partners(i, slot[i] + 1, start[cell + high]), square
         )
+        # looking at each pair once halves the time of a listing, which violent motion needs every few steps
         if cell + n_z < n_x * n_z:
             first, last = start[cell + n_z - low], start[cell + n_z + high]
             count = _list_range(particles, pairs, _Slots(order, count), Partners(i, first, last), square)

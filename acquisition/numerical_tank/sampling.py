@@ -38,6 +38,7 @@ def oversampling(steps_per_sample: int) -> int:
     (7, 4, 3)
     """
     divisors = (k for k in range(LEAST_OVERSAMPLING, steps_per_sample) if steps_per_sample % k == 0)
+    # a divisor, so that means and samples begin together
     return next(divisors, steps_per_sample)
 
 
@@ -49,6 +50,7 @@ def filter_weights(n_means: int) -> FloatArray:
     n_means : int
         Means in a sample.
     """
+    # even: a sample lies between the middles of two means, and a symmetric filter has no phase only so
     n_weights = 2 * HALF_LENGTH_SAMPLES * n_means
     window = ("kaiser", float(kaiser_beta(_ATTENUATION_DB)))
     return np.asarray(firwin(n_weights, 1 / n_means, window=window), np.float64)

@@ -28,6 +28,8 @@ FloatArray = NDArray[np.float64]
 
 _IMAGES_PER_PARTICLE = 3
 _PAIRS_PER_PARTICLE = 60
+# The gradient of s and its correction are those of the step before, which saves a sum over pairs; the places at
+# which pairs were listed decide the order of sums.
 _KEPT = ("x", "z", "vx", "vz", "s", "gx", "gz", "bxx", "bxz", "bzz", "x_listed", "z_listed")
 """What a later step depends on; all else is made anew in every step."""
 _REASONS = {
@@ -81,6 +83,7 @@ class NumericalTank:
         real = self._particles.x.dtype.type
         self._table, self._scale = table.astype(real), real((table.size - 1) / surface_gradient(0.0))
         self._sums = np.zeros(len(energy.TERMS))
+        # arrays and no numbers: the compiled loops add to them, and a checkpoint copies them
         self._counters = np.zeros(3, np.int64)
         self._put_at_rest()
         self._start = self._stored()
@@ -196,6 +199,7 @@ class NumericalTank:
         valid : object
             What was computed before.
         """
+        # where there was no room no particle was too fast: the most crowded place is where it happened
         crowded = int(np.argmax(self._particles.packing[: self.setup.n_particles]))
         which = crowded if status == stepping.NO_ROOM else int(self._counters[stepping.PARTICLE])
         place = float(self._particles.x[which]), float(self._particles.z[which])
@@ -264,6 +268,7 @@ class NumericalTank:
         targets |= {"sums": self._sums, "counters": self._counters, "start": np.zeros(3)}
         for name, target in targets.items():
             given = arrays[name]
+            # the file may belong to another tank; an array of another shape would be broadcast without a word
             if given.shape != target.shape or given.dtype != target.dtype or not np.isfinite(given).all():
                 raise InputError(
                     f"checkpoint, {name}",
@@ -277,6 +282,7 @@ class NumericalTank:
     def _relist(self) -> None:
         """List the pairs as they were listed last, at the positions of that time."""
         n, particles = self.setup.n_particles, self._particles
+        # listed at the present positions the pairs would have another order, and their sums another rounding
         x, z = particles.x[:n].copy(), particles.z[:n].copy()
         particles.x[:n], particles.z[:n] = particles.x_listed[:n], particles.z_listed[:n]
         self._list()

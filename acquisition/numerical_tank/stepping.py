@@ -82,6 +82,7 @@ def _kick(particles, constants, body_x, body_z):  # type: ignore[no-untyped-def]
         new_x = vx + constants.step * (particles.ax[i] + body_x)
         new_z = vz + constants.step * (particles.az[i] + body_z)
         particles.vx[i], particles.vz[i] = new_x, new_z
+        # force times mean velocity is exactly what the kinetic energy changes by, so that the account closes
         sum_x += 0.5 * (vx + new_x)
         sum_z += 0.5 * (vz + new_z)
         square = new_x * new_x + new_z * new_z
@@ -109,6 +110,7 @@ def _force_on_walls(particles, images, constants, force):  # type: ignore[no-unt
     n = constants.n
     all_x, all_z, floor, roof = 0.0, 0.0, 0.0, 0.0
     for k in range(images.number[0]):
+        # pair forces are equal and opposite: what the images feel is what the liquid does to the walls
         all_x += particles.ax[n + k]
         all_z += particles.az[n + k]
         if images.bz[k] < 0:
@@ -156,10 +158,13 @@ def begin_step(flow, force):  # type: ignore[no-untyped-def]
     half = constants.half * constants.step
     _move(particles, n, half)
     place_images(particles, images, n)
+    # images before any sum over pairs: their places decide which pairs are in reach, their velocities the rate of
+    # density
     mirror_velocity(particles, images, n)
     measure_pairs(particles, pairs, constants)
     rate_of_density(particles, pairs, constants)
     _compress(particles, n, half)
+    # after the density has been brought to the middle, where the pressures of the forces belong
     mirror_density(particles, images, n)
     viscosity = accelerate(particles, pairs, constants, n_all)
     correct_gradient(particles, n)
@@ -175,6 +180,7 @@ def _finish_motion(flow, body_x, body_z, sums):  # type: ignore[no-untyped-def]
     half = constants.half * constants.step
     sum_x, sum_z, largest, fastest = _kick(particles, constants, body_x, body_z)
     mirror_velocity(particles, images, n)
+    # anew, with the velocities after the kick: half a step with either makes the step symmetric in time
     rate_of_density(particles, pairs, constants)
     _compress(particles, n, half)
     sums[DENSITY_DIFFUSION] += _diffuse(particles, constants)
@@ -201,6 +207,7 @@ def end_step(flow, tank, viscosity, force, totals):  # type: ignore[no-untyped-d
     counters[CROSSINGS] += crossings
     # written so that a speed that is not a number counts as too fast
     if not largest <= constants.largest_speed * constants.largest_speed:
+        # the step is not counted: what is handed out as valid ends before it
         counters[PARTICLE] = fastest
         return TOO_FAST
     counters[STEPS_DONE] += 1

@@ -96,6 +96,7 @@ def system_of(structure: Structure, step_s: float) -> System:
         Time step [s].
     """
     damping, shape = structure.damping_matrix_kg_per_s, structure.shape_at_tank
+    # damping by the implicit mid-point rule, stable however strong it is; K is explicit, as in the liquid's step
     inverse = np.linalg.inv(structure.mass_matrix_kg + 0.5 * step_s * damping)
     give = step_s * inverse
     return System(
@@ -140,6 +141,8 @@ def step_structure(structure: MovingStructure, force: float, base: float, row: F
             new += system.keep[i, j] * p[j] + system.give[i, j] * modal
         row[2 * n + i] = new
         velocity += system.shape[i] * new
+    # as much as stops the tank within the step, but no more than Coulomb's force, so that what is at rest stays
+    # there; the sign of the velocity would make it chatter
     friction = min(max(-velocity / system.mobility, -system.coulomb), system.coulomb)
     acceleration, mean = base, 0.0
     for i in range(n):
@@ -224,6 +227,7 @@ def stored_energy_j(structure: Structure, motion: Motion, step_s: float) -> floa
     """
     q, p, stiffness = motion.q, motion.p, structure.stiffness_n_per_m
     kinetic = 0.5 * p @ structure.mass_matrix_kg @ p
+    # with the term of second order the account closes to rounding and not to the square of the step
     potential = 0.5 * stiffness @ q**2 - step_s**2 / 8 * stiffness @ p**2
     return float(kinetic + potential)
 

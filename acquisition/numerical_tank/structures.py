@@ -151,6 +151,7 @@ class Structure:
 
     def natural_frequencies_hz(self) -> FloatArray:
         """Return the undamped natural frequencies [Hz] of the structure alone, ascending."""
+        # by a symmetric problem, whose eigenvalues are real to the last digit
         lower = np.linalg.inv(np.linalg.cholesky(self.mass_matrix_kg))
         squares = np.linalg.eigvalsh(lower @ np.diag(self.stiffness_n_per_m) @ lower.T)
         return np.asarray(np.sqrt(squares) / (2 * math.pi))
@@ -181,6 +182,7 @@ def _check(structure: Structure) -> None:
         _check_number(name, getattr(structure, name))
     if not structure.shape_at_tank.any():
         raise InputError("mode shapes at the tank", got="only zeros", allowed="one other than zero at least")
+    # modal masses measured without the liquid, or of shapes scaled otherwise, leave a mass below zero here
     if not math.isfinite(structure.included_mass_kg) or np.linalg.eigvalsh(structure.mass_matrix_kg)[0] <= 0:
         raise InputError(
             "modal masses without the liquid",

@@ -31,6 +31,8 @@ def list_images(particles: Particles, images: Images, constants: Constants) -> b
     count = 0
     for i in range(n):
         x, z = particles.x[i], particles.z[i]
+        # 0 is the particle itself, 1 beyond the left wall or the floor, 2 beyond the right wall or the roof; both
+        # at once are the images in a corner, without which the mirrored system would have a hole there
         for across_x in range(3):
             if across_x == 1 and x >= reach:
                 continue
@@ -116,6 +118,7 @@ def exchange_with_images(particles: Particles, constants: Constants):  # type: i
         particles.x[i], crossed = _into_box(particles.x[i], constants.length)
         if crossed:
             particles.vx[i] = -particles.vx[i]
+            # after the change of sign: what the wall gave the particle
             impulse_x += 2.0 * particles.vx[i]
             count += 1
         particles.z[i], crossed = _into_box(particles.z[i], constants.height)

@@ -42,10 +42,12 @@ def out_of_order(counter: IntArray, n_samples: IntArray) -> NDArray[np.bool_]:
     # a frame that was sent twice must not make all that follows it in its block look late
     is_repeat = (counter[1:] >= counter[:-1]) & (counter[1:] < stop[:-1])
     start[1:][is_repeat] = np.minimum(stop[:-1], stop[1:])[is_repeat]
+    # in order, as nearly always: the chain is not needed
     if (start[1:] >= np.maximum.accumulate(stop)[:-1]).all():
         return np.zeros(len(counter), np.bool_)
     stops, rank = np.unique(stop, return_inverse=True)
     n_before = np.searchsorted(stops, start, side="right")
+    # by samples and not by blocks: one long block outweighs many short ones that contradict it
     is_outside: NDArray[np.bool_] = ~_chain(stop - start, rank.astype(np.int64), n_before)
     return is_outside & (stop > start)
 
@@ -54,6 +56,7 @@ def out_of_order(counter: IntArray, n_samples: IntArray) -> NDArray[np.bool_]:
 def _chain(weight: IntArray, rank: IntArray, n_before: IntArray) -> NDArray[np.bool_]:
     """The heaviest chain; block j may follow block i if rank[i] < n_before[j]. A Fenwick tree of maxima."""
     n = len(weight)
+    # the best chain that ends below a rank is found in log n: comparing all pairs would be n²
     tree = np.full(rank.max() + 2, -1, np.int64)
     total = np.zeros(n, np.int64)
     before = np.full(n, -1, np.int64)

@@ -111,6 +111,7 @@ def assemble(
     attributes = _attributes(journal, output, base, chosen)
     losses = [loss for placement in placements for loss in placement.losses()]
     require_readable_size(
+        # before anything of that size is read or written: a wrong counter can span years
         sum((len(placement.info.channels) + 2) * placement.n_samples for placement in placements),
         what=f"recording {output}",
         explanation=_longest(losses, placements),
@@ -193,6 +194,7 @@ def _attributes(journal: Journal, output: Path, base: SourcePlacement, options: 
         "start_time_utc": _start_time_utc(base),
         **(noted if isinstance(noted, dict) else {}),
         **options.attributes,
+        # last: neither the journal nor an option may say otherwise
         "sloshlab_format": FORMAT,
         "sampling_rate_hz": base.info.sampling_rate_hz,
     }
@@ -203,10 +205,12 @@ def _start_time_utc(base: SourcePlacement) -> str:
     arrivals = []
     for group in base.groups:
         if len(group.entries):
+            # a host time belongs to the last sample of its entry, the start to place 0
             last = group.index[0] + group.entries.n_samples[0] - 1
             arrivals.append(int(group.entries.host_utc_ns[0]) * 1e-9 - int(last) / base.info.sampling_rate_hz)
     try:
         moment = datetime.fromtimestamp(0, UTC) + timedelta(milliseconds=round(1e3 * min(arrivals)))
+    # a journal may hold any time
     except (OverflowError, ValueError):
         moment = datetime.fromtimestamp(0, UTC)
     return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
@@ -226,6 +230,7 @@ def _parts(
     labels = device_labels(infos)
     names = channel_names(infos, labels)
     samples = [PlacedSamples(journal, placement) for placement in placements]
+    # the survey decides types and finds stuck sensors, so that all counts are read once before any is written
     surveys = [_survey(sample, for_alignment, experiment, advance) for sample in samples]
     alignments = [first_source(base)]
     for other, survey, own in zip(placements[1:], surveys[1:], pairs, strict=True):
@@ -245,7 +250,9 @@ def _survey(
 ) -> SourceSurvey:
     info = samples.placement.info
     factor = thinned_by(info.sampling_rate_hz)
+    # a thinned copy of these alone, to compare the sensors of one tank after the recording
     rigid = [c.name for c in info.channels if c.quantity == "acceleration" and experiment.startswith("shaker_")]
+    # whole means of the thinned copy in each stretch
     n_each = max(1, samples_at_once(len(info.channels)) // factor) * factor
     return surveyed(samples, n_each, for_alignment | set(rigid), advance)
 
@@ -268,6 +275,7 @@ def _n_samples(parts: Sequence[Part], options: AssemblyOptions) -> int:
     """Length of the time base: the first source's, or with a common trigger that of the longest."""
     if options.align != "counter":
         return parts[0].placement.n_samples
+    # with a common trigger any device may have been read longest; otherwise the first is the time base
     return max(part.placement.n_samples + part.shift for part in parts)
 
 

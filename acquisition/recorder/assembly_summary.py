@@ -14,6 +14,7 @@ from acquisition.recorder.source_alignment import AlignmentMethod, described
 from acquisition.samples.delivery import TroubleKind
 from sloshlab.conditioning.device_clock import ClockStatus
 
+# a line that loses every other frame has hundreds of thousands of gaps; beyond these there is a number
 MOST_LOSSES_NAMED: Final = 1000
 MOST_TROUBLES_NAMED: Final = 100
 _MOST_MESSAGES_NAMED: Final = 8
@@ -244,6 +245,7 @@ def _lost(losses: Sequence[Loss], n_messages: int, rate_hz: float) -> str:
     )
     if n_messages == 1:
         return text
+    # each message of a CAN device has frames of its own, which are lost by themselves
     by_message = [sum(loss.n_samples for loss in losses if loss.group == k) for k in range(n_messages)]
     if all(n == n_samples for n in by_message):
         return f"{text}, in each of its {n_messages} messages"
@@ -261,6 +263,7 @@ def _gaps(losses: Sequence[Loss]) -> list[Loss]:
     gaps: list[Loss] = []
     for loss in sorted(losses, key=lambda loss: loss.index):
         reached = gaps[-1].index + gaps[-1].n_samples if gaps else 0
+        # counted once per message, 70 lost samples of three messages would be called 210
         if gaps and loss.index < reached:
             stop = max(reached, loss.index + loss.n_samples)
             gaps[-1] = replace(gaps[-1], n_samples=stop - gaps[-1].index)
@@ -272,6 +275,7 @@ def _gaps(losses: Sequence[Loss]) -> list[Loss]:
 def _damage_flags(journal: Journal, part: Part) -> Iterator[str]:
     """Order is all that tells of damage that a short checksum has let through."""
     is_damaged = journal.trouble_counts.get((part.placement.source, TroubleKind.CORRUPT_FRAME.name), 0)
+    # a CAN frame has a checksum of 16 bits: of frames with 40 of 64 bits flipped one in 32 768 passes
     if is_damaged and part.survey.n_late:
         yield (
             f"{part.label}: {part.survey.n_late} samples came out of order on a line that damages frames; "

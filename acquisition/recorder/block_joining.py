@@ -8,7 +8,9 @@ from typing import Final, Protocol
 
 from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
 
+# what kill -9 costs at most
 LONGEST_WAIT_NS: Final = 250_000_000
+# memory is bounded by bytes and by blocks: many blocks of one sample weigh more than their counts
 _MOST_BYTES_WAITING: Final = 1 << 20
 _MOST_BLOCKS_WAITING: Final = 4096
 
@@ -81,6 +83,7 @@ class BlockJoiner:
             return
         place = source, block.group
         waiting = self._samples.get(place)
+        # a gap, a late block or a restart: the journal keeps the order of arrival and joins nothing across it
         if waiting and (waiting.stream, waiting.next_counter) != (block.stream, block.counter):
             self._write_samples(place)
             waiting = None
@@ -98,6 +101,7 @@ class BlockJoiner:
         self._troubles[source, trouble.kind] = since_ns, joined
 
     def _add_end(self, source: int, end: End) -> None:
+        # in the journal, too, an end stands behind the last samples of its stream
         for place in [place for place in self._samples if place[0] == source]:
             self._write_samples(place)
         self._sink.append(source, end)
@@ -105,6 +109,7 @@ class BlockJoiner:
     def _write_samples(self, place: tuple[int, int]) -> None:
         blocks = self._samples[place].blocks
         self._sink.append_blocks(place[0], blocks)
+        # after the write: if that fails the samples are still known as not written
         del self._samples[place]
         self._written(place[0], blocks)
 

@@ -10,7 +10,9 @@ from typing import Final
 
 from acquisition.samples.delivery import Block, Delivery
 
+# at 8 × 51.2 kHz, 1.6 MB/s of counts, a disk may hang for some twenty seconds
 BYTES_PER_SOURCE: Final = 32 << 20
+# a flood of empty deliveries must fill the queue as well
 _BYTES_PER_DELIVERY: Final = 200
 
 
@@ -51,6 +53,8 @@ class DeliveryQueue:
         """Hand deliveries over, waiting for space; False if nobody takes them any more."""
         n_bytes = sum(_size(delivery) for delivery in deliveries)
         with self._changed:
+            # A full queue makes its own source wait: the device or the system then loses data, and its counter
+            # tells. One delivery may exceed the limit, or a large one could never pass.
             self._changed.wait_for(lambda: self._is_closed or self._n_bytes[source] < self._limit)
             if self._is_closed:
                 return False
@@ -62,6 +66,7 @@ class DeliveryQueue:
     def finish(self, source: int, error: str | None) -> None:
         """Say that nothing more comes from a source; never waits."""
         with self._changed:
+            # without a limit: how a source ended must be known even where its samples wait
             self._waiting.append((Finished(source, error), 0))
             self._changed.notify_all()
 
@@ -69,6 +74,7 @@ class DeliveryQueue:
         """Everything under way, in order; after `timeout_s` maybe nothing."""
         with self._changed:
             self._changed.wait_for(lambda: bool(self._waiting), timeout_s)
+            # everything at once, so that readers wait for a lock once per batch and not once per delivery
             taken = [item for item, _ in self._waiting]
             self._waiting.clear()
             self._n_bytes = [0] * len(self._n_bytes)

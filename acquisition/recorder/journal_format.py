@@ -49,8 +49,10 @@ ENTRY: Final = np.dtype(
 NO_CLOCK: Final = -1
 """Stands for an unknown device clock."""
 
+# a declared length beyond this is not believed, so that no damaged header makes a reader allocate gigabytes
 LARGEST_PAYLOAD_BYTES: Final = 16 << 20
 LARGEST_TEXT_BYTES: Final = 1 << 20
+# a damaged or foreign journal may name any number
 MOST_SOURCES: Final = 256
 _LARGEST = 2**63 - 1
 _CRC_OF_HEADER = struct.Struct("<Q")
@@ -104,6 +106,7 @@ def unpacked_block_header(header: bytes, offset: int) -> BlockHeader | None:
     if len(header) < BLOCK_HEADER.size or header[:4] != BLOCK_MAGIC:
         return None
     _, kind, zero, source, n_bytes, identity, sequence, payload_crc, crc = BLOCK_HEADER.unpack(header)
+    # the header has a checksum of its own: the length must be right before the payload can be read at all
     if crc != _header_crc(header[:-4], offset) or zero or n_bytes > LARGEST_PAYLOAD_BYTES:
         return None
     return BlockHeader(kind, source, n_bytes, identity, sequence, payload_crc)
@@ -127,7 +130,9 @@ def unpacked_text(payload: bytes) -> dict[str, Any]:
     if len(payload) > LARGEST_TEXT_BYTES:
         raise MalformedBlockError("a description that is too long")
     try:
+        # a good checksum is no reason to believe the content: any program may have written it
         content = json.loads(payload.decode())
+    # brackets nested deeply enough end in a RecursionError
     except (ValueError, RecursionError) as error:
         raise MalformedBlockError(f"a description that is no JSON ({error})") from error
     if not isinstance(content, dict):
@@ -167,6 +172,7 @@ def _checked(described: T) -> T:
         value = getattr(described, field.name)
         if field.name in _CONTAINERS or (value is None and "None" in str(field.type)):
             continue
+        # a dataclass does not check the types of its fields; to Python a truth value is an int
         allowed = str if field.name in _TEXTS else int if field.name in _INTEGERS else (int, float)
         if not isinstance(value, allowed) or isinstance(value, bool):
             raise MalformedBlockError(f"{field.name} = {value!r}"[:80])

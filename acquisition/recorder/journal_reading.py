@@ -35,6 +35,7 @@ from acquisition.samples.delivery import CountArray, End, Trouble
 from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
 
+# at about 60 bytes each; one every 40 ms is nine days
 MOST_ENTRIES: Final = 20_000_000
 MOST_TROUBLES_KEPT: Final = 10_000
 """Further troubles are counted, not kept one by one."""
@@ -168,6 +169,7 @@ class Journal:
         n_channels = self.entries[entry.source, entry.group].n_channels
         n_bytes = entry.n_samples * n_channels * entry.bytes_per_count
         data = self._file.read(entry.offset, n_bytes)
+        # the index is older than this read: another program may have cut the file meanwhile
         if len(data) < n_bytes:
             raise JournalError(f"journal {self.path}", got="a file that became shorter", remedy="read it again")
         counts = np.frombuffer(data, f"<i{entry.bytes_per_count}").astype(np.int32)
@@ -277,6 +279,7 @@ def _collect(found: _Collected, start: int, header: BlockHeader, payload: bytes)
         return
     content = unpacked_text(payload)
     if header.block_type == BlockType.METADATA:
+        # unlike a source, metadata may change while recording; the latest word counts
         found.metadata.update(content)
     elif header.block_type == BlockType.SOURCE:
         # repeated on purpose; the first is what the samples were taken with
@@ -303,12 +306,15 @@ def _collect_samples(found: _Collected, start: int, header: BlockHeader, payload
     if len(payload) < SAMPLES_HEAD.size:
         raise MalformedBlockError("samples without a head")
     group, n_bytes, zero, n_channels, n_entries, stream, counter = SAMPLES_HEAD.unpack_from(payload)
+    # a block with good checksums may still say anything: every size is compared with the bytes that are there
     rows_end = SAMPLES_HEAD.size + n_entries * ENTRY.itemsize
     if n_bytes not in (2, 4) or zero or not 1 <= n_channels <= MOST_CHANNELS or len(payload) < rows_end:
         raise MalformedBlockError("samples with an impossible head")
+    # a copy, so that the index does not keep every payload in memory
     rows = np.frombuffer(payload, ENTRY, n_entries, SAMPLES_HEAD.size).copy()
     if not n_entries or not rows["n_samples"].all():
         raise MalformedBlockError("samples without samples")
+    # in 64 bits: the sum of 32-bit numbers can come round to one that fits
     n_samples = int(rows["n_samples"].sum(dtype=np.int64))
     if len(payload) != rows_end + n_samples * n_channels * n_bytes or counter > 2**63 - 1 - n_samples:
         raise MalformedBlockError("samples whose number is wrong")
@@ -326,6 +332,7 @@ def _entries_of_all_groups(found: _Collected, scan: Scan) -> dict[tuple[int, int
         for group, members in enumerate(info.groups)
     }
     for place, blocks in found.samples.items():
+        # looked at only now: the description of a source may stand behind its samples if the first was damaged
         unusable = [block for block in blocks if block.n_channels != expected.get(place)]
         for block in unusable:
             n_rows_bytes = SAMPLES_HEAD.size + block.rows.nbytes
@@ -344,7 +351,9 @@ def _entries_of_all_groups(found: _Collected, scan: Scan) -> dict[tuple[int, int
 def _entries(source: int, group: int, n_channels: int, blocks: list[_SamplesBlock]) -> Entries:
     rows = np.concatenate([block.rows for block in blocks]) if blocks else np.empty(0, ENTRY)
     n_each = np.array([len(block.rows) for block in blocks], np.int64)
+    # sums of 32-bit numbers would come round
     n_samples = rows["n_samples"].astype(np.int64)
+    # samples of a block are consecutive: those of the second entry follow those of the first
     before = _samples_before(n_samples, n_each)
     width = np.repeat(_column(blocks, "bytes_per_count"), n_each)
     return Entries(

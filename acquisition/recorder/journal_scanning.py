@@ -48,6 +48,7 @@ class OpenFile:
         except OSError as error:
             raise JournalError(f"journal {path}", got=str(error.strerror), allowed="a readable file") from error
         self._descriptor = descriptor
+        # also without a `with`: a journal that is only looked into must not keep its file open
         self.close = weakref.finalize(self, os.close, descriptor)
         self.n_bytes = os.fstat(descriptor).st_size
 
@@ -56,6 +57,7 @@ class OpenFile:
         if not self.close.alive:
             raise JournalError(f"journal {self.path}", got="a read after closing", remedy="read it again")
         try:
+            # at a place of its own, without a position that several readers would share
             data = os.pread(self._descriptor, n_bytes, offset)
             while 0 < len(data) < n_bytes and (more := self._more(offset, n_bytes, data)):
                 data += more
@@ -84,12 +86,14 @@ class Scan:
         while position < self.file.n_bytes:
             header = self._header_at(position)
             if header is None:
+                # one byte further, not behind the block: its length is part of what cannot be believed
                 found = self._next_header(position + 1)
                 self._leave_out(position, found - position, "no block")
                 position = found
                 continue
             start = position + BLOCK_HEADER.size
             payload = self.file.read(start, header.n_bytes)
+            # the last block of a crash; whatever it declares, nothing can follow
             if len(payload) < header.n_bytes:
                 self._leave_out(position, self.file.n_bytes - position, "a block that was not finished")
                 return
@@ -97,6 +101,7 @@ class Scan:
                 yield start, header, payload
             else:
                 self._leave_out(position, BLOCK_HEADER.size + header.n_bytes, "a damaged block")
+            # the header was sound, so its length is: what follows a damaged payload is read
             position = start + header.n_bytes
 
     def refuse(self, start: int, header: BlockHeader, reason: str) -> None:
@@ -117,18 +122,21 @@ class Scan:
                         f"journal {self.file.path}", got=f"version {version}", allowed=allowed, remedy="upgrade"
                     )
                 return identity, FILE_HEADER.size
+        # a damaged file header costs nothing: blocks carry the identity themselves
         return None, 0
 
     def _header_at(self, position: int) -> BlockHeader | None:
         header = unpacked_block_header(self.file.read(position, BLOCK_HEADER.size), position)
         if header is None:
             return None
+        # without a file header the first sound block says whose journal this is
         if self.identity is None:
             self.identity = header.identity
         return header if header.identity == self.identity else None
 
     def _next_header(self, position: int) -> int:
         """Place of the next sound header, or the end of the file."""
+        # the four bytes may lie across the border of two pieces
         overlap = len(BLOCK_MAGIC) - 1
         while position < self.file.n_bytes:
             data = self.file.read(position, _SCAN_BYTES + overlap)

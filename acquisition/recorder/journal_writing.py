@@ -29,16 +29,21 @@ from acquisition.samples.delivery import Block, CountArray, Delivery, End, Troub
 from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
 
+# a power cut costs so much more than a crash; forcing every block would make the writer wait for the disk each
+# time
 SYNCHRONISATION_INTERVAL_NS: Final = 500_000_000
 """The journal is forced to the disk at most this often."""
 
 DESCRIPTION_INTERVAL_NS: Final = 30_000_000_000
 """Metadata and sources are repeated this often, so that no single damage makes the samples unreadable."""
 
+# the clock fit needs the earliest arrivals of a run, not every one; each entry costs 32 bytes
 SHORTEST_ENTRY_NS: Final = 40_000_000
 """Blocks that were read closer together than this share their times."""
 
+# well below the largest payload, whatever the entries of the block add
 _LARGEST_COUNTS_BYTES: Final = 4 << 20
+# the number of entries is stored in 16 bits, and one block becomes one entry at most
 _MOST_BLOCKS_JOINED: Final = 20_000
 
 
@@ -62,6 +67,8 @@ class JournalFile(Protocol):
 
 
 def _new_file(path: Path, overwrite: bool) -> JournalFile:
+    # Unbuffered: each block is with the system at once, and kill -9 costs what is still being joined only. With
+    # "x" an older journal, which may be all that is left of a run, is never overwritten unasked.
     return path.open("wb" if overwrite else "xb", buffering=0)
 
 
@@ -104,6 +111,7 @@ class JournalWriter:
         self._metadata, self._sources = dict(metadata), tuple(sources)
         self._monotonic_ns, self._synchronise = monotonic_ns, synchronise
         self._sequence = 0
+        # remains of an older journal on the same disk have another one and are not taken for blocks of this
         self._identity = secrets.randbits(32)
         self._synchronised_ns = self._described_ns = monotonic_ns()
         self._is_broken = False
@@ -111,6 +119,8 @@ class JournalWriter:
         try:
             self._write(packed_file_header(self._identity))
             self._describe()
+            # Before anything is recorded: the descriptions, without which no samples can be read, and the name in
+            # its folder, without which the file is gone after a power cut.
             self._force_to_disk()
             _synchronise_folder(path.parent)
         except BaseException:
@@ -167,6 +177,8 @@ class JournalWriter:
             return
         try:
             if not self._is_broken:
+                # only a recorder that ended properly writes it: without it a reader says that something may be
+                # missing
                 self._append(BlockType.CLOSING, 0, packed_text(closing or {}))
                 self._force_to_disk()
         finally:
@@ -195,9 +207,11 @@ class JournalWriter:
         place = {"identity": self._identity, "sequence": self._sequence, "offset": self.n_bytes}
         self._write(packed_block(block_type, source, payload, **place))
         self._sequence += 1
+        # troubles and ends reach the disk with the samples after them, or at the close
         if block_type is not BlockType.SAMPLES:
             return
         now = self._monotonic_ns()
+        # only after samples: a run without any does not grow
         if now - self._described_ns >= DESCRIPTION_INTERVAL_NS:
             self._describe()
         if now - self._synchronised_ns >= SYNCHRONISATION_INTERVAL_NS:
@@ -208,11 +222,13 @@ class JournalWriter:
             raise JournalError(f"journal {self.path}", got="a write after its end", remedy="start a new journal")
         rest = memoryview(data)
         try:
+            # an unbuffered file may take a part of the bytes only, as at the end of a disk
             while rest:
                 rest = rest[self._file.write(rest) or 0 :]
         except OSError as error:
             self._cut_back()
             raise self._refused(error) from error
+        # an interrupt within a write leaves half a block as well
         except BaseException:
             self._cut_back()
             raise
@@ -220,6 +236,7 @@ class JournalWriter:
 
     def _cut_back(self) -> None:
         """Remove the incomplete block; if even that fails, readers leave it out by its checksum."""
+        # nothing is written behind what could not be removed: its length would be wrong for every later place
         self._is_broken = True
         if self._file is not None:
             with contextlib.suppress(OSError):
@@ -253,6 +270,7 @@ class JournalWriter:
 def _synchronise_folder(folder: Path) -> None:
     """Make the name of a new file survive a power cut, where the system can."""
     with contextlib.suppress(OSError):
+        # not every system lets a folder be opened or forced to the disk
         descriptor = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(descriptor)
@@ -280,6 +298,7 @@ def _parts(blocks: Sequence[Block]) -> list[list[Block]]:
     for whole in blocks:
         for block in _split(whole):
             is_full = n_bytes + block.counts.nbytes > _LARGEST_COUNTS_BYTES
+            # a plug-in may deliver blocks of any size
             if not parts or is_full or len(parts[-1]) == _MOST_BLOCKS_JOINED:
                 parts.append([])
                 n_bytes = 0
@@ -324,6 +343,7 @@ def _samples_payload(blocks: Sequence[Block]) -> bytes:
 
 def _narrowed(counts: CountArray) -> np.ndarray[Any, Any]:
     """16-bit counts where all of them fit, whatever the channels declare."""
+    # by the counts of each block and not by the channel's bits: 24-bit channels are mostly small, too
     narrow = counts.astype("<i2")
     return narrow if np.array_equal(narrow, counts) else counts.astype("<i4", copy=False)
 
@@ -333,8 +353,10 @@ def _entries(blocks: Sequence[Block]) -> np.ndarray[Any, Any]:
     began_ns = 0
     for block in blocks:
         ticks = NO_CLOCK if block.clock_ticks is None else block.clock_ticks
+        # a device has 64 bits without a sign, the file has them with one
         if not 0 <= ticks < 2**63:
             ticks = NO_CLOCK
+        # an entry has one clock, at its first sample: one that comes later needs an entry of its own
         brings_clock = bool(rows) and rows[-1][2] == NO_CLOCK != ticks
         if rows and not brings_clock and block.host_monotonic_ns - began_ns < SHORTEST_ENTRY_NS:
             rows[-1][0] += len(block.counts)

@@ -38,8 +38,10 @@ def longest_duration_s(infos: Sequence[SourceInfo], align: str) -> float:
     >>> round(longest_duration_s([daq], "host"))
     1541
     """
+    # as the assembly counts: time and quality beside the channels of each device
     taken = sum((len(info.channels) + 2) * info.sampling_rate_hz for info in infos)
     written = (sum(len(info.channels) for info in infos) + 2) * infos[0].sampling_rate_hz
     if align != "counter":
+        # devices that are resampled keep their own counts and flags beside the values
         written += sum((len(info.channels) + 1) * info.sampling_rate_hz for info in infos[1:])
     return _SHARE * MAXIMUM_DECODED_BYTES / (BYTES_PER_VALUE * max(taken, written))

@@ -105,6 +105,7 @@ class PlacedSamples:
             place = int(group.index[k])
             new = self._counts(number, k)[low - place : high - place]
             here = slice(low - start, high - start)
+            # entries come in the order of arrival: what is known was there first, and the first copy is kept
             known = is_there[here]
             if not known.any():
                 counts[here] = new
@@ -126,6 +127,7 @@ class PlacedSamples:
             return kept[1]
         entry: Entry = self._groups[number].group.entries[k]
         counts = self._journal.counts(entry)
+        # one entry per group; more would grow with the run
         self._kept[number] = (k, counts)
         return counts
 
@@ -135,9 +137,11 @@ class _Ordered:
 
     def __init__(self, group: GroupPlacement) -> None:
         self.group = group
+        # stable, so that copies stay in the order of arrival
         order = np.argsort(group.start, kind="stable")
         self._order = order[group.stop[order] > group.start[order]]
         self._starts = group.start[self._order]
+        # ascending even where entries overlap, as a search needs it
         self._reached = np.maximum.accumulate(group.stop[self._order])
 
     def between(self, start: int, stop: int) -> list[int]:

@@ -24,9 +24,11 @@ from sloshlab.errors import JournalError
 RAGGED_S: Final = 1.0
 """Streams that begin at a counter below this were started for us; groups may differ by this at the ends."""
 
+# a device that says by mistake that it took much more must not make hours of lost samples
 LONGEST_MISSING_TAIL_S: Final = 60.0
 """A longer tail that a device says it took is counted but not shown, unless the run itself was as long."""
 
+# leaves room for sums of counters and places in 64 bits
 _LARGEST_COUNTER: Final = 2**62
 IntArray = NDArray[np.int64]
 
@@ -226,12 +228,14 @@ def _stream(
 ) -> Stream:
     own = [(entry.counter[mask], entry.n_samples[mask], entry.host_monotonic_ns[mask])
            for entry in entries if (mask := entry.stream == number).any()]  # fmt: skip
+    # by counter, not by arrival: the first block to come may be a late one
     firsts = [int(counter.min()) for counter, _, _ in own]
     lasts = [int((counter + n).max()) for counter, n, _ in own]
     ragged = math.ceil(RAGGED_S * info.sampling_rate_hz)
     first = _first_counter(firsts, ragged)
     last, not_shown = _last_counter(lasts, first, ragged, taken, info.sampling_rate_hz, is_complete=is_complete)
     clock = fitted_device_clock(
+        # a host time belongs to the last sample of its block
         np.concatenate([counter + n - 1 for counter, n, _ in own]),
         np.concatenate([host for _, _, host in own]),
         info.sampling_rate_hz,
@@ -261,10 +265,12 @@ def _last_counter(
 ) -> tuple[int, int]:
     """End of the stream, exclusive, and the samples of its tail that are not shown."""
     last = max(lasts)
+    # the device's own count: a tail that is missing by it was lost
     if taken is not None:
         most = last + max(last - first, math.ceil(LONGEST_MISSING_TAIL_S * rate_hz))
         return (max(last, taken), 0) if taken <= most else (last, taken - last)
     # a recorder that stopped in the middle of a set of messages lost nothing
+    # after a crash the last samples of a group are kept: what the others lack there was lost
     if is_complete and max(lasts) - min(lasts) <= ragged:
         last = min(lasts)
     return last, 0
@@ -273,17 +279,22 @@ def _last_counter(
 def _following(before: Stream, here: Stream, rate_hz: float) -> Stream:
     """`here` with its place behind `before`: by host time, or behind one flagged sample."""
     end = before.first_index + before.n_samples
+    # Host times mean nothing there. One sample lost between the streams says that they do not join; how long the
+    # gap was is unknown.
     if ClockStatus.NOT_REAL_TIME in (before.clock.status, here.clock.status):
         return _at(here, end + 1, None)
+    # each clock counts from an origin of its own, so that float64 keeps its digits
     origins_s = (here.clock.host_origin_ns - before.clock.host_origin_ns) * 1e-9
     host_s = origins_s + here.clock.host_s(here.first_counter)
     period_s = before.clock.period_s if before.clock.status is ClockStatus.FITTED else 1.0 / rate_hz
     samples = (host_s - before.clock.host_s(before.first_counter)) / period_s
+    # half a step for rounding to a place
     error_s = sum(_place_error_s(stream.clock) for stream in (before, here)) + 0.5 / rate_hz
     index = before.first_index + round(samples)
     if index + error_s * rate_hz < end:
         # more samples than there was time for: the device was not read, or did not sample, in real time
         return _at(here, end + 1, None)
+    # at least one lost sample between, so that no analysis takes the streams for one
     return _at(here, max(end + 1, index), error_s)
 
 
@@ -305,6 +316,7 @@ def _placed_group(entries: Entries, streams: Sequence[Stream]) -> GroupPlacement
         counter, n = entries.counter[own], entries.n_samples[own]
         index[own] = counter - stream.first_counter + stream.first_index
         bounds = stream.first_index, stream.first_index + stream.n_samples
+        # cut to the stream's own places: late samples never fall into the stream before
         start[own] = np.clip(index[own], *bounds)
         stop[own] = np.clip(index[own] + n, *bounds)
         is_late[own] = out_of_order(counter, n)

@@ -72,6 +72,8 @@ class ReaderThread:
     def _run(self) -> None:
         error = self._reason_of(self._read_until_stopped)
         if error is not None:
+            # told before the source is closed and past the queue: closing may take long, and samples may wait
+            # there
             self._failed(self.number, error)
         close_error = self._reason_of(self._source.close)
         if error is None and close_error is not None:
@@ -79,12 +81,15 @@ class ReaderThread:
         self._queue.finish(self.number, error or close_error)
 
     def _read_until_stopped(self) -> None:
+        # so that all devices start at the same time, however long each took to open
         self._start_together.wait(_START_TIMEOUT_S)
         if not self._is_stopping:
             self._source.start()
         while not self._is_stopping:
             if not self._read_once(READ_TIMEOUT_S):
                 return
+        # what had arrived when the stop came, and what the source itself holds back (a CAN device is asked to stop
+        # and the end that it announces proves its last frames)
         if self._read_once(0.0):
             self._put(self._source.finish())
 

@@ -34,6 +34,7 @@ from sloshlab.errors import JournalError, SloshlabError
 
 STATUS_INTERVAL_S: Final = 0.25
 _WRITER_TIMEOUT_S: Final = 0.05
+# a driver that never returns is left behind after this; the others are kept
 _READER_DEADLINE_NS: Final = 10_000_000_000
 
 
@@ -143,6 +144,7 @@ class Recorder:
         """
         watching = observer or NobodyWatching()
         self._began_ns = self._monotonic_ns()
+        # no daemon: the interpreter must not end within a write
         writer = threading.Thread(target=self._write, name="journal writer")
         try:
             for reader in self._readers:
@@ -151,6 +153,7 @@ class Recorder:
             self._watch(watching)
         finally:
             self.request_stop()
+            # a reader could not be started, or an interrupt came before the writer: nobody would empty the queue
             if writer.ident is None:
                 self._together.abort()
                 self._stop(StopReason.REQUESTED)
@@ -196,7 +199,9 @@ class Recorder:
     def _write(self) -> None:
         try:
             self._write_until_finished()
+            # what still waits to be joined, before the last block says that all is there
             self._joiner.write_all()
+            # only here is the journal closed with its last block: it vouches that everything is in it
             reason = self._reason or StopReason.SOURCES_FAILED
             self._journal.close({"reason": reason.name, "duration_s": self._settings.duration_s})
         except JournalError as error:
@@ -209,6 +214,7 @@ class Recorder:
     def _give_up(self, message: str) -> None:
         self._storage_error = message
         self._stop(StopReason.STORAGE)
+        # before the readers are waited for: those that wait for space let go
         self._queue.close()
         for reader in self._readers:
             reader.join(_READER_DEADLINE_NS * 1e-9)
@@ -218,11 +224,13 @@ class Recorder:
     def _write_until_finished(self) -> None:
         while not all(record.is_finished for record in self._records):
             for item in self._queue.take(_WRITER_TIMEOUT_S):
+                # one item at a time: whoever asks for the status does not wait for the whole queue
                 with self._lock:
                     self._take(item)
             with self._lock:
                 self._joiner.write_due()
             self._decide()
+            # a driver that does not return keeps only its own samples from being complete
             if self._stopped_ns is not None and self._monotonic_ns() - self._stopped_ns > _READER_DEADLINE_NS:
                 self._leave_hanging_readers()
 
@@ -276,8 +284,10 @@ class Recorder:
         settings = self._settings
         if settings.duration_s is not None and self._has_recorded(settings.duration_s, running):
             return StopReason.DURATION
+        # what no reader takes would not be assembled, and its journal not be recovered by any command
         if settings.longest_s is not None and max(record.length_s for record in running) >= settings.longest_s:
             return StopReason.TOO_LONG
+        # without a duration silence is no reason to end: the person who started it decides
         quiet_s = min(record.quiet_s for record in running)
         is_over = settings.duration_s is not None and quiet_s > settings.silence_limit_s
         return StopReason.SILENCE if is_over else None
@@ -294,6 +304,7 @@ class Recorder:
         return all(
             record.recorded_s >= target_s
             or record.state is SourceState.ENDED
+            # a second device that is silent must not hold the recording
             or min(record.quiet_s, waited_s) > 2 * self._settings.margin_s + 1.0
             for record in running[1:]
         )

@@ -106,7 +106,10 @@ def written_recording(
     import netCDF4
 
     with _refusals_named(path), atomic_file.replaced(path) as temporary:
+        # The netCDF library is not made for threads and lets go of the interpreter; without the lock, writing
+        # beside a source that reads a recording ended the process.
         with NETCDF_LOCK, netCDF4.Dataset(temporary, mode="w", format="NETCDF4") as dataset:
+            # counts are stored as they came
             dataset.set_auto_maskandscale(False)
             for name, size in dimensions.items():
                 dataset.createDimension(name, size)
@@ -114,6 +117,8 @@ def written_recording(
                 _create(dataset, variable, dimensions[variable.dimension])
             dataset.setncatts(dict(attributes))
             yield RecordingFile(dataset)
+        # the content before the new name, and the folder after it: whatever moment the power fails, there is the
+        # old file or the whole new one
         _force_to_disk(temporary)
     _force_to_disk(path.absolute().parent)
 
@@ -144,6 +149,7 @@ def _create(dataset: Any, variable: Variable, size: int) -> None:
         compression="zlib",
         complevel=COMPRESSION_LEVEL,
         shuffle=True,
+        # as long as a stretch is written at once, so that no chunk is compressed twice
         chunksizes=(chunk,),
         fill_value=False if variable.fill is None else variable.fill,
     )

@@ -74,6 +74,7 @@ def device_labels(infos: Sequence[SourceInfo]) -> list[str]:
     """Unique names that may be part of a variable's name."""
     labels: list[str] = []
     for info in infos:
+        # a device names itself, and its label becomes part of names of variables
         plain = re.sub(r"[^A-Za-z0-9_]+", "_", info.device)[:40] or "device"
         label, number = plain, 2
         while label in labels:
@@ -90,12 +91,14 @@ def channel_names(infos: Sequence[SourceInfo], labels: Sequence[str]) -> list[tu
     JournalError
         If a name cannot be that of a variable, or a device uses one twice.
     """
+    # a channel of that name would take the place of the time base
     taken: set[str] = {"time", "quality"}
     named = []
     for info, label in zip(infos, labels, strict=True):
         own = []
         for channel in info.channels:
             name = channel.name if channel.name not in taken else f"{channel.name}_{label}"
+            # in netCDF a slash in a name leads into another group
             if name in taken or not _NAME.fullmatch(channel.name):
                 raise JournalError(
                     f"channel of {info.device}",
@@ -121,6 +124,8 @@ def stored_type(channel: Channel, survey: ChannelSurvey) -> tuple[np.dtype[Any],
     for n_bits in (16, 32, 64):
         lowest = -(2 ** (n_bits - 1))
         fill = lowest if channel.missing_count is None else channel.missing_count
+        # A "lost" that a reading could have is no mark: the lowest count serves if no reading has it, else a wider
+        # type.
         fits = all(lowest <= count < -lowest for count in (*readings, fill))
         is_used = {16: survey.has_lowest_16, 32: survey.has_lowest_32, 64: False}[n_bits]
         if n_bits >= min(channel.bits, 32) and fits and (channel.missing_count is not None or not is_used):
@@ -158,6 +163,7 @@ def _resampled_variables(part: Part) -> list[Variable]:
     values, counts = [], []
     for name, channel, (dtype, fill) in zip(part.names, part.channels, part.stored, strict=True):
         resampled = {**attributes_of(channel), "resampled_from": f"counts_{name}"}
+        # Nothing is lost by resampling: the counts as they were taken stand beside the values.
         values.append(Variable(name, "time", np.float32, resampled, math.nan))
         described = {"units": channel.units, "channel": name, **place, **_scaling(channel)}
         counts.append(Variable(f"counts_{name}", dimension, dtype, described, fill))
@@ -190,6 +196,7 @@ def require_recordable(infos: Sequence[SourceInfo], attributes: Mapping[str, Any
     JournalError, RecordingError
         As at the assembly.
     """
+    # any start will do: it is known only with the first sample
     measured = {"start_time_utc": "2026-01-01T00:00:00Z", "sampling_rate_hz": infos[0].sampling_rate_hz}
     names = channel_names(infos, device_labels(infos))
     named = [pair for own, info in zip(names, infos, strict=True) for pair in zip(own, info.channels, strict=True)]
@@ -210,6 +217,7 @@ def checked_attributes(
     """
     plain = {key: _plain(value) for key, value in attributes.items() if value is not None}
     empty = {name: ("time", np.zeros(2), attributes_of(channel)) for name, channel in named_channels}
+    # by the reader's own check, on two samples: what it would refuse is not written
     validate_recording(xr.Dataset(empty, coords={"time": [0.0, 1.0 / rate_hz]}, attrs=plain), name=what)
     return plain
 

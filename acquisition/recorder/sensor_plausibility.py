@@ -16,6 +16,7 @@ from sloshlab.conditioning.resampling import resampled
 from sloshlab.errors import AnalysisError
 from sloshlab.units import factor_to_si
 
+# sensors at rest have no gain to compare: noise alone feigned a wrong one
 _MOTION_OVER_NOISE = 3.0
 
 LARGEST_DELAY_S: Final = 2e-3
@@ -24,6 +25,7 @@ LARGEST_DELAY_S: Final = 2e-3
 
 def doubtful_sensors(parts: Sequence[Part], experiment: str) -> list[str]:
     """One remark per accelerometer of the tank that disagrees with the first one; shaker experiments only."""
+    # on the shaker the tank is rigid, so that its accelerometers read the same; elsewhere nothing need agree
     if not experiment.startswith("shaker_"):
         return []
     recording = _thinned_recording(parts)
@@ -49,6 +51,7 @@ def _thinned_recording(parts: Sequence[Part]) -> xr.Dataset:
             if channel.quantity == "acceleration" and channel.name in part.survey.thinned:
                 values = _on_base(part, part.survey.thinned[channel.name], n, step_s)
                 factor = factor_to_si(channel.units, "acceleration")
+                # at least one count, where the device states no noise
                 noise = factor * max(channel.noise_std or 0.0, abs(channel.scale_factor))
                 attributes = {"quantity": "acceleration", "noise_std": noise}
                 variables[name] = ("time", factor * values, attributes)

@@ -32,6 +32,7 @@ LATENCY_DIFFERENCE_S: Final = 0.25
 UNKNOWN_START_S: Final = 30.0
 """How far starts are sought apart where host times mean nothing."""
 
+# beyond what quartzes differ by: those of two devices are some 100 ppm apart
 UNKNOWN_DRIFT_PPM: Final = 500.0
 _MOST_PAIRS_TRIED = 6
 _LARGEST_STEP_DIFFERENCE = 1e-9
@@ -115,6 +116,7 @@ def require_alignable(infos: Sequence[SourceInfo], align: str, redundant: Sequen
         elif align == "device":
             _require_clock(infos[0])
             _require_clock(other)
+    # before anything is recorded: a misspelt name would be noticed after the run
     own, *others = ({channel.name for channel in info.channels} for info in infos)
     for first, second in redundant:
         if not any((first in own and second in names) or (second in own and first in names) for names in others):
@@ -175,7 +177,9 @@ def aligned_by_device_clock(base: SourcePlacement, other: SourcePlacement) -> So
     """
     base_start, base_step, base_rms = _device_time(base)
     start, step, rms = _device_time(other)
+    # seconds of the base's own clock: its sample k has the time k/rate exactly, whatever its quartz does
     unit = base_step * base.info.sampling_rate_hz
+    # two standard deviations
     error_s = 2 * math.hypot(base_rms, rms)
     return SourceAlignment(AlignmentMethod.DEVICE, (start - base_start) / unit, step / unit, error_s)
 
@@ -196,6 +200,7 @@ def aligned_by_host(
     pairs : sequence of (str, str)
         A channel of `base` and one of `other` with the same motion.
     """
+    # a phase knows a delay only up to a period, so arrivals bound the search
     prior, largest_delay_s, largest_drift_ppm = _by_arrival(base, other)
     delays = []
     for names in itertools.islice(pairs, _MOST_PAIRS_TRIED):
@@ -208,7 +213,10 @@ def aligned_by_host(
         except AnalysisError:
             continue
         delays.append((*names, delay))
+    # an ambiguous delay is not used, however small its residual
     delays.sort(key=lambda delay: (delay[2].status is not AlignmentStatus.ALIGNED, delay[2].error_s))
+    # Load cells alone on one device and accelerometers alone on the other show no common motion while the liquid
+    # sloshes. Arrivals alone leave milliseconds, and 20 µs at 20 Hz can be a tenth of the dissipated work.
     if not delays or delays[0][2].status is not AlignmentStatus.ALIGNED:
         return replace(prior, delays=tuple(delays))
     best = delays[0][2]
@@ -228,6 +236,7 @@ def common_motion_pairs(
 
 
 def _rigid_accelerometers(placement: SourcePlacement) -> list[str]:
+    # roof and control move as one, as the tank is rigid; a tip or a beam does not
     names = [channel.name for channel in placement.info.channels]
     return [name for name in names if name.startswith((ACCELERATION_ROOF, ACCELERATION_CONTROL))]
 
@@ -237,6 +246,7 @@ def _by_arrival(base: SourcePlacement, other: SourcePlacement) -> tuple[SourceAl
     clocks = [placement.main_stream.clock for placement in (base, other)]
     if any(clock.status is ClockStatus.NOT_REAL_TIME for clock in clocks):
         together = SourceAlignment(AlignmentMethod.NONE, 0.0, 1.0 / other.info.sampling_rate_hz, None)
+        # at least half of the shorter run overlaps then
         shortest_s = min(placement.n_samples / placement.info.sampling_rate_hz for placement in (base, other))
         return together, min(UNKNOWN_START_S, 0.5 * shortest_s), UNKNOWN_DRIFT_PPM
     base_start, base_step = _host_time(base, clocks[0].host_origin_ns)
@@ -276,6 +286,7 @@ def _device_time(placement: SourcePlacement) -> tuple[float, float, float]:
         )
     time = (ticks - ticks[0]) / placement.info.clock_hz
     middle = places.mean()
+    # about the middle: far from zero a fit loses digits
     slope, height = np.polyfit(places - middle, time, 1)
     rms = float(np.sqrt(np.mean((time - height - slope * (places - middle)) ** 2)))
     return float(ticks[0] / placement.info.clock_hz + height - slope * middle), float(slope), rms

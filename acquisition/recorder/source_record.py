@@ -19,6 +19,7 @@ _TOLD_AT_ONCE: Final = frozenset(
         TroubleKind.OVERRUN,
     }
 )
+# a line that breaks again and again must not fill the terminal; all are counted and in the journal
 _MOST_TOLD_PER_KIND: Final = 20
 
 
@@ -85,6 +86,7 @@ class SourceRecord:
         """
         if self._first_block_ns is None:
             return 0.0
+        # waiting for the first sample does not count: it leaves no gap
         return max(self.recorded_s, (self._monotonic_ns() - self._first_block_ns) * 1e-9)
 
     @property

@@ -189,6 +189,7 @@ class LossMeter:
             self._stream, self._next_counter = block.stream, block.counter
         end = block.counter + n_samples
         if block.counter < self._next_counter:
+            # a copy looks like a late block; the count for a person never goes below zero
             self.n_lost -= min(self.n_lost, n_samples)
         else:
             self.n_lost += block.counter - self._next_counter
@@ -225,6 +226,7 @@ class DriftMeter:
         host_s = (block.host_monotonic_ns - self._origin[1]) * 1e-9
         difference_s = (counter - self._origin[0]) / self._rate_hz - host_s
         self._n += 1
+        # running means and squares about them (Welford): sums of squares of times would cancel after hours
         before_host_s = host_s - self._mean_host_s
         before_difference_s = difference_s - self._mean_difference_s
         self._mean_host_s += before_host_s / self._n
@@ -241,6 +243,7 @@ class DriftMeter:
         scatter = max(0.0, self._difference_squares - slope * self._products) / (self._n - 2)
         uncertainty = math.sqrt(scatter / self._host_squares)
         found = Drift(slope * 1e6, uncertainty * 1e6)
+        # a drift that is played, or not known yet, means nothing
         is_known = found.uncertainty_ppm <= _LARGEST_UNCERTAINTY_PPM and abs(found.ppm) <= LARGEST_DRIFT_SHOWN_PPM
         return found if is_known else None
 
@@ -259,8 +262,10 @@ class SourceMeters:
 
     def arrived(self, block: Block) -> None:
         """Count a block as soon as it is there."""
+        # each CAN message has a counter of its own
         loss = self.losses[block.group]
         loss.update(block)
+        # one clock for the device: its first group stands for all
         if block.group == 0:
             if self._first is None:
                 self._first = block.host_monotonic_ns, loss.n_received

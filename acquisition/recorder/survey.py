@@ -23,7 +23,9 @@ SHORTEST_STUCK_SAMPLES: Final = 64
 SHORTEST_STUCK_S: Final = 0.25
 """A count that stays the same for less than both is no sign of anything."""
 
+# a channel that is constant in pieces must not fill the memory
 MOST_RUNS_KEPT: Final = 100_000
+# far above the motion that clocks are aligned by; 51.2 kHz would make the correlations fifty times as long
 THINNED_RATE_HZ: Final = 1000.0
 
 # a sensor is stuck if another one swings by ten counts and eight times its noise, so much that this one, in the
@@ -172,6 +174,7 @@ def surveyed(
 def _means(counts: NDArray[np.int32], read: NDArray[np.bool_], factor: int) -> FloatArray:
     n = counts.size // factor
     means = counts[: n * factor].reshape(n, factor).mean(axis=1)
+    # a mean over part of its samples would belong to another time
     means[~read[: n * factor].reshape(n, factor).all(axis=1)] = np.nan
     return np.asarray(means, dtype=np.float64)
 
@@ -183,6 +186,7 @@ class _Tracker:
         n_channels = len(info.channels)
         self._info = info
         self._shortest = max(SHORTEST_STUCK_SAMPLES, math.ceil(SHORTEST_STUCK_S * info.sampling_rate_hz))
+        # ranges of cells bound the swing of the other channels during a run without another reading of the samples
         self._cell = max(8, self._shortest // 4)
         n_cells = n_samples // self._cell + 1
         self._cells = np.empty((2, n_channels, n_cells), np.int32)
@@ -233,15 +237,19 @@ class _Tracker:
     def _is_stuck(self, k: int, start: int, stop: int, value: int) -> bool:
         """Whether another channel moved so much that this one, as it moves elsewhere, must have moved too."""
         low, high = self._limits[k]
+        # a sensor at its limit stands still, too
         if value <= low or value >= high:
             return False  # clipped is something else
         first, last = -(-start // self._cell), stop // self._cell
+        # cells that lie wholly within the run; the shortest has three of them
         lowest = self._cells[0, :, first:last].min(axis=1).astype(np.float64)
         swing = self._cells[1, :, first:last].max(axis=1) - lowest
         own_std = self._std(k)
         for other in range(len(self._runs)):
             if other == k or swing[other] < max(_MOVES_COUNTS, _NOISE_FACTOR * self._noise(other)):
                 continue
+            # in the proportion in which both move elsewhere: a force cell need not move by as many counts as an
+            # accelerometer
             expected = swing[other] * own_std / self._std(other)
             if own_std == 0 or expected >= max(_MUST_MOVE_COUNTS, _NOISE_FACTOR / 2 * self._noise(k)):
                 return True
@@ -318,6 +326,7 @@ def _scan(scanned, measures, findings):  # type: ignore[no-untyped-def]
     counts, arrived, read, first_place = scanned
     limits, shortest, cell = measures
     extremes, totals, sums, run, cells = findings
+    # as many runs of the shortest length as fit, and for each channel one that began before
     found = np.empty((counts.size // shortest + counts.shape[1] + 1, 4), np.int64)
     n_found = 0
     for k in range(counts.shape[1]):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
+# a device that describes itself wrongly must not make a recorder allocate for a million
 MOST_CHANNELS: Final = 256
 """More channels than this in one device are refused."""
 

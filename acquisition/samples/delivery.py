@@ -31,10 +31,12 @@ class Block:
     """
 
     group: int
+    # not the counter alone says where a sample belongs: after a restart it counts through the same numbers again
     stream: int
     counter: int
     counts: CountArray
     clock_ticks: int | None
+    # two clocks: the monotonic one for intervals, as nobody sets it, and UTC for the date of the recording
     host_monotonic_ns: int
     host_utc_ns: int
 

@@ -27,7 +27,9 @@ BUS_GATHERING_S: Final = 0.02
 ENOUGH_BYTES: Final = 32_768
 """So much text is worth taking apart at once."""
 
+# a bus that floods must not keep `receive` for ever
 MOST_FRAMES_AT_ONCE: Final = 4096
+# a bus without anybody who acknowledges would keep the sender
 _SEND_TIMEOUT_S: Final = 1.0
 _DRIVER_STUMBLES: Final = (ImportError, NotImplementedError, ValueError, TypeError, AttributeError, NameError)
 """What python-can's interfaces raise when their driver or a part of their configuration is missing."""
@@ -114,6 +116,7 @@ class TextLink(CanLink):
             self._sleep(GATHERING_S)
             with contextlib.suppress(LineLostError):  # the next call meets it again
                 text += self._line.read(0.0)
+        # the parser keeps the beginning of a message; it also bounds it, whatever a server sends
         received, self._rest = self._parse(self._rest + text)
         return received
 
@@ -123,6 +126,7 @@ class TextLink(CanLink):
 
     def close(self) -> None:
         """Say farewell and let the line go."""
+        # said once, though close may be called twice
         farewell, self._farewell = self._farewell, b""
         with contextlib.suppress(LineLostError):
             if farewell:
@@ -211,6 +215,7 @@ def open_bus(name: str, configuration: dict[str, Any]) -> Any:
     import can
 
     try:
+        # a file in the home directory must not decide which bus is recorded
         return can.Bus(ignore_config=True, **configuration)
     except (can.CanError, OSError, *_DRIVER_STUMBLES) as error:
         raise SourceError(

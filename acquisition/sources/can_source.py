@@ -37,8 +37,11 @@ _RETRY_TIMEOUT_S: Final = 0.5
 _LAST_WORDS_NS: Final = 1_000_000_000
 """So long a device may take to say its end after it was asked to stop."""
 
+# as in the serial protocol
 _ASK_AGAIN_NS: Final = 500_000_000
+# the default port of socketcand
 _SOCKETCAND_PORT: Final = 29536
+# python-can's own
 _MULTICAST_PORT: Final = 43113
 _INTERFACE: Final = re.compile(r"[a-z0-9_]{1,32}")
 _PASSED_ON: Final = "bus."
@@ -102,10 +105,12 @@ class CanSource(Source):
             raise SourceError(f"source {self.url}: dbc", got="none", allowed="a DBC file", remedy=remedy)
         layout = read_layout(Path(self._dbc))
         controls = [message for message in (layout.status, layout.command) if message is not None]
+        # socketcand's text has no CAN FD: such a device would stay silent without a word
         if self._interface == "socketcand" and (layout.fd or any(message.fd for message in controls)):
             allowed = "classic frames, as socketcand carries no others"
             raise SourceError(f"source {self.url}: {self._dbc}", got="messages of CAN FD", allowed=allowed)
         self._receiver = CanReceiver(layout, self._longest_gap_s)
+        # before the bus is open: multicast lost 900 frames while compiled code was loaded at the first of them
         _load_decoder(layout)
         self._link = self._connect(self._timeout_s)
         self._layout = layout
@@ -144,6 +149,7 @@ class CanSource(Source):
         self._raise_failure()
         deadline_ns = self._monotonic_ns() + int(timeout_s * 1e9)
         deliveries, self._waiting = self._waiting, []
+        # what came before the counter made no sense is delivered; the next call raises the failure
         while not deliveries and self._receiver.failure is None:
             remaining_s = max(0.0, (deadline_ns - self._monotonic_ns()) * 1e-9)
             try:
@@ -171,6 +177,8 @@ class CanSource(Source):
         self._raise_failure()
         try:
             if self._started and self._heard and not self._complete and self._link is not None:
+                # asked before the decision: the end that the device announces proves its last frames, up to 18 of
+                # each message
                 _command(self._link, layout, STOP)
                 deliveries += self._until_end() if layout.command is not None and layout.status is not None else []
         except LineLostError:
@@ -280,6 +288,7 @@ class CanSource(Source):
         return [*given_up, Trouble(TroubleKind.DISCONNECTED, error.got, 1, self._retried_ns)]
 
     def _try_again(self, timeout_s: float) -> None:
+        # a server that refuses at once must not be asked without a pause
         wait_s = _RETRY_S - (self._monotonic_ns() - self._retried_ns) * 1e-9
         if wait_s > 0 or not self._reconnect:
             self._sleep(min(wait_s, timeout_s) if self._reconnect else timeout_s)
@@ -305,6 +314,7 @@ class CanSource(Source):
             port = options.integer("port", _MULTICAST_PORT, lowest=1, highest=65535)
             exposed = options.yes("expose", False)
             name = f"source {self.url}"
+            # a bus with CAN FD takes classic frames, too
             return lambda _: self._python_can(open_multicast_bus(group, port, fd=True, exposed=exposed, name=name))
         return self._hardware(options, url, fd)
 
@@ -370,4 +380,5 @@ def _typed(text: str) -> str | int | bool:
     """Option of a python-can interface: yes, no, a whole number, or text."""
     if text in ("yes", "no"):
         return text == "yes"
+    # drivers want numbers as numbers; longer texts of digits are serial numbers
     return int(text) if re.fullmatch(r"-?[0-9]{1,18}", text) else text

@@ -19,6 +19,7 @@ SLCAN_BITRATES: Final = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_
 _OPEN: Final = b"O\r"
 _CLOSE: Final = b"C\r"
 _BUS_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,31}")
+# a server that never stops talking costs no more memory than this
 _LONGEST_ANSWER_BYTES: Final = 1024
 _MADE_UP: Final = b"< frame 101 0.000000 00 >"
 """Taken apart once before frames can come: what is compiled or loaded then takes seconds on a busy computer."""
@@ -52,6 +53,7 @@ def open_socketcand(
     SourceError
         If nobody listens, it is no socketcand, or it has no such bus.
     """
+    # the name is sent within a message: a ">" in it would be a command of its own
     if not _BUS_NAME.fullmatch(bus):
         allowed = "the name of a bus, for example can0"
         raise SourceError(f"source {url}: channel", got=repr(bus)[:80], allowed=allowed)
@@ -61,6 +63,7 @@ def open_socketcand(
     line = open_line(f"socket://{address}", 0, name=name)
     deadline_ns = monotonic_ns() + int(timeout_s * 1e9)
     try:
+        # one deadline for both answers; a server that trickles must not extend it
         rest = _answered(name, line, b"", b"hi", lambda: deadline_ns - monotonic_ns())
         line.write(f"< open {bus} >".encode())
         rest = _answered(name, line, rest, b"ok", lambda: deadline_ns - monotonic_ns())
@@ -86,6 +89,7 @@ def _answered(name: str, line: Line, text: bytes, expected: bytes, remaining_ns:
             text += line.read(remaining_ns() * 1e-9)
         except LineLostError as error:
             raise _no_socketcand(name, text or error.got.encode(), expected) from error
+    # two answers may come in one piece, and frames with the last: python-can's client breaks there
     message, _, rest = text.partition(b">")
     if message.strip().removeprefix(b"<").strip() != expected:
         raise _no_socketcand(name, message + b">", expected)

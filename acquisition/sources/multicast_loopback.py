@@ -17,6 +17,7 @@ from sloshlab.errors import SourceError
 DEFAULT_GROUP: Final = "239.74.163.2"
 """python-can's own group for IPv4."""
 
+# a million bytes hold a second of 8000 frames of some 100 bytes
 RECEIVE_BUFFER_BYTES: Final = 8 << 20
 """Asked for; the system may give less (on Linux net.core.rmem_max)."""
 
@@ -53,6 +54,7 @@ def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool, name: 
     name = name or f"can:udp_multicast?channel={group}&port={port}"
     _check_group(name, group, exposed)
     try:
+        # 0 hops: what is sent goes no further than this computer
         bus = can.Bus(
             interface="udp_multicast", channel=group, port=port, hop_limit=int(exposed), fd=fd, ignore_config=True
         )
@@ -75,16 +77,21 @@ def _check_group(name: str, group: str, exposed: bool) -> None:
         address = ipaddress.ip_address(group)
     except ValueError:
         address = ipaddress.ip_address("0.0.0.0")
+    # the confinement below is for IPv4
     if not address.is_multicast or (address.version == 6 and not exposed):
         raise SourceError(name, got=repr(group), allowed="a multicast address, for example " + DEFAULT_GROUP)
 
 
 def _prepare_socket(fileno: int, group: str, exposed: bool) -> None:
+    # a copy of the descriptor, as python-can offers no way to its socket's options and this object closes its own
     with socket.socket(fileno=os.dup(fileno)) as same:
         same.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         if exposed:
             return
+        # sent by this interface and joined there, or nothing of what is sent would come back
         interface = socket.inet_aton(_LOOPBACK_ADDRESS)
         same.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
         same.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + interface)
+        # python-can has joined the group on the default interface, too, and takes datagrams from anywhere on its
+        # port
         same.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, _LOOPBACK_INTERFACE)

@@ -124,6 +124,7 @@ class PlayedSource(Source):
         if not self._real_time:
             return self._n_samples()
         played_ns = self._monotonic_ns() - self._started_ns
+        # from the start each time, not added up read by read: no drift comes of rounding
         return min(int(played_ns * 1e-9 * self._played_rate_hz()) + 1, self._n_samples())
 
     def _played_rate_hz(self) -> float:

@@ -17,10 +17,12 @@ from urllib.parse import urlsplit
 
 from sloshlab.errors import SourceError
 
+# bounds what one read and its frames take of memory, whatever is sent
 MOST_BYTES_AT_ONCE: Final = 1 << 18
 """One `read` returns no more than about this."""
 
 _PIECE: Final = 1 << 16
+# commands are a few bytes; a device that takes none for so long is gone
 _WRITE_TIMEOUT_S: Final = 1.0
 _CONNECT_TIMEOUT_S: Final = 3.0
 
@@ -88,6 +90,7 @@ class DescriptorLine:
                 piece = self._receive(_PIECE)
             except BlockingIOError:
                 break
+            # a pseudo-terminal whose other side was closed ends in EIO, behind the bytes that were still in it
             except OSError as error:
                 if pieces:
                     break
@@ -132,6 +135,7 @@ class PolledLine:
         try:
             waiting = int(self._port.in_waiting)
             if not waiting:
+                # one byte is waited for and the rest then taken, as pyserial's read returns early by time only
                 self._port.timeout = max(0.0, timeout_s)
             return bytes(self._port.read(min(max(1, waiting), MOST_BYTES_AT_ONCE)))
         except OSError as error:
@@ -181,6 +185,7 @@ def _socket_line(target: str, name: str) -> Line:
     if not address[0] or not address[1]:
         raise SourceError(name, got="no host and port", allowed="socket://HOST:PORT")
     try:
+        # not by pyserial's socket://, which leaks the socket when the other end went first
         connection = socket.create_connection(address, _CONNECT_TIMEOUT_S)
     except (OSError, UnicodeError) as error:  # the latter for host names that cannot be one
         raise SourceError(
@@ -188,7 +193,9 @@ def _socket_line(target: str, name: str) -> Line:
             got=getattr(error, "strerror", None) or str(error) or "no answer",
             remedy="start the device that listens there, or correct host and port",
         ) from error
+    # commands are small, and waiting for more would delay them
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    # so that a read takes all that is waiting and never waits for more
     connection.setblocking(False)
     return DescriptorLine(name, connection.fileno(), connection.recv, connection.sendall, connection.close)
 
@@ -197,6 +204,7 @@ def _port_line(target: str, baudrate: int, name: str) -> Line:
     import serial  # type: ignore[import-untyped]
 
     try:
+        # exclusive: two programs at one port would each get a part of the bytes
         port = serial.serial_for_url(
             target, baudrate=baudrate, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True
         )
@@ -204,6 +212,7 @@ def _port_line(target: str, baudrate: int, name: str) -> Line:
         raise _cannot_open(name, error) from error
     if os.name == "posix" and type(port) is serial.Serial:
         descriptor = port.fileno()
+        # by the descriptor: pyserial's read waits for a number of bytes, or until its time is over
         return DescriptorLine(name, descriptor, lambda n: os.read(descriptor, n), port.write, port.close)
     return PolledLine(name, port)
 

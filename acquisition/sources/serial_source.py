@@ -84,6 +84,7 @@ class SerialSource(Source):
         except BaseException:
             self.close()
             raise
+        # samples of a free-running device that came meanwhile wait in `_waiting` and are the first to be delivered
         self._opened = True
 
     def _await_calibration(self) -> None:
@@ -189,9 +190,11 @@ class SerialSource(Source):
         data = self._line.read(timeout_s)
         if not data:
             return []
+        # after the read and before decoding: the clock fit takes it for the arrival of the last byte
         host = HostTime(self._monotonic_ns(), self._utc_ns())
         n_frames = self._decoder.n_frames
         deliveries = self._decoder.feed(data, host)
+        # back with the first good frame only: noise is not the device coming back
         if self._away and self._decoder.n_frames > n_frames:
             self._away = False
             back = Trouble(TroubleKind.RECONNECTED, self._target, 1, host.monotonic_ns)
@@ -206,6 +209,7 @@ class SerialSource(Source):
         if self._line is not None:
             self._line.close()
             self._line = None
+        # the rest of a cut frame would spoil the first frame of the new connection
         self._decoder.break_off()
         now_ns = self._monotonic_ns()
         self._retried_ns = now_ns
@@ -240,6 +244,7 @@ class SerialSource(Source):
 
     def _ask_for_everything(self) -> None:
         self._ask(CommandKind.SEND_CALIBRATION)
+        # a device that is done is not started again
         if self._started and not (self._decoder.sampling and self._decoder.complete):
             self._ask(CommandKind.START)
 
@@ -262,4 +267,5 @@ class SerialSource(Source):
 
 def _request(kind: CommandKind) -> bytes:
     """The frame, after a zero that ends whatever noise the device has read before."""
+    # zeros in a row mean nothing
     return b"\0" + encode_frame(CommandFrame(kind))

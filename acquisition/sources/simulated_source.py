@@ -66,6 +66,7 @@ class SimulatedSource(PlayedSource):
         SourceError
             If there is no rig, or a setting is out of range.
         """
+        # before the run is made, which needs its memory at once
         self._check_length()
         try:
             if self._rig is None:
@@ -127,6 +128,7 @@ def run_settings(options: URLOptions) -> dict[str, Any]:
 def counts_of(channel: xr.DataArray) -> CountArray:
     """Counts behind the values of a virtual sensor; the division is exact to far less than half a count."""
     counts = np.rint(channel.values / channel.encoding["scale_factor"])
+    # the count by which the virtual sensors mark a lost sample on disk
     return np.where(np.isnan(counts), LOST_COUNT, counts).astype(np.int32)
 
 

@@ -33,6 +33,7 @@ MISSING_COUNT: Final = -(2**31)
 
 _QUANTISED_BITS = 30
 _PIECE_SAMPLES = 1 << 16
+# a file chooses its own chunks, and each is decompressed as a whole
 _LARGEST_STORAGE_CHUNK = 1 << 26
 _DESCRIPTIVE = ("range_min", "range_max", "noise_std", "x_m", "block_from", "block_to", "sensor_serial")
 _STUMBLES = (
@@ -85,6 +86,7 @@ class StoredCounts:
         # once ended in a segmentation fault
         with NETCDF_LOCK, contextlib.ExitStack() as closing:
             attributes = read_attributes(self._file)
+            # with a damaged heap the HDF5 library would never come to an end
             require_sound_structure(self._file)
             with self._as_recording_error():
                 self._dataset = _opened(self._file, closing)
@@ -172,6 +174,7 @@ class StoredCounts:
         """Attributes, units and names by the rules of the recording format, on two samples made up for it."""
         described = {name: ("time", np.zeros(2), _attributes(self._dataset[name])) for name in names}
         time = np.arange(2) / self.sampling_rate_hz
+        # by the reader's own rules, without reading the samples
         made_up = xr.Dataset(described, coords={"time": time}, attrs=_attributes(self._dataset))
         validate_recording(made_up, name=f"recording {self._file}")
 
@@ -227,6 +230,7 @@ class StoredCounts:
             **known,
         )
         fill = attributes.get("_FillValue", attributes.get("missing_value"))
+        # an attribute may be anything; what no count can equal marks none
         fill = None if fill is None or isinstance(fill, str) or np.ndim(fill) else fill
         if dtype.kind == "f" or dtype.itemsize > 4:
             return self._quantised(variable, channel, fill)
@@ -237,6 +241,7 @@ class StoredCounts:
             scaled = raw.astype(np.float64) * channel.scale_factor + channel.add_offset
             return scaled if fill is None else np.where(raw == fill, np.nan, scaled)
 
+        # a power of two, so that float32 values above 2⁻⁶ of the full scale come back exactly
         step = _step(self._full_scale(variable, channel, values))
 
         def counts(raw: np.ndarray) -> CountArray:
@@ -268,6 +273,7 @@ def _as_stored(dtype: np.dtype[Any], channel: Channel, fill: float | None) -> _S
         add_offset=channel.add_offset + channel.scale_factor * shift,
         missing_count=int(fill) - shift if fill is not None and _is_count(fill, dtype) else None,
     )
+    # in 64 bits meanwhile: unsigned counts of 32 bits do not fit before they are moved down
     return _StoredChannel(described, lambda raw: (raw.astype(np.int64) - shift).astype(np.int32))
 
 
@@ -291,6 +297,7 @@ def _opened(file: Path, closing: contextlib.ExitStack) -> Any:
 
     dataset = netCDF4.Dataset(file, mode="r")
     closing.callback(dataset.close)
+    # the counts themselves: the library would turn them into scaled values and masks
     dataset.set_auto_maskandscale(False)
     return dataset
 

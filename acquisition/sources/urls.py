@@ -25,6 +25,7 @@ BACKENDS: Final[Registry[Callable[[SourceURL], Source]]] = Registry(
 )
 """By the scheme of a URL: classes or functions that make a source of it."""
 for _scheme, _backend in {
+    # as text: a backend and its libraries are loaded when a URL asks for them
     "can": "acquisition.sources.can_source:CanSource",
     "file": "acquisition.sources.file_source:FileSource",
     "serial": "acquisition.sources.serial_source:SerialSource",
@@ -65,6 +66,7 @@ def parse_url(text: str) -> SourceURL:
     >>> url.scheme, url.target, dict(url.options)
     ('serial', 'socket://127.0.0.1:7000', {'device': 'daq'})
     """
+    # a URL is quoted in errors and stored in recordings: no control characters reach either
     if len(text) > LONGEST_URL or not text.isprintable():
         got = f"{len(text)} characters" if len(text) > LONGEST_URL else repr(text)
         raise SourceError("source", got=got, allowed=f"≤ {LONGEST_URL} printable characters on one line")
@@ -76,6 +78,7 @@ def parse_url(text: str) -> SourceURL:
             allowed="scheme:target, for example serial:/dev/ttyUSB0",
             remedy=f"write file:{text} to play a recording",
         )
+    # no urlsplit: a target is a path, a port or a URL of its own, whose slashes and colons are its own business
     target, _, query = rest.partition("?")
     return SourceURL(text, scheme, unquote(target), _parsed_options(text, query))
 
@@ -161,6 +164,7 @@ class URLOptions:
             value = float(text)
         except ValueError:
             value = math.nan
+        # false for values that are not numbers, too
         if not lowest <= value <= highest:
             raise self.error(name, text, f"a number, {lowest:g} … {highest:g}")
         return value
@@ -170,6 +174,7 @@ class URLOptions:
         text = self.text(name)
         if text is None:
             return default
+        # by a pattern: Python's int takes underscores, digits of other scripts and numbers of any length
         if not re.fullmatch(r"[+-]?[0-9]{1,18}", text) or not lowest <= int(text) <= highest:
             raise self.error(name, text, f"a whole number, {lowest} … {highest}")
         return int(text)

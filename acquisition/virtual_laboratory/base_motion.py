@@ -79,17 +79,20 @@ class RandomBaseMotion:
             for factor in (-1 / omega**2, -1j / omega, np.ones(omega.size))
         )
         rise, rate, curvature = _rise(time_s)
+        # the second derivative of u · rise, term by term: acceleration and displacement belong together exactly
         return a * rise + 2 * v * rate + u * curvature, u * rise
 
     def _lines(self) -> tuple[FloatArray, NDArray[np.complex128]]:
         """Frequencies and complex amplitudes of the acceleration, Σ ½ |A|² = RMS²."""
         first = math.ceil(LOWEST_FREQUENCY_HZ * self.duration_s)
+        # whole cycles in the duration: the sum of lines is one inverse Fourier transform
         number = np.arange(first, math.floor(self.highest_hz * self.duration_s) + 1)
         frequency_hz = number / self.duration_s
         below, above = (((frequency_hz + sign * self.centre_hz) / self.width_hz) ** 2 for sign in (-1, 1))
         density = np.exp(-below / 2) + np.exp(-above / 2)
         generator = np.random.default_rng([self.seed, 3])
         drawn = generator.standard_normal((number.size, 2)) @ np.array([1.0, 1.0j]) * np.sqrt(density)
+        # scaled to the level that was asked for, whatever was drawn
         return frequency_hz, drawn * (self.rms_m_per_s2 / math.sqrt(0.5 * float(np.sum(np.abs(drawn) ** 2))))
 
 
@@ -97,6 +100,7 @@ def _sum_of_lines(amplitude: NDArray[np.complex128], number: FloatArray, n_steps
     """Re Σ A exp(2πi number (k + ½)/n) for all k."""
     spectrum = np.zeros(n_steps // 2 + 1, complex)
     index = np.round(number).astype(int)
+    # the phase moves the values from the beginning to the middle of each step
     spectrum[index] = 0.5 * n_steps * amplitude * np.exp(1j * math.pi * index / n_steps)
     return np.asarray(np.fft.irfft(spectrum, n_steps))
 

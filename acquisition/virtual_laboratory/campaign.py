@@ -141,7 +141,9 @@ def record_campaign_run(run: CampaignRun, path: str | os.PathLike[str], *, index
     rig = Rig.from_toml_text(rig_text(run.fill_level))
     recording = virtual_shaker_run(
         rig,
+        # by the place in the list: the same run has the same bytes, whichever others are made
         seed=1000 * seed + index,
+        # one laboratory: gains and dry mass are those of the sensors, not of a run
         laboratory=campaign_laboratory(seed),
         run_id=run.name,
         rig_name=rig_name(run.fill_level),
@@ -181,6 +183,7 @@ def _runs_of_one_fill(fill_level: float) -> list[CampaignRun]:
 def _mishaps(fill_level: float, acceleration_g: float) -> dict[str, Any]:
     """A block of lost samples in one run, a few clipped samples in another."""
     if (fill_level, acceleration_g) == (0.25, 3.0):
+        # flagged as a real recorder would, so that the analysis meets both in the recordings of raw_data
         return {"lost": (131.0, 70)}
     if (fill_level, acceleration_g) == (0.75, 6.0):
         return {"n_clipped": 8}

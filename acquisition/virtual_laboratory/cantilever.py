@@ -121,6 +121,7 @@ class Cantilever:
 
     def _integral(self, mode: int, power: int) -> float:
         """∫ µ ψᵖ dx by Gauss quadrature with points enough for the waves of the mode."""
+        # each mode has half a wave more than the one before
         places, weights = np.polynomial.legendre.leggauss(20 + 10 * mode)
         shape = self.shape(mode, 0.5 * (places + 1) * self.length_m)
         return float(0.5 * self.mass_kg * (weights @ shape**power))
@@ -181,6 +182,7 @@ def fitted_to(
     bare = Cantilever(length_m, width_m, thickness_m, 0.0, youngs_modulus_pa, density_kg_per_m3)
     fastest = bare.frequency_hz(1)
     kappa = eigenvalue(1, 0.0) * math.sqrt(frequency_hz / fastest)
+    # a smaller κ asks for a mass ratio beyond the largest that is allowed
     mass_ratio = _mass_ratio(kappa) if kappa > 0.05 else math.inf
     if not (frequency_hz <= fastest and 0 <= mass_ratio <= _LARGEST_MASS_RATIO):
         raise InputError(
@@ -203,6 +205,7 @@ def _mass_ratio(kappa: float) -> float:
 def _characteristic(kappa: float, mass_ratio: float) -> float:
     """The characteristic equation over cosh κ."""
     cos, sin, tanh = math.cos(kappa), math.sin(kappa), math.tanh(kappa)
+    # undivided it would grow as e^κ and overflow at high modes
     return 1 / math.cosh(kappa) + cos + mass_ratio * kappa * (cos * tanh - sin)
 
 

@@ -26,8 +26,10 @@ REGIMES: Final = ("quiet", "faraday", "impacts", "chaotic")
 
 _CHAOTIC_ABOVE_G = 2.6
 _TRANSITION_WIDTH = 0.06
+# from cycle to cycle, in the order of REGIMES; shares of the work, and parts of β
 _SCATTER_OF_WORK = np.array([0.01, 0.03, 0.07, 0.12])
 _SCATTER_OF_MASS = np.array([0.002, 0.005, 0.02, 0.04])
+# what one cycle lacks the next mostly makes up, so that means over a window are far surer than a single cycle
 _CYCLE_MEMORY = 0.7
 _LARGEST_WORK = 1.65
 _POINTS_PER_CYCLE = 24
@@ -106,6 +108,7 @@ class LiquidForce:
         generator = np.random.default_rng(self.seed)
         first, last = np.sort(self.motion.phase(np.array([0.0, self.motion.duration_s]))) / (2 * np.pi)
         origin, n_cycles = int(np.floor(first)) - 1, int(np.ceil(last) - np.floor(first)) + 3
+        # scatter follows the cycles of the motion and not time, so that the force is a function of any instant
         centres = origin + 0.5 + np.arange(n_cycles)
         draws = tuple(_cycle_scatter(n_cycles, generator) for _ in range(3))
         broad = _broad_band_noise(n_cycles, generator)
@@ -139,6 +142,7 @@ class LiquidForce:
         mass = self._law.effective_mass(omega_bar, u_bar) + np.tensordot(_SCATTER_OF_MASS, weights, 1) * np.interp(
             cycle, centres, of_mass
         )
+        # −β m_l ü₁ − γ u̇₁ with γ = W̄ m_l Ω/π; the fundamental alone, as the law says nothing of harmonics
         linear = -mass * moved.fundamental_acceleration - work * omega / np.pi * moved.fundamental_velocity
         impact = 1 + 0.15 * np.interp(cycle, centres, of_impact)
         workless = self._faraday(cycle, weights) + self._impacts(moved.rotor, omega_bar, impact, weights)
@@ -180,6 +184,7 @@ def _comb_line(order: int, harmonics: Sequence[tuple[int, float, float]]) -> com
     line = 0.35 * np.exp(-((order / 5.0) ** 2) / 2) * (np.exp(1j * roof) - 0.5 * np.exp(1j * floor))
     for its_order, _, angle in harmonics:
         if its_order == order:
+            # the truth of the work must stay the law's, to the last harmonic
             line = (line * np.exp(-1j * angle)).real * np.exp(1j * angle)
     return complex(line)
 
@@ -195,6 +200,7 @@ def _broad_band_noise(n_cycles: int, generator: np.random.Generator) -> FloatArr
     n_points = n_cycles * _POINTS_PER_CYCLE
     order = np.fft.rfftfreq(n_points, 1 / _POINTS_PER_CYCLE)
     shape = 1 / (1 + (order / 2.0) ** 2) * (order > 0.2) * (order < 6)
+    # noise at the excitation would do work that the law does not know
     shape *= 1 - np.exp(-((np.abs(order - 1) / 0.33) ** 4))
     noise = np.fft.irfft(np.fft.rfft(generator.standard_normal(n_points)) * shape, n_points)
     return np.asarray(noise / noise.std())

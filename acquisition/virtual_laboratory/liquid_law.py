@@ -83,6 +83,7 @@ class LiquidLaw:
         distance = (
             x**2 / (2 * self.frequency_width**2) + self.amplitude_stiffness * (np.expm1(c * y) - c * y) / c**2
         )
+        # far from the peak the exponential is too small for a float, and no work is right
         with np.errstate(under="ignore"):
             return np.asarray(self.work_peak * onset / onset_peak * np.exp(-slope * relative - distance))
 
@@ -97,6 +98,7 @@ class LiquidLaw:
         )
 
 
+# the mean of β over the band is then −β_q at 0.25 g, whatever its tilt
 _OMEGA_BAR_CENTRE: Final = 4.1356
 """ω̄ at 12.5 Hz, the middle of the 5…20 Hz band, for the tank of 27.2 mm height."""
 
@@ -139,6 +141,7 @@ def liquid_law(fill_level: float) -> LiquidLaw:
     if fill_level in LAWS:
         return LAWS[fill_level]
     z = (fill_level - 0.5) / 0.25
+    # parabolas meet the three laws exactly, which are all that is known
     weights = {0.25: z * (z - 1) / 2, 0.50: 1 - z**2, 0.75: z * (z + 1) / 2}
     return LiquidLaw(
         **{
@@ -206,6 +209,7 @@ def amplitude_shape_from_means(
     from scipy.integrate import quad
     from scipy.optimize import fsolve
 
+    # from the onset at 1 g on: with the amplitudes below no law could have the published mean
     low, high = 1.0 / omega_bar**2, min(6.0 / omega_bar**2, stroke_limit_u_bar)
 
     def misses(shape: FloatArray) -> list[float]:

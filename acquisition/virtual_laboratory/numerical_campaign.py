@@ -40,6 +40,7 @@ COMMAND: Final = "sloshlab virtual campaign --liquid numerical -o raw_data/numer
 _SAMPLING_RATE_HZ: Final = 512.0
 _FIRST_SEED: Final = 500
 """Other seeds than those of the campaign whose liquid follows a law."""
+# of a quarter filled at h/16 four layers would be left; six of h/24 are as many as of 3/8 at h/16
 _SHALLOWEST_FILL: Final = 0.375  # a shallower liquid is computed more finely
 
 
@@ -156,6 +157,7 @@ def make_numerical_campaign(
             atomic_file.write_bytes(target / name, text.encode())
         manifest = _Manifest(target, settings)
         missing = [task for task in tasks if not manifest.vouches_for(task)]
+        # the longest first, or one process would work at it alone at the end
         missing.sort(key=_cost, reverse=True)
         session = _Session(manifest, missing, progressed or (lambda share: None), finished or (lambda run: None))
         try:
@@ -168,6 +170,7 @@ def make_numerical_campaign(
                 "computed of the others; give the same command again to go on"
             ) from interrupt
         finally:
+            # also when it was interrupted, so that what is finished is vouched for
             manifest.write()
     return CampaignSummary(manifest.path, len(tasks) - len(missing), session.n_made, tuple(session.flags))
 
@@ -187,6 +190,7 @@ def record(task: _Task, progress: Callable[[float], None]) -> dict[str, Any]:
     )
     recording = _recording(task, liquid)
     write_virtual_run(recording, task.recording)
+    # only after the recording has been written
     task.checkpoint.unlink(missing_ok=True)
     computing_s = computed[0] if computed else time.monotonic() - start_s
     return {"computing_s": computing_s, "flag": str(recording.attrs.get(STOPPED, ""))}
@@ -198,6 +202,7 @@ def _discard_if_damaged(checkpoint: Path) -> None:
         try:
             checkpoints.load(checkpoint)
         except InputError:
+            # the run starts again; one damaged file must not stop a campaign of hours
             checkpoint.unlink()
 
 
@@ -260,6 +265,7 @@ class _Manifest:
         self.path, self._folder, self._settings = folder / MANIFEST_NAME, folder, settings
         self._runs: dict[str, Any] = {}
         self._files: dict[str, Any] = {}
+        # a manifest that is not there, or none, vouches for nothing
         with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
             known = json.loads(self.path.read_text(encoding="utf-8"))
             self._runs, self._files = dict(known["runs"]), dict(known["files"])
@@ -269,6 +275,7 @@ class _Manifest:
         run = self._runs.get(task.run.name)
         if not isinstance(run, dict) or run.get("made_of") != _made_of(task) or not task.recording.is_file():
             return False
+        # by its content: a recording may have been replaced or cut since
         return bool(self._files.get(self._relative(task.recording)) == file_record(task.recording))
 
     def add(self, task: _Task, result: Mapping[str, Any]) -> None:
@@ -322,6 +329,7 @@ def _task(folder: Path, settings: CampaignSettings, run: NumericalRun) -> _Task:
         settings.seed,
     )
     kept_in = Path(settings.checkpoints or folder / CHECKPOINTS_NAME)
+    # the hash in the name, so that a checkpoint of other settings is not taken up, nor lost
     checkpoint = kept_in / f"{run.name.replace('/', '_')}_{_made_of(task)[:12]}.checkpoint"
     return replace(task, checkpoint=checkpoint)
 
@@ -358,6 +366,7 @@ def _made_of(task: _Task) -> str:
         "run": asdict(task.run),
         "seeds": [task.seed, task.laboratory_seed],
         "tank": None if setup is None else asdict(setup),
+        # another version may compute another liquid: its recordings are made again
         "version": __version__,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
@@ -384,6 +393,7 @@ def _locked(file: int) -> bool:
     except ImportError:  # there are no such locks on this system
         return True
     try:
+        # let go by the system when the process ends, however it ends
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
         return False

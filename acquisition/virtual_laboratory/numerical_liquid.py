@@ -120,10 +120,12 @@ class NumericalLiquid:
             unstable; and global attributes, then with `numerical_tank_stopped`.
         """
         if configuration != "sloshing":
+            # exact and made in a second: a frozen liquid is a rigid mass, an empty tank has none
             mass_kg = rig.liquid_mass_kg if configuration == "frozen" else 0.0
             time_s = np.arange(round(motion.duration_s * sampling_rate_hz)) / sampling_rate_hz
             force_n = -mass_kg * motion.at(time_s).acceleration
             return force_n, {"liquid": configuration, "seed": seed, "sloshlab_version": __version__}
+        # the same seed as for the shaker's imperfections: repeats differ in both
         setup = numerical_setup(
             rig, layers_per_height=self.layers_per_height, seed=seed, sampling_rate_hz=sampling_rate_hz
         )

@@ -23,6 +23,7 @@ SUDDEN_STARTS: Final = (
 SUDDEN_STARTS_BETWEEN: Final = ((9.5, (3.0,)), (10.5, (2.5, 4.5)), (11.5, (3.5, 6.0)), (12.5, (5.0,)))
 """Between those, for the validation of what was trained on them."""
 LONG_STROKE: Final = "long_stroke"
+# the other shaker's stroke ends at 6 g there, and sweeps that end at 6 g do not tell the saturation of the liquid
 LONG_STROKE_M: Final = 0.025
 LONG_STROKE_SWEEPS: Final = ((3.0, 3), (4.0, 1), (5.0, 1), (6.0, 1), (7.0, 1), (8.0, 2))
 """Levels in g, beyond what the other shaker's stroke allows at 9 … 11.5 Hz, and how often each."""

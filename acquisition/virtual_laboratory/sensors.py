@@ -25,6 +25,7 @@ CHANNELS: Final = FORCE_CELLS + ACCELEROMETERS
 LOST_COUNT: Final = -32768
 """Count that stands for a lost sample."""
 
+# 9 to 10 bits each way
 _HALF_SCALE_COUNTS: Final = {"force": 640, "acceleration": 448}
 _NOISE_COUNTS = 0.6
 _HEADROOM = 1.15
@@ -55,6 +56,7 @@ class Laboratory:
     @classmethod
     def drawn(cls, seed: int, channels: Sequence[str] = CHANNELS) -> Laboratory:
         """Draw a laboratory with these channels: gains and dry mass within ±1 %, most within ±0.5 %."""
+        # a stream of its own: nothing that is drawn for a run can change the laboratory
         generator = np.random.default_rng([seed, 7301])
 
         def one() -> float:
@@ -116,6 +118,7 @@ def cell_forces(
 ) -> tuple[FloatArray, ...]:
     """F_ext shared by the two cells; their sum is F_ext."""
     share = laboratory.cell_1_share + laboratory.rocking * np.sin(2 * np.pi * 0.11 * time_s)
+    # the share rocks slowly, so that a single cell means nothing and only the sum does
     return share * external_force_n, (1 - share) * external_force_n
 
 
@@ -157,6 +160,7 @@ def reading(
     largest = float(np.abs(truth).max()) or 1.0
     half_scale = _amplifier_range(largest * _HEADROOM)
     if n_clipped:
+        # the range that so many samples reach
         half_scale = float(np.sort(np.abs(truth * gain))[-n_clipped])
     n_counts = (noisy_half_scale_counts or _HALF_SCALE_COUNTS[quantity]) if noisy else 32000
     step = half_scale / n_counts

@@ -87,6 +87,7 @@ def virtual_shaker(
 ) -> VirtualShaker:
     """The truth of the run that `virtual_shaker_run` records for the same arguments."""
     truth = laboratory or (Laboratory.drawn(0) if imperfect else Laboratory.perfect())
+    # numbered streams of one seed: motion 1, sensors 2, so that noise does not change with what the motion draws
     generator = np.random.default_rng([seed, 1])
     motion = shaken(plan, Imperfections.drawn(generator) if imperfect else None)
     liquid = None
@@ -189,6 +190,7 @@ def virtual_shaker_run(
         raise InputError("n_clipped", got=str(n_clipped), allowed="0 … 1000")
     if experiment in TONES and numerical is None:
         raise InputError("experiment", got=experiment, remedy="its liquid has no law; take a computed one")
+    # one frequency only; the attributes of the recording tell it by equal ends of the sweep
     if experiment == "sudden_start":
         stop_hz = start_hz
     first, last = (start_hz, stop_hz) if direction == "up" else (stop_hz, start_hz)
@@ -216,6 +218,7 @@ def virtual_shaker_run(
         liquid_force_n, method = numerical.force_n(
             rig, motion, configuration, sampling_rate_hz=sampling_rate_hz, seed=seed
         )
+        # a computation that became unstable gives the samples that are valid
         time_s, flags = time_s[: liquid_force_n.size], flags[: liquid_force_n.size]
         moved = motion.at(time_s)
         external_force_n = rig.tank.dry_mass_kg * laboratory.dry_mass_factor * moved.acceleration - liquid_force_n
@@ -252,6 +255,7 @@ def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
     path : path-like
         The recording to write.
     """
+    # in one chunk and at the highest level: the recordings are part of the repository
     squeeze = {"zlib": True, "complevel": 9, "shuffle": True, "chunksizes": (run.sizes["time"],)}
     encoding: dict[str, dict[str, Any]] = {str(name): dict(squeeze) for name in run.variables}
     for name, channel in run.data_vars.items():
@@ -259,6 +263,7 @@ def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
             encoding[str(name)].update(
                 dtype="int16", scale_factor=channel.encoding["scale_factor"], _FillValue=np.int16(LOST_COUNT)
             )
+    # no time and no flag is ever missing
     encoding["time"]["_FillValue"] = None
     if "quality" in run:
         encoding["quality"]["_FillValue"] = None
@@ -328,6 +333,7 @@ def _readings(
     forces = cell_forces(external_force_n, time_s, laboratory)
     truths = dict(zip(FORCE_CELLS, forces, strict=True))
     truths.update(dict.fromkeys(ACCELEROMETERS, moved.acceleration))
+    # one after the other in the order of the channels: the recordings of raw_data, made again, are the same bytes
     generator = np.random.default_rng([seed, 2])
     return {
         name: reading(

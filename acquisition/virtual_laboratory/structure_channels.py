@@ -41,6 +41,7 @@ def true_values(
     modal, shape = computed.modal_acceleration_m_per_s2, rig.structure.shape_at_tank
     tip = base_m_per_s2 + modal @ shape
     truths = {
+        # of the structure on the tank: what moves the dry mass beside the liquid
         FORCE_INTERFACE: rig.dry_mass_kg * tip - computed.liquid_force_n,
         ACCELERATION_TIP: tip,
         DISPLACEMENT_TANK: base_m + computed.modal_displacement_m @ shape,

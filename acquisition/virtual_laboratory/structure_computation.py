@@ -67,6 +67,7 @@ class StructureTask:
         """Hash of all that determines the result."""
         described = (asdict(self.setup), asdict(self.structure), self.initial_displacement_m, self.configuration)
         digest = hashlib.sha256(json.dumps(described, sort_keys=True).encode())
+        # two runs with the same settings may be shaken differently
         digest.update(np.ascontiguousarray(self.base_acceleration_m_per_s2).tobytes())
         return np.frombuffer(digest.digest(), np.uint8)
 
@@ -102,6 +103,7 @@ def n_steps_of(setup: TankSetup, n_samples: int) -> int:
     setup : TankSetup
     n_samples : int
     """
+    # the filter of the last sample needs half its length beyond it
     return (n_samples + HALF_LENGTH_SAMPLES) * setup.steps_per_sample
 
 
@@ -120,6 +122,7 @@ def sampled_from_release(values: FloatArray, setup: TankSetup, n_samples: int) -
 
 
 def _sampled_means(means: FloatArray, n_means: int, n_samples: int) -> FloatArray:
+    # mirrored at the release, as a structure let go from rest would have moved but for its damping
     before = means[: HALF_LENGTH_SAMPLES * n_means][::-1]
     return sampled(np.concatenate([before, means]), n_means, n_samples + HALF_LENGTH_SAMPLES)[HALF_LENGTH_SAMPLES:]
 
@@ -267,6 +270,7 @@ def _means_of(history: StructureHistory, n_steps: int) -> FloatArray:
 
 
 def _interrupted(run: _Computation, path: Path) -> ComputationInterruptedError:
+    # as with a shaken tank: steps without their means cannot be gone on from
     if run.is_consistent and run.share > 0:
         run.save(path)
     if not path.exists():

@@ -63,6 +63,7 @@ class StructureLaboratory:
     def drawn(cls, seed: int, rig: Rig) -> StructureLaboratory:
         """Draw a laboratory for a rig."""
         described = described_structure(rig)
+        # beside that of the sensors: a structure does not change the gains of a laboratory
         generator = np.random.default_rng([seed, 7302])
 
         def around_one(spread: float, limit: float, number: int) -> tuple[float, ...]:
@@ -176,6 +177,7 @@ def structure_rig(rig: Rig, laboratory: StructureLaboratory) -> StructureRig:
             )
         )
     )
+    # the modal data of a rig contain the liquid, frozen; the computed one acts by its force
     structure = Structure(modes, included_mass_kg=rig.liquid_mass_kg)
     steps = np.arange(1, N_BEAM_ACCELEROMETERS + 1) / (N_BEAM_ACCELEROMETERS + 1)
     places = tuple(float(x) for x in np.round(steps * beam.length_m, 6))
@@ -187,12 +189,14 @@ def _on_a_guide(
     rig: Rig, described: DescribedStructure, laboratory: StructureLaboratory, dry_mass_kg: float
 ) -> StructureRig:
     mass_kg, stiffness = described.mass_kg or 0.0, described.stiffness_n_per_m or 0.0
+    # on a guide all that moves is beyond the force cell: two different masses are a mistake in the rig description
     if abs(rig.tank.dry_mass_kg / mass_kg - 1) > _MASSES_AGREE:
         raise InputError(
             "rig: tank.dry_mass_kg",
             got=f"{rig.tank.dry_mass_kg:g}",
             allowed=f"structure.mass_kg = {mass_kg:g}, the same moving mass",
         )
+    # what is drawn is the frequency, as that is what a laboratory measures
     true_stiffness = stiffness * laboratory.frequency_factors[0] ** 2
     structure = Structure(
         (Mode(dry_mass_kg, true_stiffness, 0.0, 1.0, dry_mass_kg),),

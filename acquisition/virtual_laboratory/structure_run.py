@@ -176,6 +176,7 @@ def virtual_structure_run(
         initial_displacement_m=initial_displacement_m,
         rms_g=rms_g,
         width_hz=spectrum_width_hz,
+        # of the steps beyond the last sample as well, which the filter needs
         period_s=n_steps_of(setup, n_samples) * setup.step_s,
         seed=seed,
     )
@@ -266,10 +267,13 @@ def _plan(
 
 def _largest_speed_m_per_s(plan: _Plan, setup: TankSetup, duration_s: float) -> float:
     """Largest speed of the tank relative to the root, without sloshing."""
+    # damped as little as a beam without sloshing is, a random run would ask for far too fast a sound
     structure = plan.rig.structure if plan.base is None else _damped(plan.rig.structure)
     frozen_mass_kg = setup.liquid_mass_kg
     fastest_hz = structure.with_mass_at_tank(frozen_mass_kg).natural_frequencies_hz()[-1]
+    # after a release the first cycles are the fastest
     period_s = min(duration_s, 1.0) if plan.base is None else plan.base.duration_s
+    # twenty steps in a cycle of the fastest mode, far from where the leapfrog becomes unstable
     n_steps = math.ceil(period_s * 20 * fastest_hz)
     carried = FrozenTank(frozen_mass_kg, structure, period_s / n_steps)
     carried.deflect(plan.initial_displacement_m)

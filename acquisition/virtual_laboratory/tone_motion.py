@@ -90,6 +90,8 @@ class ToneMotion:
         displacement, omega = np.zeros_like(time_s), 2 * np.pi * frequency_hz
         for own, size, phase in zip(omega, amplitude_m_per_s2, phase_rad, strict=True):
             displacement -= size / own**2 * np.cos(own * time_s + phase)
+        # the displacement is ramped and not the acceleration, which would leave the tank with a velocity and a
+        # drift
         ramped = displacement * _rise(time_s) * _rise(duration_s - time_s)
         return cls(make_interp_spline(time_s, ramped, k=5), duration_s)
 
@@ -134,11 +136,13 @@ def random_motion(
     """
     _check_tones(rms_g, lowest_hz, highest_hz, duration_s)
     generator = np.random.default_rng([seed, 1])
+    # whole cycles in the duration, so that the spectrum is zero outside the band
     frequency_hz = np.arange(np.ceil(lowest_hz * duration_s), np.floor(highest_hz * duration_s) + 1) / duration_s
     size = generator.rayleigh(size=frequency_hz.size)  # Gaussian noise: Rayleigh amplitudes, any phase
     amplitude = rms_g * GRAVITY_M_PER_S2 * size * np.sqrt(2 / np.sum(size**2))
     phase = generator.uniform(-np.pi, np.pi, frequency_hz.size)
     motion = ToneMotion.of_tones(frequency_hz, amplitude, phase, duration_s)
+    # looked at afterwards: how the tones add up is known only then
     return _within_stroke(motion, stroke_limit_m, "random motion")
 
 

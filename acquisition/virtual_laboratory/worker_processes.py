@@ -23,6 +23,7 @@ Work = Callable[[Any, Callable[[float], None]], Any]
 """Takes a task and a function to be called with the share of it that is done; returns its result."""
 
 _DONE, _FAILED, _SHARE, _STOPPED = "done", "failed", "share", "stopped"
+# time to save a checkpoint; a process that says nothing for so long is ended
 _PATIENCE_S: Final = 60.0
 _LOOK_UP_S: Final = 0.5
 
@@ -103,6 +104,7 @@ def _start(work: Work, number: int, task: Any) -> _Running:
     parent_end, child_end = context.Pipe()
     process = context.Process(target=_child, args=(child_end, work, task), name=f"task {number}")
     process.start()
+    # the parent's copy; with it open the pipe would not end when the process does
     child_end.close()
     return _Running(number, process, parent_end)
 
@@ -141,6 +143,7 @@ def _stop(
     """Ask all to stop, hear what they still have to say, and leave none behind."""
     for worker in running.values():
         worker.outcome = worker.outcome or Outcome(error=_STOPPED)
+        # SIGTERM, which the process turns into an interrupt: it saves first
         worker.process.terminate()
     while running:
         ready = wait(list(running), timeout=_PATIENCE_S)
@@ -156,6 +159,7 @@ def _interrupt(*_: object) -> NoReturn:
 
 def _child(connection: Connection, work: Work, task: Any) -> None:
     """What runs in a process of its own. Ctrl-C is for the parent, which then terminates this one."""
+    # a terminal sends Ctrl-C to all processes at once
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _interrupt)
 
@@ -171,6 +175,7 @@ def _child(connection: Connection, work: Work, task: Any) -> None:
         answer = _STOPPED, ""
     except (SloshlabError, OSError, MemoryError) as error:
         answer = _FAILED, " ".join(str(error).split()) or type(error).__name__
+    # the answer must not be cut off by a second signal
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     with contextlib.suppress(OSError):
         connection.send(answer)

@@ -78,6 +78,7 @@ class FrameBatch:
         """
         contents = [b"" if message.is_remote_frame else bytes(message.data) for message in messages]
         length = np.array([len(content) for content in contents], np.int64)
+        # rows of 64 bytes for classic frames would be copied for nothing, eight times as much
         width = _FD if length.size and length.max() > _CLASSIC else _CLASSIC
         packed = b"".join([content.ljust(width, b"\0") for content in contents])
         return cls(

@@ -69,6 +69,7 @@ class BitField:
             weight += n_bits
 
     def _big_endian_pieces(self) -> Iterator[Piece]:
+        # in DBC files big-endian fields start at their most significant bit and go on at bit 7 of the next byte
         byte, top = divmod(self.start_bit, 8)
         left = self.length
         while left:
@@ -108,6 +109,7 @@ class BitField:
             part = data[:, byte] if n_bits == 8 else (data[:, byte] >> shift) & ((1 << n_bits) - 1)
             value |= part.astype(np.int64) << weight
         if self.signed:
+            # not negative yet: a top bit of 1 takes 2^length away
             value -= (value >> (self.length - 1)) << self.length
         return value
 

@@ -26,16 +26,19 @@ from acquisition.wire.can_bits import IntArray
 from acquisition.wire.can_layout import SampleMessage
 from sloshlab.errors import SourceError
 
+# one of the two facts that the proof of a place rests on; the other is that a counter only grows
 LATEST_FRAMES: Final = 64
 """A frame may arrive after others that are up to so many frames ahead of it."""
 
 LONGEST_GAP_S: Final = 3600.0
 
+# frames that no later one ever decides, as those that repeat the same low bits, must not fill the memory
 _MOST_WAITING: Final = 4096
 # a counter that cannot be proved for so long makes no sense
 _PATIENCE_S: Final = 3.0
 _FEWEST_PATIENCE: Final = 1024
 _MOST_CONTRADICTIONS: Final = 2
+# a batch that contradicts itself is looked at again in such pieces
 _PIECE: Final = 32
 _CLOCK_DOUBT: Final = 1.02
 """A device may count so much faster than it should by the host's clock."""
@@ -108,8 +111,10 @@ class CounterTracker:
         self._name = message.name
         per_frame = message.samples_per_frame
         self.reach = min(LATEST_FRAMES * per_frame, (1 << always) // 4)
+        # only a frame with the highest bits of the counter has a smallest counter by itself
         self._top_bits = ((1 << parts[-1].field.length) - 1) << parts[-1].bit
         coarsest = 1 << parts[-1].bit if any(part.selectors for part in parts) else 0
+        # less than a turn of the whole counter, so that one place at most agrees with the bits of a frame
         self._horizon = self._wrap - 2 * coarsest - 4 * self.reach
         self.longest_gap_samples = min(round(longest_gap_s * sampling_rate_hz), self._horizon // 2)
         self._chunk = max(16, min(_MOST_WAITING, self._horizon // (8 * per_frame)))
@@ -236,6 +241,8 @@ class CounterTracker:
         if not len(self._value) or (self._begin is None and self.highest is None):
             return Decided(np.full(n_before, _NONE), n_before, 0)
         counters, n_decided = self._bounded()
+        # one frame too late makes all that came with it impossible: in pieces it costs its neighbours only,
+        # however many frames come at once
         if n_decided is None and len(value) > _PIECE and not n_before and not self._is_distrusted:
             self._value, self._known = waiting
             return self._in_pieces(value, known, _PIECE)
@@ -260,6 +267,7 @@ class CounterTracker:
         """Counters of all that wait and how many of them are decided; None if they cannot be as they are."""
         lowest, highest = self._window()
         counters, n_decided, is_possible = _decide(self._value, self._known, lowest, highest, self.reach)
+        # the oldest are given up rather than kept without end
         n_decided = max(n_decided, len(counters) - _MOST_WAITING)
         if not is_possible or self._is_distrusted or self._has_jump(counters[:n_decided]):
             return counters, None
@@ -291,6 +299,7 @@ class CounterTracker:
         proved = counters[counters >= 0]
         if not len(proved):
             return False
+        # ahead of everything before it: a late frame is no jump back
         before = np.maximum.accumulate(proved)
         start = self.highest if self.highest is not None else int(before[0])
         before = np.concatenate([[start], before[:-1]])
@@ -300,6 +309,8 @@ class CounterTracker:
         """Give up all that waits; too much of that is an error."""
         n_frames = len(counters)
         self._drop(n_frames)
+        # A device that started anew without saying so counts up to where its stream stopped; from there on its
+        # frames would fit again, in wrong places.
         self._n_contradictions += 1
         self._n_impossible += n_frames
         if self._n_impossible > self._patience:
@@ -336,6 +347,7 @@ class CounterTracker:
         _, first = np.unique(found, return_index=True)
         is_new = np.zeros(len(proved), np.bool_)
         is_new[first] = True
+        # a copy may come in another batch, but not later than any frame may be
         is_new &= ~np.isin(counters[proved], self._recent)
         counters = counters.copy()
         counters[proved[~is_new]] = _NONE
@@ -358,10 +370,12 @@ def _decide(value: IntArray, known: IntArray, lowest: int, highest: int, reach: 
     smallest = np.empty(n, np.int64)
     largest = np.empty(n, np.int64)
     after = np.empty(n, np.int64)
+    # forwards: by all that came before, each frame is at least so far
     ahead = lowest
     for i in range(n):
         smallest[i] = _smallest_from(max(ahead - reach, 0), value[i], known[i])
         ahead = max(ahead, smallest[i])
+    # backwards: by all that came after, it is at most so far
     behind = highest
     for i in range(n - 1, -1, -1):
         after[i] = min(behind + reach, highest)
@@ -374,6 +388,8 @@ def _decide(value: IntArray, known: IntArray, lowest: int, highest: int, reach: 
             return counters, n, False
         if largest[i] == smallest[i]:
             counters[i] = largest[i]
+        # No later frame can bound it by less than the furthest counter so far. Where that would decide, it waits;
+        # else it stays without a place.
         elif _largest_to(min(after[i], ahead), value[i], known[i]) <= smallest[i]:
             n_decided = i
     return counters, n_decided, True
@@ -385,6 +401,8 @@ def _smallest_from(bound: int, value: int, known: int) -> int:
     wrong = (bound ^ value) & known
     if wrong == 0:
         return bound
+    # Above its highest wrong bit the number may stay the bound's. The lowest bit from there up that may be raised
+    # makes it larger; below it all is as small as the known bits allow.
     bit: int = _highest_bit(wrong)
     while bit < 62:
         weight = 1 << bit
@@ -402,6 +420,7 @@ def _largest_to(bound: int, value: int, known: int) -> int:
     wrong = (bound ^ value) & known
     if wrong == 0:
         return bound
+    # the mirror image: a bit that may be lowered is lowered, and below it all is as large as the known bits allow
     bit: int = _highest_bit(wrong)
     while bit < 62:
         weight = 1 << bit

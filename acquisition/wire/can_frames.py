@@ -95,8 +95,10 @@ def checksums(arbitration_id: int, data: FrameBytes, crc: BitField) -> NDArray[n
     """
     left_out = {piece.byte for piece in crc.pieces()}
     used = np.array([byte for byte in range(data.shape[1]) if byte not in left_out], np.int64)
+    # the identifier is summed, too: the same bytes under another identifier are no frame of this message
     start = binascii.crc_hqx(arbitration_id.to_bytes(4, "little"), _CRC_START)
     values = np.empty(len(data), np.uint16)
+    # one compiled loop over all frames, which is faster than the standard library frame by frame
     _sum_up(np.ascontiguousarray(data), used, start, _CRC_TABLE, values)
     return values
 
@@ -126,6 +128,7 @@ def decode(message: SampleMessage, data: FrameBytes) -> DecodedFrames:
     InputError
         If the frames have another length than the message.
     """
+    # the positions of all fields rest on the length
     if data.ndim != 2 or data.shape[1] != message.length:
         raise InputError(f"frames of {message.name}", got=str(data.shape), allowed=f"(n, {message.length})")
     n_frames, columns = len(data), message.samples_per_frame * len(message.channels)
@@ -138,6 +141,7 @@ def decode(message: SampleMessage, data: FrameBytes) -> DecodedFrames:
     n_samples = numbers[_N_SAMPLES]
     if message.n_samples is None:
         n_samples[:] = message.samples_per_frame
+    # sample by sample, as blocks and journal have them
     counts = numbers[_N_NUMBERS:].T.astype(np.int32, order="C")
     return DecodedFrames(
         intact,
@@ -268,6 +272,7 @@ def _encoded(
     data = np.zeros((n_frames, message.length), np.uint8)
     _write_samples(message, data, counts)
     sample = np.arange(n_frames, dtype=np.int64) * per_frame
+    # of any size: only as many bits as a frame carries are sent
     counter = first_counter % (1 << 62) + sample
     selector = message.multiplexor_of(counter)
     _write_parts(message.counter, data, selector, counter)
@@ -277,6 +282,7 @@ def _encoded(
     if message.flags is not None and device_flags:
         carrying = _where(message.flags, selector)
         flags = np.zeros(n_frames, np.int64)
+        # in one frame only: each that carries the bit is counted as a loss by the host
         flags[carrying[:1]] = device_flags
         _write_parts([message.flags], data, selector, flags)
     if message.crc is not None:
@@ -304,6 +310,7 @@ def _write_samples(message: SampleMessage, data: FrameBytes, counts: NDArray[np.
             field.write(data, padded[k::per_frame])
     if message.n_samples is not None:
         valid = np.full(n_frames, per_frame, np.int64)
+        # a CAN FD frame says how many of its samples are valid, so that a run may end anywhere
         valid[-1] -= n_missing
         message.n_samples.write(data, valid)
 
@@ -325,6 +332,7 @@ def _latched(
 ) -> IntArray:
     """Clock at the last latch before each frame."""
     at = sample - counter % latch_samples
+    # a stretch may begin in the middle of the eight frames that carry one clock
     before = at < 0
     if before.any() and latched_ticks is None:
         raise InputError(
@@ -358,6 +366,7 @@ def control_frame(message: ControlMessage, **values: int) -> bytes:
             raise InputError(
                 f"signal of {message.name}", got=name, allowed=", ".join(f.name for f in message.fields)
             )
+        # a number of samples beyond the field comes round as the counter does
         field.write(data, value % (1 << field.length))
     crc = message.field("crc_16")
     if crc is not None:

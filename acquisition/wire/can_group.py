@@ -21,6 +21,7 @@ from acquisition.wire.can_counter import CounterTracker, Decided
 from acquisition.wire.can_frames import LOST_DATA, decode
 from acquisition.wire.can_layout import CanLayout, SampleMessage
 
+# a longer clock does not come round, and a turn of it would not fit into 64 bits with a sign
 _CLOCK_WRAP_BITS: Final = 62
 _SHORTEST_SILENCE_NS: Final = 100_000_000
 
@@ -129,6 +130,7 @@ class GroupReceiver:
         now_ns = int(monotonic[-1])
         deliveries: list[Delivery] = []
         right = batch.length == self.message.length
+        # a batch of short classic frames has rows that are narrower than a message of CAN FD
         data = batch.data[right] if right.any() else np.zeros((0, self.message.length), np.uint8)
         frames = decode(self.message, data[:, : self.message.length])
         valid = (frames.n_samples >= 1) & (frames.n_samples <= self.message.samples_per_frame)
@@ -158,9 +160,11 @@ class GroupReceiver:
             not len(monotonic)
             or int(monotonic[-1]) - (int(monotonic[0]) if before is None else before) < _SHORTEST_SILENCE_NS
         ):
+            # the differences between all frames are looked at only where they add up to a silence
             return self.tracker.take(counter, known)
         silences_ns = np.diff(monotonic, prepend=monotonic[:1] if before is None else before)
         at = int(silences_ns.argmax())
+        # what came before the silence is not in doubt
         first = self.tracker.take(counter[:at], known[:at])
         self.tracker.refuse_after_silence(int(silences_ns[at]) * 1e-9, self._sampling_rate_hz)
         return first.followed_by(self.tracker.take(counter[at:], known[at:]))
@@ -200,6 +204,7 @@ class GroupReceiver:
             return
         frames, latch = self._proved, self.message.clock_latch_samples
         n_ready = len(frames)
+        # the clock is complete only with the last of the frames that carry its parts
         if not everything and latch > 1:
             cycle = int(frames.counter.max()) // latch * latch
             n_ready = int(np.argmax(frames.counter >= cycle))
@@ -213,6 +218,8 @@ class GroupReceiver:
         breaks = np.flatnonzero(frames.counter[1:] != frames.counter[:-1] + frames.n_samples[:-1]) + 1
         edges = [0, *breaks.tolist(), len(frames)]
         for first, last in itertools.pairwise(edges):
+            # a block has one clock, at its first sample: frames before the first known clock become a block
+            # without
             timed = next((k for k in range(first, last) if int(frames.counter[k]) in ticks), first)
             if first < timed:
                 yield self._block(frames[first:timed], None, stream)
@@ -232,6 +239,7 @@ class GroupReceiver:
             int(frames.counter[0]),
             counts,
             ticks,
+            # of the block's own last frame, not of the batch: a log has many blocks in one batch
             int(frames.host_monotonic_ns[-1]),
             int(frames.host_utc_ns[-1]),
         )
@@ -257,6 +265,7 @@ class DeviceClock:
         if not self._n_bits or not len(there):
             return {}
         base = frames.counter[there] - frames.counter[there] % latch_samples
+        # counters nearly always grow already
         if (base[1:] < base[:-1]).any():
             order = np.argsort(base, kind="stable")
             base, there = base[order], there[order]
@@ -268,6 +277,7 @@ class DeviceClock:
 
     def unwrapped(self, counter: int, ticks: int) -> int:
         """Clock at a sample, as if it had never come round."""
+        # by the sample counter, which knows how many turns a gap took
         if self._last is not None and self._n_bits < _CLOCK_WRAP_BITS:
             wrap = 1 << self._n_bits
             expected = self._last[1] + (counter - self._last[0]) * self._ticks_per_sample

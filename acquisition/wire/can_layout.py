@@ -25,6 +25,7 @@ STREAM_BITS: Final = 8
 FD_LENGTHS: Final = (8, 12, 16, 20, 24, 32, 48, 64)
 """Lengths of a CAN FD frame from 8 bytes up."""
 
+# checksum 2, counter 4, clock 4, flags 1, number of samples 1
 _FD_HEADER_BYTES = 12
 _CRC = BitField("crc_16", 0, 16)
 
@@ -132,6 +133,8 @@ class SampleMessage:
         """
         if self.multiplexor is None:
             return np.zeros(len(counter), np.int64)
+        # which part of the counter is sent follows from the counter itself, so that no state is needed to make
+        # frames
         part = next((part for part in self.counter if part.field == self.multiplexor), None)
         if part is None:
             raise SourceError(
@@ -233,6 +236,7 @@ COMMAND: Final = ControlMessage("host_command", COMMAND_ID, False, 8, (_CRC, Bit
 
 def _classic_groups(numbered: Sequence[tuple[int, Channel]]) -> list[list[int]]:
     """Pairs of 16-bit channels; wider ones alone. Groups are in the order of their first channel."""
+    # four bytes are left for counts beside checksum, counter and the byte that is sent in turn
     groups: list[list[int]] = []
     half: list[int] | None = None
     for index, channel in numbered:
@@ -252,6 +256,7 @@ def _fd_groups(numbered: Sequence[tuple[int, Channel]]) -> list[list[int]]:
     left = 0
     for index, channel in numbered:
         width = channel.bits // 8
+        # one sample of each channel must fit, as the counter is that of the whole message
         if width > left:
             groups.append([])
             left = FD_LENGTHS[-1] - _FD_HEADER_BYTES
@@ -272,6 +277,8 @@ def _sample_fields(channels: Sequence[Channel], first_byte: int, n_samples: int)
 def _classic_message(
     number: int, channels: Sequence[Channel], indices: tuple[int, ...], has_clock: bool
 ) -> SampleMessage:
+    # The multiplexor is the low bits of the counter, so that byte 2 is its low byte in every frame; eight frames
+    # in a row carry all of it, the whole clock and the flags.
     multiplexor = BitField("sample_counter_0", 16, 3)
     page = [Selected(BitField(f"sample_counter_{bit}", 24, 8), bit, (n,)) for n, bit in enumerate((8, 16, 24))]
     clock = [Selected(BitField(f"device_clock_{bit}", 24, 8), bit, (bit // 8 + 3,)) for bit in (0, 8, 16, 24)]
@@ -294,6 +301,7 @@ def _fd_message(
 ) -> SampleMessage:
     row = sum(channel.bits for channel in channels) // 8
     n_samples = (FD_LENGTHS[-1] - _FD_HEADER_BYTES) // row
+    # CAN FD has a few lengths only; the rest of the frame stays zero
     needed = _FD_HEADER_BYTES + n_samples * row
     return SampleMessage(
         name=f"samples_{number}",

@@ -22,7 +22,9 @@ from sloshlab.errors import SourceError
 
 # device_status comes once per second: so long samples wait for it after a connection that broke
 _LONGEST_WAIT_NS: Final = 3_000_000_000
+# bounds the memory of frames that wait for a status
 _MOST_HELD: Final = 65_536
+# frames may still be on their way when the end is announced
 _END_WAIT_NS: Final = 300_000_000
 _STREAMS: Final = 1 << STREAM_BITS
 # a counter announced that lies back by more is that of a device which started anew
@@ -99,6 +101,7 @@ class CanReceiver:
         start = 0
         status = self._layout.status
         at = np.flatnonzero(_is(batch, status)).tolist() if status is not None else []
+        # cut at every status, since it speaks of what comes after it
         for index in at:
             deliveries += self._samples(batch[start:index], monotonic[start:index], utc[start:index])
             deliveries += self._status(batch.data[index, : batch.length[index]].tobytes(), int(monotonic[index]))
@@ -158,6 +161,7 @@ class CanReceiver:
     def _status(self, data: bytes, now_ns: int) -> list[Delivery]:
         assert self._layout.status is not None
         values = read_control_frame(self._layout.status, data)
+        # a number of samples that was damaged on its way would move all that follows
         if values is None:
             return [Trouble(TroubleKind.CORRUPT_FRAME, "device_status: wrong crc_16 or length", 1, now_ns)]
         deliveries: list[Delivery] = []
@@ -213,6 +217,7 @@ class CanReceiver:
         return [Trouble(TroubleKind.UNCERTAIN_COUNTER, detail, n_frames, now_ns)]
 
     def _restarted(self, stream: int, now_ns: int) -> list[Delivery]:
+        # before the end is told, which stands behind its samples
         deliveries = self._flushed(now_ns)
         if self._ending_since_ns is not None:
             deliveries += self._end()
@@ -222,6 +227,7 @@ class CanReceiver:
         for group in self._groups:
             group.tracker.restart()
         self._n_restarts += 1
+        # numbers of streams have 8 bits and may be drawn again
         self._stream = stream + _STREAMS * self._n_restarts
         self._n_end_seen, self._ended = 0, None
         return deliveries
@@ -245,6 +251,7 @@ class CanReceiver:
         if self._ending_since_ns is None and self._ended is None:
             self._ending_since_ns = now_ns
         is_whole = all(group.is_whole for group in self._groups)
+        # the device announces its end three times; after that it has nothing more to say
         if self._ending_since_ns is not None and (is_whole or self._n_end_seen >= 3):
             deliveries += self._end()
         return deliveries
@@ -266,6 +273,7 @@ class CanReceiver:
 
 
 def _is(batch: FrameBatch, message: SampleMessage | ControlMessage) -> NDArray[np.bool_]:
+    # a frame with 29 bits of the same number is another's, and a remote frame carries nothing
     same: NDArray[np.bool_] = (batch.arbitration_id == message.arbitration_id) & ~batch.remote
     same &= batch.extended == message.extended
     return same

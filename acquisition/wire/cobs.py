@@ -157,6 +157,7 @@ def _decode(data: ByteArray, start: int, stop: int, body: ByteArray, write: int)
         return -1
     while read < stop:
         code = int(np.int64(data[read]))
+        # a code from a damaged stream may point beyond its run, or beyond the buffer
         if code == 0 or read + code > stop:
             return -1
         for k in range(read + 1, read + code):
@@ -165,6 +166,7 @@ def _decode(data: ByteArray, start: int, stop: int, body: ByteArray, write: int)
             body[write] = data[k]
             write += 1
         read += code
+        # neither a block of 254 bytes nor the last one stands for a zero
         if code < 255 and read < stop:
             body[write] = 0
             write += 1
@@ -182,6 +184,7 @@ def _decode_runs(
             continue
         size = stop - start
         if size > 0:
+            # what is longer than any frame is not decoded at all
             end = _decode(data, start, stop, bodies, write) if size <= longest_run else -1
             if end - write < shortest or end - write > longest:
                 n_garbage_bytes += size

@@ -69,6 +69,8 @@ class DescribedDevice(Protocol):
 class _ChannelText(BaseModel):
     """One channel as the text has it: the fields of `Channel`, checked."""
 
+    # strict, as a number written as text is a mistake; a misspelt range_min must not pass for a sensor without
+    # limits
     model_config = ConfigDict(strict=True, extra="forbid")
 
     name: str
@@ -112,6 +114,7 @@ class _DeviceText(BaseModel):
     device: DeviceName
     sampling_rate_hz: Annotated[float, Field(gt=0, le=HIGHEST_SAMPLING_RATE_HZ)]
     clock_hz: Annotated[float, Field(gt=0, le=1e12)] | None = None
+    # of anything: their number is checked before a million of them are looked at
     channels: list[Any]
 
 
@@ -189,7 +192,9 @@ def _loaded(text: bytes) -> Any:
     if len(text) > LONGEST_TEXT:
         raise SourceError("calibration of the device", got=f"{len(text)} bytes", allowed=f"≤ {LONGEST_TEXT}")
     try:
+        # Python reads NaN and Infinity, which JSON does not have
         return json.loads(text.decode(), parse_constant=_refuse_constant)
+    # brackets nested deeply enough end in a RecursionError
     except (ValueError, RecursionError) as error:
         raise SourceError(
             "calibration of the device", got=f"no JSON ({str(error)[:80]})", remedy=_REMEDY

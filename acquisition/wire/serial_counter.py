@@ -55,12 +55,15 @@ class StreamCounter:
         CounterJumpError
             If more samples would be missing than may be.
         """
+        # a device that has been running begins anywhere
         if self._n_arrived == 0:
             self._lowest = self.next = counter
+        # the nearest place, ahead or back: right while fewer than half a turn is missing or late at once
         jump = (counter - self.next + _HALF) % _WRAP - _HALF
         first = self.next + jump
         lowest, following = min(self._lowest, first), max(self.next, first + n_samples)
         n_missing = following - lowest - (self._n_arrived + n_samples)
+        # a peer that sends one sample per allowed gap would otherwise fill a disk with lost ones
         if abs(jump) > self._longest_gap or n_missing > self._n_arrived + n_samples + self._longest_gap:
             raise CounterJumpError(jump, n_missing)
         self._lowest, self.next = lowest, following

@@ -31,7 +31,9 @@ from sloshlab.errors import SourceError
 MOST_STREAMS: Final = 1000
 """A device that starts anew more often than this is broken."""
 
+# devices repeat their calibration once per second; 8 channels at 51.2 kHz fill this in five
 MOST_BYTES_BEFORE_CALIBRATION: Final = 1 << 23
+# so that a late frame of the stream before is not taken for another start
 _STREAMS_REMEMBERED: Final = 8
 _LONGEST_WORDS: Final = 200
 
@@ -178,6 +180,7 @@ class SerialDecoder:
         if isinstance(frame, CalibrationFrame):
             self._take_calibration(frame.text, host)
         elif isinstance(frame, MessageFrame):
+            # shown in a terminal: no control characters from the line
             self.words = "".join(c for c in frame.text[:_LONGEST_WORDS] if c.isprintable())
         elif self.calibration is None and isinstance(frame, SamplesFrame | EndFrame):
             self._hold(frame, host)
@@ -208,11 +211,13 @@ class SerialDecoder:
             for frame, arrival in held:
                 self._take(frame, arrival)
             return
+        # the device repeats it every second
         if text == self._current[0]:
             return
         try:
             calibration = channels_from_calibration(text)
         except SourceError as error:
+            # no failure: the recording keeps the first calibration, which was good
             self._tally.add(TroubleKind.MALFORMED_FRAME, str(error))
             return
         if calibration != self._current[1]:
@@ -233,6 +238,8 @@ class SerialDecoder:
             self._tally.add(TroubleKind.UNCERTAIN_COUNTER, "samples from before the counter began")
             return
         run = self._run
+        # Frames of one read share its host time and become one block. After lost data a block begins even where
+        # the counter shows no gap.
         if run is None or (run.stream, run.following, run.host) != (frame.stream, first, host) or frame.overrun:
             self._finish_run()
             run = self._run = _Run(frame.stream, first, first, host)
@@ -255,6 +262,7 @@ class SerialDecoder:
         assert self.calibration is not None
         rate_hz = self.calibration.sampling_rate_hz
         silent_s = (host.monotonic_ns - state.last_arrival_ns) * 1e-9
+        # a counter of 32 bits is unwrapped to the nearest place, which is wrong after half a turn of silence
         if silent_s * rate_hz > 1 << 31:
             raise self._jump_error(f"silence of {silent_s:.0f} s, in which 32 bits of counter may have wrapped")
         try:
@@ -285,6 +293,7 @@ class SerialDecoder:
                 detail = f"stream {stream} after stream {next(reversed(self._streams))}"
                 self._deliveries.append(Trouble(TroubleKind.RESTARTED, detail, 1, host.monotonic_ns))
             self._n_streams += 1
+            # each start becomes a stream in the journal and a gap in the recording
             if self._n_streams > MOST_STREAMS:
                 raise SourceError(
                     f"source {self._url}",
@@ -301,12 +310,14 @@ class SerialDecoder:
         assert self.calibration is not None
         self.sampling = True
         state = self._stream_state(frame.stream, host)
+        # the end is sent three times, so that one lost frame does not hide it
         if state.ended:
             return
         state.ended = True
         self._finish_run()
         n_samples: int | None = frame.n_samples
         longest_tail = self._longest_gap_s * self.calibration.sampling_rate_hz
+        # an end far beyond the counter would become hours of lost samples
         if not 0 <= frame.n_samples - state.counter.next <= longest_tail:
             n_samples = None
             self._tally.add(

@@ -23,6 +23,7 @@ from acquisition.wire import cobs
 from sloshlab.errors import InputError
 
 VERSION: Final = 1
+# bounds the memory that any sender can make the host use for a frame
 LONGEST_BODY: Final = 65_535
 """Bytes of header, payload and CRC together; what is longer is garbage."""
 
@@ -187,12 +188,14 @@ def _bounded_rest(data: bytes | bytearray | memoryview, start: int) -> tuple[byt
 
     One byte more than any frame has is kept: with it the run stays known as too long until its zero comes.
     """
+    # whoever never sends a zero costs no more memory than the longest frame
     keep = min(len(data), start + _LONGEST_RUN + 1)
     return bytes(data[start:keep]), len(data) - keep
 
 
 def _frame(body: memoryview, n_bytes: int) -> Frame | FrameError:
     content = body[: -_CRC.size]
+    # the checksum first: nothing that a damaged frame says is believed
     if _CRC.unpack(body[-_CRC.size :])[0] != zlib.crc32(content):
         return FrameError(FrameErrorKind.CORRUPT, f"checksum of a frame of {len(body)} bytes", n_bytes)
     try:
@@ -261,6 +264,7 @@ def _counts(payload: memoryview, n_samples: int, n_channels: int, width: int) ->
 def _unpack_24_bits(payload: cobs.ByteArray, counts: CountArray) -> None:
     for k in range(counts.size):
         low, middle, high = payload[3 * k], payload[3 * k + 1], payload[3 * k + 2]
+        # numpy has no integers of 24 bits; the last line gives bit 23 its weight of −2²³
         unsigned = np.int32(low) | (np.int32(middle) << 8) | (np.int32(high) << 16)
         counts[k] = (unsigned ^ 0x800000) - 0x800000
 
@@ -279,6 +283,7 @@ def encode_frame(frame: Frame) -> bytes:
     '03 81 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 05 b9 b0 2e f4 00'
     """
     if isinstance(frame, SamplesFrame):
+        # the clock of the first sample is the one that is sent
         ticks = np.full(len(frame.counts), frame.clock_ticks, np.uint64)
         (encoded,) = encode_samples(
             frame.stream,
@@ -311,6 +316,7 @@ def _content_without_samples(frame: Frame) -> tuple[bytes, bytes]:
 
 def _closed(header: bytes, payload: bytes | memoryview) -> bytes:
     content = b"".join((header, payload))
+    # the checksum is stuffed with the rest, since it may hold zeros itself
     return cobs.encode(content + _CRC.pack(zlib.crc32(content))) + b"\0"
 
 
@@ -352,6 +358,7 @@ def encode_samples(
     [34, 32]
     """
     ticks = np.asarray(clock_ticks, np.uint64)
+    # once for all frames, before any is made
     _require_expressible(counts, bytes_per_count, samples_per_frame)
     n_channels = counts.shape[1]
     packed = memoryview(_packed(counts, bytes_per_count))

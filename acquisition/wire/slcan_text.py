@@ -36,6 +36,7 @@ _IS_ANSWER: Final = np.isin(np.arange(256), np.frombuffer(b"zZVvNFA", np.uint8))
 _LONGEST_ANSWER: Final = 16
 _LARGEST_STANDARD: Final = 0x7FF
 _LARGEST_EXTENDED: Final = 0x1FFF_FFFF
+# the bell, which refuses a command, ends a line as well
 _LINE_ENDS: Final = bytes.maketrans(b"\a\n", b"\r\r")
 
 
@@ -99,6 +100,7 @@ def _frames(letters: _ByteArray, start: IntArray, size: IntArray) -> tuple[Frame
     identifier = np.zeros(len(start), np.int64)
     data = np.zeros((len(start), 64 if (length[allowed] > 8).any() else 8), np.uint8)
     shape = size << 16 | length << 8 | n_id
+    # frames of one shape are a rectangle of letters; a bus has few shapes
     for frame_shape in np.unique(shape[allowed]).tolist():
         these = np.flatnonzero(allowed & (shape == frame_shape))
         digits = _DIGIT[letters[start[these, np.newaxis] + np.arange(1, frame_shape >> 16)]]
@@ -107,6 +109,7 @@ def _frames(letters: _ByteArray, start: IntArray, size: IntArray) -> tuple[Frame
         pairs = digits[:, n_letters + 1 : n_letters + 1 + 2 * n_bytes]
         data[these, :n_bytes] = pairs[:, ::2] << 4 | pairs[:, 1::2] & 15
         allowed[these] = (digits != _NO_DIGIT).all(axis=1)
+    # three and eight hexadecimal digits hold more than 11 and 29 bits
     allowed &= identifier <= np.where(n_id == 8, _LARGEST_EXTENDED, _LARGEST_STANDARD)
     answered = _IS_ANSWER[kind] & (size <= _LONGEST_ANSWER)
     n_garbage = int(size[~allowed & ~answered].sum())

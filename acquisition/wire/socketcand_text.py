@@ -71,11 +71,14 @@ def parse_socketcand(text: bytes) -> SocketcandText:
     others, n_error_frames = b"", 0
     batch = usual
     if n_taken < len(whole):
+        # slower, but right for any spacing and for whatever stands between frames
         found = _FRAME.findall(whole, n_taken)
         others, n_error_frames = _ERROR.subn(b"", _FRAME.sub(b"", whole[n_taken:]))
         batch = usual.followed_by(_batch(found))
     n_garbage_bytes = len(_HARMLESS.sub(b"", others)) + len(_HARMLESS.sub(b"", between))
+    # a peer that never closes a message must not fill the memory
     if len(rest) > LONGEST_MESSAGE_BYTES:
+        # counted at once: the end that would count it may never come
         n_garbage_bytes, rest = n_garbage_bytes + len(rest), b""
     return SocketcandText(batch, rest, n_error_frames, n_garbage_bytes)
 
@@ -179,6 +182,7 @@ def _take_usual(text: FrameBytes, digits: IntArray, room: _Room) -> tuple[int, i
             n_bytes += 1
             k += 2
         if k < 0 or k + 1 >= text.size or text[k] != _SPACE or text[k + 1] != _GREATER:
+            # the row is used again by the next frame
             data[n] = 0
             return n, at
         identifiers[n], extended[n], length[n] = value & 0x1FFFFFFF, n_digits == 8, n_bytes
