@@ -153,6 +153,7 @@ def growth_rate(model, x, y, settling):  # type: ignore[no-untyped-def]
             slope = 0.0
             for i in range(m):
                 slope -= factors[i] * (phi[n_in + b] - theta[i * p + n_in + b])
+            # linearised about the run itself: a real second run would soon differ by too much, or not at all
             new += slope * difference[output_delays[b] - 1]
         for b in range(reach - 1, 0, -1):
             difference[b] = difference[b - 1]
