@@ -71,8 +71,8 @@ def _relaxing_springs(motion, parameters, memory, rates):
     """
     middle = 2.0 * pi * parameters[2]
     slowest = 10.0 ** -parameters[3]
-    # evenly spaced logarithms: such a sum loses nearly the same share over all frequencies between the slowest and the
-    # fastest
+    # evenly spaced logarithms: such a sum loses nearly the same share at all frequencies between the slowest and
+    # the fastest
     ratio = (_FASTEST / slowest) ** (1.0 / (_N_SPRINGS - 1))
     relative, force, loss = slowest, 0.0, 0.0
     for j in range(_N_SPRINGS):

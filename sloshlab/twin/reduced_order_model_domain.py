@@ -103,6 +103,7 @@ def _cycles_seen(simulation: Simulation, term: Term) -> MotionCycles:
     positions = np.arange(0.0, velocity.size, 1 / ratio) if ratio < 1 else np.empty(0)
     if positions.size < _SHORTEST:
         return motion_cycles(velocity, rate_hz)
+    # in the band that the model sees: higher modes would split cycles that it never noticed
     return motion_cycles(resampled(velocity, positions, rate_ratio=ratio), ratio * rate_hz)
 
 

@@ -123,6 +123,7 @@ def _of_tank(simulation: Simulation, order: int) -> FloatArray:
 def _force(simulation: Simulation, place: str, attributes: Mapping[str, Any], n_cells: int) -> FloatArray | None:
     sign = -1.0 if attributes.get("block_from") == "tank" else 1.0
     if place.startswith("cell"):
+        # cells carry equal shares: the twin's tank does not tilt
         return sign * simulation.interface_force_n / n_cells
     return sign * simulation.interface_force_n if place in ("interface", "total") else None
 

@@ -60,6 +60,7 @@ def save_twin(twin: Twin, path: str | os.PathLike[str]) -> None:
     """
     file = Path(path)
     tables = {f"term_{i}": term.table for i, term in enumerate(twin.terms) if term.table.size}
+    # arrays first: a text without its arrays would be a twin that cannot be loaded
     if tables:
         _write_arrays(file.with_suffix(".nc"), tables)
     write_bytes(file, _text(twin).encode())
@@ -94,6 +95,7 @@ def load_twin(path: str | os.PathLike[str]) -> Twin:
 def _number(value: float) -> str:
     if math.isinf(value):
         return "inf" if value > 0 else "-inf"
+    # `repr` gives the shortest text that reads back as the same number
     return "nan" if math.isnan(value) else repr(float(value))
 
 

@@ -150,6 +150,7 @@ class ForceKind:
         values = {parameter.name: _checked(self.name, parameter, numbers) for parameter in self.parameters}
         if self.check is not None:
             self.check(values)
+        # a copy that cannot be written: terms are shared between twins
         array = np.array(table, dtype=np.float64).ravel()
         array.setflags(write=False)
         return Term(self, where, values, array)
@@ -214,6 +215,7 @@ def register(kind: ForceKind) -> ForceKind:
         If another kind has this name.
     """
     other = _KINDS.setdefault(kind.name, kind)
+    # a module that is imported again registers its own kinds once more, which is no clash
     if other is not kind and other.law.function.__qualname__ != kind.law.function.__qualname__:
         raise InputError(f"force {kind.name}", got="a name that is taken", remedy="choose another name")
     _KINDS[kind.name] = kind
