@@ -96,6 +96,7 @@ def error_by_frequency(
     AnalysisError
         If no window lies at the tuned frequency.
     """
+    # a band of its own, which no other one shares: its windows were used to tune
     low, high = tuned_omega_bar * (1 - tuned_half_width), tuned_omega_bar * (1 + tuned_half_width)
     tuned = (omega_bar >= low) & (omega_bar <= high)
     if not tuned.any():
@@ -123,6 +124,7 @@ def _limits(omega_bar: FloatArray, low: float, high: float, n_bands: int) -> lis
 
 
 def _band(low: float, high: float, is_tuned: bool, measured: FloatArray, ball: FloatArray) -> FrequencyBand:
+    # a ball that is pressed through a wall dissipates nothing that could be compared; such windows are counted
     inside = np.isfinite(ball)
     counts = int(inside.sum()), int((~inside).sum())
     error = (ball - measured)[inside]
