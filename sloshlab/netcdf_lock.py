@@ -8,4 +8,6 @@ from __future__ import annotations
 import threading
 from typing import Final
 
+# Two threads that read at once ended in a segmentation fault. Re-entrant, because writing validates what it
+# reads.
 NETCDF_LOCK: Final = threading.RLock()

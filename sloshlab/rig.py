@@ -162,6 +162,7 @@ class Rig(_Described):
         """
         file = Path(path)
         try:
+            # before it is read: a wrong path may name a recording
             if file.stat().st_size > _LARGEST_RIG_FILE_BYTES:
                 raise RigError(
                     f"rig {file}",
