@@ -29,7 +29,6 @@ FORMAT: Final = "1"
 MAXIMUM_DECODED_BYTES: Final = 6 * 2**30
 """Recordings that would need more memory than this once decoded are refused before allocation."""
 
-# Rounding of a time in seconds stays below it; a device clock that was not resampled does not.
 JITTER_ALLOWED_STEPS: Final = 1e-6
 """Largest deviation of the time coordinate from a uniform one, in steps."""
 
@@ -44,7 +43,7 @@ _QUALITY_MEANINGS: Final = {
     STUCK: "stuck",
 }
 
-# Two hundred thousand times are checked at once, so that no copy of a long time coordinate is made.
+# Times are checked part by part, so that no copy of a long coordinate is made.
 _TIME_CHUNK = 1 << 18
 _DECODING_BLOCK = 1 << 20
 
@@ -188,7 +187,7 @@ def read_recording(
 @contextlib.contextmanager
 def _opened(file: Path) -> Iterator[Any]:
     """Open a netCDF file for reading; whatever the reader stumbles over becomes one `RecordingError`."""
-    # late, as importing it takes longer than many commands do
+    # heavy, and so imported only where a file is opened
     import netCDF4
 
     if not file.is_file():
@@ -198,7 +197,7 @@ def _opened(file: Path) -> Iterator[Any]:
         # before the library opens it: a damaged heap keeps HDF5 busy for ever, and no exception ends that
         require_sound_structure(file)
         with NETCDF_LOCK, netCDF4.Dataset(file, mode="r") as source:
-            # counts are scaled here, block by block; masked arrays would need several times the memory
+            # counts are scaled here, block by block, so that only the result is large
             source.set_auto_maskandscale(False)
             yield source
     except RecordingError:
@@ -256,7 +255,7 @@ def write_recording(
     RecordingError
         If the data set breaks the format; nothing is written then.
     """
-    # before anything is written: a file that no reader takes is worse than none
+    # nothing is written that `read_recording` would refuse
     validate_recording(recording, name=str(path))
     chosen: dict[str, dict[str, Any]] = {}
     for name, variable in recording.variables.items():
@@ -460,7 +459,7 @@ def _decoded_values(variable: Any, scale: float, offset: float, fill: float | No
     Block by block, so that only the result is large. Up to 16 bits float32 has no rounding that matters.
     """
     stored = np.dtype(variable.dtype)
-    # 24 bits of single precision hold 16 of a converter exactly, unless a large offset takes them
+    # 24 bits of precision are enough for 16 of a converter, unless a large offset takes them
     few_bits = stored.kind in "iu" and stored.itemsize <= 2 and abs(offset) <= 2**15 * abs(scale)
     values = np.empty(len(variable), dtype=np.float32 if few_bits or stored == np.float32 else np.float64)
     storage = variable.chunking()
