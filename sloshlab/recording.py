@@ -554,6 +554,7 @@ def _validated(model: type[M], attributes: Mapping[Any, Any], *, what: str) -> M
     try:
         return model.model_validate(plain)
     except ValidationError as error:
+        # the first breach only: one line names one place and its remedy
         first = error.errors()[0]
         place = str(first["loc"][0]) if first["loc"] else "attributes"
         missing = first["type"] == "missing"

@@ -122,6 +122,7 @@ class BouncingBall:
         """The [twin] table of a rig file, as text."""
         values: dict[str, Any] = dataclasses.asdict(self)
         lines = ["[twin]", 'tank_model = "bouncing_ball"', "", "[twin.parameters]"]
+        # `repr`: read again, every number is the same
         return "\n".join([*lines, *(f"{name} = {value!r}" for name, value in values.items())]) + "\n"
 
 

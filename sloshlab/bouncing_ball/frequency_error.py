@@ -148,6 +148,7 @@ def summary(bands: Sequence[FrequencyBand]) -> tuple[float, float]:
     (tuned,) = (band for band in bands if band.is_tuned)
     others = [band for band in bands if not band.is_tuned and band.n_windows]
     n = np.array([band.n_windows for band in others], dtype=float)
+    # bands are pooled by their windows: a mean over bands would count one of few windows as much as one of many
     squares = [np.array([getattr(band, name) for band in others]) ** 2 for name in ("error_rms", "measured_rms")]
     error, measured = (float((n * square).sum()) for square in squares)
     return tuned.relative_error, float(np.sqrt(error / measured)) if measured > 0 else float("nan")

@@ -114,7 +114,7 @@ def guide_from_decay(
     reading = analyse_free_decay(acceleration, sampling_rate_hz).log_decrement
     stiffness = mass * (2 * math.pi * float(np.median(reading.frequency_hz[reading.used]))) ** 2
     duration = acceleration.size / sampling_rate_hz
-    # ζ of small damping is linear in b₀ and b₁; what large amplitudes add is found by simulation
+    # closed form for small ζ, which is linear in b₀ and b₁; the simulation goes on from there
     start = _closed_form(measured, mass, stiffness)
 
     def curve(values: FloatArray) -> DampingCurve:

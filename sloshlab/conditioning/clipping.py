@@ -64,6 +64,7 @@ def clipping_limits(channel: xr.DataArray) -> tuple[float, float]:
     step = float(channel.attrs.get("adc_step", channel.encoding.get("scale_factor", 0.0)))
     ends = [abs(end) for end in (low, high) if np.isfinite(end)]
     span = high - low if len(ends) == 2 else sum(ends)
+    # never zero: float limits of a converted unit are off by rounding
     margin = max(abs(step) / 2, _RANGE_SHARE * span)
     return low + margin, high - margin
 

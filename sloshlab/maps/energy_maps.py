@@ -165,6 +165,7 @@ class _Grid:
 def _grids(frequency_hz: FloatArray, amplitude_m: FloatArray, rig: Rig | None, n_grid: int) -> list[_Grid]:
     """Grids over u₀ and, with a tank, over ū and v̄, that cover the given windows."""
     frequencies = np.linspace(frequency_hz.min(), frequency_hz.max(), n_grid)
+    # v̄ √(gh) = Ωu₀: along a line of constant v̄ the displacement falls with the frequency
     per_speed = 1 / (2 * np.pi * frequencies)
 
     def grid(largest: float, metres_per_unit: FloatArray) -> _Grid:

@@ -118,6 +118,7 @@ class ModalFilter:
         # q̈ = Ψ⁺ a (2.25)
         coordinates = self.weights @ values
         residual = _rms(values - self.mode_shapes @ coordinates)
+        # what is left over is the only sign of a mode that was not kept, or of a sensor that is wrong
         share = residual / np.maximum(_rms(values), np.finfo(float).tiny)
         return ModalResponse(self.mode_names, self.sensor_names, coordinates, residual, share, sampling_rate_hz)
 

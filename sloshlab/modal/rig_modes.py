@@ -204,6 +204,7 @@ def rig_modal_filter(rig: Rig, places_m: Mapping[str, float], *, n_modes: int | 
     tip = np.asarray(structure.tip_mode_shape[: len(names)])
     # along the whole beam, as the largest deflection of a higher mode need not be at a sensor
     along = cantilever_modes(beam, n_modes=len(names)).mode_shape * tip
+    # ψ is 1 at the tip in the closed form; a rig may state another scale
     at_sensors = _shapes_at(beam, list(places_m.values()), len(names)) * tip
     return modal_filter(
         at_sensors,

@@ -124,6 +124,7 @@ class Spectra:
     @property
     def output_psd_interval(self) -> FloatArray:
         """Ends of the 90 % intervals of S_yy, shape (2, n_outputs, n_lines)."""
+        # real and imaginary part of every averaged line count
         n_free = 2 * self.normalisation.n_effective_averages
         tails = chi2.ppf([0.5 + CONFIDENCE / 2, 0.5 - CONFIDENCE / 2], n_free)
         return np.asarray(n_free / tails[:, None, None] * self.output_psd[None])

@@ -119,6 +119,7 @@ def update_beam(
         # relative errors: the third frequency is twenty times the first one
         return np.asarray(np.log(modelled / measured) / relative)
 
+    # away from the bound at zero, where a step to one side only is left
     start = np.array([0.0, max(beam.tip_mass_kg / beam_mass, 1e-3)])
     found = least_squares(misfit, start, bounds=([-5, 0], [5, 1e3]), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     covariance = np.linalg.pinv(found.jac.T @ found.jac)

@@ -162,7 +162,7 @@ class Ensemble:
         """
         reach = self.residual.reach_of(probability)
         mean, std = _mean_and_std([member.simulate(x, start) for member in self.members])
-        # what members disagree about and what no model can know are independent: variances add
+        # what members disagree about and what no model can know are taken as independent: variances add
         half = reach * np.sqrt(std**2 + self.residual.variance(mean, self.sampling_rate_hz))
         return PredictedRange(mean, mean - half, mean + half, std, probability)
 
@@ -330,7 +330,6 @@ def local_mean_square(values: FloatArray, sampling_rate_hz: float) -> FloatArray
     [0.04, 5.71, 9.0]
     """
     keep = math.exp(-1 / (LEVEL_TIME_CONSTANT_S * sampling_rate_hz))
-    # backward-looking, as an interval must be known at its own instant
     return np.asarray(lfilter([1 - keep], [1, -keep], np.nan_to_num(values) ** 2))
 
 

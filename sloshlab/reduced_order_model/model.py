@@ -91,6 +91,8 @@ class ReducedOrderModel:
         if self.delays.n_states != n_states or (self.agitation and len(self.agitation.scales) != n_states):
             allowed = f"{self.delays.n_states} scaled states, as many as among the regressors"
             raise InputError("memory of the model", got=f"{n_states} states", allowed=allowed)
+        # a break-up is a gain on a model of the steady state: fed back, its output would not be what the network
+        # was trained on
         if self.break_up is not None and self.delays.outputs:
             raise InputError("memory of the model", got="a break-up and feedback", allowed="one of them")
         if self.theta.shape != (self.network.n_parameters,) or not np.isfinite(self.theta).all():

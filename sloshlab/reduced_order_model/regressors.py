@@ -74,6 +74,7 @@ class Delays:
     @property
     def is_one_line(self) -> bool:
         """Whether φ is a stretch of past inputs without holes, and nothing else."""
+        # only the moments of a line without holes are correlations of one signal
         first = self.inputs[0]
         only_inputs = not self.outputs and not self.n_states
         return only_inputs and self.inputs == tuple(range(first, first + len(self.inputs)))

@@ -103,6 +103,7 @@ def stability(
         simulated = model.simulate(x)
         return Stability(-math.inf, _bound(model), float(np.nanmax(np.abs(simulated))))
     run_x = (x - model.scaling.input_offset) / model.scaling.input_scale
+    # no force, in the network's values
     y = np.full(n_samples, -model.scaling.output_offset / model.scaling.output_scale)
     rate = growth_rate(model.compiled(), run_x, y, round(_SETTLING * n_samples))
     largest = float(np.abs(model.scaling.output_of(y)).max())

@@ -96,6 +96,7 @@ def vertex(abscissa: FloatArray, values: FloatArray) -> tuple[float, float]:
     [1.3, 5.0]
     """
     at = int(np.nanargmax(values))
+    # at an end of the sweep the true peak may lie beyond; it is not extrapolated
     if not 0 < at < values.size - 1:
         return float(abscissa[at]), float(values[at])
     x, y = abscissa[at - 1 : at + 2], values[at - 1 : at + 2]

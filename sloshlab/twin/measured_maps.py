@@ -60,6 +60,7 @@ def terms_from_maps(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tu
         damping = _damping_kg_per_s(rig, maps["w_bar"], str(metric), frequency, parameters)
         return (VISCOUS_DAMPING(place="tank", damping_n_s_per_m=damping),)
     following: dict[str, Any] = {"liquid_mass_kg": rig.liquid_mass_kg, "height_m": rig.tank.height_m}
+    # a map needs a frequency before the motion has shown one
     following["start_frequency_hz"] = frequency
     if "time_constant_s" in parameters:
         following["time_constant_s"] = parameters["time_constant_s"]

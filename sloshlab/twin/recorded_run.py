@@ -111,6 +111,8 @@ def drive_of(recording: xr.Dataset, twin: Twin, *, block: Block = "all", by_nois
 def _driven_tank(recording: xr.Dataset, twin: Twin, *, by_noise: bool) -> Drive:
     names = acceleration_channels(recording)
     rate = run_attributes(recording).sampling_rate_hz
+    # by noise: a loud sensor would bring half of its noise into the drive; alike by default, which makes errors
+    # of the gains least
     weights = weights_by_noise(recording, names) if by_noise else None
     mean = mean_acceleration(recording, names, weights).values
     acceleration, n_driven, flags = _usable(recording, names, mean)
@@ -212,6 +214,7 @@ def _usable(
     good = np.isfinite(series)
     n_driven = series.size
     for start, stop in runs(good, False):
+        # at the ends there is nothing to bridge to
         if stop - start > LONGEST_BRIDGE or start == 0 or stop == series.size:
             n_driven = start
             break

@@ -108,6 +108,8 @@ def true_channel(
     order = ORDER_OF_DERIVATIVE[quantity]
     along = attributes.get("x_m")
     has_structure = simulation.twin.structure is not None
+    # the control accelerometer is on what the shaker moves: the tank, or the base where a structure carries the
+    # tank
     if place.startswith("root") or along == 0.0 or (place.startswith("control") and has_structure):
         return simulation.base_motion[:, order] if has_structure else None
     if place.startswith("beam"):

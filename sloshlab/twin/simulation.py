@@ -67,6 +67,7 @@ class Simulation:
     @cached_property
     def places(self) -> FloatArray:
         """Displacement, velocity, acceleration of structure (relative) and tank (absolute), shape (n, 2, 3)."""
+        # made when they are asked for: they follow from the modes, and keeping them would cost every simulation
         relative = np.stack([self._relative(order) for order in range(3)], axis=-1)
         return np.stack([relative, relative + self.base_motion], axis=1)
 

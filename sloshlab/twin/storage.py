@@ -33,6 +33,7 @@ from sloshlab.twin.twin import Twin
 
 FloatArray = npt.NDArray[np.float64]
 FORMAT: Final = 1
+# Checked before anything is read: a file may hold anything.
 _LARGEST_TEXT_BYTES, _LARGEST_ARRAYS_BYTES = 1_000_000, 200_000_000
 _MOST_TERMS = 1000
 _STRUCTURE_ARRAYS = (

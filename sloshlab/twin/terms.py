@@ -158,6 +158,7 @@ class ForceKind:
 
 def _checked(kind: str, parameter: Parameter, numbers: Mapping[str, float]) -> float:
     value: Any = numbers.get(parameter.name, parameter.default)
+    # True and False are numbers to Python, but not to a person who fills in a rig file
     good = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
     if not good or not (math.isfinite(value) and parameter.low <= value <= parameter.high):
         raise InputError(
