@@ -28,6 +28,7 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
+    # beside the target, because a file can be moved into place at once only within one file system
     handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=".part" + target.suffix, dir=target.parent)
     os.close(handle)
     temporary = Path(name)
@@ -37,8 +38,10 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
+        # atomic: readers see the old file or the new one, never a part
         os.replace(temporary, target)
     finally:
+        # also after success, when it has been moved away
         temporary.unlink(missing_ok=True)
 
 

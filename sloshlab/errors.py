@@ -17,6 +17,7 @@ def _one_line(what: str, got: str, allowed: str, remedy: str) -> str:
         f"allowed: {allowed}" if allowed else "",
         f"remedy: {remedy}" if remedy else "",
     ]
+    # one line, whatever the text of a library's own error contains: a command tells every refusal in one line
     details = "; ".join(part for part in parts if part)
     return " ".join((f"{what}: {details}" if details else what).split())
 

@@ -17,6 +17,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HEAP = b"GCOL\x01\x00\x00\x00"
 _HEAP_HEADER_BYTES = 16
 _OBJECT_HEADER = struct.Struct("<HHIQ")
+# Objects of a heap are padded to it.
 _ALIGNMENT = 8
 
 

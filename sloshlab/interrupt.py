@@ -30,12 +30,14 @@ def held() -> Iterator[None]:
         yield
         return
     arrived: list[tuple[Any, ...]] = []
+    # noted only: raised here, it could fall between a lock that is taken and the note that it is
     signal.signal(signal.SIGINT, lambda *told: arrived.append(told))
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
         if arrived:
+            # handed to whoever handled it before, not raised: a program with its own handler goes on having it
             before(*arrived[0])
 
 
@@ -52,6 +54,7 @@ def never_lost() -> Iterator[None]:
     KeyboardInterrupt
     """
     before = signal.getsignal(signal.SIGINT)
+    # a handler of somebody else's is left alone: taken over, a command gave back None at its end
     if threading.current_thread() is not threading.main_thread() or before is not signal.default_int_handler:
         yield
         return
@@ -64,6 +67,7 @@ def never_lost() -> Iterator[None]:
 
     def sent_again(dropped: Any) -> None:
         if issubclass(dropped.exc_type, KeyboardInterrupt):
+            # sent again a moment later: within the clean-up it would be dropped once more
             threading.Timer(_AFTER_THE_CLEAN_UP_S, _thread.interrupt_main).start()
         else:
             dropped_before(dropped)
@@ -72,6 +76,8 @@ def never_lost() -> Iterator[None]:
     signal.signal(signal.SIGINT, noted)
     try:
         yield
+    # compiled code that was looking at its arguments says SystemError, a module that was being loaded
+    # ImportError
     except (SystemError, ImportError) as error:
         if not arrived:
             raise

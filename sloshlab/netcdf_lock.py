@@ -8,4 +8,5 @@ from __future__ import annotations
 import threading
 from typing import Final
 
+# Two threads that read at once could end in a segmentation fault.
 NETCDF_LOCK: Final = threading.RLock()

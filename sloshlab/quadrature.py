@@ -13,9 +13,12 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+# Of the polynomial of fifth degree through six samples. A symmetric rule errs in amplitude only; a phase error
+# would turn reactive power, up to forty times the dissipated one, into work.
 STEP_WEIGHTS: npt.NDArray[np.float64] = np.array([11.0, -93.0, 802.0, 802.0, -93.0, 11.0]) / 1440.0
 """Weights of samples i-2 … i+3 in the integral over the step from i to i+1, in steps."""
 
+# three for the weights of a boundary, three more for the step rule of the inner integral
 MARGIN_SAMPLES = 6
 """Samples beyond a boundary that the integral of an integral may touch."""
 
@@ -40,6 +43,8 @@ def _lagrange_integrals() -> npt.NDArray[np.float64]:
 
 def _gregory_corrections() -> npt.NDArray[np.float64]:
     """What whole steps from sample p on give to samples p-3 … p+2 beyond a weight of one from p on."""
+    # As in Gregory's formula: inside, the step rules of overlapping steps add up to one; only near a boundary
+    # some miss.
     cumulative = np.concatenate([[0.0], np.cumsum(STEP_WEIGHTS)[:5]])
     return np.asarray(cumulative - np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]))
 
@@ -62,6 +67,7 @@ def boundary_weights(fraction: float, weights: npt.NDArray[np.float64]) -> None:
     """
     for j in range(6):
         value = 0.0
+        # Horner's scheme; at fraction 0 only the correction of the whole steps is left
         for power in range(6, 0, -1):
             value = (value + _PARTIAL_STEP[j, power]) * fraction
         weights[j] = value + _GREGORY[j]

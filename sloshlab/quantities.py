@@ -180,5 +180,7 @@ def described(dataset: xr.Dataset) -> xr.Dataset:
             attributes["units"] = quantity.units
         if str(name) not in QUANTITIES:
             attributes["long_name"] = f"standard error of: {quantity.long_name}"
+        # replaced, not added to: arithmetic of xarray keeps attributes, and the square of a force would still
+        # say N
         result[name].attrs = attributes
     return result

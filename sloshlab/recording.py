@@ -44,6 +44,7 @@ _QUALITY_MEANINGS: Final = {
     STUCK: "stuck",
 }
 
+# Times are checked part by part, so that no copy of a long coordinate is made.
 _TIME_CHUNK = 1 << 18
 _DECODING_BLOCK = 1 << 20
 
@@ -191,14 +192,17 @@ def read_recording(
 @contextlib.contextmanager
 def _opened(file: Path) -> Iterator[Any]:
     """Open a netCDF file for reading; whatever the reader stumbles over becomes one `RecordingError`."""
+    # heavy, and so imported only where a file is opened
     import netCDF4
 
     if not file.is_file():
         got = "a folder" if file.is_dir() else "no such file"
         raise RecordingError(f"recording {file}", got=got, allowed="a netCDF-4 file", remedy="check the path")
     try:
+        # before the library opens it: a damaged heap keeps HDF5 busy for ever, and no exception ends that
         require_sound_structure(file)
         with NETCDF_LOCK, netCDF4.Dataset(file, mode="r") as source:
+            # counts are scaled here, block by block, so that only the result is large
             source.set_auto_maskandscale(False)
             yield source
     except RecordingError:
@@ -256,13 +260,17 @@ def write_recording(
     RecordingError
         If the data set breaks the format; nothing is written then.
     """
+    # nothing is written that `read_recording` would refuse
     validate_recording(recording, name=str(path))
     chosen: dict[str, dict[str, Any]] = {}
     for name, variable in recording.variables.items():
         compressed = {"zlib": True, "complevel": 4, "shuffle": True} if variable.ndim else {}
+        # texts of varying length cannot be compressed
         if variable.dtype.kind not in "fiu":
             compressed = {}
         chosen[str(name)] = {**compressed, **(encoding or {}).get(str(name), {})}
+    # an interrupt within xarray's call would leave its lock taken and closing would wait for ever: it is held
+    # back
     with atomic_file.replaced(path) as temporary, NETCDF_LOCK, interrupt.held():
         recording.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=chosen)
 
@@ -358,6 +366,7 @@ def _check_size(source: Any, n_samples: int, name: str, maximum_decoded_bytes: i
         size = 1
         for dimension in variable.dimensions:
             size *= len(source.dimensions[dimension])
+        # declared sizes, eight bytes each once decoded; nothing is read yet
         needed += 8 * size
     if needed > maximum_decoded_bytes:
         raise RecordingError(
@@ -388,8 +397,10 @@ def _check_time(time: np.ndarray, rate_hz: float, name: str) -> None:
                 allowed="uniform seconds",
                 remedy="time is never lost: keep it and flag the samples",
             )
+        # against the grid, not from step to step: small errors of steps may add up to a gap
         deviation = np.abs(chunk - (time[0] + step * np.arange(start, start + chunk.size)))
         worst = max(worst, float(deviation.max()))
+    # late times of a long run have fewer digits behind the point than a millionth of a step
     resolution = 4 * np.spacing(max(abs(float(time[0])), abs(float(time[-1]))))
     if worst > JITTER_ALLOWED_STEPS * step + resolution:
         raise _time_error(time, step, worst, name)
@@ -398,6 +409,7 @@ def _check_time(time: np.ndarray, rate_hz: float, name: str) -> None:
 def _time_error(time: np.ndarray, step: float, worst: float, name: str) -> RecordingError:
     """A wrong rate if the mean and the usual step both differ from the stated one, else jitter or a jump."""
     mean_step = float(time[-1] - time[0]) / (time.size - 1)
+    # a gap changes the mean step, not the usual one: only both together mean a wrong rate
     usual_step = float(np.median(np.diff(time)))
     rate_error = abs(mean_step - step) * (time.size - 1)
     off = min(abs(mean_step / step - 1), abs(usual_step / step - 1))
@@ -430,6 +442,7 @@ def _decoded_channel(channel: str, variable: Any, attributes: dict[str, Any], na
     kind = np.dtype(variable.dtype).kind
     if kind not in "fiu":
         raise RecordingError(f"{name}: {channel}", got=f"values of type {variable.dtype}", allowed="numbers")
+    # units once, on reading: counts go to SI in one multiplication
     scale = _number(attributes, "scale_factor", 1.0, channel, name) * factor
     offset = _number(attributes, "add_offset", 0.0, channel, name) * factor
     fill = attributes.get("_FillValue", attributes.get("missing_value"))
@@ -437,6 +450,7 @@ def _decoded_channel(channel: str, variable: Any, attributes: dict[str, Any], na
     kept = {key: value for key, value in attributes.items() if key not in _STORAGE_ATTRIBUTES}
     kept["units"] = SI_UNITS[described.quantity]
     if kind in "iu":
+        # clipping is judged by half a step of the converter, which floats no longer show
         kept["adc_step"] = abs(scale)
     for key in _SCALED_ATTRIBUTES:
         if key in kept:
@@ -450,10 +464,12 @@ def _decoded_values(variable: Any, scale: float, offset: float, fill: float | No
     Block by block, so that only the result is large. Up to 16 bits float32 has no rounding that matters.
     """
     stored = np.dtype(variable.dtype)
+    # 24 bits of precision are enough for 16 of a converter, unless a large offset takes them
     few_bits = stored.kind in "iu" and stored.itemsize <= 2 and abs(offset) <= 2**15 * abs(scale)
     values = np.empty(len(variable), dtype=np.float32 if few_bits or stored == np.float32 else np.float64)
     storage = variable.chunking()
     block = storage[0] if isinstance(storage, list) else _DECODING_BLOCK
+    # whole storage chunks, or each would be decompressed twice
     block = max(block, _DECODING_BLOCK // block * block)
     for start in range(0, values.size, block):
         raw = variable[start : start + block]
@@ -501,6 +517,7 @@ def _check_lost_are_flagged(recording: xr.Dataset, name: str) -> None:
         raise RecordingError(f"{name}: quality", got=f"{flags.dtype}{flags.dims}", allowed="uint8(time)")
     for channel in channels(recording):
         values = recording[channel].values
+        # one pass without an array of flags; most channels are whole
         if np.isfinite(values.sum()):
             continue
         not_finite = ~np.isfinite(values)
@@ -542,6 +559,7 @@ def _validated(model: type[M], attributes: Mapping[Any, Any], *, what: str) -> M
     try:
         return model.model_validate(plain)
     except ValidationError as error:
+        # the first breach only: one line names one place and its remedy
         first = error.errors()[0]
         place = str(first["loc"][0]) if first["loc"] else "attributes"
         missing = first["type"] == "missing"

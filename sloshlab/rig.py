@@ -18,6 +18,7 @@ from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import RigError
 from sloshlab.registry import Registry, one_of
 
+# Strict: a number that is written as text is an error.
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 NonNegativeFloat = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 
@@ -162,6 +163,7 @@ class Rig(_Described):
         """
         file = Path(path)
         try:
+            # before it is read: a wrong path may name a recording
             if file.stat().st_size > _LARGEST_RIG_FILE_BYTES:
                 raise RigError(
                     f"rig {file}",
@@ -197,6 +199,7 @@ class Rig(_Described):
         try:
             return cls.model_validate(document)
         except ValidationError as error:
+            # the first breach only: one line names one place and its remedy
             first = error.errors()[0]
             place = ".".join(str(part) for part in first["loc"]) or "rig"
             raise RigError(

@@ -58,6 +58,7 @@ in UDUNITS 'g' is the gram; a force in gram-force is 'gf', an acceleration in g 
     si = SI_UNITS[quantity]
     if units == si:
         return 1.0
+    # only where the units are not SI already
     import cf_units
 
     what = f"units of {_article(quantity)} {quantity}"
@@ -73,6 +74,7 @@ in UDUNITS 'g' is the gram; a force in gram-force is 'gf', an acceleration in g 
         convertible = False
     if not convertible:
         raise UnitsError(what, got=repr(units), allowed=f"units convertible to {si}", remedy=remedy)
+    # with an offset no factor is right
     if source.convert(0.0, si) != 0.0:
         raise UnitsError(what, got=repr(units), allowed="units without an offset", remedy=remedy)
     return float(source.convert(1.0, si))

@@ -44,6 +44,7 @@ def viscous_damping_kg_per_s(
     for name, value in (("liquid_mass_kg", liquid_mass_kg), ("tank_height_m", tank_height_m)):
         if not (math.isfinite(value) and value > 0):
             raise AnalysisError(name, got=str(value), allowed="> 0")
+    # (E.4); the printed c₁ = 3.40 … c_rand = 3.686 kg/s need ω̄₁ = 3.55, though 2π·10.87 Hz/√(g/h) is 3.597
     return liquid_mass_kg / math.pi * math.sqrt(GRAVITY_M_PER_S2 / tank_height_m) * omega_bar * w_bar
 
 
@@ -123,6 +124,7 @@ def _mean_over(u_bar: np.ndarray, values: np.ndarray, measured: np.ndarray) -> f
     both = measured[1:] & measured[:-1]
     if not both.any():
         return float(values[measured].mean())
+    # only stretches with measured ends: a gap in the map has no mean
     widths = np.diff(u_bar)[both]
     middles = (0.5 * (values[1:] + values[:-1]))[both]
     return float((widths * middles).sum() / widths.sum())

@@ -56,6 +56,7 @@ class BouncingBall:
                 allowed="bouncing_ball",
                 remedy="identify one with `sloshlab ball`",
             )
+        # through the twin, so that the same bounds and defaults hold as in a simulation
         (term,) = Twin.from_rig(rig).tank_alone().terms
         names = [parameter.name for parameter in dataclasses.fields(cls)]
         return cls(**{name: term.values[name] for name in names})
@@ -110,6 +111,7 @@ class BouncingBall:
         RigError
             If the rig has no structure.
         """
+        # without the rig's own tank model, or two liquids would act at once
         frozen = rig.model_copy(update={"twin": None})
         twin = Twin.from_rig(frozen)
         if twin.structure is None:
@@ -120,6 +122,7 @@ class BouncingBall:
         """The [twin] table of a rig file, as text."""
         values: dict[str, Any] = dataclasses.asdict(self)
         lines = ["[twin]", 'tank_model = "bouncing_ball"', "", "[twin.parameters]"]
+        # `repr`: read again, every number is the same
         return "\n".join([*lines, *(f"{name} = {value!r}" for name, value in values.items())]) + "\n"
 
 
@@ -139,4 +142,5 @@ def _scales(rig: Rig, omega_bar: float) -> tuple[float, float]:
     if not (math.isfinite(omega_bar) and omega_bar > 0):
         raise InputError("omega_bar", got=str(omega_bar), allowed="> 0")
     area = rig.liquid.density_kg_per_m3 * rig.tank.length_m * rig.tank.width_m
+    # (2.19) as printed. Table 2.3 seems to state its numbers without ω̄² and ω̄; ω̄ = 1 reads it so.
     return area * GRAVITY_M_PER_S2 * omega_bar**2, area * rig.velocity_scale_m_per_s * omega_bar

@@ -51,6 +51,8 @@ def decaying_harmonic(
     amplitude_m: float, decay_per_s: float, frequency_hz: float, duration_s: float, sampling_rate_hz: float
 ) -> Excitation:
     """Base motion u = −A e^{−σt} cos Ωt with its exact derivatives; it starts in the lowest point."""
+    # derivatives are powers of this number: displacement, velocity and acceleration are those of one motion
+    # exactly
     root = complex(-decay_per_s, 2 * np.pi * frequency_hz)
 
     def inputs(time: FloatArray) -> FloatArray:
@@ -106,14 +108,19 @@ def w_bar_line(
     omega = omega_bar * rig.frequency_scale_rad_per_s
     frequency = omega / (2 * np.pi)
     decay = np.log(largest_u_bar / smallest_u_bar) * frequency / run.n_cycles
+    # settling cycles come before the largest amplitude, so that the line is whole
     start = largest_u_bar * rig.tank.height_m * np.exp(decay * _N_SETTLING_CYCLES / frequency)
     n = samples_per_cycle(ball, rig, frequency, run.samples_per_cycle)
     n_cycles = run.n_cycles + _N_SETTLING_CYCLES
     motion = decaying_harmonic(start, decay, frequency, n_cycles / frequency, n * frequency)
     result = ball.in_tank(rig).simulate(motion).require_done()
+    # (2.21); work of a term is negative where it dissipates
     works = -np.diff(result.work_of_terms_j[::n, 0])[_N_SETTLING_CYCLES:]
+    # the amplitude in the middle of a cycle stands for it
     time = (np.arange(works.size) + _N_SETTLING_CYCLES + 0.5) / frequency
     weight = np.ones(run.n_averaged_cycles) / run.n_averaged_cycles
     u_bar = start * np.exp(-decay * time) / rig.tank.height_m
+    # A slow decay gives back a little stored energy: a few per cent below W̄ in steady motion where the ball
+    # rests.
     w_bar = works / (rig.liquid_mass_kg * (omega * u_bar * rig.tank.height_m) ** 2)
     return np.convolve(u_bar, weight, mode="valid"), np.convolve(w_bar, weight, mode="valid")

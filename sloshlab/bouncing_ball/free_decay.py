@@ -25,6 +25,7 @@ _DIED_OUT_SHARE = 2e-3
 """A decay is read down to this share of its largest value."""
 _FEWEST_VALUES = 8
 _LONGEST_COULOMB_DECAY_S = 200.0
+# A simulation has no noise, but the errors of the reading still need a number.
 _NO_NOISE = DecayNoise(np.zeros(1), np.full(1, 1e-12), 1e6)
 
 
@@ -53,6 +54,7 @@ class DampingCurve:
     def at(self, acceleration_m_per_s2: FloatArray) -> FloatArray:
         """ζ at other amplitudes, linear in ln a; held beyond the ends."""
         order = np.argsort(self.acceleration_m_per_s2)
+        # a decay passes amplitudes at a constant ratio
         known = np.log(self.acceleration_m_per_s2[order])
         return np.interp(np.log(acceleration_m_per_s2), known, self.damping_ratio[order])
 
@@ -152,6 +154,7 @@ def simulated_curve(decay: Simulation, frequency_hz: float) -> DampingCurve:
         raise AnalysisError("simulated decay", got=f"{n_cycles:.1f} cycles", allowed="at least 5")
     # friction may hold the tank still for a while: extrema without curvature, which have no errors
     with np.errstate(divide="ignore", invalid="ignore"):
+        # by the same function as the recording: an error of the reading is then in both
         reading = log_decrement(signal, decay.sampling_rate_hz, frequency_hz=frequency_hz, noise=_NO_NOISE)
     used = reading.used & np.isfinite(reading.damping_ratio)
     if not used.any():
@@ -220,6 +223,7 @@ def steady_loss_factor(
     u_bar = acceleration_m_per_s2 / omega**2 / rig.tank.height_m
     if rig.structure is None or rig.structure.mass_kg is None:
         raise RigError("rig", got="no mass of one degree of freedom", remedy="give the sdof rig")
+    # (2.17): the loss is the ball's, the energy that of liquid and structure together
     share = rig.liquid_mass_kg / (rig.liquid_mass_kg + rig.structure.mass_kg)
     omega_bar = np.full(u_bar.shape, omega / rig.frequency_scale_rad_per_s)
     return np.asarray(share / np.pi * w_bar_at(ball, rig, omega_bar, u_bar, run))

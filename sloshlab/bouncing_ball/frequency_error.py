@@ -96,6 +96,7 @@ def error_by_frequency(
     AnalysisError
         If no window lies at the tuned frequency.
     """
+    # a band of its own, which no other one shares: its windows were used to tune
     low, high = tuned_omega_bar * (1 - tuned_half_width), tuned_omega_bar * (1 + tuned_half_width)
     tuned = (omega_bar >= low) & (omega_bar <= high)
     if not tuned.any():
@@ -123,6 +124,7 @@ def _limits(omega_bar: FloatArray, low: float, high: float, n_bands: int) -> lis
 
 
 def _band(low: float, high: float, is_tuned: bool, measured: FloatArray, ball: FloatArray) -> FrequencyBand:
+    # a ball that is pressed through a wall dissipates nothing that could be compared; such windows are counted
     inside = np.isfinite(ball)
     counts = int(inside.sum()), int((~inside).sum())
     error = (ball - measured)[inside]
@@ -146,6 +148,7 @@ def summary(bands: Sequence[FrequencyBand]) -> tuple[float, float]:
     (tuned,) = (band for band in bands if band.is_tuned)
     others = [band for band in bands if not band.is_tuned and band.n_windows]
     n = np.array([band.n_windows for band in others], dtype=float)
+    # bands are pooled by their windows: a mean over bands would count one of few windows as much as one of many
     squares = [np.array([getattr(band, name) for band in others]) ** 2 for name in ("error_rms", "measured_rms")]
     error, measured = (float((n * square).sum()) for square in squares)
     return tuned.relative_error, float(np.sqrt(error / measured)) if measured > 0 else float("nan")

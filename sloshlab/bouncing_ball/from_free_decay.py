@@ -69,11 +69,13 @@ def identify_from_decay(
             allowed=f"enough for the {measured.acceleration_m_per_s2.max():.3g} m/s² of the decay",
         )
 
+    # a whole fraction: the reading of the decrement depends on the rate, so that both decays must have one
     rate = sampling_rate_hz / max(1, int(sampling_rate_hz / (_SAMPLES_PER_CYCLE * frequency)))
 
     def residuals(ball: BouncingBall) -> FloatArray:
         decay = simulated_decay(ball, rig, initial_displacement_m, duration_s, sampling_rate_hz=rate)
         curve = simulated_curve(decay, frequency)
+        # in per cent of critical damping, so that a residual of ten is that of no ball at all
         return 100 * (curve.at(measured.acceleration_m_per_s2) - measured.damping_ratio)
 
     space = SearchSpace(rig, 2 * np.pi * frequency, damping_in_flight)

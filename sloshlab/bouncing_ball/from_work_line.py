@@ -19,6 +19,7 @@ from sloshlab.rig import Rig
 FloatArray = npt.NDArray[np.float64]
 
 _N_VALUES = 25
+# The decay passes beyond both ends of the line, so that nothing is extrapolated.
 _MARGIN = 1.05
 
 
@@ -64,6 +65,7 @@ def work_line(maps: xr.Dataset, omega_bar: float, n_values: int = _N_VALUES) -> 
             remedy="choose another frequency, or give runs that cover it",
         )
     known_u, known_w = line["u_bar"].values[measured], line.values[measured]
+    # equally spaced: the grid of the map is not, and dense parts would count more
     u_bar = np.linspace(known_u[0], known_u[-1], n_values)
     return WorkLine(omega_bar, u_bar, np.interp(u_bar, known_u, known_w))
 
@@ -78,6 +80,7 @@ def line_of(ball: BouncingBall, rig: Rig, line: WorkLine, run: DecayingRun | Non
         smallest_u_bar=float(line.u_bar[0]) / _MARGIN,
         run=run,
     )
+    # amplitudes fall along the motion
     return np.interp(line.u_bar, u_bar[::-1], w_bar[::-1])
 
 

@@ -108,11 +108,13 @@ def guide_from_decay(
     RigError
         If the rig has no structure of one degree of freedom.
     """
+    # masses are taken as stated; the frequency then tells the stiffness
     mass = (_structure(rig).mass_kg or 0.0) + rig.liquid_mass_kg
     measured = measured_curve(acceleration, sampling_rate_hz, lowest_acceleration_g=lowest_acceleration_g)
     reading = analyse_free_decay(acceleration, sampling_rate_hz).log_decrement
     stiffness = mass * (2 * math.pi * float(np.median(reading.frequency_hz[reading.used]))) ** 2
     duration = acceleration.size / sampling_rate_hz
+    # closed form for small ζ, which is linear in b₀ and b₁; the simulation goes on from there
     start = _closed_form(measured, mass, stiffness)
 
     def curve(values: FloatArray) -> DampingCurve:
@@ -123,6 +125,7 @@ def guide_from_decay(
         return simulated_curve(decay, measured.frequency_hz)
 
     def residuals(values: FloatArray) -> FloatArray:
+        # relative: friction shows at small amplitudes, where ζ is largest, viscous damping at large ones
         return curve(values).at(measured.acceleration_m_per_s2) / measured.damping_ratio - 1
 
     found = least_squares(residuals, start, bounds=(0.0, np.inf), x_scale=start, diff_step=1e-3, max_nfev=20).x
@@ -134,7 +137,9 @@ def _closed_form(measured: DampingCurve, mass_kg: float, stiffness_n_per_m: floa
     displacement = measured.acceleration_m_per_s2 * mass_kg / stiffness_n_per_m
     friction = 2 / (np.pi * stiffness_n_per_m * displacement)
     viscous = np.full(displacement.shape, 1 / (2 * math.sqrt(stiffness_n_per_m * mass_kg)))
+    # neither can be negative; scatter must not trade one against the other beyond zero
     found, _ = nnls(np.stack([friction, viscous], axis=1), measured.damping_ratio)
+    # a start at zero would leave the search without a scale
     smallest = 1e-3 * measured.damping_ratio.mean() / np.array([friction.mean(), viscous.mean()])
     return np.asarray(np.maximum(found, smallest))
 

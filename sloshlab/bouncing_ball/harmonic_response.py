@@ -55,6 +55,7 @@ class HarmonicRun:
 def samples_per_cycle(ball: BouncingBall, rig: Rig, frequency_hz: float, at_least: int) -> int:
     """Samples per cycle that resolve the contact of a ball."""
     mass = (1 - ball.beta) * rig.liquid_mass_kg
+    # contact is the quickest thing in the motion: a stiff ball is in contact for a small part of a cycle
     oscillation = _STEPS_PER_CONTACT_RADIAN * np.sqrt(ball.stiffness_n_per_m / mass)
     needed = max(oscillation, _STEPS_PER_RELAXATION * ball.damping_kg_per_s / mass) / frequency_hz
     return int(min(max(at_least, np.ceil(needed)), _MOST_SAMPLES_PER_CYCLE))
@@ -89,6 +90,7 @@ def work_per_cycle(
     run = run or HarmonicRun()
     result = harmonic_motion(ball, rig, amplitude_m, frequency_hz, run)
     n = samples_per_cycle(ball, rig, frequency_hz, run.samples_per_cycle)
+    # whole cycles only, so that stored energy is the same at both ends
     works = -np.diff(result.work_of_terms_j[::n, 0])[run.n_settling_cycles :]
     return float(works.mean()), float(works.std())
 
@@ -104,6 +106,7 @@ def hysteresis(
     result = harmonic_motion(ball, rig, amplitude_m, frequency_hz, run)
     n = samples_per_cycle(ball, rig, frequency_hz, run.samples_per_cycle)
     part = slice(n * run.n_settling_cycles, None)
+    # F_S = Δf − m_l ü: the twin's force is that beyond a frozen liquid
     force = result.tank_force_n[part] - rig.liquid_mass_kg * result.acceleration_m_per_s2[part]
     return result.displacement_m[part], force
 
@@ -113,6 +116,7 @@ def loss_factor(
 ) -> float:
     """η = L_D/(π m_l A² Ω²) (2.16)."""
     work, _ = work_per_cycle(ball, rig, amplitude_m, frequency_hz, run)
+    # (2.16) is W̄/π, the loss factor of App. A
     return work / (np.pi * rig.liquid_mass_kg * (2 * np.pi * frequency_hz * amplitude_m) ** 2)
 
 
@@ -122,6 +126,7 @@ def _work_if_inside(
     """`work_per_cycle`, NaN where the ball leaves its tank."""
     try:
         return work_per_cycle(ball, rig, amplitude_m, frequency_hz, run)
+    # holes in a map are told by NaN; a run of a thousand points must not end at one of them
     except AnalysisError:
         return float("nan"), float("nan")
 

@@ -161,6 +161,7 @@ def identified(
     found = _evolved(search, settings, progress)
     best = _polished(search, found, settings)
     rough = float(np.sqrt(found.fun / n_values))
+    # least squares with wide steps may end in a worse place than it began
     if best.cost * 2 > found.fun:
         best = OptimizeResult(x=found.x, cost=found.fun / 2, fun=search(found.x), jac=_jacobian(search, found.x))
     return IdentifiedBall(
@@ -192,6 +193,7 @@ class _Search:
         try:
             values = self._residuals(self.space.ball(point))
         except SloshlabError:
+            # large but finite: differential evolution compares sums of squares
             return np.full(self.n_values, _NO_BALL)
         return np.clip(np.nan_to_num(values, nan=_NO_BALL), -_NO_BALL, _NO_BALL)
 
@@ -215,10 +217,12 @@ def _evolved(search: _Search, settings: SearchSettings, progress: Progress | Non
         maxiter=settings.n_generations,
         popsize=settings.population,
         seed=settings.seed,
+        # an even cover of the box; the number of candidates is a power of two for it
         init="sobol",
         mutation=(0.4, 0.9),
         recombination=0.8,
         tol=1e-6,
+        # its own polishing takes steps far smaller than the roughness of impacts
         polish=False,
         callback=report,
     )
@@ -235,6 +239,7 @@ def _refined(
         point[free] = values
         return search(point)
 
+    # least squares with bounds starts inside of them
     inside = np.clip(start[free], 1e-9, 1 - 1e-9)
     n_steps = max(2, n_evaluations // (len(_STEPS) * (int(free.sum()) + 1)))
     results = []
@@ -260,6 +265,7 @@ def _polished(search: _Search, found: OptimizeResult, settings: SearchSettings) 
 def _jacobian(search: _Search, point: FloatArray) -> FloatArray:
     columns = []
     for i in range(point.size):
+        # away from the nearer bound
         step = _STEPS[0] if point[i] < 0.5 else -_STEPS[0]
         moved = point.copy()
         moved[i] += step
@@ -293,6 +299,7 @@ def _interval(
     settings: SearchSettings,
 ) -> ParameterInterval:
     centre, half = float(best.x[i]), factor * float(np.sqrt(covariance[i, i]))
+    # t² times the variance of the residuals: for linear residuals the profile ends where the usual interval does
     growth = factor**2 * 2 * best.cost / (best.fun.size - best.x.size)
     ends = [
         _interval_end(
@@ -349,7 +356,9 @@ class _Profile:
     def growth(self, distance: float) -> float:
         """At a distance, 0 … room."""
         start = np.clip(self._best.x + distance * self._direction, 0.0, 1.0)
+        # the others are fitted again: they compensate along a curved valley, which the Jacobian alone cannot see
         again = _refined(self._search, start, self._n_evaluations, self._free)
+        # the next fit starts along the valley that was found
         self._direction = (again.x - self._best.x) / distance
         return max(float(2 * again.cost - 2 * self._best.cost), 0.0)
 
@@ -365,10 +374,12 @@ def _interval_end(profile: _Profile, first: float, wanted: float) -> tuple[float
     if distance < _SHORTEST:
         return (np.inf, np.nan) if profile.room < _SHORTEST else (distance, 1.0)
     for _ in range(_PROFILE_STEPS):
+        # the root, which grows linearly where residuals are linear: secants then find the end in few fits
         root = float(np.sqrt(profile.growth(distance) / wanted))
         if abs(root - 1) < _PROFILE_TOLERANCE:
             return distance, root**2
         if root < 1:
+            # not enough growth up to the bound of the search: the interval is open there
             if distance >= profile.room:
                 return np.inf, root**2
             low = (distance, root)

@@ -39,6 +39,7 @@ class Bound:
 
 
 BOUNDS: Final = (
+    # less than half of the height, where floor and ceiling would touch the ball at once
     Bound("radius_m", 0.05, 0.495, logarithmic=False),
     Bound("stiffness_n_per_m", 0.7, 15.0),
     Bound("damping_kg_per_s", 0.01, 2.0),
@@ -81,6 +82,8 @@ class SearchSpace:
         radius, ratio, damping, hardening, beta = (
             bound.value(float(share)) for bound, share in zip(BOUNDS, np.clip(point, 0.0, 1.0), strict=True)
         )
+        # stiffness and damping are searched by what they mean for the motion: contact frequency over Ω, share of
+        # critical
         mass = (1 - beta) * self.rig.liquid_mass_kg
         stiffness = mass * (ratio * self.omega_rad_per_s) ** 2
         return BouncingBall(

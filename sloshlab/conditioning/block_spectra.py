@@ -22,6 +22,7 @@ from sloshlab.errors import AnalysisError
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
+# more than twice the highest frequency that is looked for
 _LOWEST_RATE_HZ = 400.0
 _BLOCK_S = 1.0
 _LINES_BESIDE = 2
@@ -55,6 +56,7 @@ class BlockSpectra:
 
     def ratio(self, index: int, delay_s: float) -> float:
         """Real factor G of y = G x(t − τ) over all blocks, its sign kept; NaN without signal."""
+        # the delay is turned back first: the real part of a turned phasor would be short by cos ωτ
         aligned = (self.cross[index] * np.exp(1j * self.omega_rad_per_s * delay_s)).real
         power = float(self.power.sum())
         return float(aligned.sum()) / power if power > 0 else float("nan")
@@ -64,6 +66,7 @@ class BlockSpectra:
         if self.power.size < 2:
             return float("nan")
         aligned = (self.cross[index] * np.exp(1j * self.omega_rad_per_s * delay_s)).real
+        # blocks are taken as independent; their scatter contains noise and whatever differs along the run
         residual = aligned - self.ratio(index, delay_s) * self.power
         return float(np.sqrt((residual**2).sum()) / self.power.sum())
 
@@ -102,6 +105,7 @@ def block_spectra(
     step_s = sampling_step_s(recording)
     duration_s = step_s * reference.size
     factor = max(1, int(1.0 / (step_s * _LOWEST_RATE_HZ)))
+    # at least eight blocks, or their scatter says nothing
     per_block = round(min(_BLOCK_S, duration_s / 8) / (step_s * factor))
     if per_block < _FEWEST_SAMPLES_PER_BLOCK:
         raise AnalysisError(
@@ -112,6 +116,7 @@ def block_spectra(
         )
     signals = [reference, *(recording[name].values for name in names)]
     spectra = np.stack([_spectra(signal, factor, per_block) for signal in signals])
+    # a block with a lost sample in any channel is left out for all, so that ratios compare the same motion
     spectra = spectra[:, np.isfinite(spectra).all(axis=(0, 2))]
     if spectra.shape[1] == 0:
         raise AnalysisError(
@@ -122,6 +127,7 @@ def block_spectra(
         )
     line_hz = 1.0 / (per_block * factor * step_s)
     lines = _lines_around_maximum(spectra[0], line_hz, frequency_range_hz)
+    # the same lines in all channels, those of the reference
     x, *others = (np.take_along_axis(spectrum, lines, axis=1) for spectrum in spectra)
     x_power = np.abs(x) ** 2
     power = x_power.sum(axis=1)
@@ -152,6 +158,7 @@ def delay_s(spectra: BlockSpectra, index: int) -> tuple[float, float]:
     # a sensor mounted upside down is half a period off at every frequency, which is no delay
     sign = 1.0 if cross.real.sum() >= 0 else -1.0
     lag = -np.angle(sign * cross)
+    # a phase tells the delay in proportion to its frequency
     moment = float((weight * omega**2).sum())
     if moment <= 0:
         return float("nan"), float("nan")
@@ -168,7 +175,9 @@ def _spectra(values: npt.NDArray[np.floating], factor: int, per_block: int) -> C
     coarse = np.empty(n_blocks * per_block)
     _averaged(values, factor, coarse)
     blocks = coarse.reshape(n_blocks, per_block)
+    # static weight and offsets would leak into the lowest lines
     blocks -= blocks.mean(axis=1, keepdims=True)
+    # periodic, so that a whole number of periods falls on three lines exactly
     window = np.hanning(per_block + 1)[:-1]
     return np.asarray(np.fft.rfft(blocks * window, axis=1), dtype=np.complex128)
 
@@ -189,6 +198,7 @@ def _lines_around_maximum(
 def _averaged(values: npt.NDArray[np.float64], factor: int, coarse: FloatArray) -> None:
     """Means of `factor` samples in a row; NaN where one of them is."""
     for block in range(coarse.size):
+        # a plain sum hands NaN on, and a block mean has no phase error against that of another channel
         total = 0.0
         for i in range(block * factor, (block + 1) * factor):
             total += values[i]

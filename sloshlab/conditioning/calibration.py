@@ -111,8 +111,10 @@ def apparent_mass(
     force = total_force(recording, force_names)
     acceleration = mean_acceleration(recording, acceleration_names)
     run_id = str(recording.attrs.get("run_id", "unnamed"))
+    # over the lines of the motion only: static weight, hum and most of the noise are elsewhere
     spectra = block_spectra(force.to_dataset(), [str(force.name)], acceleration.values)
     delay, delay_std = delay_s(spectra, 0)
+    # in phase after the delay is turned back, else a delay would look like less mass
     mass = spectra.ratio(0, delay)
     if not math.isfinite(mass):
         raise AnalysisError(
@@ -164,10 +166,12 @@ def identify_dry_mass(
             allowed="at least one of them",
             remedy="record one, or state tank.dry_mass_kg in the rig",
         )
+    # g and M cannot be told apart from one kind of run
     gain, gain_std = 1.0, math.nan
     if masses_empty and masses_frozen:
         apparent, apparent_std = _combined(masses_empty)
         loaded, loaded_std = _combined(masses_frozen)
+        # the liquid was weighed: the only mass that is known without the sensors
         gain = (loaded - apparent) / liquid_mass_kg
         gain_std = math.hypot(loaded_std, apparent_std) / liquid_mass_kg
         _require_positive("gain of force over acceleration", gain)
@@ -211,6 +215,7 @@ def check_signs(recording: xr.Dataset, rig: Rig | None = None) -> None:
         Naming the channel, what it shows and the remedy. When all force channels are against the
         acceleration, the acceleration is named as the likelier culprit.
     """
+    # accelerometers first: a force can only be judged against an acceleration whose sign is right
     redundant = redundant_accelerometers(recording)
     if len(redundant) > 1:
         require_equal_signs(agreement(recording, redundant))
@@ -221,6 +226,7 @@ def check_signs(recording: xr.Dataset, rig: Rig | None = None) -> None:
         return
     found = ", ".join(f"apparent mass {masses[name]:+.3g} kg on {name}" for name in forces)
     expected = "" if rig is None else f", {rig.tank.dry_mass_kg + rig.liquid_mass_kg:.3g} kg in all"
+    # all cells wrong at once is less likely than one acceleration
     if len(negative) == len(forces):
         accelerometers = ", ".join(redundant or acceleration_channels(recording))
         what = f"{accelerometers} (or {', '.join(forces)})"
@@ -281,6 +287,7 @@ def w_bar_bias_of_delay(dry: DryMass, rig: Rig, *, frequency_hz: float) -> float
     The force (M_dry + m_l) ü of a mass, later by τ, has W = π (M_dry + m_l) (Ωu₀)² sin Ωτ in a cycle, so that
     W̄ = π Ωτ (M_dry + m_l)/m_l to first order in Ωτ.
     """
+    # the whole inertia on the cells, not the liquid's: a small delay of a heavy tank feigns much work
     total = dry.mass_kg + rig.liquid_mass_kg
     return math.pi * 2 * math.pi * frequency_hz * dry.delay_s * total / rig.liquid_mass_kg
 
@@ -288,6 +295,7 @@ def w_bar_bias_of_delay(dry: DryMass, rig: Rig, *, frequency_hz: float) -> float
 def _combined(masses: Sequence[ApparentMass]) -> tuple[float, float]:
     """Mean over runs; its standard deviation from the runs' own or their scatter, whichever is larger."""
     values = np.array([mass.mass_kg for mass in masses])
+    # the blocks of one run do not know what differs from run to run
     within = math.sqrt(sum(mass.mass_std_kg**2 for mass in masses)) / len(masses)
     between = float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else 0.0
     return float(values.mean()), max(within, between)

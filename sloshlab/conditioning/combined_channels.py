@@ -32,6 +32,7 @@ def force_channels(recording: xr.Dataset) -> list[str]:
     """
     forces = channels(recording, "force")
     cells = [name for name in forces if name.startswith(FORCE_CELL)]
+    # an interface force beside cells is not added: it would count the same force twice
     chosen = cells or [name for name in forces if name == FORCE_INTERFACE]
     if not chosen:
         raise AnalysisError(
@@ -55,6 +56,7 @@ def acceleration_channels(recording: xr.Dataset) -> list[str]:
         If none of these is there, or several unknown ones are.
     """
     accelerations = channels(recording, "acceleration")
+    # the control accelerometer is left for comparison where the roof has its own
     for prefix in (ACCELERATION_ROOF, ACCELERATION_TIP, ACCELERATION_CONTROL):
         chosen = [name for name in accelerations if name.startswith(prefix)]
         if chosen:
@@ -129,6 +131,7 @@ def weights_by_noise(recording: xr.Dataset, names: Sequence[str]) -> list[float]
         With sum 1.
     """
     stated = [float(recording[name].attrs.get("noise_std", 0.0)) for name in names]
+    # The mean of a loud and a quiet accelerometer would have half of the loud one's noise.
     known = all(np.isfinite(std) and std > 0 for std in stated)
     inverse = [(min(stated) / std) ** 2 if known else 1.0 for std in stated]
     return [weight / sum(inverse) for weight in inverse]
@@ -186,6 +189,7 @@ def dynamic_force_noise_power(
     """
     noise = {name: float(recording[name].attrs.get("noise_std", 0.0)) for name in [*forces, *accelerations]}
     of_mean = sum(noise[name] ** 2 for name in accelerations) / len(accelerations) ** 2
+    # the gain of ü on d is the mass
     return sum(noise[name] ** 2 for name in forces) + mass_kg**2 * of_mean
 
 
@@ -203,7 +207,9 @@ def _combined(
     recording: xr.Dataset, names: Sequence[str], factors: Sequence[float], name: str, quantity: str
 ) -> xr.DataArray:
     """Σ factor × channel in the widest type of the channels, in place after the first product."""
+    # equal factors are applied once to the sum: no temporary array per channel
     equal = len(set(factors)) == 1
+    # single precision stays single, which halves the memory
     widest = np.result_type(*(recording[channel].dtype for channel in names), np.float32)
     total = np.multiply(recording[names[0]].values, 1.0 if equal else factors[0], dtype=widest)
     for channel, factor in zip(names[1:], factors[1:], strict=True):

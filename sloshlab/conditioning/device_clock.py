@@ -144,10 +144,12 @@ def fitted_device_clock(
     """
     counter, arrival, origin_ns = _checked_pairs(counters, host_monotonic_ns, sampling_rate_hz)
     nominal_s = 1.0 / sampling_rate_hz
+    # one counter only: a time, but no rate
     if counter[0] == counter[-1]:
         earliest = float((arrival - nominal_s * counter).min())
         return _undetermined(counter.size, origin_ns, earliest, nominal_s)
     first_s, period_s = _lower_line(counter, arrival)
+    # never negative by construction; the shortest latency itself is part of `first_s` and cannot be known
     latency = arrival - (first_s + period_s * counter)
     offset_error, period_error, residual = _errors(counter, latency)
     rate_ratio = nominal_s / period_s if period_s > 0 else math.inf
@@ -181,8 +183,10 @@ def _checked_pairs(
             got=f"{counter.size} counters, {host_ns.size} host times, {sampling_rate_hz:g} Hz",
             allowed="one host time per counter, at least one, and a rate > 0",
         )
+    # by counter, not by arrival: late blocks have their place, and of equal counters the earliest comes first
     order = np.lexsort((host_ns, counter))
     origin_ns = int(host_ns.min())
+    # a monotonic clock in nanoseconds has more digits than a float; its difference to the first has not
     arrival = np.asarray((host_ns[order] - origin_ns) * 1e-9, dtype=np.float64)
     return counter[order].astype(np.float64), arrival, origin_ns
 
@@ -196,6 +200,7 @@ def _undetermined(n_pairs: int, origin_ns: int, first_s: float, period_s: float)
 
 
 def _status(rate_ratio: float, relative_error: float) -> ClockStatus:
+    # before the rate is judged: a rate that is not known must not be called wrong
     if relative_error > LARGEST_REAL_TIME_DRIFT:
         return ClockStatus.UNDETERMINED
     if abs(rate_ratio - 1) > LARGEST_REAL_TIME_DRIFT:
@@ -215,6 +220,7 @@ def _lower_line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _edge_over(x: FloatArray, y: FloatArray) -> tuple[int, int]:
     """Both ends of the lower hull's edge over x = 0, by Andrew's monotone chain."""
+    # linear in the number of arrivals, which are sorted; all lines below all points touch the lower hull
     hull = np.empty(x.size, dtype=np.int64)
     n = 0
     for i in range(x.size):
@@ -238,6 +244,7 @@ def _errors(counter: FloatArray, latency: FloatArray) -> tuple[float, float, flo
     places, minima = _earliest_per_segment(counter, latency)
     span = counter[-1] - counter[0]
     if places.size < _FEWEST_SEGMENTS:
+        # too few parts for a law of minima: the whole spread of the latencies stands in
         spread = float(latency.max())
         return spread, 2 * spread / span, float(np.sqrt((minima**2).mean()))
     ends = np.array([counter[0], counter[-1]]) - counter.mean()
@@ -275,6 +282,7 @@ def _spread_and_middle(minima: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _weibull(shape: float, n_segments: int) -> FloatArray:
+    # a seed of its own: the same arrivals always give the same error
     return np.random.default_rng(0).weibull(shape, (_N_DRAWS, n_segments))
 
 

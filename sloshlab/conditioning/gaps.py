@@ -49,6 +49,7 @@ def sampling_step_s(data: xr.Dataset | xr.DataArray) -> float:
     time = data["time"].values
     if time.size < 2:
         raise AnalysisError("number of samples", got=str(time.size), allowed="≥ 2", remedy="record again")
+    # over the whole length: single differences of a long time coordinate have lost digits
     return float((time[-1] - time[0]) / (time.size - 1))
 
 
@@ -78,6 +79,8 @@ def sample_is_usable(recording: xr.Dataset, names: Sequence[str] | None = None) 
     usable = np.ones(recording.sizes["time"], dtype=np.bool_)
     for name in wanted:
         mark_nan(recording[name].values, usable)
+    # all channels are looked at here, also when few were asked for: a flag belongs to the sample, not to a
+    # channel
     usable[_flagged_without_nan(recording, everything)] = False
     return usable
 
@@ -135,6 +138,7 @@ def _flagged_without_nan(recording: xr.Dataset, names: Sequence[str]) -> Any:
     if "quality" not in recording:
         return np.empty(0, dtype=np.intp)
     flagged = np.flatnonzero(recording["quality"].values & LOST)
+    # what some channel explains by its NaN costs that channel only
     for name in names:
         if flagged.size == 0:
             break
@@ -146,5 +150,6 @@ def _flagged_without_nan(recording: xr.Dataset, names: Sequence[str]) -> Any:
 def mark_nan(values: npt.NDArray[np.float64], usable: BoolArray) -> None:
     """Set `usable` to False where `values` is NaN; one pass, nothing allocated."""
     for i in range(values.size):
+        # true for NaN only; no array of flags is made
         if values[i] != values[i]:
             usable[i] = False

@@ -26,6 +26,7 @@ from sloshlab.errors import AnalysisError
 from sloshlab.quadrature import STEP_WEIGHTS
 from sloshlab.units import SI_UNITS
 
+# A tenth of the lowest frequency of the source's sweeps: the amplitude is 10⁻⁴ off at 5 Hz.
 DRIFT_CORNER_HZ = 0.5
 """Default corner of the high-pass that removes drift."""
 
@@ -114,6 +115,7 @@ def integrated(
     usable = np.ones(values.size, dtype=np.bool_)
     mark_nan(values, usable)
     result = np.full(values.size, np.nan) if not usable.all() else np.empty(values.size)
+    # one knot per block of samples: the trend costs a small banded system, however long the recording
     block = _block_samples(1.0 / step_s, corner_hz)
     penalty = _penalty(1.0 / step_s, corner_hz, order)
     for start, stop in runs(usable, True):
@@ -123,6 +125,7 @@ def integrated(
         stretch = result[start:stop]
         moments = np.zeros(_n_knots(stretch.size, block))
         _cumulative(values[start:stop], step_s, block, stretch, moments)
+        # each stretch by itself: across a gap the constant of integration is not known
         knots = _trend_knots(moments, stretch.size, block, order, penalty)
         _subtract_chain(stretch, knots, block)
     return result
@@ -152,6 +155,7 @@ def displacement_of_part(
         [m].
     """
     padding = int(padding_s * sampling_rate_hz)
+    # near the ends of a stretch the trend has data on one side only
     used = slice(max(0, part.start - padding), min(acceleration.size, part.stop + padding))
     speed = integrated(np.asarray(acceleration[used], dtype=np.float64), 1 / sampling_rate_hz, corner_hz=corner_hz)
     moved = integrated(speed, 1 / sampling_rate_hz, corner_hz=corner_hz)
@@ -209,6 +213,7 @@ def integration_error(
     if not 0 < frequency_hz < sampling_rate_hz / 2:
         raise AnalysisError("frequency_hz", got=f"{frequency_hz:g}", allowed=f"0 < f < {sampling_rate_hz / 2:g}")
     omega = 2 * math.pi * frequency_hz / sampling_rate_hz
+    # both errors are real factors: by symmetry neither rule nor trend shifts the phase
     rule = 2 * sum(w * math.cos((k + 0.5) * omega) for k, w in enumerate(STEP_WEIGHTS[3:]))
     gain = rule * omega / (2 * math.sin(omega / 2))
     gain *= 1.0 - _trend_response(omega, sampling_rate_hz, corner_hz, order)
@@ -253,6 +258,7 @@ def _n_knots(n_samples: int, block: int) -> int:
 
 def _penalty(sampling_rate_hz: float, corner_hz: float, order: int) -> float:
     """λ that makes the trend's response one half at the corner (for D → fine knots)."""
+    # λ (2 sin ωD/2)^{2p} = 1 at the corner
     angle = math.pi * corner_hz * _block_samples(sampling_rate_hz, corner_hz) / sampling_rate_hz
     return float((2 * math.sin(angle)) ** (-2 * order))
 
@@ -261,6 +267,7 @@ def _trend_response(omega: float, sampling_rate_hz: float, corner_hz: float, ord
     """Response of the trend at ω [rad/sample], images left out."""
     block = _block_samples(sampling_rate_hz, corner_hz)
     hat = (math.sin(omega * block / 2) / math.sin(omega / 2)) ** 2 / block
+    # sums over the samples of a block in closed form, not the integrals of hats, which fine blocks would miss
     gram = (2 * block**2 + 1) / (3 * block) + (block**2 - 1) / (3 * block) * math.cos(omega * block)
     stiffness = _penalty(sampling_rate_hz, corner_hz, order) * block
     stiffness *= (2 * math.sin(omega * block / 2)) ** (2 * order)
@@ -274,9 +281,11 @@ def _trend_knots(moments: FloatArray, n_samples: int, block: int, order: int, pe
     than the rest, and the banded system would lose those digits.
     """
     n_knots = moments.size
+    # a short stretch has too few knots for the full difference
     degree = min(order, n_knots - 1)
     bands = np.zeros((max(degree, 1) + 1, n_knots))  # lower form: bands[k, i] = A[i + k, i]
     _add_gram(bands, n_samples, block)
+    # Legendre polynomials, whose columns stay independent where powers of the knot numbers would not
     unseen = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, n_knots), degree - 1)
     weighted = bands[0, :, None] * unseen  # BᵀB times the polynomials
     weighted[1:] += bands[1, :-1, None] * unseen[:-1]
@@ -296,6 +305,7 @@ def _add_gram(bands: FloatArray, n_samples: int, block: int) -> None:
     xi = np.arange(block) / block
     full = n_samples // block
     last = xi[: n_samples - full * block]
+    # samples lie on the hats at whole fractions of a block, those of the last block only as far as it goes
     for count_from, count_to, places in ((0, full, xi), (full, full + (last.size > 0), last)):
         blocks = slice(count_from, count_to)
         bands[0, blocks] += ((1 - places) ** 2).sum()
@@ -316,6 +326,7 @@ def _step_integral(values: FloatArray, i: int) -> float:
         for k in range(6):
             total += weights[k] * values[k]
     else:
+        # mirrored: the same one-sided rules, from the other end
         weights = _FIRST_STEP if i == n - 2 else _SECOND_STEP
         for k in range(6):
             total += weights[k] * values[n - 1 - k]
@@ -326,6 +337,7 @@ def _step_integral(values: FloatArray, i: int) -> float:
 def _cumulative(values: FloatArray, step_s: float, block: int, result: FloatArray, moments: FloatArray) -> None:
     """Fill `result` with the integral from the first sample and `moments` with Σ hat × result."""
     n = values.size
+    # symmetric weights in three pairs: three products per step instead of six
     w0, w1, w2 = STEP_WEIGHTS[0], STEP_WEIGHTS[1], STEP_WEIGHTS[2]
     total = 0.0
     place, knot = 0, 0
@@ -336,6 +348,7 @@ def _cumulative(values: FloatArray, step_s: float, block: int, result: FloatArra
         plain += value
         weighted += place * value
         place += 1
+        # moments are gathered in the pass that integrates: a second pass would read the result again
         if place == block or i == n - 1:
             moments[knot] += plain - weighted / block
             moments[knot + 1] += weighted / block

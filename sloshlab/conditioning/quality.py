@@ -20,6 +20,7 @@ from sloshlab.recording import CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, STUCK, chann
 LARGEST_LOST_FRACTION = 0.5
 """A channel with more lost samples than this share makes the run unusable."""
 
+# Fewer cost only the cycles that they touch.
 LARGEST_CLIPPED_FRACTION = 0.01
 """A channel with more clipped samples than this share makes the run unusable."""
 
@@ -133,6 +134,7 @@ def quality_of(recording: xr.Dataset) -> RunQuality:
     qualities = tuple(channel_quality(recording[name]) for name in channels(recording))
     lost = gaps(recording)
     flags = _flag_counts(recording)
+    # a comparison that fails is a remark: the channels may be good each by itself
     agreed, failure = _accelerometer_agreement(recording, qualities)
     reasons = [*_channel_reasons(qualities), *_sign_reasons(agreed)]
     remarks = [*_channel_remarks(qualities), *_gap_remarks(lost, flags), *_gain_remarks(agreed), *failure]
@@ -175,6 +177,7 @@ def _flag_counts(recording: xr.Dataset) -> dict[int, int]:
     if "quality" not in recording:
         return dict.fromkeys(bits, 0)
     flags = recording["quality"].values
+    # most recordings have no flags: one pass instead of four
     if not flags.any():
         return dict.fromkeys(bits, 0)
     return {bit: int(np.count_nonzero(flags & bit)) for bit in bits}
@@ -184,6 +187,7 @@ def _accelerometer_agreement(
     recording: xr.Dataset, qualities: tuple[ChannelQuality, ...]
 ) -> tuple[SensorAgreement | None, list[str]]:
     """The agreement, or None with the reason why it could not be had."""
+    # a dead sensor is a reason of its own, and would disagree with every other one
     alive = {
         channel.name for channel in qualities if channel.n_lost < channel.n_samples and not channel.is_constant
     }
@@ -199,6 +203,7 @@ def _accelerometer_agreement(
 def _channel_reasons(qualities: tuple[ChannelQuality, ...]) -> list[str]:
     reasons = []
     for channel in qualities:
+        # one reason per channel, the gravest first
         lost, clipped = channel.n_lost / channel.n_samples, channel.clipping.n_clipped / channel.n_samples
         if channel.is_constant:
             reasons.append(f"{channel.name}: constant at {channel.minimum:.6g} {channel.units}")
@@ -263,6 +268,7 @@ def _statistics(values: npt.NDArray[Any]) -> tuple[int, float, float, float, flo
     if n == 0:
         return 0, math.nan, math.nan, math.nan, math.nan
     mean = total / n
+    # taken about the first value: a force with a large static part would lose the digits of its small motion
     variance = squares / n - mean * mean
     return n, minimum, maximum, origin + mean, math.sqrt(max(variance, 0.0)) if variance < math.inf else math.inf
 
@@ -275,6 +281,7 @@ def _sums(values: npt.NDArray[np.float64]) -> tuple[int, float, float, float, fl
     total, squares = 0.0, 0.0
     for i in range(values.size):
         value = float(values[i])
+        # NaN, a lost sample
         if value != value:
             continue
         if n == 0:

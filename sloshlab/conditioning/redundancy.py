@@ -97,6 +97,7 @@ class SensorAgreement:
 def redundant_accelerometers(recording: xr.Dataset) -> list[str]:
     """Accelerometers of a rigid tank that must read the same: on the roof, and the control."""
     accelerations = channels(recording, "acceleration")
+    # a tip of a beam or a root moves otherwise: only what is fixed to the rigid tank must agree
     return [name for name in accelerations if name.startswith((ACCELERATION_ROOF, ACCELERATION_CONTROL))]
 
 
@@ -176,7 +177,9 @@ def _compared(recording: xr.Dataset, name: str, reference: str) -> PairAgreement
         reference=reference,
         gain_ratio=abs(ratio),
         delay_s=delay,
+        # e^{+jωt}: what comes later has the smaller phase
         phase_error_at_20_hz_rad=-2 * math.pi * PHASE_ERROR_AT_HZ * delay,
+        # noise of a silent sensor has either sign: it must move against the other one to be called wrong
         sign=-1 if ratio < -_SMALLEST_COMMON_SHARE else 1,
         rms_disagreement=_rms_disagreement(x, y),
     )
@@ -188,6 +191,7 @@ def _wrong_signs(reference: str, pairs: Sequence[PairAgreement]) -> tuple[str, .
     against = [pair.name for pair in pairs if pair.sign < 0]
     if not against:
         return ()
+    # of two that disagree neither is known to be right
     if len(against) == len(with_reference):
         return (*with_reference, *against)
     return tuple(against if len(against) < len(with_reference) else with_reference)
@@ -197,6 +201,7 @@ def _rms_disagreement(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) ->
     n, sum_x, sum_xx, sum_d, sum_dd = _sums(x, y)
     if n == 0:
         return float("nan")
+    # about the mean: static offsets of accelerometers are no disagreement about the motion
     variance_x = sum_xx / n - (sum_x / n) ** 2
     variance_d = max(sum_dd / n - (sum_d / n) ** 2, 0.0)
     return math.sqrt(variance_d / variance_x) if variance_x > 0 else float("nan")

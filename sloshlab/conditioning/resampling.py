@@ -20,9 +20,11 @@ from sloshlab.errors import AnalysisError
 
 FloatArray = npt.NDArray[np.float64]
 
+# A wider kernel is no better below 0.4 of the rate and loses more around each gap.
 HALF_WIDTH: Final = 24
 """Samples of the slower rate to each side of an instant that enter its value."""
 
+# The transition of this window at 24 samples reaches from 0.4 to 0.6 of the rate.
 _KAISER_SHAPE = 13.4
 _STEPS_PER_SAMPLE = 4096
 """Of the table of the kernel, which is interpolated linearly between them."""
@@ -36,6 +38,7 @@ def half_width(rate_ratio: float = 1.0) -> int:
     >>> half_width(), half_width(0.5)
     (24, 48)
     """
+    # a kernel for a slower rate is as long in samples of the slower rate
     return math.ceil(HALF_WIDTH / min(1.0, rate_ratio))
 
 
@@ -73,6 +76,7 @@ def resampled(values: npt.ArrayLike, positions: npt.ArrayLike, *, rate_ratio: fl
     >>> bool(abs(resampled(np.cos(0.5 * t), [50.25])[0] - np.cos(0.5 * 50.25)) < 1e-6)
     True
     """
+    # also refuses NaN
     if not 1e6 * rate_ratio > HALF_WIDTH:
         raise AnalysisError("ratio of sampling rates", got=f"{rate_ratio:g}", allowed=f"> {1e-6 * HALF_WIDTH:g}")
     samples = np.ascontiguousarray(values, dtype=np.float64)
@@ -85,6 +89,7 @@ def _kernel() -> FloatArray:
     """sinc(u) w(u/24) for u = 0 … 24 in steps, one zero more for the interpolation."""
     u = np.arange(HALF_WIDTH * _STEPS_PER_SAMPLE + 1) / _STEPS_PER_SAMPLE
     window = i0(_KAISER_SHAPE * np.sqrt(np.maximum(1 - (u / HALF_WIDTH) ** 2, 0))) / i0(_KAISER_SHAPE)
+    # at the very end of the kernel the interpolation looks one step ahead
     return np.append(np.sinc(u) * window, [0.0, 0.0])
 
 
@@ -100,9 +105,11 @@ def _interpolated(values: FloatArray, positions: FloatArray, cutoff: float, kern
             result[i] = values[int(nearest)]
             continue
         first, last = np.ceil(place - reach), np.floor(place + reach)
+        # nothing is made up beyond the ends
         if not (first >= 0 and last <= values.size - 1):
             result[i] = np.nan
             continue
+        # no normalisation by the sum of the weights: NaN goes through the plain sum and leaves a gap as a gap
         total = 0.0
         for k in range(int(first), int(last) + 1):
             step = abs(place - k) * cutoff * _STEPS_PER_SAMPLE

@@ -26,6 +26,7 @@ FloatArray = npt.NDArray[np.float64]
 _HIGHEST_FREQUENCY_HZ = 150.0
 _LOWEST_FREQUENCY_HZ = 1.0
 _COARSE_RATE_HZ = 400.0
+# A phase knows the delay up to a period: the right maximum need not be the highest.
 _N_CANDIDATES = 5
 _SMALLEST_CORRELATION = 0.3
 _CLEARLY_WORSE = 2.0
@@ -187,18 +188,23 @@ def clock_delay(
     if not fits:
         return _nothing_in_common(reference)
     fits.sort(key=lambda fit: fit.residual_rms_s)
+    # once more from the improved line: what is left then is far below a period, where the phase is exact
     best = _line_through_windows(reference, other, fits[0].line) or fits[0]
     half_period_s = 0.25 / _highest_frequency_hz(reference)
+    # candidates that ended in the same line are no rivals
     rivals = [fit for fit in fits[1:] if abs(fit.line.middle_s - best.line.middle_s) > half_period_s]
     status = AlignmentStatus.ALIGNED
     if best.correlation < _SMALLEST_CORRELATION:
         status = AlignmentStatus.NO_COMMON_MOTION
+    # a delay wrong by a period fits a steady motion as well as the right one; only a changing frequency tells
+    # them apart
     elif any(fit.residual_rms_s < _CLEARLY_WORSE * best.residual_rms_s for fit in rivals):
         status = AlignmentStatus.AMBIGUOUS
     return _stated(best, status)
 
 
 def _stated(fit: _Fit, status: AlignmentStatus) -> ClockDelay:
+    # the worse end of the run: an error of the drift is largest there
     farthest_s = fit.half_span_s + abs(fit.centroid_s - fit.line.centre_s)
     error_s = 2 * math.hypot(fit.middle_std_s, fit.slope_std * farthest_s)
     return ClockDelay(
@@ -228,6 +234,7 @@ def _nothing_in_common(reference: SampledSignal) -> ClockDelay:
 
 
 def _require_common_time(reference: SampledSignal, other: SampledSignal) -> None:
+    # stated times may be off by as much as is sought, so that little overlap is not yet a reason to refuse
     ends = [signal.start_s + signal.step_s * signal.values.size for signal in (reference, other)]
     common_s = min(ends) - max(reference.start_s, other.start_s)
     shortest_s = min(signal.step_s * signal.values.size for signal in (reference, other))
@@ -240,6 +247,7 @@ def _require_common_time(reference: SampledSignal, other: SampledSignal) -> None
 def _highest_frequency_hz(signal: SampledSignal) -> float:
     """Below this lie 99 % of the power."""
     values = _centred(signal)
+    # the frequency decides how far apart maxima of the correlation can be, and how fine drifts must be tried
     power = np.cumsum(np.abs(np.fft.rfft(values)) ** 2)
     line = int(np.searchsorted(power, 0.99 * power[-1]))
     return min(_HIGHEST_FREQUENCY_HZ, max(_LOWEST_FREQUENCY_HZ, line / (values.size * signal.step_s)))
@@ -256,10 +264,12 @@ def _candidates(
     centre_s = float(time.mean())
     x = _interpolated(reference, time)
     n_lags = max(1, round(largest_delay_s / step_s))
+    # padded by more than the largest lag, so that the ends do not meet in the circular correlation
     n_padded = 1 << (n + n_lags).bit_length()
     x_spectrum = np.conj(np.fft.rfft(x, n_padded))
     found: list[tuple[float, _Line]] = []
     for slope in _drifts(largest_drift_ppm, n * step_s, _highest_frequency_hz(reference)):
+        # about the middle, so that a drift does not change the delay it goes with
         y = _interpolated(other, time + slope * (time - centre_s))
         correlation = np.fft.irfft(x_spectrum * np.fft.rfft(y, n_padded), n_padded)
         near = np.concatenate([correlation[n_padded - n_lags :], correlation[: n_lags + 1]])
@@ -313,6 +323,7 @@ def _best_apart(found: list[tuple[float, _Line]], distance_s: float) -> list[_Li
 def _line_through_windows(reference: SampledSignal, other: SampledSignal, line: _Line) -> _Fit | None:
     """Delays of the windows after `line` has been taken off, and the better line; None without signal."""
     time = reference.start_s + reference.step_s * np.arange(reference.values.size)
+    # on the reference's instants, once per candidate; the fit of the windows is linear in what remains
     positions = (time + line.at(time) - other.start_s) / other.step_s
     y = resampled(other.values, positions, rate_ratio=other.step_s / reference.step_s)
     windows = _windows(reference.values, y, reference.step_s)
@@ -344,6 +355,7 @@ def _windows(
     x: FloatArray, y: FloatArray, step_s: float
 ) -> list[tuple[float, float, float, tuple[float, float, float]]]:
     """Per window without lost samples: delay [s], weight, centre [samples], (Re ΣYX*, Σ|X|², Σ|Y|²)."""
+    # at least some sixteen windows, or a line through them has no residual to speak of
     n_window = max(32, round(min(2.0, x.size * step_s / 16) / step_s))
     hann = np.hanning(n_window + 1)[:-1]
     omega = np.asarray(2 * np.pi * np.fft.rfftfreq(n_window, step_s), dtype=np.float64)
@@ -379,17 +391,20 @@ def _line_through(
         w = weight * used
         if np.count_nonzero(w) < _FEWEST_WINDOWS:
             return None
+        # about the weighted centre the errors of height and slope are independent
         centroid = float((w * time).sum() / w.sum())
         middle = float((w * delay).sum() / w.sum())
         moment = float((w * (time - centroid) ** 2).sum())
         slope = float((w * (time - centroid) * delay).sum() / moment)
         residual = delay - middle - slope * (time - centroid)
         scaled = np.abs(residual) * np.sqrt(weight)
+        # from the median, which windows that are far off do not move; the tiny term keeps exact data
         keep = scaled <= _OUTLIER * 1.4826 * np.median(scaled) + 1e-300
         if np.array_equal(keep, used):
             break
         used = keep
     n_free = max(1, int(np.count_nonzero(w)) - 2)
+    # from the scatter, not from the stated noise: it contains what the two sensors do not share
     unit_variance = _WINDOW_OVERLAP_VARIANCE * float((w * residual**2).sum()) / n_free
     rms = math.sqrt(float((w * residual**2).sum() / w.sum()))
     stds = math.sqrt(unit_variance / float(w.sum())), math.sqrt(unit_variance / moment)

@@ -72,6 +72,7 @@ def energy_maps(
     AnalysisError
         If there are fewer than three windows.
     """
+    # windows without a motion have no place in the logarithms
     used = windows.isel(window=np.flatnonzero(windows["acceleration_g"].values > 0))
     if used.sizes["window"] < 3:
         raise AnalysisError(
@@ -138,6 +139,7 @@ class _Plane:
         acceleration = np.maximum(amplitude_m * (2 * np.pi * frequency_hz) ** 2, 1e-12)
         return {
             "logarithms of frequency and acceleration": np.column_stack(
+                # logarithms: an octave of frequency counts as much as a doubling of the level
                 [np.log2(frequency_hz), np.log2(acceleration / GRAVITY_M_PER_S2)]
             ),
             "frequency and displacement": np.column_stack(
@@ -163,9 +165,11 @@ class _Grid:
 def _grids(frequency_hz: FloatArray, amplitude_m: FloatArray, rig: Rig | None, n_grid: int) -> list[_Grid]:
     """Grids over u₀ and, with a tank, over ū and v̄, that cover the given windows."""
     frequencies = np.linspace(frequency_hz.min(), frequency_hz.max(), n_grid)
+    # v̄ √(gh) = Ωu₀: along a line of constant v̄ the displacement falls with the frequency
     per_speed = 1 / (2 * np.pi * frequencies)
 
     def grid(largest: float, metres_per_unit: FloatArray) -> _Grid:
+        # without the line at zero, where W̄ is 0/0
         axis = np.linspace(0.0, largest, n_grid + 1)[1:]
         return _Grid(frequencies, axis, np.outer(metres_per_unit, axis))
 
@@ -184,6 +188,7 @@ def _measured(
     """Nodes that the windows lie around, judged in the logarithms."""
     own = plane.at(windows["frequency_hz"].values, windows["amplitude_m"].values)
     nodes = plane.at(grid.frequency_hz.ravel(), grid.amplitude_m.ravel())
+    # in one kind of coordinates for all maps, whichever the interpolation chose
     inside = inside_measured_region(next(iter(own.values())), group, next(iter(nodes.values())))
     return inside.reshape(grid.amplitude_m.shape)
 
@@ -198,6 +203,7 @@ def _on_grids(
     """Values and standard errors on each grid, NaN outside the mask; the weights are found once for all grids."""
     frequency = np.concatenate([grid.frequency_hz[mask] for grid, mask in zip(grids, masks, strict=True)])
     amplitude = np.concatenate([grid.amplitude_m[mask] for grid, mask in zip(grids, masks, strict=True)])
+    # solving for the weights costs far more than evaluating them
     edges = np.cumsum([mask.sum() for mask in masks])[:-1]
     both = (
         interpolated(field, plane.at(frequency, amplitude), chosen) if frequency.size else (frequency, amplitude)

@@ -27,6 +27,7 @@ DEFAULT_SMOOTHING = 1e-2
 _SMALLEST_RELATIVE_STD = 0.25
 """Standard errors below this part of the median are raised to it: a few cycles may agree by chance."""
 _LARGEST_NUMBER_OF_POINTS = 20_000
+# Every candidate solves a dense system of this size for every fold.
 _LARGEST_NUMBER_TO_CHOOSE_BY = 600
 
 
@@ -64,6 +65,7 @@ class ScatteredField:
         typical = float(np.median(self.std))
         if smoothing == 0.0 or not typical > 0:
             return np.full(self.values.size, smoothing)
+        # a point with twice the error is followed a quarter as closely
         return np.asarray(smoothing * np.maximum(self.std / typical, _SMALLEST_RELATIVE_STD) ** 2)
 
 
@@ -113,6 +115,7 @@ def interpolated(
     # interpolation is linear in the values: its weights, found once, carry values and standard errors alike
     unit_vectors = np.eye(points.shape[0])
     operator = _interpolator(points, unit_vectors, field.weights(chosen.smoothing))(at[chosen.coordinates])
+    # errors of windows are taken as independent: they have no cycle in common unless M < 2P
     return operator @ field.values, np.sqrt(operator**2 @ field.std**2)
 
 
@@ -155,6 +158,7 @@ def _thinned(field: ScatteredField) -> ScatteredField:
 
 
 def _every(field: ScatteredField, n_folds: int) -> list[npt.NDArray[np.bool_]]:
+    # every fifth, not blocks: neighbours along a run stay, so that only scatter is judged
     return [np.arange(field.values.size) % n_folds == fold for fold in range(n_folds)]
 
 
@@ -165,6 +169,7 @@ def _inner_runs(field: ScatteredField) -> list[npt.NDArray[np.bool_]]:
         return []
     second = next(iter(field.coordinates.values()))[:, 1]
     level = np.array([np.median(second[field.group == group]) for group in groups])
+    # the outermost runs could only be extrapolated
     inner = groups[(level > level.min()) & (level < level.max())]
     return [field.group == group for group in inner]
 

@@ -46,6 +46,7 @@ class MapError:
             The values that the two maps were made of, window by window.
         """
         difference = (predicted - measured).values
+        # without the interpolation, whose own error is in both maps
         by_window = windows[1].values - windows[0].values
         return cls(
             largest=float(np.nanmax(np.abs(measured.values))),

@@ -44,6 +44,7 @@ def inside_measured_region(points: FloatArray, group: npt.NDArray[np.intp], at: 
     >>> inside_measured_region(runs, np.repeat([0, 1], 10), np.array([[4.5, 0.5], [4.5, 1.8]])).tolist()
     [True, False]
     """
+    # a single run is measured along itself, though it spans no area
     strip = cKDTree(points).query(at)[0] <= _STRIP_OVER_SPACING * _window_spacing(points, group)
     spacing = _run_spacing(points, group)
     if not np.isfinite(spacing):
@@ -52,6 +53,7 @@ def inside_measured_region(points: FloatArray, group: npt.NDArray[np.intp], at: 
         triangulation = Delaunay(points)
     except QhullError:
         return np.asarray(strip)
+    # long thin triangles bridge bays that nobody measured; their circumscribed circles are large
     small = _circumradius(points[triangulation.simplices]) <= _RADIUS_OVER_SPACING * spacing
     triangle = triangulation.find_simplex(at)
     return np.asarray(strip | ((triangle >= 0) & small[triangle]))
@@ -87,4 +89,5 @@ def _circumradius(triangles: FloatArray) -> FloatArray:
     sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2)
     edge_1, edge_2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     twice_area = np.abs(edge_1[:, 0] * edge_2[:, 1] - edge_1[:, 1] * edge_2[:, 0])
+    # collinear points have an infinite circle
     return np.asarray(sides.prod(axis=1) / np.maximum(2 * twice_area, 1e-300))

@@ -63,17 +63,21 @@ def element_modes(
             allowed=f"1 … {_LARGEST_N_ELEMENTS} elements, modes up to twice their number, inertia ≥ 0",
         )
     stiffness, mass = _assembled(beam, n_elements)
+    # a rigid body beyond the tip: its centre moves with deflection and slope of the last node
     mass[-2, -2] += beam.tip_mass_kg
     mass[-1, -2] += beam.tip_mass_kg * tip_offset_m
     mass[-2, -1] += beam.tip_mass_kg * tip_offset_m
     mass[-1, -1] += tip_inertia_kg_m2 + beam.tip_mass_kg * tip_offset_m**2
+    # clamped: deflection and slope of the root are zero
     free = slice(2, None)
     # M v = ω⁻² K v: the lowest modes are the largest values here and lose no digits to the highest
     size = mass.shape[0] - 2
     inverse_squares, vectors = eigh(
         mass[free, free], stiffness[free, free], subset_by_index=[size - n_modes, size - 1]
     )
+    # ψ = 1 at the tip
     vectors = vectors[:, ::-1] / vectors[-2, ::-1]
+    # a translation of the whole beam, whose inertia is what a moving base exerts (2.31)
     rigid = np.zeros(mass.shape[0])
     rigid[0::2] = 1.0
     shape = np.vstack([np.zeros((2, n_modes)), vectors])

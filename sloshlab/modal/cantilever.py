@@ -132,9 +132,11 @@ def cantilever_modes(beam: Cantilever, *, n_modes: int, x_m: FloatArray | None =
             "position along the beam", got=f"{x.min():g} … {x.max():g} m", allowed=f"0 … {beam.length_m:g} m"
         )
     ratio = beam.tip_mass_kg / (beam.mass_per_length_kg_per_m * beam.length_m)
+    # only the ratio of tip mass to beam mass enters the wave numbers; stiffness scales them to frequencies
     roots = np.array([_root(n, ratio) for n in range(1, n_modes + 1)])
     speed = np.sqrt(beam.bending_stiffness_n_m2 / beam.mass_per_length_kg_per_m)
     omega = (roots / beam.length_m) ** 2 * speed
+    # Gauss points grow with the number of waves along the beam
     nodes, weights = _nodes_and_weights(40 + 4 * n_modes)
     along = 0.5 * (nodes + 1)
     inner = _shapes(roots, along)
@@ -165,6 +167,7 @@ def _nodes_and_weights(n: int) -> tuple[FloatArray, FloatArray]:
 @lru_cache(maxsize=1024)
 def _root(n: int, ratio: float) -> float:
     """The n-th wave number: between the clamped–pinned root before it and the clamped–free root."""
+    # one root in each interval for every tip mass; the first one tends to zero as the mass grows
     low = max((n - 1) * np.pi, 1e-3 / (1 + ratio))
     high = n * np.pi
     return float(brentq(_characteristic, low, high, args=(ratio,), xtol=1e-14, rtol=1e-14))
@@ -177,6 +180,7 @@ def _shapes(roots: FloatArray, position: FloatArray) -> FloatArray:
     """
     shapes = []
     for root in roots:
+        # everything over e^λ: cosh and sinh of high modes overflow, and their difference has no digits left
         decayed = np.exp(-2 * root)
         sum_c, sum_s = (
             1 + decayed + 2 * np.exp(-root) * np.cos(root),

@@ -76,6 +76,7 @@ def fit_decaying_sine(
     >>> round(fit.decay_per_s, 6), round(fit.omega_rad_per_s, 6)
     (0.3, 9.0)
     """
+    # from the middle, where amplitude and decay are nearly uncorrelated
     time: FloatArray = np.linspace(-0.5, 0.5, signal.size) * ((signal.size - 1) / sampling_rate_hz)
     nonlinear: FloatArray = np.array([decay_per_s, 2 * np.pi * frequency_hz])
     largest = _LARGEST_STEP * nonlinear[1]
@@ -83,6 +84,7 @@ def fit_decaying_sine(
         basis = _basis(time, nonlinear)
         linear = _solved(basis, signal)
         jacobian = _jacobian(time, basis, linear)
+        # Gauss–Newton on all five; only s and ω are kept, as the others are solved for exactly in the next round
         step = np.linalg.lstsq(jacobian, signal - basis @ linear, rcond=None)[0][:2]
         nonlinear = np.asarray(nonlinear + np.clip(step, -largest, largest), dtype=np.float64)
         if np.abs(step).max() <= 1e-8 * nonlinear[1]:
@@ -112,7 +114,9 @@ def _jacobian(time: FloatArray, basis: FloatArray, linear: FloatArray) -> FloatA
 
 def _result(nonlinear: FloatArray, linear: FloatArray, jacobian: FloatArray, residual: FloatArray) -> DecayingSine:
     amplitude = float(np.hypot(linear[0], linear[1]))
+    # pseudo-inverse: less than a cycle leaves constant and cosine undetermined
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-20)
+    # error of √(A² + B²) to first order: along (A, B) only
     direction = linear[:2] / amplitude if amplitude > 0 else np.zeros(2)
     variances = [covariance[0, 0], covariance[1, 1], direction @ covariance[2:4, 2:4] @ direction]
     unit_std = np.sqrt(np.maximum(variances, 0.0))

@@ -45,8 +45,11 @@ def analytic_signal(signal: FloatArray, sampling_rate_hz: float, *, frequency_hz
     >>> round(float(abs(z[1000])), 3)
     3.0
     """
+    # zeros behind the record, or the end of the decay would be filtered into its beginning
     n_padded = signal.size + int(2 * _EDGE_STD * sampling_rate_hz * _kernel_std_s(frequency_hz)) + 1
     lines = np.fft.fftfreq(n_padded, 1 / sampling_rate_hz)
+    # twice the positive frequencies and none of the negative: the analytic signal, in the same transform as the
+    # band
     band = 2 * np.exp(-0.5 * ((lines - frequency_hz) / (BANDWIDTH_SHARE * frequency_hz)) ** 2)
     spectrum = np.fft.fft(signal - signal.mean(), n_padded) * band
     return np.asarray(np.fft.ifft(spectrum)[: signal.size], dtype=np.complex128)
@@ -76,6 +79,7 @@ def envelope(
         Stretches that the ends of the record reach into are marked as edge.
     """
     z = analytic_signal(signal, sampling_rate_hz, frequency_hz=frequency_hz)
+    # the band has hardly more to tell; finer points would only make the covariance matrix larger
     step = max(1, int(sampling_rate_hz / frequency_hz / _POINTS_PER_CYCLE))
     time = np.arange(0, z.size, step) / sampling_rate_hz
     log_amplitude, phase = np.log(np.maximum(np.abs(z), 1e-300))[::step], np.unwrap(np.angle(z))[::step]
@@ -120,8 +124,11 @@ def _slopes(
     """Decay, ω, amplitude, standard error of both slopes, relative standard error of the amplitude."""
     centred = time - time.mean()
     weight = centred / (centred**2).sum()
+    # error of ln|z| and of arg z is noise over amplitude
     inverse = np.exp(-log_amplitude)
     lag = centred[:, None] - centred[None, :]
+    # noise behind a Gaussian band is correlated over its impulse response; taken as independent, errors would be
+    # too small
     covariance = (
         noise_variance * np.exp(-((np.pi * bandwidth_hz * lag) ** 2)) * inverse[:, None] * inverse[None, :]
     )

@@ -102,12 +102,14 @@ def analyse_free_decay(
     # to the end of the motion only: what dry friction holds has no extrema and no phase
     part = np.asarray(signal, dtype=np.float64)[first : last + 1]
     frequency = release.frequency_hz
+    # first, because it measures the noise that the other two readings use
     by_fit, noise = local_sine_fit(part, sampling_rate_hz, frequency_hz=frequency, n_cycles=n_cycles)
     # judged by the sine fit, whose stretches do not overlap: its errors are independent
     _refuse_without_decay(by_fit)
     _refuse_other_frequency(by_fit, frequency_range_hz)
     by_envelope = envelope(part, sampling_rate_hz, frequency_hz=frequency, noise=noise, n_cycles=n_cycles)
     by_peaks = log_decrement(part, sampling_rate_hz, frequency_hz=frequency, noise=noise)
+    # how far a value looks to each side; a decrement is read from peak to peak
     half_s = 0.5 * n_cycles / frequency
     n_edge = round(filter_edge_s * sampling_rate_hz)
     inner = n_edge / sampling_rate_hz, (np.size(signal) - 1 - n_edge) / sampling_rate_hz
@@ -131,6 +133,7 @@ def _completed(
     amplitude = reading.acceleration_amplitude_m_per_s2
     if motion == "displacement":
         amplitude = amplitude * (2 * np.pi * reading.frequency_hz) ** 2
+    # a stretch that begins within the transient is marked, not only one whose middle lies there
     in_transient = time - reach_s < release.transient_end_s - 1e-9
     in_transient &= release.transient_end_s > release.release_s
     trust = reading.trust
@@ -141,6 +144,7 @@ def _completed(
         reading,
         time_s=time,
         acceleration_amplitude_m_per_s2=amplitude,
+        # values are marked and never dropped
         trust=np.where(in_transient, str(Trust.RELEASE), trust),
     )
 
@@ -165,6 +169,7 @@ def _refuse_without_decay(reading: InstantaneousDamping) -> None:
 def _refuse_other_frequency(reading: InstantaneousDamping, frequency_range_hz: tuple[float, float] | None) -> None:
     """Where a mode is not excited lies the foot of another one, to whose frequency the fit converges."""
     low, high = frequency_range_hz or (0.0, np.inf)
+    # the median, as single stretches may have followed another mode
     seen = float(np.median(reading.frequency_hz[reading.used]))
     if not low <= seen <= high:
         raise AnalysisError(

@@ -87,6 +87,7 @@ def local_sine_fit(
             allowed=f"at least {n_cycles}, one stretch",
             remedy="take fewer cycles per stretch, or record longer",
         )
+    # edges rounded from their exact places, so that long decays do not lose or gain samples
     edges = np.round(np.arange(int(signal.size / length) + 1) * length).astype(int)
     fits: list[DecayingSine] = []
     guess = frequency_hz, 0.0
@@ -132,10 +133,12 @@ def _noise(fits: list[DecayingSine], time_s: FloatArray, n_cycles: int) -> Decay
     """
     lines = np.arange(1, int(1.75 * n_cycles) + 1)
     lines = lines[np.abs(lines - n_cycles) > 1]
+    # below lies drift, which the band of the mode does not see
     lines = lines[lines >= 0.5 * n_cycles]
     levels = np.array([fit.noise_std for fit in fits])
     shares = [_line_shares(fit, lines[lines <= fit.residual.size // 2]) for fit in fits]
     pooled = np.concatenate(shares) if shares else np.ones(1)
+    # one colour for all stretches: a few lines of one stretch tell next to nothing
     colour = float(pooled.mean()) if pooled.size else 1.0
     n_free = float(sum(fit.residual.size - N_PARAMETERS for fit in fits))
     # a periodogram line has two degrees of freedom

@@ -16,6 +16,7 @@ from sloshlab.modal.local_sine_fit import LARGEST_AMPLITUDE_ERROR, DecayNoise
 
 FloatArray = npt.NDArray[np.float64]
 
+# A quarter of a cycle in all: wider, a parabola no longer follows the sine; narrower, it follows the noise.
 _HALF_WIDTH_SHARE = 1 / 8
 """Half width of the parabola over the period."""
 _NEIGHBOURS = np.array([-0.25, 0.5, -0.25])
@@ -47,6 +48,7 @@ def log_decrement(
     """
     time, value, sign, found, unit_time_std, unit_value_std = _extrema(signal, sampling_rate_hz, frequency_hz)
     apart = 2 * n_cycles
+    # half the distance to the mean of both neighbours: static offset and drift drop out, which (2.13) leaves in
     amplitude = sign[1:-1] * np.convolve(value, _NEIGHBOURS, mode="valid")
     # where the motion has ended the logarithm still needs a number; such values are marked as noise
     lost = 1e-6 * np.abs(amplitude).max()
@@ -54,6 +56,7 @@ def log_decrement(
     first, last = slice(0, amplitude.size - apart), slice(apart, amplitude.size)
     when = time[1:-1]
     duration = when[last] - when[first]
+    # (2.13) per second, with the time between the extrema as it was measured
     decay = np.log(amplitude[first] / amplitude[last]) / duration
     omega = 2 * np.pi * n_cycles / duration
     std = noise.at(when)
@@ -61,10 +64,12 @@ def log_decrement(
     time_std = np.hypot((std * unit_time_std[1:-1])[first], (std * unit_time_std[1:-1])[last])
     damping, damping_std = damping_ratio_of(decay, omega, log_std / duration, omega * time_std / duration)
     whole = found[:-2] & found[1:-1] & found[2:]
+    # the smaller, later amplitude decides
     relative = (std * unit_value_std[1:-1])[last] * np.sqrt((_NEIGHBOURS**2).sum()) / amplitude[last]
     return InstantaneousDamping(
         method="log decrement",
         time_s=0.5 * (when[first] + when[last]),
+        # the amplitude half-way along an exponential decay
         acceleration_amplitude_m_per_s2=np.sqrt(amplitude[first] * amplitude[last]),
         damping_ratio=damping,
         damping_ratio_std=damping_std,
@@ -109,7 +114,9 @@ def _extrema(
         centre = np.round(vertex).astype(int)
         whole = (centre >= half_width) & (centre + half_width < signal.size)
         centre, halves = centre[whole], halves[whole]
+        # one matrix for all extrema, as all parabolas have the same places
         constant, slope, curvature = covariance @ design.T @ signal[centre[:, None] + offset].T
+        # a number of the right sign, so that the vertex stays finite; such extrema are marked as missing below
         curvature = np.where(np.abs(curvature) < flat, -flat * np.cos(np.pi * halves), curvature)
         shift = np.clip(-slope / (2 * curvature), -half_width, half_width)
         vertex = centre + shift
@@ -120,5 +127,6 @@ def _extrema(
     )
     value = constant + slope * shift + curvature * shift**2
     sign = np.where(halves % 2 == 0, 1.0, -1.0)
+    # an extremum of the wrong kind, or at the edge of its parabola, is none
     found = (sign * curvature < 0) & (np.abs(shift) < half_width)
     return vertex / sampling_rate_hz, value, sign, found, shift_std / sampling_rate_hz, value_std

@@ -115,8 +115,10 @@ class ModalFilter:
                 got=f"accelerations of shape {values.shape}",
                 allowed=f"one row for each of {', '.join(self.sensor_names)}",
             )
+        # q̈ = Ψ⁺ a (2.25)
         coordinates = self.weights @ values
         residual = _rms(values - self.mode_shapes @ coordinates)
+        # what is left over is the only sign of a mode that was not kept, or of a sensor that is wrong
         share = residual / np.maximum(_rms(values), np.finfo(float).tiny)
         return ModalResponse(self.mode_names, self.sensor_names, coordinates, residual, share, sampling_rate_hz)
 
@@ -172,10 +174,12 @@ def modal_filter(
             allowed="at least as many sensors as modes",
             remedy="keep fewer modes or add sensors",
         )
+    # against the largest deflection: a shape scaled to 1 at the tip may be larger elsewhere
     scale = np.ones(n_modes) if largest_deflection is None else np.abs(np.asarray(largest_deflection))
     visibility = np.asarray(_own_lengths(shapes) / scale, dtype=np.float64)
     _refuse_invisible(visibility, names, sensor_names)
     lengths = np.linalg.norm(shapes, axis=0)
+    # the scale of the shapes is free and must not enter
     condition = float(np.linalg.cond(shapes / lengths))
     return ModalFilter(
         names,
@@ -200,6 +204,7 @@ def _own_lengths(shapes: FloatArray) -> FloatArray:
         others = np.delete(shapes, mode, axis=1)
         own = shapes[:, mode]
         if others.shape[1]:
+            # the condition number alone does not name the mode that the sensors miss
             own = own - others @ np.linalg.lstsq(others, own, rcond=None)[0]
         lengths.append(float(np.linalg.norm(own)))
     return np.array(lengths)

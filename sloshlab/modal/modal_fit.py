@@ -137,6 +137,8 @@ def modal_fit(
     h = np.atleast_2d(np.asarray(response, dtype=np.complex128))
     f = np.asarray(frequency_hz, dtype=np.float64)
     weights = np.ones(h.shape) if response_std is None else 1 / _floored(np.atleast_2d(response_std))
+    # the vector fit needs no start near the poles, but minimises a linearised error; the least squares below
+    # start from it
     fit = vector_fit(f, h, n_pole_pairs=n_modes + n_extra_pairs, weights=weights)
     pairs = fit.poles.imag > 0
     if pairs.sum() < n_modes:
@@ -150,6 +152,7 @@ def modal_fit(
     refined = _least_squares(f, h, weights, fit, kernel)
     poles = refined.poles
     own = np.flatnonzero(poles.imag > 0)
+    # the least damped are modes: pairs beyond them stand for what lies outside of the band
     own = own[np.argsort(-poles.real[own] / np.abs(poles[own]), kind="stable")[:n_modes]]
     own = own[np.argsort(np.abs(poles[own]))]
     return _modes(refined, own, fit, f, known_errors=response_std is not None)
@@ -217,8 +220,10 @@ def _least_squares(
     f: FloatArray, h: ComplexArray, weights: FloatArray, fit: RationalFit, kernel: tuple[FloatArray, FloatArray]
 ) -> _Refined:
     """Gauss–Newton on poles, residues and constants together; a step that makes the fit worse is taken back."""
+    # in units of the highest frequency, so that poles and residues are of size one
     scale = 2 * np.pi * float(f.max())
     offsets, shares = kernel
+    # the model is averaged over the line shape: a mode as narrow as a line would come out too strongly damped
     s = np.asarray(2j * np.pi * (f[:, None] + offsets) / scale, dtype=np.complex128)
     found = (
         np.asarray(fit.poles / scale, dtype=np.complex128),
@@ -236,6 +241,7 @@ def _least_squares(
             break
         found, blocks, error = moved, moved_blocks, moved_error
     poles, residues, _ = found
+    # the rank, not the number of columns: real poles have columns of zeros for their imaginary parts
     n_free = max(2 * h.size - int(np.linalg.matrix_rank(blocks)), 1)
     # sandwich: neighbouring lines of a Hann window are correlated, which the inverse of JᵀJ alone does not know
     bread = np.linalg.pinv(blocks.T @ blocks, rcond=1e-18)
@@ -288,6 +294,7 @@ def _linearised(
     n, n_outputs = poles.size, h.shape[0]
     pair = (poles.imag != 0).astype(float)
     # s holds the points of the line shape of each line, shape (n_lines, n_points)
+    # a pole and its conjugate, which a real pole does not have
     single, partner = 1 / (s[:, :, None] - poles), pair / (s[:, :, None] - poles.conj())
     plus, minus = (np.einsum("lkp,k->lp", fraction, shares) for fraction in (single, partner))
     plus_squared, minus_squared = (np.einsum("lkp,k->lp", fraction**2, shares) for fraction in (single, partner))
@@ -317,11 +324,13 @@ def _modes(
     damping_std, frequency_std = [], []
     for index, s, w, modulus in zip(own, decay, omega, size, strict=True):
         part = refined.covariance[np.ix_([index, n + index], [index, n + index])]
+        # ζ = −Re p/|p| and f = |p|/2π, derived by Re p and Im p
         to_damping = np.array([-(w**2), -s * w]) / modulus**3
         to_frequency = np.array([-s, w]) / modulus / (2 * np.pi)
         damping_std.append(np.sqrt(max(to_damping @ part @ to_damping, 0.0)))
         frequency_std.append(np.sqrt(max(to_frequency @ part @ to_frequency, 0.0)))
     tail = 0.5 + CONFIDENCE / 2
+    # errors that were estimated from the residual need Student's quantile
     quantile = norm.ppf(tail) if known_errors else student_t.ppf(tail, refined.n_free)
     frequency = size / (2 * np.pi)
     spacing = float(np.median(np.diff(f)))

@@ -89,12 +89,15 @@ def decay_in_band(
         )
     low, high = band_of_mode(frequencies_hz, mode, sampling_rate_hz)
     sections = butter(2, [low, high], btype="bandpass", fs=sampling_rate_hz, output="sos")
+    # forwards and backwards: no delay, and amplitudes of both passes only scale the decay
     narrow = sosfiltfilt(sections, signal)
+    # a high mode has few samples per cycle; resampling adds no information, but the parabola needs points
     finer = max(1, math.ceil(_SAMPLES_PER_CYCLE * own / sampling_rate_hz))
     return analyse_free_decay(
         resample_poly(narrow, finer, 1, padtype="line"),
         finer * sampling_rate_hz,
         frequency_range_hz=(_SEARCHED[0] * own, _SEARCHED[1] * own),
         n_cycles=_N_CYCLES,
+        # the filter rings with the lower end of its band
         filter_edge_s=_EDGE_IN_CYCLES_OF_THE_BAND / low,
     )

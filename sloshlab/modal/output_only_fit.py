@@ -112,7 +112,10 @@ def fit_density(
         )
     spacing = float(np.median(np.diff(f)))
     model = _Model(f, spacing, p)
+    # Whittle's likelihood as a sum of squares: densities scatter in proportion to themselves, so that plain
+    # squares would fit the peak only
     found = least_squares(model.deviances, model.start, x_scale=model.scale, max_nfev=400, xtol=1e-12, ftol=1e-12)
+    # ζ enters squared: its sign means nothing
     frequency, damping = float(found.x[0]), abs(float(found.x[1]))
     if not (f[0] < frequency < f[-1]) or 2 * damping * frequency > f[-1] - f[0]:
         raise AnalysisError(
@@ -141,11 +144,14 @@ class _Model:
 
     def __init__(self, f: FloatArray, spacing_hz: float, density: FloatArray) -> None:
         offsets, self._shares = hann_line_shape(spacing_hz)
+        # the density is even: the line shape of the lowest lines reaches below zero
         self._points = np.abs(f[:, None] + offsets)
         self.unit = float(density.max())
         self._data = density / self.unit
         peak = int(np.argmax(density))
+        # x about the peak, where the parabola's coefficients are nearly independent
         self._centre = float(f[peak])
+        # half-power width 2ζf
         width = max(float((self._data > 0.5).sum()), 1.0) * spacing_hz
         damping = 0.5 * width / self._centre
         self.start = np.array([self._centre, damping, (2 * damping) ** 2, 0.0, 0.0])
@@ -169,6 +175,7 @@ class _Model:
     def covariance(self, parameters: FloatArray, n_averages: float) -> tuple[FloatArray, float]:
         """Covariance of the parameters with neighbouring lines correlated, and the misfit."""
         steps = 1e-5 * self.scale
+        # by the logarithm, because errors are relative
         jacobian = np.stack(
             [
                 (np.log(self.density(parameters + step)) - np.log(self.density(parameters - step))) / (2 * size)

@@ -56,6 +56,7 @@ class PooledDamping:
         return self._interval(self.frequency_hz, self.frequency_hz_std)
 
     def _interval(self, mean: FloatArray, std: FloatArray) -> FloatArray:
+        # a single repeat has no scatter: NaN goes through
         n = np.maximum(self.n_repeats, 2)
         half = student_t.ppf(0.5 + CONFIDENCE / 2, n - 1) * std / np.sqrt(n)
         return np.stack([mean - half, mean + half])
@@ -94,11 +95,13 @@ def pooled_damping(
         )
         for reading in readings
     ]
+    # bins of the logarithm: a decay passes amplitudes at a constant ratio per cycle
     bins = np.unique(np.concatenate([part[0] for part in used])) if used else np.array([], dtype=np.int64)
     if not bins.size:
         raise AnalysisError(
             "pooled decays", got=f"{len(readings)} decays without a value that may be used", allowed="at least one"
         )
+    # first within each repeat, then over repeats: values of one release share its liquid and are not independent
     damping = np.array([_bin_means(bins, index, value, std) for index, value, std, _, _ in used])
     frequency = np.array([_bin_means(bins, index, value, std) for index, _, _, value, std in used])
     return PooledDamping(
@@ -193,6 +196,7 @@ def _bin_means(
     bins: npt.NDArray[np.int64], index: npt.NDArray[np.int64], value: FloatArray, std: FloatArray
 ) -> FloatArray:
     """Weighted mean per bin, NaN where a repeat has no value."""
+    # one value with next to no error must not decide its bin alone
     floor = max(1e-3 * float(np.median(std)), 1e-12) if std.size else 1.0
     weight = 1 / np.maximum(std, floor) ** 2
     place = np.searchsorted(bins, index)

@@ -80,8 +80,10 @@ def find_release(
         If there are gaps, no motion, or fewer than five cycles after the release.
     """
     values = _checked(signal)
+    # before anything is averaged: a long rest at the end would shift the mean and hide the decay
     values = values[: _n_moving(values)]
     centred = values - values.mean()
+    # half of the largest deflection: noise before the release stays below it
     start = int(np.argmax(np.abs(centred) > 0.5 * np.abs(centred).max()))
     frequency = largest_line_hz(centred[start:], sampling_rate_hz, frequency_range_hz)
     per_cycle = sampling_rate_hz / frequency
@@ -99,6 +101,7 @@ def find_release(
     shares = _unexplained_shares(
         values[start:], sampling_rate_hz, frequency, min(n_cycles, _LARGEST_N_CYCLES + _N_LATER)
     )
+    # whole cycles: a decaying sine cannot be told within less
     end = start + _n_transient(shares) * per_cycle
     release_s, end_s, rest_s = (float(at / sampling_rate_hz) for at in (start, end, values.size - 1))
     return Release(release_s, end_s, rest_s, frequency, shares)
@@ -132,8 +135,10 @@ def largest_line_hz(
     >>> round(largest_line_hz(np.sin(2 * np.pi * 5 * np.arange(1000) / 100), 100.0), 2)
     5.0
     """
+    # padded: the largest line is within an eighth of a line of the frequency
     n_padded = 4 * signal.size
     lines = np.fft.rfftfreq(n_padded, 1 / sampling_rate_hz)
+    # the lowest lines hold what is left of drift and offset
     low, high = frequency_range_hz or (1.5 * sampling_rate_hz / signal.size, sampling_rate_hz)
     allowed = (lines >= low) & (lines <= high)
     if not allowed.any():
@@ -188,6 +193,8 @@ def _unexplained_shares(
 def _n_transient(shares: FloatArray) -> int:
     """Cycles from the release on that leave more than three times what the later ones leave, at most five."""
     n_allowed = min(_LARGEST_N_CYCLES, shares.size - 3)
+    # a median: one blow of the liquid later on must not excuse the release
     later = float(np.median(shares[n_allowed : n_allowed + _N_LATER]))
     bad = shares[:n_allowed] > max(_RATIO_TO_LATER * later, _SMALLEST_SHARE)
+    # to the first cycle that is good; a bad one later is no release
     return int(np.argmin(bad)) if not bad.all() else int(n_allowed)

@@ -28,6 +28,7 @@ ALUMINIUM_KG_PER_M3: Final = 2700.0
 
 _LARGEST_MASS_RATIO = 100.0
 """Of the tip to the beam, up to which the tip mass is sought."""
+# Two scales of one shape differ by 2.3 and more in Table 2.4.
 _MASSES_AGREE = 0.25
 
 
@@ -53,6 +54,7 @@ def beam_of_rig(described: Structure) -> Cantilever | None:
 
     def mass_error(tip_kg: float) -> float:
         modes = cantilever_modes(replace(bare, tip_mass_kg=tip_kg), n_modes=1)
+        # a modal mass goes with the square of the shape's scale
         return described.modal_masses_kg[0] / described.tip_mode_shape[0] ** 2 - float(modes.modal_mass_kg[0])
 
     largest = _LARGEST_MASS_RATIO * bare.mass_per_length_kg_per_m * bare.length_m
@@ -81,6 +83,7 @@ def shapes_at(described: Structure, x_m: npt.ArrayLike) -> FloatArray:
     RigError
         If the file has no dimensions, or a place is not on the beam.
     """
+    # a copy, because the cached array is shared by all callers
     return _shapes_at(described, tuple(np.atleast_1d(np.asarray(x_m, np.float64)).tolist())).copy()
 
 
@@ -102,6 +105,7 @@ def base_participation_kg(described: Structure) -> FloatArray | None:
     beam = beam_of_rig(described)
     if beam is None:
         return None
+    # the shape may be scaled to any tip value; Γ scales with it
     return np.asarray(_modes(described, beam, [beam.length_m]).base_factor_kg * described.tip_mode_shape)
 
 
@@ -138,6 +142,7 @@ def rotation_of_beam(described: Structure) -> Rotation | None:
     modes = _modes(described, beam, x)
     coupling = 0.5 * length * line * (weights * x) @ modes.mode_shape + tip * length
     of_modes = coupling / modes.modal_mass_kg
+    # what the kept modes do not hold of the rotation; without it the base would turn too light
     inertia = line * length**3 / 3 + tip * length**2 - float(of_modes**2 @ modes.modal_mass_kg)
     base = line * length**2 / 2 + tip * length - float(of_modes @ modes.base_factor_kg)
     return Rotation(length, np.asarray(of_modes / described.tip_mode_shape), inertia, base)

@@ -83,6 +83,7 @@ def stated_modes(rig: Rig, n_modes: int | None = None) -> ModeNames:
     if structure.kind == "sdof":
         if n_modes not in (None, 1):
             raise AnalysisError("number of modes", got=str(n_modes), allowed="1 on a guide")
+        # on a guide the mass is stated without the liquid; modal data of a beam contain it frozen
         mass_kg = (structure.mass_kg or 0.0) + rig.liquid_mass_kg
         omega = float(np.sqrt((structure.stiffness_n_per_m or 0.0) / mass_kg))
         damping = (structure.damping_kg_per_s or 0.0) / (2 * mass_kg * omega)
@@ -161,6 +162,7 @@ def sensor_places_m(places_m: Mapping[str, float | None], length_m: float) -> di
     for name, stated in places_m.items():
         place = stated
         if place is None and name.startswith(_AT_THE_TIP):
+            # the tank is at the tip, and so are its roof accelerometers
             place = length_m
         if place is None and name.startswith(ACCELERATION_ROOT):
             place = 0.0
@@ -200,7 +202,9 @@ def rig_modal_filter(rig: Rig, places_m: Mapping[str, float], *, n_modes: int | 
     names = stated_modes(rig, n_modes).names
     structure, beam = structure_of(rig), uniform_beam(rig)
     tip = np.asarray(structure.tip_mode_shape[: len(names)])
+    # along the whole beam, as the largest deflection of a higher mode need not be at a sensor
     along = cantilever_modes(beam, n_modes=len(names)).mode_shape * tip
+    # ψ is 1 at the tip in the closed form; a rig may state another scale
     at_sensors = _shapes_at(beam, list(places_m.values()), len(names)) * tip
     return modal_filter(
         at_sensors,

@@ -42,6 +42,7 @@ def fit_single_mode(spectra: Spectra, output: int, frequency_range_hz: tuple[flo
     lines = (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high)
     if not lines.any():
         raise AnalysisError(f"no line between {low:.4g} and {high:.4g} Hz")
+    # the largest within the range: it falls between modes and where the liquid answers by itself
     coherence = float(spectra.coherence[output, lines].max())
     if coherence < _SMALLEST_COHERENCE:
         raise AnalysisError(

@@ -124,6 +124,7 @@ class Spectra:
     @property
     def output_psd_interval(self) -> FloatArray:
         """Ends of the 90 % intervals of S_yy, shape (2, n_outputs, n_lines)."""
+        # real and imaginary part of every averaged line count
         n_free = 2 * self.normalisation.n_effective_averages
         tails = chi2.ppf([0.5 + CONFIDENCE / 2, 0.5 - CONFIDENCE / 2], n_free)
         return np.asarray(n_free / tails[:, None, None] * self.output_psd[None])
@@ -134,6 +135,7 @@ class Spectra:
 
         Infinite with fewer than two effective averages.
         """
+        # two of the degrees of freedom go into the real and the imaginary part of H₁
         n_free = 2 * self.normalisation.n_effective_averages - 2
         if n_free <= 0:
             return np.full(self.output_psd.shape, np.inf)
@@ -231,6 +233,7 @@ def random_spectra(
     n_used, sums = 0, np.zeros((2 * y.shape[0] + 1, segment_length // 2 + 1), dtype=np.complex128)
     for start in range(0, x.size - segment_length + 1, hop):
         part = slice(start, start + segment_length)
+        # a segment with a gap in any channel is left out for all: H₁ needs both from the same instants
         block = np.vstack([x[None, part], y[:, part]])
         if np.isfinite(block).all():
             sums += _segment_products(block, window)
@@ -242,13 +245,16 @@ def random_spectra(
             allowed="at least 2",
             remedy="take shorter segments or record longer",
         )
+    # one-sided: the negative frequencies are added to the positive ones
     density = 2 * sums / (n_used * sampling_rate_hz * (window**2).sum())
+    # the line at half the sampling rate has no negative partner
     if segment_length % 2 == 0:
         density[:, -1] /= 2
     n_outputs = y.shape[0]
     names = output_names or tuple(f"output {n}" for n in range(1, n_outputs + 1))
     return Spectra(
         output_names=names,
+        # without the mean, which was taken out of every segment
         frequency_hz=np.arange(1, density.shape[1]) * sampling_rate_hz / segment_length,
         input_psd=density[0, 1:].real,
         output_psd=density[1 : n_outputs + 1, 1:].real,
@@ -279,6 +285,7 @@ def hann_line_shape(line_spacing_hz: float) -> tuple[FloatArray, FloatArray]:
     (1.0, 0.4)
     """
     points = _LINE_SHAPE_POINTS
+    # 0/0 one line off the middle, where the limit is 1/4
     u = np.where(np.abs(np.abs(points) - 1) < 1e-9, points + 1e-6, points)
     shape = (np.sinc(u) / (1 - u**2)) ** 2
     return points * line_spacing_hz, shape / shape.sum()
@@ -297,6 +304,7 @@ def _normalisation(
     length, energy = window.size, float((window**2).sum())
     shifts = range(1, min(n_segments, -(-length // hop)))
     correlations = [(j, float((window[: -j * hop] * window[j * hop :]).sum()) / energy) for j in shifts]
+    # Welch (1967): overlapping segments share samples, so that they count for less than their number
     inflation = 1 + 2 * sum((1 - j / n_segments) * rho**2 for j, rho in correlations)
     return Normalisation(
         window="hann",

@@ -109,14 +109,17 @@ def update_beam(
     def model(parameters: FloatArray) -> Cantilever:
         return dataclasses.replace(
             beam,
+            # by its logarithm, which keeps it positive and makes both parameters of size one
             youngs_modulus_pa=beam.youngs_modulus_pa * float(np.exp(parameters[0])),
             tip_mass_kg=beam_mass * max(float(parameters[1]), 0.0),
         )
 
     def misfit(parameters: FloatArray) -> FloatArray:
         modelled = element_modes(model(parameters), n_modes=measured.size, n_elements=n_elements).frequency_hz
+        # relative errors: the third frequency is twenty times the first one
         return np.asarray(np.log(modelled / measured) / relative)
 
+    # away from the bound at zero, where a step to one side only is left
     start = np.array([0.0, max(beam.tip_mass_kg / beam_mass, 1e-3)])
     found = least_squares(misfit, start, bounds=([-5, 0], [5, 1e3]), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     covariance = np.linalg.pinv(found.jac.T @ found.jac)
@@ -127,6 +130,7 @@ def update_beam(
         covariance = covariance * 2 * found.cost / n_free
         factor = float(student_t.ppf(0.5 + CONFIDENCE / 2, n_free))
     else:
+        # two parameters meet two frequencies exactly: nothing is left to tell an error from
         covariance, factor = covariance * np.nan, float("nan")
     updated = model(found.x)
     return UpdatedBeam(

@@ -126,6 +126,7 @@ def vector_fit(
     f = np.asarray(frequency_hz, dtype=np.float64)
     w = np.ones(h.shape) if weights is None else np.broadcast_to(np.asarray(weights, dtype=np.float64), h.shape)
     _check(f, h, w, n_pole_pairs)
+    # frequencies of size one: partial fractions and polynomial would differ by many powers of ten otherwise
     scale = 2 * np.pi * float(f.max())
     s = np.asarray(2j * np.pi * f / scale, dtype=np.complex128)
     poles = _spread(f / f.max(), n_pole_pairs)
@@ -136,6 +137,7 @@ def vector_fit(
         n_taken += 1
         moved = _relocated(s, h, w, poles, proportional)
         if stable:
+            # mirrored, which keeps the modulus of the response on the imaginary axis
             moved = np.where(moved.real > 0, -moved.conj(), moved)
         change = _largest_move(poles, moved)
         poles = np.asarray(moved, dtype=np.complex128)
@@ -164,6 +166,7 @@ def _check(f: FloatArray, h: ComplexArray, w: FloatArray, n_pole_pairs: int) -> 
 
 
 def _spread(f: FloatArray, n_pairs: int) -> ComplexArray:
+    # weakly damped and spread over the lines, as Gustavsen and Semlyen start
     centres = f.min() + (np.arange(n_pairs) + 0.5) / n_pairs * (f.max() - f.min())
     return np.asarray(centres * (-0.01 + 1j), dtype=np.complex128)
 
@@ -176,6 +179,7 @@ def _partial_fractions(s: ComplexArray, poles: ComplexArray) -> ComplexArray:
             columns.append(1 / (s - pole))
         else:
             first, second = 1 / (s - pole), 1 / (s - pole.conj())
+            # real coefficients of this pair make conjugate residues: the response of a real system
             columns += [first + second, 1j * (first - second)]
     return np.stack(columns, axis=1)
 
@@ -190,6 +194,7 @@ def _relocated(
     denominator = np.column_stack([own, np.ones_like(s)])
     rows, right = [], []
     for response, weight in zip(h, w, strict=True):
+        # outputs of unlike units count alike in the common poles
         scaled = weight / max(float(np.linalg.norm(weight * response)), 1e-300)
         system = scaled[:, None] * np.hstack([numerator, -response[:, None] * denominator])
         # only the scaling function is common to all outputs: of each output's system what is left after its own
@@ -206,6 +211,7 @@ def _relocated(
     at_infinity = float(solution[-1])
     if abs(at_infinity) < _SMALLEST_SIGMA:
         at_infinity = float(np.copysign(_SMALLEST_SIGMA, at_infinity))
+    # zeros of d̃ + Σ c/(s − p) are those of 1 + Σ (c/d̃)/(s − p)
     return _zeros(poles, solution[:-1] / at_infinity)
 
 
@@ -236,11 +242,13 @@ def _zeros(poles: ComplexArray, coefficients: FloatArray) -> ComplexArray:
     values = np.linalg.eigvals(matrix - np.outer(column, coefficients))
     # eigenvalues that are real but for rounding stay single, or each would become a pair
     values = np.where(np.abs(values.imag) < 1e-13 * np.abs(values), values.real, values)
+    # one of each pair; the order is by modulus, as in the result
     kept = values[values.imag >= 0]
     return np.asarray(kept[np.argsort(np.abs(kept))], dtype=np.complex128)
 
 
 def _largest_move(before: ComplexArray, after: ComplexArray) -> float:
+    # a pair has turned into two real poles, or the reverse
     if before.size != after.size:
         return np.inf
     ordered = before[np.argsort(np.abs(before))]

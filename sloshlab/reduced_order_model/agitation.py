@@ -28,6 +28,7 @@ Kind = Literal["speed", "excess_acceleration"]
 
 KINDS: Final = ("speed", "excess_acceleration")
 _SPEED: Final = 0
+# Five per cent of a wrong s are left after three time constants.
 FORGOTTEN: Final = 3.0
 """So many time constants after a gap a state that began at rest is taken to be known."""
 
@@ -133,6 +134,8 @@ class Agitation:
         ----------
         time, velocity : float
         """
+        # √s has the unit of a velocity there; the other state is a ratio of accelerations, equal in both tanks
+        # (2.33–2.35)
         if self.kind == "speed":
             rescaled = (
                 tuple(offset * velocity for offset in self.offsets),
@@ -166,9 +169,11 @@ def _follow(kind, velocity, step_s, time_constant_s, unknown):  # type: ignore[n
     state, value, wait = np.empty(velocity.size), 0.0, 0
     for k in range(velocity.size):
         if k:
+            # only velocities before this sample, as in the delay line
             last = velocity[k - 1]
             before = velocity[k - 2] if k > 1 else 0.0
             if np.isnan(last):
+                # after a gap the state is not known; it starts anew and is told only when it has forgotten that
                 value, wait = 0.0, unknown
             else:
                 if np.isnan(before):
@@ -176,7 +181,9 @@ def _follow(kind, velocity, step_s, time_constant_s, unknown):  # type: ignore[n
                 if kind == _SPEED:
                     stirred = last * last
                 else:
+                    # acceleration beyond g: the liquid is held down by its weight below it
                     stirred = max(abs(last - before) / (step_s * GRAVITY_M_PER_S2) - 1.0, 0.0)
+                # the exact step of ṡ = (p − s)/τ, stable for any τ; Euler's would need τ far above a step
                 value = stirred + (value - stirred) * math.exp(-step_s / time_constant_s)
                 wait = max(wait - 1, 0)
         state[k] = np.nan if wait else value

@@ -37,6 +37,7 @@ class ArrayBackend:
 
     def asarray(self, values: Any) -> Array:
         """Return values as a float64 array of this library, on this device."""
+        # double precision everywhere: normal equations square the condition number
         return self.xp.asarray(values, dtype=self.xp.float64, device=self.device)
 
     def indices(self, values: NDArray[np.int64]) -> Array:
@@ -81,6 +82,7 @@ def array_backend(library: str = "numpy", device: str | None = None) -> ArrayBac
         raise MissingExtraError(library, extra="gpu", purpose=f"arrays of {library}") from None
     backend = ArrayBackend(xp, device)
     try:
+        # whether the device exists shows only when an array is put there
         backend.asarray([0.0])
     except (ValueError, TypeError, RuntimeError, AssertionError) as error:
         reason = " ".join(str(error).split())[:200]

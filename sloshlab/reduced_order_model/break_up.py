@@ -78,6 +78,7 @@ class BreakUp:
         ----------
         time : float
         """
+        # accelerations are equal in both tanks, so that the exponent and b₀ stay
         return replace(self, growth_per_s=self.growth_per_s / time, calming_s=self.calming_s * time)
 
     def facts(self) -> dict[str, Any]:
@@ -89,8 +90,10 @@ class BreakUp:
 def next_share(share, last, before, step_s, parameters):  # type: ignore[no-untyped-def]
     """b one step later, the rate being constant over the step: growth exactly, then calming exactly."""
     growth, exponent, calming_s, at_rest = parameters
+    # downward acceleration in g: only while the tank falls faster than the liquid is the surface unstable
     excess = (before - last) / (step_s * GRAVITY_M_PER_S2) - 1.0
     rate = growth * excess**exponent if excess > 0 else 0.0
+    # logistic growth in closed form: it cannot overshoot 1 at any step
     grown = 1 / (1 + (1 / share - 1) * np.exp(-rate * step_s))
     return at_rest + (grown - at_rest) * np.exp(-step_s / calming_s)
 
@@ -103,6 +106,7 @@ def _follow(velocity, step_s, parameters, shares):  # type: ignore[no-untyped-de
             last = velocity[k - 1]
             before = velocity[k - 2] if k > 1 else 0.0
             if np.isnan(last):
+                # after a gap the liquid counts as broken up, which is where the model without memory holds
                 share = 1.0
             else:
                 share = next_share(share, last, last if np.isnan(before) else before, step_s, parameters)

@@ -57,6 +57,7 @@ def with_break_up(model: ReducedOrderModel, runs: Sequence[Run]) -> ReducedOrder
     known = [np.isfinite(force) & np.isfinite(run.y) for force, run in zip(forces, runs, strict=True)]
     if not any(samples.any() for samples in known):
         raise AnalysisError("break-up", got="no sample that the model can predict", remedy="longer runs")
+    # blocks at rest must not count by dividing by next to no speed
     floor = _SLOWEST_SHARE * np.sqrt(np.mean([np.nanmean(run.x**2) for run in runs]))
     size = max(1, round(BLOCK_S * model.sampling_rate_hz))
 
@@ -68,7 +69,9 @@ def with_break_up(model: ReducedOrderModel, runs: Sequence[Run]) -> ReducedOrder
             found.append(_in_phase(error, run.x, size, floor))
         return np.concatenate(found)
 
+    # logarithms: growth and rest share span decades
     low, high = np.log(np.array(list(_BOUNDS.values())).T)
+    # an even cover of the box before least squares, which alone ends in the next valley
     tried = qmc.scale(qmc.Halton(low.size, seed=0).random(_N_TRIED), low, high)
     costs = [float(np.sum(errors(logarithms) ** 2)) for logarithms in tried]
     starts = tried[np.argsort(costs)[:_N_REFINED]]

@@ -41,6 +41,7 @@ class EarlyStop:
         ----------
         validation : float
         """
+        # in a row: six in the source (2.2)
         self._rises = self._rises + 1 if validation > self._before else 0
         self._before = validation
         self._lowest.append(min(validation, self._lowest[-1] if self._lowest else math.inf))
@@ -50,8 +51,10 @@ class EarlyStop:
         if len(self._lowest) <= n_epochs:
             return ""
         before, now = self._lowest[-1 - n_epochs], self._lowest[-1]
+        # a training that wavers never rises often enough in a row
         if now == before:
             return f"validation error no lower for {n_epochs} epochs"
+        # one that creeps never rises: 70 delays and 35 neurons went on for a hundred epochs for 0.3 per cent
         gain = 1.0 - now / before if math.isfinite(before) else 1.0
         if gain < self.least_gain:
             return f"validation error only {100 * gain:.2g} % lower after {n_epochs} epochs"

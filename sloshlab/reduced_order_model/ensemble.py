@@ -162,6 +162,7 @@ class Ensemble:
         """
         reach = self.residual.reach_of(probability)
         mean, std = _mean_and_std([member.simulate(x, start) for member in self.members])
+        # what members disagree about and what no model can know are taken as independent: variances add
         half = reach * np.sqrt(std**2 + self.residual.variance(mean, self.sampling_rate_hz))
         return PredictedRange(mean, mean - half, mean + half, std, probability)
 
@@ -214,6 +215,7 @@ def fit_ensemble(
         raise InputError("block of an ensemble", got=f"{block_s:g} s", allowed=f"≥ {1 / sampling_rate_hz:g} s")
     members, records = list[ReducedOrderModel](), list[TrainingRecord]()
     for number in range(n_members):
+        # a stream of its own per member: blocks must not change with the number of members
         rng = np.random.default_rng([chosen.seed, number, 2])
         member, record = fit(
             kind,
@@ -298,15 +300,18 @@ def residual_spread(members: Sequence[ReducedOrderModel], runs: Sequence[Run]) -
     # σ² stays above zero where members agree and the force is nil
     least = _LEAST_SHARE * float(np.mean(error**2)) + 1e-300
 
+    # by likelihood: least squares of e² looked at strong motion only and covered 83 … 100 % of unseen sweeps
     def negative_log_likelihood(logarithms: FloatArray) -> float:
         squared = variance + least + np.exp(logarithms[0]) + np.exp(logarithms[1]) * level
         return float(np.mean(np.log(squared) + error**2 / squared))
 
+    # logarithms keep both variances positive without bounds
     start = np.array([math.log(float(np.mean(error**2)) + least), math.log(0.1)])
     found = minimize(negative_log_likelihood, start, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-9})
     a_squared, b_squared = np.exp(found.x)
     constant, slope = float(np.sqrt(a_squared + least)), float(np.sqrt(b_squared))
     sigma = np.sqrt(variance + constant**2 + slope**2 * level)
+    # measured quantiles instead of those of a normal law: 1.48 for 90 per cent on the numerical tank, not 1.64
     reach = np.quantile(np.abs(error) / sigma, PROBABILITIES)
     return ResidualSpread(constant, slope, tuple(reach.tolist()))
 

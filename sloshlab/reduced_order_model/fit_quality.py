@@ -57,6 +57,7 @@ def fit_quality(measured: ArrayLike, simulated: ArrayLike) -> FitQuality:
         raise InputError("fit", got="no sample known in both", allowed="at least one")
     y, of_model = y[known], of_model[known]
     error = float(np.linalg.norm(y - of_model))
+    # (2.24) is printed with the mean of the model's output; both are given
     usual, printed = (float(np.linalg.norm(y - mean)) for mean in (y.mean(), of_model.mean()))
     return FitQuality(error / np.sqrt(y.size), _percent(error, usual), _percent(error, printed), int(y.size))
 

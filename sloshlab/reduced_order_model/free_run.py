@@ -51,6 +51,7 @@ def evaluate(kind, theta, phi, features, factors):  # type: ignore[no-untyped-de
     for i in range(m):
         squared = 0.0
         for a in range(p):
+            # Σ⁻¹ = I: the spread of the neurons is that of the scaled regressors
             difference = phi[a] - theta[i * p + a]
             squared += difference * difference
         features[i] = -squared
@@ -92,6 +93,7 @@ def run_free(model, x, y, stretch):  # type: ignore[no-untyped-def]
     for k in range(stretch.first, stretch.last):
         fill_regressors(model, x, y, k, phi)
         y[k] = evaluate(kind, theta, phi, features, factors)
+        # written so that NaN is caught, too
         if not abs(y[k]) <= bound:
             return k
     return stretch.last
@@ -108,6 +110,7 @@ def free_run_sums(model, x, y, stretch, sums):  # type: ignore[no-untyped-def]
     longest = 0
     for b in range(n_out):
         longest = max(longest, output_delays[b])
+    # only as many past sensitivities as are fed back; all of them would be samples times parameters
     history = np.zeros((longest + 1, n_theta))
     free = y.copy()
     phi, features, factors, slope = np.empty(p), np.empty(m), np.empty(m), np.empty(n_out)
@@ -138,6 +141,7 @@ def free_run_sums(model, x, y, stretch, sums):  # type: ignore[no-untyped-def]
         squares += error * error
         for j in range(n_theta):
             gradient[j] += error * now[j]
+            # half of a symmetric matrix; the caller mirrors it
             for i in range(j + 1):
                 matrix[j, i] += now[j] * now[i]
     return squares

@@ -81,9 +81,13 @@ class OneStepProblem:
             moments = moments + features @ wanted
             squares += float(xp.sum(wanted * wanted))
         diagonal = xp.eye(n_linear, dtype=matrix.dtype, device=self.backend.device)
+        # the ridge follows the size of the matrix: its unit is that of the features squared
         ridged = matrix + (_RIDGE * float(xp.sum(matrix * diagonal)) / n_linear) * diagonal
         linear = xp.linalg.solve(ridged, moments[:, None])[:, 0]
+        # ‖y − Aᵀw‖² from sums that are there already: no second pass over the samples. Not the ridged matrix: Σ
+        # e² is that of the data alone.
         squares += float(linear @ (matrix @ linear)) - 2 * float(linear @ moments)
+        # linear parameters come last in θ for this
         return xp.concat([theta[:-n_linear], linear]), squares
 
 
@@ -120,8 +124,10 @@ def next_step(problem: LeastSquaresProblem, at: Step, xp: Any) -> Step | None:
     (H + λ diag H) Δθ = g (Marquardt 1963). H costs far more than a trial of λ, so the λ of least error is sought:
     downwards from the last one if that lowers the error at all, else, or if smaller ones are worse, upwards.
     """
+    # the dear part, once per epoch: ten times a trial of λ
     sums = problem.normal_sums(at.theta)
     diagonal = xp.linalg.diagonal(sums.matrix)
+    # Marquardt's scaling: parameters of different size are damped alike
     scale = xp.maximum(diagonal, _FLOOR * xp.max(diagonal))
 
     def attempt(damping: float) -> Step:
@@ -130,6 +136,8 @@ def next_step(problem: LeastSquaresProblem, at: Step, xp: Any) -> Step | None:
             return Step(at.theta, math.inf, damping)
         return Step(*problem.improved(at.theta + change), damping)
 
+    # The first λ that lowers the error would do, but 60 delays and 20 neurons then take 60 epochs for what the
+    # best one reaches in 10.
     found = attempt(at.damping)
     if found.squares < at.squares:
         lower = _best_along(attempt, found, at.squares, 1 / _RATIO)
@@ -145,6 +153,7 @@ def _best_along(attempt: Callable[[float], Step], best: Step, before: float, fac
     """Change the damping by a factor as long as that gains markedly more."""
     while _SMALLEST_DAMPING <= best.damping * factor <= LARGEST_DAMPING:
         other = attempt(best.damping * factor)
+        # a gain by rounding would let λ run to its bounds
         if not before - other.squares > _MARKEDLY * (before - best.squares):
             return best
         best = other
@@ -154,6 +163,7 @@ def _best_along(attempt: Callable[[float], Step], best: Step, before: float, fac
 def _solved(xp: Any, matrix: Array, added: Array, right: Array) -> Array | None:
     """Solution of (matrix + diag added) x = right; None if rounding leaves that not positive definite."""
     n = right.shape[0]
+    # the array standard knows no assignment to a diagonal; a strided slice of the flat copy is one
     flat = xp.reshape(matrix, (-1,), copy=True)
     flat[:: n + 1] = flat[:: n + 1] + added
     damped = xp.reshape(flat, (n, n))

@@ -49,8 +49,10 @@ def from_rest(
     if not (np.isfinite(acceleration).all() and np.isfinite(signals.dynamic_force_n).all()):
         raise AnalysisError(f"{signals.name}", got="lost samples", allowed="a run from rest without gaps")
     step_s = 1 / signals.sampling_rate_hz
+    # from zero, and without the trend that `liquid_signals` leaves free at the ends of a run
     velocity = cumulative_simpson(acceleration, dx=step_s, initial=0.0)
     time_s = step_s * np.arange(velocity.size)
+    # smooth at both ends, so that the harmonic motion leaves nothing in the slope
     window = np.hanning(2 * (velocity.size // 4) + 1)
     late = slice(velocity.size - window.size, None)
     offset = np.sum(window * (time_s * velocity)[late]) / np.sum(window * time_s[late] ** 2)

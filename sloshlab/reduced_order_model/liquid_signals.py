@@ -100,11 +100,14 @@ def liquid_signals(
     -----
     F_ext = M_dry ü − F_S and F_S = −m_l ü + Δf give Δf = (M_dry + m_l) ü − F_ext (1.6–1.7, 2.22).
     """
+    # the gain first: everything after it is a difference of nearly equal forces
     force = np.asarray(total_force(recording).values, np.float64) / gain_ratio
     acceleration = np.array(mean_acceleration(recording).values, np.float64)
+    # an offset would become a ramp of the velocity
     acceleration -= np.nanmean(acceleration)
     step_s = sampling_step_s(recording)
     mass_kg = (rig.tank.dry_mass_kg if dry_mass_kg is None else dry_mass_kg) + rig.liquid_mass_kg
+    # (1.19, 2.22); static weight removed with the mean, as in all forces here
     dynamic = mass_kg * acceleration - (force - np.nanmean(force))
     return LiquidSignals(
         integrated(acceleration, step_s),

@@ -91,6 +91,8 @@ class ReducedOrderModel:
         if self.delays.n_states != n_states or (self.agitation and len(self.agitation.scales) != n_states):
             allowed = f"{self.delays.n_states} scaled states, as many as among the regressors"
             raise InputError("memory of the model", got=f"{n_states} states", allowed=allowed)
+        # a break-up is a gain on a model of the steady state: fed back, its output would not be what the network
+        # was trained on
         if self.break_up is not None and self.delays.outputs:
             raise InputError("memory of the model", got="a break-up and feedback", allowed="one of them")
         if self.theta.shape != (self.network.n_parameters,) or not np.isfinite(self.theta).all():
@@ -125,6 +127,7 @@ class ReducedOrderModel:
         """
         chosen = backend or array_backend()
         run = scaled_run(Run.of(x, y), self.scaling, self.agitation, self.sampling_rate_hz)
+        # a model without feedback needs no measured output: it predicts where that is lost, too
         known = run if self.has_feedback else replace(run, y=np.nan_to_num(run.y))
         theta, predicted = chosen.asarray(self.theta), np.full(run.x.size, np.nan)
         for first, last in segments(known, self.delays):
@@ -134,6 +137,8 @@ class ReducedOrderModel:
                 predicted[start:stop] = chosen.to_numpy(self.network.output(chosen.xp, theta, phi))
         outputs = self.scaling.output_of(predicted)
         if self.break_up is not None:
+            # on the physical force: a share of nothing must be nothing, which an offset of the scaling would
+            # spoil
             outputs *= self.break_up.share(np.asarray(x, np.float64), self.sampling_rate_hz)
         return outputs
 
@@ -172,6 +177,7 @@ class ReducedOrderModel:
                     got=f"it runs away at {reached / self.sampling_rate_hz:.3f} s",
                     remedy="take a model without feedback, or train this one further",
                 )
+            # what was given to start from is not simulated and stays NaN
             simulated[first:last] = own[first:last]
         return self.scaling.output_of(simulated)
 

@@ -69,6 +69,7 @@ def chosen_rate(signals: Sequence[LiquidSignals], *, share: float = SHARE) -> Mo
     frequency, power = _mean_spectrum([signal.dynamic_force_n for signal in signals], rate_hz)
     cumulative = np.cumsum(power) / power.sum()
     highest = float(frequency[int(np.searchsorted(cumulative, share))])
+    # whole numbers only: the delays then count samples of the recording
     every = max(1, math.floor(rate_hz / (SAMPLES_PER_PERIOD * max(highest, frequency[1]))))
     kept = rate_hz / every
     return ModelRate(
@@ -85,6 +86,7 @@ def _mean_spectrum(forces: Sequence[FloatArray], rate_hz: float) -> tuple[FloatA
     n = round(_BLOCK_S * rate_hz)
     total, count, frequency = np.zeros(n // 2 + 1), 0, np.zeros(0)
     for force in forces:
+        # blocks without gaps; a gap that is bridged would add power of its own
         whole = force[: force.size // n * n].reshape(-1, n)
         for block in whole[np.isfinite(whole).all(axis=1)]:
             frequency, power = welch(block, rate_hz, nperseg=n)

@@ -37,6 +37,7 @@ def network_of(kind: str, settings: Mapping[str, Any]) -> Network:
     2485
     """
     network = NETWORKS[kind].of_settings(settings)
+    # before a matrix of that many rows is asked for; a saved model may name any size
     if network.n_parameters > LARGEST_PARAMETERS:
         raise InputError(
             f"network {kind}",

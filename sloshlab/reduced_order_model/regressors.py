@@ -62,6 +62,7 @@ class Delays:
         >>> Delays.tapped(2, 1)
         Delays(inputs=(1, 2), outputs=(1,), n_states=0)
         """
+        # delays start at 1 as in (2.23): the force at t_k is then known before the motion it makes
         first = 0 if with_present else 1
         return cls(tuple(range(first, n_inputs + 1)), tuple(range(1, n_outputs + 1)))
 
@@ -73,6 +74,7 @@ class Delays:
     @property
     def is_one_line(self) -> bool:
         """Whether φ is a stretch of past inputs without holes, and nothing else."""
+        # only the moments of a line without holes are correlations of one signal
         first = self.inputs[0]
         only_inputs = not self.outputs and not self.n_states
         return only_inputs and self.inputs == tuple(range(first, first + len(self.inputs)))
@@ -142,6 +144,7 @@ def segments(run: Run, delays: Delays) -> list[tuple[int, int]]:
     x_known, y_known = np.isfinite(run.x), np.isfinite(run.y)
     for of, ds in ((x_known, delays.inputs), (y_known, delays.outputs)):
         for delay in ds:
+            # before the first samples nothing is known; zeros would be a motion that was not there
             known[:delay] = False
             known[delay:] &= of[: max(n - delay, 0)]  # none where the run is shorter
     edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
@@ -184,6 +187,7 @@ def regressors(run: Run, delays: Delays, start: int, stop: int) -> FloatArray:
     delays : Delays
     start, stop : int
     """
+    # one column per sample, so that row a of a delay line is row 0 shifted: correlations rely on this order
     rows = [run.x[start - delay : stop - delay] for delay in delays.inputs]
     rows += [run.y[start - delay : stop - delay] for delay in delays.outputs]
     if delays.n_states:

@@ -54,6 +54,7 @@ class MatchedRepeats:
 
     def fit_of_ideal_model(self) -> FitQuality:
         """How well the mean of very many repeats would: its error is 1/√2 of that of one repeat."""
+        # two repeats differ by √2 of the scatter of one
         half = self.force_n + (self.other_force_n - self.force_n) / math.sqrt(2)
         return fit_quality(self.force_n, half)
 
@@ -92,6 +93,7 @@ def matched_repeats(reference: LiquidSignals, other: LiquidSignals, sampling_rat
     n = np.arange(max(0, -shift), min(edges.size, others.size - shift))
     if n.size < 2:
         raise _not_repeats(reference, other, "no cycles at the same times")
+    # only where the motion is the same does the difference of the forces tell what the motion does not decide
     alike = _alike(reference, other, edges[n], others[n + shift])
     if not alike.mean() > _SMALLEST_MATCHED_SHARE:
         raise _not_repeats(reference, other, f"{100 * alike.mean():.0f} % of the cycles have the same motion")
@@ -100,8 +102,10 @@ def matched_repeats(reference: LiquidSignals, other: LiquidSignals, sampling_rat
     cycle = np.searchsorted(edges[n], time_s, side="right") - 1
     cycle[(cycle < 0) | (cycle >= n.size - 1)] = -1
     cycle[~alike[cycle]] = -1
+    # cycle by cycle: compared at equal times, a drift of the shaker would count as scatter of the liquid
     positions = np.interp(time_s, edges[n], others[n + shift]) * other.sampling_rate_hz
     ratio = sampling_rate_hz / other.sampling_rate_hz
+    # limited to the model's band: what no model of this rate can say is not held against it
     force = resampled(other.dynamic_force_n, positions, rate_ratio=ratio)
     known = (cycle >= 0) & np.isfinite(force) & np.isfinite(own.dynamic_force_n)
     return MatchedRepeats(

@@ -64,6 +64,7 @@ class CorrelationTest:
     @property
     def is_passed(self) -> bool:
         """Whether no more lags are outside than chance may give."""
+        # of many lags some leave a 95 % band by chance
         most = binom.ppf(1 - CHANCE_OF_FALSE_ALARM, self.lags.size, EXPECTED_SHARE)
         return self.n_outside <= int(most)
 
@@ -159,16 +160,19 @@ def _products(e: FloatArray, z: FloatArray, lag: int) -> FloatArray:
 
 def _standard_error(products: FloatArray, longest_lag: int) -> float:
     """Of the mean of the products, from the scatter of their sums over blocks."""
+    # 1.96/√N holds for white signals of constant size; here frequency and amplitude change along the run
     length = max(_BLOCK_LAGS * longest_lag, -(-products.size // _MOST_BLOCKS))
     n_blocks = products.size // length
     blocks = products[: n_blocks * length].reshape(n_blocks, length)
     counts = np.isfinite(blocks).sum(axis=1)
+    # sums instead of means of blocks, as gaps make blocks count differently
     deviation = np.nansum(blocks, axis=1) - counts * np.nanmean(products)
     return float(np.sqrt((deviation**2).sum() * n_blocks / max(n_blocks - 1, 1)) / max(counts.sum(), 1))
 
 
 def _explained(correlation: FloatArray, own: FloatArray) -> float:
     """cᵀ R⁻¹ c, without the directions in which the signal hardly varies."""
+    # a near-harmonic signal varies in two directions only: the inverse of R would be noise in all others
     values, vectors = np.linalg.eigh(toeplitz(own))
     used = values > _SMALLEST_EIGENVALUE * values[-1]
     along = vectors[:, used].T @ correlation

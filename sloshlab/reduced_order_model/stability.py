@@ -103,6 +103,7 @@ def stability(
         simulated = model.simulate(x)
         return Stability(-math.inf, _bound(model), float(np.nanmax(np.abs(simulated))))
     run_x = (x - model.scaling.input_offset) / model.scaling.input_scale
+    # no force, in the network's values
     y = np.full(n_samples, -model.scaling.output_offset / model.scaling.output_scale)
     rate = growth_rate(model.compiled(), run_x, y, round(_SETTLING * n_samples))
     largest = float(np.abs(model.scaling.output_of(y)).max())
@@ -153,6 +154,7 @@ def growth_rate(model, x, y, settling):  # type: ignore[no-untyped-def]
             slope = 0.0
             for i in range(m):
                 slope -= factors[i] * (phi[n_in + b] - theta[i * p + n_in + b])
+            # linearised about the run itself: a real second run would soon differ by too much, or not at all
             new += slope * difference[output_delays[b] - 1]
         for b in range(reach - 1, 0, -1):
             difference[b] = difference[b - 1]

@@ -24,6 +24,7 @@ from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.regressors import Delays
 
 FORMAT: Final = 1
+# checked before reading: a file may hold anything
 LARGEST_BYTES: Final = 50_000_000
 Made = TypeVar("Made")
 SCALING: Final = ("input_offset", "input_scale", "output_offset", "output_scale")
@@ -49,11 +50,13 @@ def save_model(model: ReducedOrderModel, path: str | os.PathLike[str]) -> None:
         scaling = [getattr(model.scaling, name) for name in SCALING]
         for name, values, kind in (
             ("theta", model.theta, "f8"),
+            # a variable, as attributes of this format are single precision
             ("sampling_rate_hz", np.array([model.sampling_rate_hz]), "f8"),
             ("scaling", np.array(scaling), "f8"),  # in the order of `SCALING`
             ("input_delays", np.array(model.delays.inputs), "i4"),
             ("output_delays", np.array(model.delays.outputs), "i4"),
         ):
+            # the classic format has no dimension of length zero but the unlimited one
             if values.size:
                 file.createDimension(name, values.size)
                 file.createVariable(name, kind, (name,))[:] = values

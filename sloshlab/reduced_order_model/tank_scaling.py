@@ -83,8 +83,10 @@ class TankScaling:
                 remedy="train a model at that fill level",
             )
         height = other.tank.height_m / height_m
+        # (2.33, 2.34): equal ω̄ and v̄ at equal accelerations make times and velocities grow with √h
         root, now = math.sqrt(height), tank_facts(other)
         viscosity, tension, density = (_ratio(facts.get(name), now[name]) for name in _LIQUID)
+        # (2.35) for the force; Re and Bo follow and are told, since they are not held
         return cls(
             root, root, other.liquid_mass_kg / mass_kg, viscosity * root * height, tension * height**2 / density
         )

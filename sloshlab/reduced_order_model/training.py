@@ -112,6 +112,7 @@ class _Best:
 
     def take(self, epoch: Epoch, theta: FloatArray) -> None:
         self.epochs.append(epoch)
+        # by the validation run: the training error falls with every epoch
         better = self.epoch is None or epoch.validation_mse < self.epoch.validation_mse
         if np.isfinite(epoch.validation_mse) and better:
             self.epoch, self.theta = epoch, theta
@@ -175,6 +176,7 @@ def fit(
         If input or output is constant, or no start gave a stable model.
     """
     chosen = settings or TrainingSettings()
+    # of the training runs only: the validation run decides when to stop and between starts, nothing else
     scaling = _scaling(training, validation, delays, chosen)
     if agitation is not None:
         agitation = agitation.fitted([run.x for run in training], sampling_rate_hz)
@@ -194,6 +196,7 @@ def fit(
             _train_once(task, chosen, start, best, started=started, on_epoch=on_epoch or (lambda epoch: None))
     except KeyboardInterrupt:
         interrupted = True
+        # interrupted before anything was trained: nothing could be given back
         if best.theta is None:
             raise
     if best.theta is None or best.epoch is None:
@@ -213,6 +216,7 @@ def _train_once(
     on_epoch: Callable[[Epoch], None],
 ) -> None:
     """One start: one step ahead, then free if there is feedback."""
+    # every start its own stream, whatever the starts before it drew
     rng = np.random.default_rng([settings.seed, start])
     theta = task.backend.asarray(task.network.initial(*_initial_samples(task, rng), rng))
     is_line = task.delays.is_one_line
@@ -220,12 +224,14 @@ def _train_once(
     one_step = OneStepProblem(
         task.backend, task.network, lambda: blocks(task.training, task.delays, size), is_line
     )
+    # NOE starts from a trained NARX, as in the source (2.2)
     stages: list[tuple[LeastSquaresProblem, ArrayBackend]] = [(one_step, task.backend)]
     if task.delays.outputs:  # sample by sample, compiled: on the host
         stages.append((_FreeRunProblem(task.network, task.delays, task.training), array_backend()))
     number = 0
     for problem, backend in stages:
         is_last = problem is stages[-1][0]
+        # epochs one step ahead are no candidates for the best free-running model
         own = best if is_last else _Best()
         # one step ahead only prepares the free run: a rising validation error does not end it
         own_settings = settings if is_last else replace(settings, patience=settings.n_epochs)
@@ -260,6 +266,7 @@ def _descend(
         assert step is not None
         theta = step.theta
         parameters = task.backend.to_numpy(theta)
+        # free-running from the first epoch on, as the model will be used
         validation = _free_squares(task.network, task.delays, parameters, task.validation) / n_validation
         epoch = Epoch(
             start,
@@ -304,14 +311,17 @@ class _FreeRunProblem:
         model = feedback_model(self.network, theta, self.delays)
         for run, stretch in self._stretches():
             squares += free_run.free_run_sums(model, run.x, run.y, stretch, sums)
+        # the compiled loop fills the lower triangle only
         return NormalSums(sums.matrix + np.tril(sums.matrix, -1).T, sums.gradient, squares)
 
     def improved(self, theta: Array) -> tuple[Array, float]:
+        # with feedback the weights enter their own later outputs: nothing is linear, so nothing is solved for
         return theta, _free_squares(self.network, self.delays, theta, self.runs)
 
 
 def _free_squares(network: Network, delays: Delays, theta: FloatArray, runs: Sequence[Run]) -> float:
     """Σ e² of free runs; infinite if one runs away."""
+    # without feedback one step ahead is the free run
     if not delays.outputs:
         squares = 0.0
         for phi, target in blocks(runs, delays, BLOCK):
@@ -351,6 +361,8 @@ def _scaling(
             raise AnalysisError(f"{what} of the training runs", got="a constant", remedy="train on runs that move")
         found.append((mean, spread))
     (x_mean, x_spread), (y_mean, y_spread) = found
+    # Distances in the network's values add up over the delays: divided by √n, so that as many neurons are felt
+    # with 70 delays as with 2.
     return Scaling(x_mean, x_spread * math.sqrt(delays.n_regressors) / settings.input_spread, y_mean, y_spread)
 
 
@@ -360,6 +372,7 @@ def _initial_samples(task: _Task, rng: np.random.Generator) -> tuple[FloatArray,
     share = min(1.0, _LARGEST_INITIAL / total)
     parts = []
     for phi, target in blocks(task.training, task.delays, BLOCK):
+        # drawn evenly over all runs, block by block: centres shall lie where the motion was
         kept = rng.random(target.size) < share
         parts.append((phi[:, kept], target[kept]))
     phi, target = np.concatenate([p for p, _ in parts], axis=1), np.concatenate([t for _, t in parts])

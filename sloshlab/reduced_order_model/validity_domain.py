@@ -62,6 +62,7 @@ def motion_cycles(velocity_m_per_s: ArrayLike, sampling_rate_hz: float) -> Motio
     """
     velocity = np.asarray(velocity_m_per_s, np.float64)
     known = np.nan_to_num(velocity)
+    # noise about zero would make cycles of a sample or two
     quiet = _QUIET * float(np.max(np.abs(known), initial=0.0))
     state = np.where(known > quiet, 1, np.where(known < -quiet, -1, 0))
     marked = np.flatnonzero(state)
@@ -74,6 +75,7 @@ def motion_cycles(velocity_m_per_s: ArrayLike, sampling_rate_hz: float) -> Motio
     edges = after
     top = np.maximum.reduceat(known, edges)[:-1]
     bottom = np.minimum.reduceat(known, edges)[:-1]
+    # a cycle with a gap has unknown extremes
     lost = np.add.reduceat(np.isnan(velocity).astype(int), edges)[:-1] > 0
     cycles = MotionCycles(place[:-1] / sampling_rate_hz, sampling_rate_hz / np.diff(place), 0.5 * (top - bottom))
     return MotionCycles(*(values[~lost] for values in vars(cycles).values()))
@@ -191,6 +193,7 @@ class ValidityDomain:
         above = cycles.speed_m_per_s / (strongest * MARGIN)
         below = weakest / np.maximum(cycles.speed_m_per_s * MARGIN, 1e-300)
         reasons = np.where(above > 1, "too strong", np.where(below > 1, "too weak", ""))
+        # judged last: where no training had this frequency, weak and strong have no meaning
         reasons = np.where(seen, reasons, "frequency")
         return reasons, np.where(seen, np.maximum(above, below), cycles.speed_m_per_s)
 

@@ -27,6 +27,7 @@ def crossing_level(levels: Sequence[float], values: Sequence[float], threshold: 
     >>> crossing_level([1.0, 4.0], [0.0, 1.0], 0.5)
     2.0
     """
+    # only a crossing that was seen counts: nothing is extrapolated below the first or above the last level
     for low in range(len(levels) - 1):
         if values[low] < threshold <= values[low + 1] and levels[low + 1] > levels[low]:
             part = (threshold - values[low]) / (values[low + 1] - values[low])

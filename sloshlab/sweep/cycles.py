@@ -21,6 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 BoolArray = npt.NDArray[np.bool_]
 
+# At 20 Hz and 512 samples per second the quadrature is 1 % off for the fifth harmonic already.
 N_HARMONICS = 5
 """Harmonics 1 … 5 of the excitation frequency are kept."""
 
@@ -73,11 +74,14 @@ class Cycles:
     @cached_property
     def omega_rad_per_s(self) -> FloatArray:
         """Ω of each cycle [rad/s], shape (n,)."""
+        # from the boundaries, not from the law: the shaker need not have kept it
         return 2 * np.pi / (self.stop_s - self.start_s)
 
     @cached_property
     def harmonic_work_j(self) -> FloatArray:
         """πγΩu₀² = ½ T Re(F₁ u̇₁*), the work of the fundamental alone [J], shape (n,)."""
+        # F is the force on the tank and u̇ its velocity, so that what is dissipated is positive. (1.30) has the
+        # other sign, which goes with the minus that (1.15) drops from (1.10).
         duration = self.stop_s - self.start_s
         return np.asarray(0.5 * duration * (self.force_phasor[:, 0] * self.velocity_phasor.conj()).real)
 
@@ -87,6 +91,8 @@ class Cycles:
         The mean of a single cycle is not removed: it is part of what repeats every second cycle.
         """
         mean = float(self.dynamic_mean[at].mean())
+        # mean of (d − mean)² from moments that are kept; a difference of nearly equal numbers may come out below
+        # zero
         power = self.dynamic_square[at] - 2 * mean * self.dynamic_mean[at] + mean**2
         peak = np.maximum(self.dynamic_highest[at] - mean, mean - self.dynamic_lowest[at])
         return np.maximum(power, 0.0), peak
@@ -94,6 +100,7 @@ class Cycles:
     @cached_property
     def dynamic_phasor(self) -> ComplexArray:
         """Amplitudes of d at Ω … 5Ω [N], shape (n, 5)."""
+        # (1.19): Δf = (M_dry + m_l) ü − F_ext.
         return np.asarray(self.inertia_kg * self.acceleration_phasor - self.force_phasor)
 
 
@@ -134,9 +141,14 @@ def evaluate_cycles(
     -------
     Cycles
     """
+    # Boundaries lie between samples. Rounded to samples they would open the loop by up to half a step at each
+    # end.
     positions = np.asarray(boundaries_s, dtype=np.float64) * sampling_rate_hz
+    # the quadrature takes samples from beyond the boundaries
     inside = (positions[:-1] >= MARGIN_SAMPLES + 1) & (positions[1:] <= force.size - MARGIN_SAMPLES - 2)
     long_enough = np.diff(positions) > 4
+    # dn/dx at every boundary, for the phase within a cycle. Second order at the ends too: a sweep's phase is
+    # quadratic.
     slope = np.gradient(np.arange(positions.size, dtype=np.float64), positions, edge_order=2)
     signals = _Signals(
         force,
@@ -150,6 +162,7 @@ def evaluate_cycles(
     return Cycles(
         start_s=np.asarray(boundaries_s[:-1]),
         stop_s=np.asarray(boundaries_s[1:]),
+        # cycles that were not evaluated are NaN throughout
         usable=np.isfinite(scalars[:, _WORK]),
         work_j=scalars[:, _WORK],
         force_phasor=phasors[:, :N_HARMONICS],
@@ -198,6 +211,7 @@ def _kernel(
             cycle = _Cycle(
                 positions[n],
                 positions[n + 1],
+                # 1 where the frequency is the mean one of the cycle
                 slope[n] * (positions[n + 1] - positions[n]),
                 slope[n + 1] * (positions[n + 1] - positions[n]),
                 n % 2,
@@ -209,6 +223,7 @@ def _kernel(
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _complete(signals: _Signals, start: float, stop: float) -> bool:
     """True if no sample that the cycle needs is lost or flagged."""
+    # Without fastmath: under its assumption that there is no NaN the test below would be optimised away.
     force, motion, unusable = signals.force, signals.motion, signals.unusable
     first, last = int(np.ceil(start)) - MARGIN_SAMPLES, int(np.floor(stop)) + MARGIN_SAMPLES
     # a sum is finite if all its terms are; one test per cycle instead of two per sample
@@ -226,15 +241,20 @@ def _complete(signals: _Signals, start: float, stop: float) -> bool:
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nsz", "arcp"})  # type: ignore[untyped-decorator]
 def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phasors: ComplexArray) -> None:
+    # The flags of fastmath leave out "ninf", because `highest` and `lowest` start at infinity. Arrays leave the
+    # tuple before the loop, in which counting their references would cost time.
     force, motion, motion_is_velocity = signals.force, signals.motion, signals.motion_is_velocity
     step_s, inertia_kg, start, stop = signals.step_s, signals.inertia_kg, cycle.start, cycle.stop
     p, q = int(np.ceil(start)), int(np.floor(stop))
     length = stop - start
     duration = length * step_s
+    # A plain sum over whole steps; what the cut steps and the six-point rule add touches six samples at each
+    # boundary.
     left, right = np.empty(6), np.empty(6)
     boundary_weights(p - start, left)
     boundary_weights(stop - q, right)
     # φ/2π of the cycle as the cubic x + x (1-x) (c₀ (1-x) - c₁ x) with the measured slopes at both ends
+    # (continuous with the neighbouring cycles in value and slope: Ω changes within the cycle)
     c_start, c_stop = cycle.slope_start - 1.0, cycle.slope_stop - 1.0
     work = sum_force = sum_force_time = sum_velocity = sum_motion = 0.0
     sum_d = sum_d2 = 0.0
@@ -243,9 +263,12 @@ def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phaso
     half_1 = half_3 = 0.0 + 0.0j
     force_k = np.zeros(N_HARMONICS, dtype=np.complex128)
     motion_k = np.zeros(N_HARMONICS, dtype=np.complex128)
+    # any start will do: the mean of the velocity is taken out of every sum below
     velocity = 0.0
+    # three samples beyond the cycle to each side, for the weights of the boundaries
     for i in range(p - 3, q + 4):
         weight = 1.0 if p <= i <= q else 0.0
+        # added, not assigned: in a short cycle both boundaries touch the same sample
         if i <= p + 2:
             weight += left[i - p + 3]
         if i >= q - 2:
@@ -253,14 +276,21 @@ def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phaso
         x = (i - start) / length
         turn = x + x * (1.0 - x) * (c_start * (1.0 - x) - c_stop * x)
         rate = 1.0 + (1.0 - 2.0 * x) * (c_start * (1.0 - x) - c_stop * x) - x * (1.0 - x) * (c_start + c_stop)
+        # One sine and one cosine per sample: e^{−jφ} is the square of e^{−jφ/2}, and the harmonics are its
+        # powers.
         half_angle = np.pi * turn
         half = np.cos(half_angle) - 1j * np.sin(half_angle)
         unit = half * half
         # channels of 16 bits stay in single precision, which halves the memory traffic; the sums are double
         f, a = float(force[i]), float(motion[i])
+        # the integral up to sample i; it is advanced to i + 1 after its use, at the end of this round
         v = a if motion_is_velocity else velocity
+        # from the middle of the cycle, so that a linear term has no mean and both corrections below are
+        # independent
         t = (x - 0.5) * duration
         w = weight * step_s
+        # Phasors are integrals over φ, not over time: only over φ are mean and harmonics orthogonal while Ω
+        # changes.
         w_phase = w * rate
         work += w * f * v
         sum_force += w * f
@@ -275,34 +305,44 @@ def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phaso
             motion_k[k] += w_phase * a * turning
             turning *= unit
         if not motion_is_velocity:
+            # the same six-point rule as for the loop: symmetric, so that the velocity has no phase error
             velocity += step_s * (
                 STEP_WEIGHTS[2] * (motion[i] + motion[i + 1])
                 + STEP_WEIGHTS[1] * (motion[i - 1] + motion[i + 2])
                 + STEP_WEIGHTS[0] * (motion[i - 2] + motion[i + 3])
             )
+        # With a measured velocity the acceleration is known as phasors only, so that d is the whole force there.
         d = inertia_kg * a - f if not motion_is_velocity else -f
         sum_d += w * d
         sum_d2 += w * d * d
         half_1 += w_phase * d * half
         half_3 += w_phase * d * half * unit
+        # samples beyond the boundaries count in the quadrature, but belong to the neighbouring cycles
         if p <= i <= q:
             highest, lowest = max(highest, d), min(lowest, d)
     two_per_duration = 2.0 / duration
     # both constants of integration are corrected in the sums, so that the samples are gone through once
+    # An accelerometer's offset makes the velocity run away; over a cycle of steady motion ü has no mean.
     drift = 0.0 if motion_is_velocity else sum_motion / duration
     mean_velocity = sum_velocity / duration
+    # ∮ F (v − v̄ − drift·t) dt by linearity. Static weight in F drops out too, as the corrected velocity has no
+    # mean.
     scalars[_WORK] = work - mean_velocity * sum_force - drift * sum_force_time
     scalars[_MEAN] = sum_d / duration
     scalars[_SQUARE] = sum_d2 / duration
     scalars[_HIGHEST], scalars[_LOWEST] = highest, lowest
+    # the mean of the velocity needs no correction here: a constant has no part at Ω
     velocity_1 = two_per_duration * (velocity_1 - drift * time_1)
     omega = 2.0 * np.pi / duration
     for k in range(N_HARMONICS):
         phasors[k] = two_per_duration * force_k[k]
+        # e^{+jΩt}: a derivative is a factor jkΩ
         factor = 1j * omega * (k + 1) if motion_is_velocity else 1.0 + 0.0j
         phasors[N_HARMONICS + k] = two_per_duration * motion_k[k] * factor
     phasors[2 * N_HARMONICS] = velocity_1
     # half a turn of Ω/2 passes in a cycle: what alternates has the other sign in every second one
+    # The constant and the harmonics have the other sign in every second cycle then; only means over pairs are
+    # free of them.
     sign = 1.0 - 2.0 * cycle.parity
     phasors[2 * N_HARMONICS + 1] = sign * two_per_duration * half_1
     phasors[2 * N_HARMONICS + 2] = sign * two_per_duration * half_3

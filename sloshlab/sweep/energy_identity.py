@@ -12,6 +12,7 @@ FloatArray = npt.NDArray[np.float64]
 def harmonic_mass_kg(windows: xr.Dataset) -> FloatArray:
     """(W − πγΩu₀²)/(u₀Ω)² [kg], shape (n_windows,); zero for a sinusoidal motion, NaN without a motion."""
     speed2 = (2 * np.pi * windows["frequency_hz"].values * windows["amplitude_m"].values) ** 2
+    # For a mono-harmonic motion, harmonics of the force do no work and both works agree (1.30).
     difference = windows["work_j"].values - windows["work_harmonic_j"].values
     return np.asarray(difference / np.where(speed2 > 0, speed2, np.nan))
 

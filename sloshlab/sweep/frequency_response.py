@@ -63,6 +63,7 @@ def frequency_response_of(windows: xr.Dataset) -> FrequencyResponse | None:
     """
     windows = windows.sortby("time_s")
     frequency = windows["frequency_hz"].values
+    # e^{+jΩt}: γ u̇ = γ ü/(jΩ) = −(jγ/Ω) ü
     apparent = windows["apparent_mass_kg"].values - 1j * windows["gamma_kg_per_s"].values / (2 * np.pi * frequency)
     usable = np.isfinite(apparent) & (np.abs(apparent) > 0)
     if not usable.any():
@@ -95,12 +96,14 @@ def vertex(abscissa: FloatArray, values: FloatArray) -> tuple[float, float]:
     [1.3, 5.0]
     """
     at = int(np.nanargmax(values))
+    # at an end of the sweep the true peak may lie beyond; it is not extrapolated
     if not 0 < at < values.size - 1:
         return float(abscissa[at]), float(values[at])
     x, y = abscissa[at - 1 : at + 2], values[at - 1 : at + 2]
     if not (np.isfinite(y).all() and (x[1] - x[0]) * (x[2] - x[1]) > 0):
         return float(abscissa[at]), float(values[at])
     left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
+    # divided differences, because windows of an octave sweep are not evenly spaced in frequency
     curvature = (right - left) / (x[2] - x[0])
     if curvature >= 0:
         return float(x[1]), float(y[1])

@@ -52,6 +52,7 @@ class SweepLaw:
         [5.0, 20.0]
         """
         if self.kind is LawKind.OCTAVE:
+            # (1.11) with 2^{R t}: the "e^{log2 R t}" of the source has the exponent R t ln 2
             return np.asarray(self.start_hz * np.exp2(self.rate * time_s))
         if self.kind is LawKind.LINEAR:
             return np.asarray(self.start_hz + self.rate * time_s)
@@ -60,6 +61,7 @@ class SweepLaw:
     def phase_rad(self, time_s: FloatArray) -> FloatArray:
         """Phase φ with φ' = Ω [rad]; for ``OCTAVE`` φ = Ω/(R ln 2) as in (1.13), so φ(0) ≠ 0."""
         if self.kind is LawKind.OCTAVE and self.rate != 0.0:
+            # (1.13); φ(0) = Ω_i/(R ln 2) fixes the numbers n of the cycles: 866 … 3462 from 5 to 20 Hz in 240 s
             return np.asarray(2 * np.pi * self.frequency_hz(time_s) / (self.rate * math.log(2)))
         if self.kind in (LawKind.LINEAR, LawKind.OCTAVE):
             slope = self.rate if self.kind is LawKind.LINEAR else 0.0
@@ -78,8 +80,10 @@ class SweepLaw:
         first, last = np.sort(self.phase_rad(np.array([start_s, stop_s]))) / (2 * np.pi)
         if not np.isfinite(first + last):
             return np.empty(0)
+        # a boundary at the very start or end must not be lost to rounding
         n = np.arange(math.ceil(first - 1e-9), math.floor(last + 1e-9) + 1, dtype=float)
         if self.kind is LawKind.OCTAVE and self.rate != 0.0:
+            # (1.14). Where R is negative, φ and n are negative too, so that n R stays positive.
             times = np.log2(n * self.rate * math.log(2) / self.start_hz) / self.rate
         elif self.rate == 0.0:
             times = n / self.start_hz
@@ -102,6 +106,7 @@ class SweepLaw:
         if not np.isfinite(turns).all():
             return float("nan")
         deviation = turns - np.arange(turns.size)
+        # measured boundaries have no number n that the law knows: only differences between them can be compared
         deviation -= deviation.mean()
         return float(np.abs(deviation / self.frequency_hz(measured_s)).max())
 
@@ -133,13 +138,16 @@ def identify_law(time_s: FloatArray, frequency_hz: FloatArray) -> SweepLaw:
         middle = float(np.median(frequency_hz)) if time_s.size else math.nan
         return SweepLaw(LawKind.FREE, middle, 0.0, stated=False)
     rate, start = np.polyfit(time_s, frequency_hz, 1)
+    # a straight line in the logarithm: Ω = Ω_i 2^{R t}
     octave_rate, octave_start = np.polyfit(time_s, np.log2(frequency_hz), 1)
     candidates = [
         SweepLaw(LawKind.LINEAR, float(start), float(rate), stated=False),
         SweepLaw(LawKind.OCTAVE, float(2**octave_start), float(octave_rate), stated=False),
     ]
+    # both compared by relative errors, as the two fits minimise different things
     errors = [np.abs(law.frequency_hz(time_s) / frequency_hz - 1) for law in candidates]
     best = int(np.argmin([np.sqrt(np.mean(error**2)) for error in errors]))
+    # a quantile, because the frequency at a start, a stop or a gap is wrong by any amount
     if np.quantile(errors[best], 0.95) < 0.02:
         return candidates[best]
     change_per_s = np.abs(np.gradient(np.log(frequency_hz), time_s))

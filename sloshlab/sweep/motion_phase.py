@@ -23,6 +23,7 @@ from sloshlab.errors import AnalysisError
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
+# 50 samples per cycle at 20 Hz.
 _DEMODULATION_RATE_HZ = 1000.0
 """The motion is averaged down to about this rate before its phase is taken."""
 _KNOTS_PER_CYCLE = 1.0
@@ -34,6 +35,7 @@ _STRONG_LINE = 0.4
 """The fundamental has at least this part of the largest line of a block."""
 _LOBE_LINES = 13
 """Lines from the foot of a line to beyond its top, under a Hann window padded to four times its length."""
+# The spectrum of a Hann window of two cycles is zero at the distance of the mean and of all harmonics from Ω.
 _WINDOW_CYCLES = 2.0
 _SMALLEST_RELATIVE_AMPLITUDE = 2e-3
 _SMALLEST_SHARE_OF_POWER = 0.1
@@ -74,6 +76,7 @@ class MotionPhase:
             If the phase does not increase, which means that no sweep was recorded.
         """
         start, stop = self.moving_interval_s()
+        # the spline is not monotonic where the motion is lost for a moment: boundaries start from what rises
         fine = np.unique(np.concatenate([self.knot_s[(self.knot_s >= start) & (self.knot_s <= stop)]]))
         cycles = self.phase(fine) / (2 * np.pi)
         rising = np.concatenate([[True], np.diff(np.maximum.accumulate(cycles)) > 0])
@@ -81,6 +84,8 @@ class MotionPhase:
         n = np.arange(np.ceil(cycles[0]), np.floor(cycles[-1]) + 1)
         times = np.interp(n, cycles, fine)
         frequency = self.phase.derivative()
+        # Newton's method on the spline. Linear interpolation between knots alone would miss by the chirp within
+        # a cycle. An error δ of a boundary changes the work in δ² only, because the velocity is zero there.
         for _ in range(4):
             times = times - (self.phase(times) - 2 * np.pi * n) / np.maximum(frequency(times), 1e-9)
         times = times[(times >= start) & (times <= stop)]
@@ -121,13 +126,17 @@ def measured_phase(
     AnalysisError
         If there is no motion, or too little of it.
     """
+    # times below are those of block means; the offset to the samples is added once, at the end
     decimated, weight, rate_hz, offset_s = _averaged_down(motion, usable, sampling_rate_hz)
     knots, frequency = _dominant_frequency(decimated, weight, rate_hz)
     times, phase = _phase_knots(knots, frequency, decimated.size / rate_hz)
     amplitude = np.empty(0)
     moving = np.empty(0, dtype=np.bool_)
+    # Three rounds: a phase that the spline has wrong turns within the window and biases the next angle less each
+    # time.
     # the window follows the frequency of the last phase, which the block spectra give only roughly
     for iteration in range(3):
+        # over all knots, as the window needs a frequency everywhere; the last spline has the moving ones only
         spline = CubicSpline(times, phase)
         window_s = _WINDOW_CYCLES * 2 * np.pi / np.maximum(spline(times, 1), 1e-6)
         z, power, lost = _demodulated(
@@ -135,9 +144,11 @@ def measured_phase(
         )
         amplitude = np.abs(z)
         moving = (amplitude > _SMALLEST_RELATIVE_AMPLITUDE * amplitude.max()) & ~lost
+        # noise in the band of the window has an amplitude too, but little of the whole power
         moving &= 0.5 * amplitude**2 > _SMALLEST_SHARE_OF_POWER * power
         correction = _unwrapped(np.angle(z), moving)
         phase = spline(times) + correction
+        # the block spectra give the frequency only roughly, so that their knots are not one per cycle
         if iteration == 0:
             times, phase, moving = _respaced(times, phase, moving)
     moving = moving & _coherent(phase, moving)
@@ -148,6 +159,7 @@ def measured_phase(
             allowed="a shaken tank",
             remedy="check that the channel is the tank's motion and that the run was not empty",
         )
+    # φ is that of the acceleration in every case: a measured velocity lags it by π/2
     spline = CubicSpline(times[moving] + offset_s, phase[moving] + lead_rad)
     return MotionPhase(spline, times + offset_s, amplitude, moving | _isolated_loss(moving))
 
@@ -156,9 +168,12 @@ def _averaged_down(
     motion: FloatArray, usable: BoolArray | None, sampling_rate_hz: float
 ) -> tuple[FloatArray, FloatArray, float, float]:
     """Block means at about `_DEMODULATION_RATE_HZ`, weight 0 for blocks with a lost sample."""
+    # whole factors: a block mean is symmetric and has no phase error, only the delay of half a block that is
+    # returned
     factor = max(1, int(sampling_rate_hz // _DEMODULATION_RATE_HZ))
     n_blocks = motion.size // factor
     trimmed = motion[: n_blocks * factor].reshape(n_blocks, factor)
+    # double precision in the sums only, so that a channel of single precision is not copied
     mean = trimmed.mean(axis=1, dtype=np.float64)
     good = np.isfinite(mean)
     if usable is not None:
@@ -168,17 +183,20 @@ def _averaged_down(
             "motion", got=f"{int(good.sum())} usable samples", allowed="at least 16", remedy="record again"
         )
     mean = mean - mean[good].mean()
+    # zero is the mean by now: lost samples neither add nor take away, and the weights tell that they are lost
     mean[~good] = 0.0
     return mean, good.astype(np.float64), sampling_rate_hz / factor, (factor - 1) / (2 * sampling_rate_hz)
 
 
 def _dominant_frequency(motion: FloatArray, weight: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
     """Centres [s] and dominant frequencies [Hz] of blocks of about eight cycles."""
+    # long blocks first: how long eight cycles are is not known before a frequency is
     overall = _block_peaks(motion, weight, rate_hz, min(motion.size, 1 << 14))
     typical_hz = float(np.median(overall[1]))
     wanted = next_fast_len(int(max(32, _CYCLES_PER_BLOCK / typical_hz * rate_hz)), real=True)
     n_block = min(motion.size, wanted)
     centres, frequency = _block_peaks(motion, weight, rate_hz, n_block)
+    # median of three: a single block in which noise or a harmonic won must not bend the phase
     padded = np.pad(frequency, 1, mode="edge")
     return centres, np.median(np.stack([padded[:-2], frequency, padded[2:]]), axis=0)
 
@@ -187,6 +205,7 @@ def _block_peaks(
     motion: FloatArray, weight: FloatArray, rate_hz: float, n_block: int
 ) -> tuple[FloatArray, FloatArray]:
     """Centres and frequencies of the largest line of every half-overlapping block that is complete and moves."""
+    # half overlapping, because a Hann window hardly sees what lies at the ends of a block
     starts = np.arange(0, max(1, motion.size - n_block + 1), max(1, n_block // 2))
     peaks = [
         _peaks(motion, weight, rate_hz, n_block, starts[first : first + _BLOCKS_AT_ONCE])
@@ -206,10 +225,13 @@ def _peaks(
 ) -> tuple[FloatArray, FloatArray]:
     """Frequency and height of the largest line of blocks; height 0 where samples are lost."""
     blocks = np.lib.stride_tricks.sliding_window_view(motion, n_block)[starts]
+    # a few lost samples, at zero, do not move the largest line
     complete = np.lib.stride_tricks.sliding_window_view(weight, n_block)[starts].mean(axis=1) > 0.9
     blocks = (blocks - blocks.mean(axis=1, keepdims=True)) * np.hanning(n_block)
+    # padded, so that the largest line is within an eighth of a line of the frequency
     spectrum = np.abs(np.fft.rfft(blocks, 4 * n_block, axis=1))
     frequency = np.fft.rfftfreq(4 * n_block, 1 / rate_hz)
+    # what a Hann window leaves of slow drift lies in the two lowest lines of the unpadded block
     lowest = 2.0 * rate_hz / n_block
     spectrum[:, (frequency < lowest) | (frequency > 0.4 * rate_hz)] = 0.0
     # The fundamental is the first strong line, a harmonic may be the strongest. With the spectrum over f instead,
@@ -223,6 +245,7 @@ def _peaks(
 
 def _phase_knots(centres: FloatArray, frequency: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
     """One knot per cycle with the phase integrated from the block frequencies."""
+    # four steps per cycle of the highest frequency
     step = 0.25 / float(frequency.max())
     fine = np.arange(0.0, duration_s + step, step)
     cycles = np.concatenate([[0.0], np.cumsum(np.interp(fine, centres, frequency))[:-1]]) * step
@@ -239,7 +262,9 @@ def _knot_per_cycle(times: FloatArray, phase: FloatArray) -> tuple[FloatArray, F
 
 def _respaced(times: FloatArray, phase: FloatArray, moving: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Knots again one per cycle, now of the demodulated phase."""
+    # a knot without motion has a random angle; the phase is carried across it
     smooth = np.interp(times, times[moving], phase[moving]) if moving.any() else phase
+    # knots are found by inverting φ(t), which needs a strictly rising phase; the small slope parts equal values
     rising = np.maximum.accumulate(smooth) + 1e-6 * np.arange(smooth.size)
     new_times, _ = _knot_per_cycle(times, rising)
     spline_phase = CubicSpline(times, smooth)(new_times)
@@ -258,8 +283,11 @@ def _unwrapped(angle: FloatArray, moving: BoolArray) -> FloatArray:
 def _coherent(phase: FloatArray, moving: BoolArray) -> BoolArray:
     """False at knots whose phase jumps against both neighbours."""
     second = np.zeros_like(phase)
+    # A sweep changes the phase step from one cycle to the next by far less: by 2 per cent of a turn, 0.13 rad,
+    # at most within what counts as one step of the frequency. Noise changes it by anything.
     second[1:-1] = phase[2:] - 2 * phase[1:-1] + phase[:-2]
     second[[0, -1]] = second[[1, -2]]
+    # a knot without moving neighbours cannot be told from noise
     near_moving = np.convolve(moving, np.ones(3), mode="same") >= 2
     return near_moving & (np.abs(second) < _LARGEST_PHASE_JUMP_RAD)
 
@@ -268,6 +296,7 @@ def _isolated_loss(moving: BoolArray) -> BoolArray:
     """True where the motion stops for a moment only: the phase is carried across lost samples."""
     at = np.flatnonzero(moving)
     inside = np.zeros_like(moving)
+    # lost samples make the cycles that they touch unusable, and no others
     inside[at[0] : at[-1] + 1] = True
     return inside & ~moving
 
@@ -300,6 +329,7 @@ def _demodulated(
     lost = np.zeros(times.size, dtype=np.bool_)
     last_piece = breaks.size - 2
     for k in range(times.size):
+        # symmetric about the knot, hence without delay
         half = 0.5 * window_s[k]
         first = max(0, int(np.ceil((times[k] - half) * rate_hz)))
         last = min(motion.size - 1, int(np.floor((times[k] + half) * rate_hz)))
@@ -312,6 +342,8 @@ def _demodulated(
             while piece < last_piece and breaks[piece + 1] <= t:
                 piece += 1
             x = t - breaks[piece]
+            # the spline is evaluated here: calling SciPy for every sample of every window costs far more than
+            # the sums
             phi = (
                 (coefficients[0, piece] * x + coefficients[1, piece]) * x + coefficients[2, piece]
             ) * x + coefficients[3, piece]
@@ -320,6 +352,8 @@ def _demodulated(
             square += w * weight[i] * motion[i] ** 2
             norm += w
             present += w * weight[i]
+        # The sum of a whole Hann window. Less means that the window reaches beyond the record, where it is no
+        # longer symmetric and the phase is biased.
         expected = 0.5 * window_s[k] * rate_hz
         lost[k] = norm == 0.0 or present < 0.999 * norm or norm < 0.98 * expected
         if norm > 0.0:

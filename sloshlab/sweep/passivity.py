@@ -21,5 +21,6 @@ def gives_energy(windows: xr.Dataset) -> bool:
         With `dissipated_mass_kg` and its standard error.
     """
     work = windows["dissipated_mass_kg"].values
+    # a run without scatter has error zero, and the sign decides
     error = np.maximum(windows["dissipated_mass_kg_std"].values, np.finfo(float).tiny)
     return bool(work.size and np.median(work / error) < -_SIGMA and np.mean(work < 0) > _SHARE)

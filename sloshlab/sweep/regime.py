@@ -81,15 +81,20 @@ def classify(
     -------
     Regime
     """
+    # the mean of complex amplitudes: what keeps no phase against the motion averages out
     repeated = dynamic_phasor.mean(axis=0)
+    # sensor noise does not repeat and would count as chaos
     total = max(float(dynamic_power.mean()) - noise_power, 0.0)
     others = max(total - 0.5 * abs(repeated[0]) ** 2, 0.0)
     # the mean over n phasors keeps 1/n of the power of what does not repeat; take it out again
     harmonic = _unbiased_power(dynamic_phasor[:, 1:])
     subharmonic = _unbiased_power(subharmonic_phasor)
     explained = harmonic + subharmonic
+    # Shares add up to one also where rounding explains more than there is; never divided by zero.
     scale = max(others, explained, np.finfo(float).tiny)
     shares = (subharmonic / scale, harmonic / scale, max(scale - explained, 0.0) / scale)
+    # Only the part in phase with the acceleration is left out, which is β. The part in quadrature is dissipation
+    # and keeps a window from being quiet.
     not_inertial = max(total - 0.5 * float(repeated[0].real) ** 2, 0.0)
     force_ratio = (
         float(np.sqrt(not_inertial) / (reference_force_n / np.sqrt(2))) if reference_force_n > 0 else np.nan
@@ -109,8 +114,10 @@ def classify(
 def _unbiased_power(phasor: ComplexArray) -> float:
     """Power of the part of phasors that repeats, its own scatter removed; shape (n, k) → scalar."""
     n = phasor.shape[0]
+    # a single pair cannot tell what repeats from what does not
     if n < 2:
         return 0.0
     mean = np.abs(phasor.mean(axis=0)) ** 2
+    # NumPy's variance of complex numbers is that of both parts together, as |mean|² needs it
     scatter = phasor.var(axis=0, ddof=1) / n
     return float(0.5 * np.maximum(mean - scatter, 0.0).sum())

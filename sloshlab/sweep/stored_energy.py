@@ -96,9 +96,12 @@ def stored_work(
     >>> bool(np.allclose(stored.in_loop, 0.5 * 900.0 * -1e-6))
     True
     """
+    # from the measured response, not from the rig: it holds for any structure without loss, known or not
     stiffness = _local_stiffness(omega_rad_per_s, apparent_mass_kg)
+    # m = μ + k/Ω² (Foster). A velocity made periodic in every cycle has lost the share of μ already.
     mass = stiffness / omega_rad_per_s**2 + (apparent_mass_kg if velocity_is_measured else 0.0)
     in_loop = 0.5 * (stiffness * changes.elastic_m2 + mass * changes.kinetic_m2_per_s2)
+    # phasors count the change of Ω within the cycle in addition; the loop does not
     return StoredWork(in_loop, in_loop - 0.25 * apparent_mass_kg * changes.chirp_m2_per_s2)
 
 
@@ -108,6 +111,7 @@ def _local_stiffness(omega: FloatArray, apparent_mass_kg: FloatArray) -> FloatAr
     for at in range(omega.size):
         near = slice(max(0, at - _HALF_WIDTH), at + _HALF_WIDTH + 1)
         direction = np.sign(np.diff(omega[near]))
+        # where the frequency stands still or turns, the slope over 1/Ω² is a slope over scatter
         sweeps_on = direction.size >= 2 and abs(direction.sum()) == direction.size
         if sweeps_on and np.ptp(omega[near]) > _SMALLEST_FREQUENCY_SPREAD * omega[at]:
             # a mass on a spring: μ = m − k/Ω²

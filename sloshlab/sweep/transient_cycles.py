@@ -26,7 +26,9 @@ def cycle_works_j(velocity_m_per_s: FloatArray, force_n: FloatArray, rate_hz: fl
     """
     ends = upward_crossings_s(velocity_m_per_s, rate_hz, start_s)
     time_s = np.arange(velocity_m_per_s.size) / rate_hz
+    # −∮ Δf v: Δf is a force on the tank, so that what the liquid takes is negative work of Δf
     power = -np.nan_to_num(force_n * velocity_m_per_s)
+    # the integral first, then its values between samples: cycles do not begin at samples
     taken = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) / rate_hz])
     return np.asarray(np.diff(np.interp(ends, time_s, taken)))
 
@@ -36,4 +38,5 @@ def upward_crossings_s(velocity_m_per_s: FloatArray, rate_hz: float, start_s: fl
     v = np.nan_to_num(velocity_m_per_s)
     places = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0))
     times = (places + v[places] / (v[places] - v[places + 1])) / rate_hz
+    # the start itself is a zero of the velocity; noise makes more of them right after it
     return np.concatenate([[start_s], times[times > start_s + 2 / rate_hz]])

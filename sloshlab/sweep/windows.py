@@ -49,6 +49,7 @@ class WindowSettings:
         Windows with fewer usable cycles are left out.
     """
 
+    # 12 cycles averaged and 24 between centres, as in the source: no overlap
     half_width_cycles: int = 6
     spacing_cycles: int = 24
     smallest_n_cycles: int = 3
@@ -114,11 +115,13 @@ def window_slices(cycles: Cycles, settings: WindowSettings) -> Iterator[slice]:
     """
     frequency = cycles.omega_rad_per_s
     # a stepped sweep: no window may average two frequencies
+    # An octave sweep of 1/120 octave/s changes by 0.12 % per cycle at 5 Hz, less above.
     jumps = np.flatnonzero(np.abs(np.diff(frequency)) > _LARGEST_CHANGE_PER_CYCLE * frequency[:-1]) + 1
     edges = np.concatenate([[0], jumps, [frequency.size]])
     width = 2 * settings.half_width_cycles
     for left, right in itertools.pairwise(edges):
         start, stop = left + _SETTLING_CYCLES, right - _SETTLING_CYCLES
+        # a dwell shorter than a window is averaged as it is, rather than lost
         if settings.smallest_n_cycles <= stop - start < width:
             yield slice(int(start), int(stop))
         for first in range(int(start), int(stop) - width + 1, settings.spacing_cycles):
@@ -163,6 +166,7 @@ def evaluate_windows(
     chosen = settings or WindowSettings()
     rows, n_unsteady = [], 0
     for window in window_slices(cycles, chosen):
+        # cycles that touch a lost or clipped sample go first, so that they do not enter the medians
         at = _steady(cycles, np.arange(window.start, window.stop)[cycles.usable[window]])
         if at.size >= chosen.smallest_n_cycles:
             row = _row(cycles, at, law, start_time_s, rig=rig, noise_power=noise_power)
@@ -170,6 +174,8 @@ def evaluate_windows(
                 rows.append(row)
             else:
                 n_unsteady += 1
+    # After all windows are there, because the stiffness at one follows from its neighbours; before anything is
+    # scaled, because W̄ is made of the dissipated work only.
     _take_out_stored_energy(rows, velocity_is_measured=cycles.velocity_is_measured)
     if rig is not None:
         for row in rows:
@@ -193,16 +199,19 @@ def _take_out_stored_energy(rows: list[dict[str, object]], *, velocity_is_measur
     )
     for row, in_loop, in_phasors in zip(rows, stored.in_loop, stored.in_phasors, strict=True):
         omega = 2 * np.pi * _number(row, "frequency_hz")
+        # loop and phasors contain different shares of the stored energy, see `stored_work`
         speed2 = (omega * _number(row, "amplitude_m")) ** 2
         row["stored_work_j"] = float(in_loop)
         row["work_j"] = _number(row, "work_j") - float(in_loop)
         row["dissipated_mass_kg"] = _number(row, "dissipated_mass_kg") - float(in_loop) / speed2
         row["work_harmonic_j"] = _number(row, "work_harmonic_j") - float(in_phasors)
+        # W = πγΩu₀² = πγ(Ωu₀)²/Ω, solved for γ
         row["gamma_kg_per_s"] = _number(row, "gamma_kg_per_s") - float(in_phasors) * omega / (np.pi * speed2)
 
 
 def _steady(cycles: Cycles, at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
     """Those cycles of a window that belong to one sweep: no pause, no transition between steps."""
+    # too few for a median to know what is normal
     if at.size < 3:
         return at
     amplitude = np.abs(cycles.acceleration_phasor[at, 0])
@@ -211,6 +220,7 @@ def _steady(cycles: Cycles, at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
     # medians throughout: the transition that is sought must not shift the trend it is measured against
     deviation = np.abs(frequency - trend - np.median(frequency - trend))
     moving = amplitude > _SMALLEST_AMPLITUDE_RATIO * np.median(amplitude)
+    # 1.4826 times the median deviation is the standard deviation of normal scatter
     limit = max(_SMALLEST_OUTLIER, _OUTLIER_SIGMA * 1.4826 * float(np.median(deviation)))
     transition = ~moving | (deviation >= limit)
     # the phase is smoothed over two cycles, so that a neighbour has part of the transition
@@ -229,15 +239,21 @@ def _row(
 ) -> dict[str, object]:
     omega = cycles.omega_rad_per_s[at]
     middle = 0.5 * (cycles.start_s[at] + cycles.stop_s[at])
+    # Powers are averaged over cycles before any ratio is taken: the mean of ratios would be biased by noise, and
+    # would count weak cycles as much as strong ones.
     work, force, velocity = cycles.work_j[at], cycles.force_phasor[at, 0], cycles.velocity_phasor[at]
     acceleration = cycles.acceleration_phasor[at, 0]
     speed2, accel2 = np.abs(velocity) ** 2, np.abs(acceleration) ** 2
+    # θ, the phase of ü at which the cycle begins, is zero where cycles are counted by the motion itself
     cos2 = acceleration.real**2 / accel2
+    # F = μ ü + γ u̇ (1.20) by least squares; u̇ and ü are a quarter of a turn apart, so that each has its own
+    # quotient
     gamma = float((force * velocity.conj()).real.mean() / speed2.mean())
     mass = float((force * acceleration.conj()).real.mean() / accel2.mean())
     row: dict[str, object] = {
         "time_s": start_time_s + float(middle.mean()),
         "frequency_hz": float(omega.mean() / (2 * np.pi)),
+        # (1.9), from the velocity whose constants are set already: u₀ = |u̇|/Ω
         "amplitude_m": float(np.sqrt((speed2 / omega**2).mean())),
         "acceleration_g": float(np.sqrt(accel2.mean()) / GRAVITY_M_PER_S2),
         "n_cycles": at.size,
@@ -247,17 +263,20 @@ def _row(
         "phase_error_rad": _phase_error(cycles.start_s[at] + start_time_s, law),
         "gamma_kg_per_s": gamma,
         "apparent_mass_kg": mass,
+        # smooth where W spans decades; this is what maps interpolate
         "dissipated_mass_kg": float(work.mean() / speed2.mean()),
         "dissipated_mass_kg_std": _standard_error(work, at) / float(speed2.mean()),
         "harmonic_amplitude_n": np.abs(cycles.dynamic_phasor[at].mean(axis=0)),
         "elastic_change_m2": _slope(at, speed2 / omega**2 * cos2),
         "kinetic_change_m2_per_s2": _slope(at, speed2 * (1 - cos2)),
         "chirp_m2_per_s2": float((speed2 * (2 * cos2 - 1)).mean()) * _slope(at, np.log(omega)),
+        # logarithmic, so that it is the same part per cycle at every level
         "growth_per_cycle": _slope(at, 0.5 * np.log(accel2)),
         "stored_work_j": 0.0,
     }
     row.update(_regime(cycles, at, row, rig, noise_power))
     if rig is not None:
+        # residual of Re(F ü*) = μ |ü|²: the scatter of the amplitude itself is no error of μ
         scatter = (force * acceleration.conj()).real - mass * accel2
         row["beta_std"] = _standard_error(scatter, at) / float(accel2.mean()) / rig.liquid_mass_kg
     return row
@@ -265,6 +284,7 @@ def _row(
 
 def _slope(at: npt.NDArray[np.intp], values: FloatArray) -> float:
     """Slope of the straight line through values at cycles, per cycle."""
+    # `at` has holes where cycles were left out, which the slope must know
     from_middle = at - at.mean()
     return float(from_middle @ values / (from_middle @ from_middle))
 
@@ -273,6 +293,7 @@ def _pair_starts(at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
     """Positions in `at` of the first of disjoint pairs of consecutive cycles."""
     starts, position = [], 0
     while position + 1 < at.size:
+        # across a hole the parity of the cycles need not differ, and the pair would not cancel what alternates
         consecutive = at[position + 1] == at[position] + 1
         if consecutive:
             starts.append(position)
@@ -291,6 +312,7 @@ def _standard_error(values: FloatArray, at: npt.NDArray[np.intp]) -> float:
     What alternates from one cycle to the next, as a subharmonic does, cancels in a pair and in the mean.
     """
     first = _pair_starts(at)
+    # without pairs the scatter of single cycles stands in, too large where something alternates
     if first.size < 2:
         return float(values.std(ddof=1) / np.sqrt(values.size))
     pairs = 0.5 * (values[first] + values[first + 1])
@@ -301,12 +323,14 @@ def _scaled(row: dict[str, object], inertia_kg: float, rig: Rig) -> dict[str, ob
     """The quantities that need the tank (1.16–1.18, 1.24); W̄ = W/(m_l u₀² Ω²)."""
     liquid = rig.liquid_mass_kg
     omega, amplitude = 2 * np.pi * _number(row, "frequency_hz"), _number(row, "amplitude_m")
+    # positive = dissipated; (1.18)
     w_bar = _number(row, "dissipated_mass_kg") / liquid
     return {
         "w_bar": w_bar,
         "w_bar_std": _number(row, "dissipated_mass_kg_std") / liquid,
         # F = (M_dry + m_l) ü − Δf and Δf = −β m_l ü − γ u̇: the mass beyond M_dry + m_l is β m_l
         "beta": (_number(row, "apparent_mass_kg") - inertia_kg) / liquid,
+        # App. A: η = W/(2π U_max), U_max = ½ m_l (Ωu₀)²; at resonance η = 2ζ
         "loss_factor": w_bar / np.pi,
         "omega_bar": omega / rig.frequency_scale_rad_per_s,
         "u_bar": amplitude / rig.tank.height_m,
@@ -325,6 +349,7 @@ def _regime(
     cycles: Cycles, at: npt.NDArray[np.intp], row: dict[str, object], rig: Rig | None, noise_power: float
 ) -> dict[str, object]:
     first = _pair_starts(at)
+    # without a tank the whole force is what the parts are compared with
     mass = rig.liquid_mass_kg if rig is not None else abs(_number(row, "apparent_mass_kg"))
     lead = np.angle(cycles.acceleration_phasor[at, 0])
     # relative to the acceleration's phase, in which the part at Ω that is inertia is the real one
@@ -338,6 +363,7 @@ def _regime(
         noise_power=noise_power,
     )
     return {
+        # complex mean first: a wave at Ω/2 keeps its phase from pair to pair, chaos does not
         "subharmonic_amplitude_n": np.abs(subharmonic.mean(axis=0)) if first.size else np.full(2, np.nan),
         "regime": regime.label,
         "force_ratio": regime.force_ratio,
@@ -353,6 +379,7 @@ def _phase_error(starts_s: FloatArray, law: SweepLaw | None) -> float:
     if law is None:
         return float("nan")
     turns = law.phase_rad(starts_s)
+    # the circular mean, because phases near ±π must not average to zero
     return float(np.angle(np.exp(-1j * turns).mean())) if np.isfinite(turns).all() else float("nan")
 
 
@@ -372,4 +399,5 @@ def _table(rows: list[dict[str, object]], run_id: str, rig: Rig | None) -> xr.Da
 
 
 def _continuous(phase_error_rad: FloatArray) -> FloatArray:
+    # wrapped window by window, the error of a shaker off its law would jump
     return np.unwrap(phase_error_rad) if np.isfinite(phase_error_rad).all() else phase_error_rad

@@ -66,12 +66,15 @@ class BaseRocking:
                 "rig: structure.length_m", got="nothing", allowed="> 0", remedy="give the beam's dimensions"
             )
         mass, stiffness, turned = self._coupled(structure, rotation)
+        # a Ritz approximation in the clamped modes: frequencies are above the true ones, within 2·10⁻³ for the
+        # first three
         squares, vectors = eigh(stiffness, mass)
         tip = structure.mode_shape @ vectors + rotation.length_m * turned @ vectors
         scaled = vectors * np.where(np.abs(tip) > 1e-12 * np.abs(tip).max(), structure.mode_shape / tip, 1.0)
         base = structure.base_participation_kg + turned * (
             rotation.residual_base_kg_m + float(rotation.of_modes_per_m @ structure.base_participation_kg)
         )
+        # modal damping of the clamped beam, shared as the modes are; couplings by damping are left out
         of_clamped = scaled.T**2
         masses = np.einsum("ij,ij->j", scaled, mass @ scaled)
         return replace(
@@ -93,4 +96,5 @@ class BaseRocking:
         coupling = np.outer(share * masses, turned)
         mass = np.diag(masses) + coupling + coupling.T + inertia * np.outer(turned, turned)
         stiffness = np.diag(structure.stiffnesses_n_per_m) + np.outer(turned, moments)
+        # symmetric but for rounding; the eigenvalue solver reads one triangle
         return mass, 0.5 * (stiffness + stiffness.T), turned

@@ -37,6 +37,7 @@ _SATURATION, _BREAK_UP, _AGITATED, _CALMING, _SHARPNESS, AVERAGING, _EXPONENT = 
 @njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
 def level_g(mean_square):
     """Amplitude in g of a harmonic acceleration with this mean square."""
+    # a Runge–Kutta stage may take a mean square that fades below zero
     return sqrt(2.0 * max(mean_square, 0.0)) / _G
 
 

@@ -29,6 +29,7 @@ DONE, UNSTABLE, FAULT, CHATTER, NO_ACCELERATION = (int(status) for status in Sta
 
 _SWITCH_TOLERANCE = 1e-13
 """An event function so little below zero has not changed its sign: rounding, right after its own event."""
+# Far below a step: an event that is off by δ costs the force's jump times δ, which must not spoil the order 4.
 _EVENT_TIME_TOLERANCE_S = 1e-12
 _MOST_EVENTS_PER_STEP = 50
 """More of them within one step are chatter, which the engine does not follow."""
@@ -52,6 +53,7 @@ def _copy(source: FloatArray, target: FloatArray) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
 def _events(m: Model, i: int, y: FloatArray, s: Scratch) -> None:
+    # `s.motion` must belong to `y`: event functions are asked right after the rates of the same state
     motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
     call_law(m.events[i], (s.motion, m.parameters, y, s.values), (motion, m.parameters_at[i], at, 0))
 
@@ -66,12 +68,15 @@ def _margin(m: Model, y: FloatArray, s: Scratch) -> float:
         _events(m, i, y, s)
         at = m.memory_at[i] + m.n_states[i]
         for k in range(m.n_switches[i]):
+            # sign of the switch times the function, so that one comparison serves both directions
             smallest = min(smallest, y[at + k] * s.values[k])
         for k in range(m.n_switches[i], m.n_switches[i] + m.n_limits[i]):
             smallest = min(smallest, s.values[k])
     if s.friction[0] == STICKS:
+        # sticking ends where the holding force leaves what friction can hold in either direction
         smallest = min(smallest, s.friction[1] - s.friction[2], s.friction[3] - s.friction[1])
     elif s.friction[0] != NO_FRICTION:
+        # sliding ends where the velocity turns against its direction
         smallest = min(smallest, s.friction[0] * s.motion[m.friction_frame * N_MOTION + VELOCITY])
     return smallest
 
@@ -93,6 +98,7 @@ def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scra
             middle = min(max(middle, low + 0.01 * (high - low)), high - 0.01 * (high - low))
         advance_by_call(m, excited, start, Time(middle * step, 2.0 * middle), s)
         value = _margin(m, s.trial, s)
+        # a step so long that it diverges is beyond the event, too
         if value < -_SWITCH_TOLERANCE or not np.isfinite(value):
             # Illinois: an end that stays while the other moves twice counts half, so that it moves, too
             high, below = middle, value
@@ -117,12 +123,14 @@ def _switch(m: Model, excited: Excited, now: Time, s: Scratch, out: Outputs) -> 
         at = m.memory_at[i] + m.n_states[i]
         for k in range(m.n_switches[i] + m.n_limits[i]):
             if k >= m.n_switches[i]:
+                # a limit is not turned but ends the simulation
                 if s.values[k] < 0.0:
                     return i
             elif s.state[at + k] * s.values[k] < 0.0:
                 s.state[at + k] = -s.state[at + k]
                 _log(out, now, i, k, s.state[at + k])
     before = s.friction[0]
+    # the holding force and its bounds stand in `s.friction` since the rates of this state
     if before == STICKS:
         release_friction(s)
     elif before != NO_FRICTION and before * s.motion[m.friction_frame * N_MOTION + VELOCITY] < 0.0:
@@ -137,6 +145,7 @@ def _log(out: Outputs, now: Time, term: int, event: int, value: float) -> None:
     log, n = out.log, out.n_events[0]
     if n < log.shape[0]:
         log[n, 0], log[n, 1], log[n, 2], log[n, 3] = now.seconds, term, event, value
+    # counted also where the log is full, so that the number told is right
     out.n_events[0] = n + 1
 
 
@@ -162,6 +171,7 @@ def _record(m: Model, row: int, s: Scratch, out: Outputs) -> None:
 def _fault_of(y: FloatArray, largest: FloatArray) -> int:
     """Index of the first state that is no number or beyond its bound, or −1."""
     for j in range(y.size):
+        # not "abs(y) > largest", which is false for NaN
         if not abs(y[j]) <= largest[j]:
             return j
     return -1
@@ -171,6 +181,7 @@ def _fault_of(y: FloatArray, largest: FloatArray) -> int:
 def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
     """Set the switches and the friction of the start and record it; the term that is beyond its limit, or −1."""
     start = Time(0.0, 0.0)
+    # the event functions read the motion, which the rates fill in
     rates_by_call(m, excited, start, s)
     _update_due(m, excited, start, 0.0, s)
     for i in range(m.law.size):
@@ -178,6 +189,7 @@ def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
             _events(m, i, s.state, s)
             at = m.memory_at[i] + m.n_states[i]
             for j in range(m.n_switches[i]):
+                # a function that starts at zero counts as positive; if it falls, its event comes at once
                 s.state[at + j] = -1.0 if s.values[j] < 0.0 else 1.0
             for j in range(m.n_switches[i], m.n_switches[i] + m.n_limits[i]):
                 if s.values[j] < 0.0:
@@ -185,8 +197,10 @@ def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
     if m.friction_frame >= 0:
         velocity = s.motion[m.friction_frame * N_MOTION + VELOCITY]
         s.friction[0] = -1.0 if velocity < 0.0 else 1.0
+        # a release: whether it sticks is decided by what drives it, the sign of zero says nothing
         if velocity == 0.0:
             set_friction(m, excited, start, s)
+    # again, with the forces that the switches turn on
     rates_by_call(m, excited, start, s)
     _record(m, 0, s, out)
     return -1
@@ -251,14 +265,18 @@ def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Out
             while done < 1.0:
                 # instants are counted from the start and never summed up, so that they do not drift
                 now, share = Time((index + done) * step, 2.0 * (index + done)), 1.0 - done
+                # written so that an infinite `due` is the last, too
                 is_last = not (due - now.seconds) / step < share - _SHARE_TOLERANCE
                 if not is_last:
+                    # A model in discrete time steps at its own instants, so that nothing is resampled: the step
+                    # is cut there.
                     share = max((due - now.seconds) / step, 0.0)
                 good = advance(m, excited, now, Time(share * step, 2.0 * share), s)
                 gap = _margin(m, s.trial, s)
                 if not good:
                     where = _fault_of(s.trial, stretch.largest)
                     return (NO_ACCELERATION if where < 0 else UNSTABLE), row, where
+                # a margin that is no number is accepted here and found as a fault at the end of the row
                 if not gap < -_SWITCH_TOLERANCE:
                     _accept(s)
                     done = 1.0 if is_last else done + share
@@ -267,12 +285,15 @@ def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Out
                         _update_due(m, excited, now, _SHARE_TOLERANCE * step, s)
                         due = _next_update(m, s)
                     continue
+                # The rest of the step starts anew from the event, with the switches turned: no stage looks
+                # across it.
                 done += _to_event(m, excited, now, _PastEvent(step, share, gap), s)
                 _accept(s)
                 now = Time((index + done) * step, 2.0 * (index + done))
                 where = _switch(m, excited, now, s, out)
                 if where >= 0:
                     return FAULT, row, where
+                # the forces jump at an event, so that the last rates of the step before it no longer hold
                 rates_by_call(m, excited, now, s)
                 n_switched += 1
                 if n_switched > _MOST_EVENTS_PER_STEP:
@@ -291,5 +312,6 @@ def _accept(s: Scratch) -> None:
     """The trial step becomes the state, its last rates the first ones of the next step."""
     _copy(s.trial, s.state)
     _copy(s.trial_works, s.works)
+    # four evaluations per step, not five; forces and motion at its end are there for the event functions, too
     _copy(s.slopes[4], s.slopes[0])
     _copy(s.powers[4], s.powers[0])

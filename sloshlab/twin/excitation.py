@@ -47,6 +47,7 @@ class Excitation:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.sampling_rate_hz) and self.sampling_rate_hz > 0):
             raise InputError("sampling_rate_hz", got=str(self.sampling_rate_hz), allowed="> 0")
+        # sizes are refused before memory is taken
         if not 2 <= self.n_samples <= 50_000_000:
             raise InputError("n_samples", got=str(self.n_samples), allowed="2 … 50000000")
 
@@ -58,6 +59,7 @@ class Excitation:
         if self.inputs is None:
             return np.empty((0, len(INPUTS)))
         last = 2 * (self.n_samples - 1) * n_substeps + 1 if stop is None else stop
+        # instants from whole numbers, never by adding up steps, which would drift
         return np.ascontiguousarray(self.inputs(np.arange(first, last) / (2 * n_substeps * self.sampling_rate_hz)))
 
     def scaled(self, factor: float) -> Excitation:
@@ -68,6 +70,7 @@ class Excitation:
 
         def of(time: FloatArray) -> FloatArray:
             table = inputs(time).copy()
+            # force, phase and frequency are not read by the sensor
             table[:, : _ACCELERATION + 1] *= factor
             return table
 
@@ -134,6 +137,7 @@ def stepped_sine(
         )
     omega = 2 * pi * np.asarray(frequencies_hz, dtype=np.float64)
     amplitude = np.asarray(accelerations_m_per_s2, dtype=np.float64) / omega**2
+    # a change precedes each dwell
     starts = np.arange(omega.size) * (dwell_s + change_s)
     d_omega, d_amplitude = np.diff(omega, prepend=omega[0]), np.diff(amplitude, prepend=0.0)
 
@@ -141,6 +145,7 @@ def stepped_sine(
         u, rate, curvature = (np.zeros(time.shape) for _ in range(3))
         phase, frequency, chirp = omega[0] * time, np.full(time.shape, omega[0]), np.zeros(time.shape)
         for start, dw, da in zip(starts, d_omega, d_amplitude, strict=True):
+            # the quintic has zero slope and curvature at both ends, so that the acceleration does not jump
             x = np.clip((time - start) / change_s, 0.0, 1.0)
             smooth, slope = x**3 * (10 - 15 * x + 6 * x**2), 30 * x**2 * (1 - x) ** 2
             u += da * smooth
@@ -149,6 +154,7 @@ def stepped_sine(
             frequency += dw * smooth
             chirp += dw * slope / change_s
             after = np.maximum(time - start - change_s, 0.0)
+            # the integral of the frequency in closed form: a summed phase would depend on the step
             phase += dw * (change_s * (2.5 * x**4 - 3 * x**5 + x**6) + after)
         return _motion(u, phase, frequency, rate=rate, curvature=curvature, chirp=chirp)
 
@@ -170,6 +176,8 @@ def _motion(
     cosine, sine = np.cos(phase), np.sin(phase)
     table[:, _DISPLACEMENT] = -amplitude * cosine
     table[:, _VELOCITY] = -rate * cosine + amplitude * frequency * sine
+    # with the terms of a changing A and φ: displacement, velocity and acceleration are those of one motion
+    # exactly
     table[:, _ACCELERATION] = (amplitude * frequency**2 - curvature) * cosine + (
         2 * rate * frequency + amplitude * chirp
     ) * sine
@@ -225,6 +233,7 @@ def recorded(
 
     def inputs(time: FloatArray) -> FloatArray:
         table = np.zeros((time.size, len(INPUTS)))
+        # instants are whole fractions of a sample, so that a few rows of weights serve all of them
         per_sample = round(1.0 / ((time[1] - time[0]) * sampling_rate_hz))
         first = round(time[0] * sampling_rate_hz * per_sample)
         for column, series in between.items():
@@ -244,6 +253,8 @@ class _BandLimitedSeries:
 
     def __init__(self, values: FloatArray) -> None:
         pad = min(HALF_WIDTH, values.size - 1)
+        # reflected in the point at the end: value and slope go on; zeros would make a recording that starts at
+        # rest ring
         before, after = 2 * values[0] - values[pad:0:-1], 2 * values[-1] - values[-2 : -pad - 2 : -1]
         self._padded = np.pad(np.concatenate([before, values, after]), HALF_WIDTH - pad, mode="edge")
         self._n_samples = values.size
@@ -269,6 +280,7 @@ def _weighted(samples: FloatArray, weights: FloatArray) -> FloatArray:
     sums = np.empty(n_windows * n_phases)
     for i in range(n_windows):
         for phase in range(n_phases):
+            # fastmath may reorder this sum, as all values are finite: lost samples were refused
             total = 0.0
             for j in range(width):
                 total += samples[i + j] * weights[phase, j]

@@ -82,6 +82,7 @@ class Law:
         """Address of the compiled function in this process."""
         return int(self._compiled.address)
 
+    # by name: a compiled function and its address mean nothing in another process
     def __reduce__(self) -> str:
         return self.function.__qualname__
 

@@ -33,6 +33,7 @@ _BREAK_UP = 6
 def _liquid_damping(motion, parameters, memory, rates):
     """−s [c · saturation + (m_l/π) ω W̄(â)] v; s builds up while the liquid is agitated."""
     omega = sqrt(memory[1] / memory[0]) if memory[0] > 0 else 1.0
+    # bounded, so that a motion that has died away has a frequency
     omega = min(max(omega, 1.0), 1e4)
     averaging = parameters[_BREAK_UP + AVERAGING]
     rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / averaging
@@ -42,6 +43,8 @@ def _liquid_damping(motion, parameters, memory, rates):
     damping = parameters[0] * share_by_saturation(parameters, _BREAK_UP, size)
     if size > parameters[2]:
         over = (size - parameters[2]) / (parameters[4] * parameters[2])
+        # (E.4) with W̄ over the level: 2b/(1 + b²) has its largest value 1 at b = 1, a level of (1 + rise) times
+        # the threshold
         damping += parameters[1] / pi * omega * parameters[3] * 2.0 * over / (1.0 + over * over)
     return -share_broken_up(parameters, _BREAK_UP, memory[2]) * damping * motion[VELOCITY]
 
@@ -79,6 +82,7 @@ def _oscillator(motion, parameters, memory, rates):
     stretch, closing = memory[0] - motion[DISPLACEMENT], memory[1] - motion[VELOCITY]
     pull = omega * omega * stretch + 2 * parameters[2] * omega * closing
     rates[0], rates[1] = memory[1], -pull
+    # instead of m frozen, whose inertia the structure already has: that one is given back
     return parameters[1] * (pull + motion[ACCELERATION])
 
 
@@ -105,6 +109,7 @@ def _cushion(motion, parameters, memory, rates):
     """Liquid on a gas spring that hardens as it is compressed and softens as it expands."""
     mass, hardening = parameters[1], parameters[2]
     stretch, closing = memory[0] - motion[DISPLACEMENT], memory[1] - motion[VELOCITY]
+    # gas that is compressed to nothing would be a wall of any stiffness, which no step follows
     left = max(1.0 - hardening * stretch, 0.02)
     omega = sqrt(parameters[0] / mass)
     push = omega * omega * stretch / left + 2.0 * parameters[3] * omega * closing
@@ -133,6 +138,7 @@ AIR_CUSHION = register(
 
 @law
 def _loss(motion, parameters, memory, rates):
+    # the structure still carries what has gone: its inertia is taken back
     return parameters[0] * motion[TIME] * motion[ACCELERATION]
 
 
@@ -157,6 +163,7 @@ def _faraday(motion, parameters, memory, rates):
     rates[1] = (
         -2.0 * parameters[3] * omega * speed
         - omega * omega * (1.0 + parameters[1] * motion[ACCELERATION] / _G) * wave
+        # grows with the drive until this term detunes it; without it a parametric wave has no size
         - omega * omega * wave**3
     )
     return parameters[2] * wave
@@ -173,6 +180,7 @@ FARADAY_WAVE = register(
             Parameter("damping_ratio", "1", 0.0, 1.0, 0.03),
         ),
         _faraday,
+        # a disturbance to grow from: a flat surface is an equilibrium, if an unstable one
         memory=lambda values, table: (1e-3, 0.0),
         uses_acceleration=True,
         equation="F y, ÿ = −2ζω ẏ − ω² (1 + growth · a/g) y − ω² y³",

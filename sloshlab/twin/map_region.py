@@ -33,6 +33,8 @@ def outside_remarks(term: Term, time_s: FloatArray, motion: FloatArray, memory: 
     """
     omega_bar_axis, u_bar_axis, measured = _region(term.table)
     omega_bar, u_bar = _place_in_map(term, motion, memory)
+    # between measured and other grid points the map is partly filled: only where all neighbours were measured
+    # counts
     inside = (
         RegularGridInterpolator((omega_bar_axis, u_bar_axis), measured, bounds_error=False, fill_value=0.0)(
             np.stack([omega_bar, u_bar], axis=-1)

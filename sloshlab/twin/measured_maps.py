@@ -60,6 +60,7 @@ def terms_from_maps(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tu
         damping = _damping_kg_per_s(rig, maps["w_bar"], str(metric), frequency, parameters)
         return (VISCOUS_DAMPING(place="tank", damping_n_s_per_m=damping),)
     following: dict[str, Any] = {"liquid_mass_kg": rig.liquid_mass_kg, "height_m": rig.tank.height_m}
+    # a map needs a frequency before the motion has shown one
     following["start_frequency_hz"] = frequency
     if "time_constant_s" in parameters:
         following["time_constant_s"] = parameters["time_constant_s"]
@@ -89,6 +90,7 @@ def read_maps(path: Path, *, fill_level: float) -> xr.Dataset:
             missing = [name for name in ("w_bar", "beta") if name not in source]
             if missing or max(source[name].size for name in ("w_bar", "beta")) > _LARGEST_GRID:
                 raise InputError(what, got=f"without {', '.join(missing) or 'bounds'}", allowed="a maps.nc")
+            # loaded under the lock: the library is not made for threads
             maps = source[["w_bar", "beta"]].load()
     except (OSError, ValueError, RuntimeError, KeyError) as error:
         if isinstance(error, InputError):
@@ -116,6 +118,7 @@ def filled(grid: xr.DataArray) -> xr.DataArray:
     gaps = ~np.isfinite(grid.values)
     if gaps.all():
         raise InputError(f"map {grid.name}", got="no measured point", allowed="a measured region")
+    # by grid points, not by physical distances: both axes count alike
     nearest = distance_transform_edt(gaps, return_distances=False, return_indices=True)
     return grid.copy(data=grid.values[tuple(nearest)])
 

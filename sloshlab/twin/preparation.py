@@ -36,6 +36,7 @@ Watch = Callable[[int, int], None]
 _LARGEST_EVENT_LOG: Final = 100_000
 _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S, _LARGEST_MEMORY = 100.0, 1e6, 1e15
 """Beyond any rig; a motion that reaches them is unstable."""
+# checked before anything is allocated, so that a run that is too long is refused in words
 _LARGEST_OUTPUTS_BYTES: Final = 4 * 2**30
 _HALF_STEPS_AT_ONCE = 1 << 17
 """So that the excitation of a long run is never held whole, and progress can be told."""
@@ -69,9 +70,13 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
     n_modes = 0 if structure is None else structure.masses_kg.size
     masses = np.array([term.mass_kg for term in terms])
     memories = [np.array(term.kind.memory(term.values, term.table)) for term in terms]
+    # switches stand behind the states of their term; the engine sets their signs at the start
     blocks = [np.concatenate([m, np.ones(t.kind.n_switches)]) for m, t in zip(memories, terms, strict=True)]
+    # a workspace lies behind the parameters: what a model in discrete time keeps there costs no integration
     numbers = [np.concatenate([t.numbers, np.zeros(t.kind.workspace(t.values, t.table))]) for t in terms]
     empty = np.empty(0)
+    # Acceleration of the place per force on it. One number for all modes, because all forces act at one place:
+    # several tanks would make it a small matrix.
     mobility = 0.0 if structure is None else float((structure.mode_shape**2 / structure.masses_kg).sum())
     model = Model(
         shape=empty if structure is None else np.ascontiguousarray(structure.mode_shape),
@@ -81,6 +86,7 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
         base_participation=_participation(structure, excitation),
         mobility=mobility,
         added_mass=_checked_mass(float(masses.sum()), mobility),
+        # division taken out of the stages; (1 + m_a μ) is positive, as was checked
         inverse_inertia=1.0 / (1.0 + float(masses.sum()) * mobility),
         law=_integers([term.kind.law.address for term in terms]),
         events=_integers([term.kind.events.address if term.kind.events else 0 for term in terms]),
@@ -89,6 +95,7 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
         kind=_integers([_bits(term) for term in terms]),
         frame=_integers([PLACES.index(term.place) for term in terms]),
         mass=masses,
+        # (with `empty`, because a twin may have no terms)
         parameters=np.concatenate([*numbers, empty]),
         parameters_at=_offsets(numbers)[:-1],
         memory_at=2 * n_modes + _offsets(blocks),
@@ -119,6 +126,7 @@ def _update_period(term: Term) -> float:
 
 
 def _checked_mass(added_kg: float, mobility_per_kg: float) -> float:
+    # the determinant of the mass matrix with a rank-one change
     if 1.0 + added_kg * mobility_per_kg <= 0:
         raise InputError(
             "twin: mass",
@@ -131,6 +139,7 @@ def _checked_mass(added_kg: float, mobility_per_kg: float) -> float:
 def _participation(structure: Structure | None, excitation: Excitation) -> FloatArray:
     if structure is None:
         return np.empty(0)
+    # NaN is "not known", which matters only where the base moves
     if np.isfinite(structure.base_participation_kg).all():
         return structure.base_participation_kg
     if excitation.moves_base:
@@ -143,6 +152,7 @@ def _participation(structure: Structure | None, excitation: Excitation) -> Float
 
 
 def _friction_frame(terms: Sequence[Term], excitation: Excitation) -> int:
+    # two frictions in two frames cannot stick both while the base moves between them
     frames = sorted({PLACES.index(term.place) for term in terms if term.kind.dry_friction})
     if len(frames) > 1 and excitation.moves_base:
         raise InputError(
@@ -163,11 +173,13 @@ def start_state(
             raise InputError(f"twin: {name}", got=str(value), allowed="a number, for twins with a structure")
     modes = np.empty(0)
     if twin.structure is not None:
+        # a weight that is hung to the tank and cut off: all modes are deflected, not the first alone
         deflected = twin.structure.static_deflection
         modes = np.concatenate([deflected(displacement_m), deflected(velocity_m_per_s)])
     state = np.concatenate([modes, ready.memory])
     for term, at in zip(twin.terms, ready.model.memory_at[:-1], strict=True):
         if term.kind.moves_with_place:
+            # such memories are absolute positions: a ball starts on the floor wherever that is
             state[at] += displacement_m + first_inputs[0]
             state[at + 1] += velocity_m_per_s + first_inputs[1]
     return state
@@ -225,6 +237,8 @@ def _stretches(n_rows: int, n_substeps: int) -> Iterator[tuple[int, int]]:
 
 
 def _excited(excitation: Excitation, n_substeps: int, first_sample: int, last_sample: int) -> Excited:
+    # six half steps on both sides: the six-point polynomial of a cut step must find the same neighbours in every
+    # cut
     first = max(0, 2 * n_substeps * first_sample - _MARGIN)
     stop = min(2 * n_substeps * last_sample + 1 + _MARGIN, 2 * n_substeps * (excitation.n_samples - 1) + 1)
     return Excited(excitation.half_steps(n_substeps, first, stop), first)

@@ -23,6 +23,8 @@ _FASTEST: Final = 16.0
 
 @law
 def _structural(motion, parameters, memory, rates):
+    # Reid's law: 4 ∫₀ᴬ (π/2) η k x dx = πηkA² per cycle. Nonlinear: modes at one time share it as they share
+    # friction.
     amplitude = abs(motion[DISPLACEMENT])
     return -0.5 * pi * parameters[0] * parameters[1] * amplitude * motion[DIRECTION]
 
@@ -31,9 +33,11 @@ def _structural(motion, parameters, memory, rates):
 def _bouc_wen(motion, parameters, memory, rates):
     """ż = α v − βγ |v| |z|^(ν−1) z − βδ v |z|^ν; the switches are the signs of v and z."""
     z, v = memory[0], motion[VELOCITY]
+    # |z| by the switch: within a step z may have crossed zero, where its power must not become NaN
     size = memory[2] * z
     if size < 0.0:
         size = 0.0
+    # the usual exponent needs no power function
     power = size if parameters[3] == 1.0 else size ** parameters[3]
     rates[0] = parameters[0] * v - power * (parameters[1] * memory[1] * v * memory[2] + parameters[2] * v)
     return -z
@@ -67,10 +71,13 @@ def _relaxing_springs(motion, parameters, memory, rates):
     """
     middle = 2.0 * pi * parameters[2]
     slowest = 10.0 ** -parameters[3]
+    # evenly spaced logarithms: such a sum loses nearly the same share at all frequencies between the slowest and
+    # the fastest
     ratio = (_FASTEST / slowest) ** (1.0 / (_N_SPRINGS - 1))
     relative, force, loss = slowest, 0.0, 0.0
     for j in range(_N_SPRINGS):
         rates[j] = motion[VELOCITY] - relative * middle * memory[j]
+        # storage of a relaxing spring at ω; it is taken off, so that the law adds loss and no stiffness there
         of_unit = 1.0 / (1.0 + relative * relative)
         force += memory[j] - of_unit * motion[DISPLACEMENT]
         loss += relative * of_unit
@@ -126,6 +133,7 @@ def _behind_play(motion, parameters, memory, rates):
     """
     behind = memory[0]
     slips = memory[3] > 0.0
+    # while the slider follows, e stays: friction is moved, not stretched further
     rates[0] = 0.0 if slips and behind * memory[1] > 0.0 else motion[VELOCITY]
     force = parameters[0] if slips else parameters[2] * (abs(behind) - 0.5 * parameters[1])
     if memory[2] < 0.0:

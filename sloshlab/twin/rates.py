@@ -41,6 +41,7 @@ _ACCELERATION_TOLERANCE = 1e-12
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
 def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
     """Excitation at a position in half steps: the row itself, or a six-point polynomial between rows."""
+    # the classical scheme needs the inputs at the ends and in the middle of a step: rows are half steps
     table = excited.table
     n = table.shape[0]
     if n == 0:
@@ -52,6 +53,7 @@ def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
         for column in range(inputs.size):
             inputs[column] = table[nearest, column]
         return
+    # steps cut by events; fifth degree, so that the order 4 of the scheme survives
     first = min(max(int(np.floor(place)) - 2, 0), n - 6)
     for column in range(inputs.size):
         inputs[column] = 0.0
@@ -69,12 +71,15 @@ def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
     for frame in range(2):
         at = frame * N_MOTION
         s.motion[at + TIME] = time
+        # frame 0 is relative to the base, where forces of the structure act; frame 1 is absolute, for those of
+        # the tank
         s.motion[at + DISPLACEMENT] = x + frame * s.inputs[0]
         s.motion[at + VELOCITY] = v + frame * s.inputs[1]
         s.motion[at + ACCELERATION] = np.nan  # a law that reads it without saying so gets NaN as its force
         s.motion[at + BASE_ACCELERATION] = s.inputs[2]
         s.motion[at + PHASE] = s.inputs[3]
         s.motion[at + FREQUENCY] = s.inputs[4]
+        # the direction held within the step, not the sign of the velocity, which may turn within it
         s.motion[at + DIRECTION] = s.friction[0]
 
 
@@ -107,11 +112,14 @@ def _solve_acceleration(m: Model, free: float, known: float, stage: Stage, s: Sc
 
     Secants from the slope of the last time, which most laws keep, or else Newton's method.
     """
+    # (1 + m_a μ) a = free + μ (known + F(a)), μ = Σψ²/m being the mobility of the place: one unknown, whatever
+    # the number of modes
     inertia = 1.0 + m.added_mass * m.mobility
     start = (free + m.mobility * known) * m.inverse_inertia
     a, slope, before, force_before = start, s.slope[0], np.nan, 0.0
     for _ in range(_MOST_SECANTS):
         there = _forces_at(m, a, stage, s)
+        # `before` starts as NaN: the first step takes the slope of the last time
         if abs(a - before) > _LEAST_CHORD * (1.0 + abs(a)):
             slope = (there - force_before) / (a - before)
         correction = (free + m.mobility * (known + there) - inertia * a) / (inertia - m.mobility * slope)
@@ -145,6 +153,7 @@ def _hold(m: Model, holding: float, stage: Stage, s: Scratch) -> None:
     """Bounds of the holding force of sticking friction, and its shares of the friction terms."""
     at = m.friction_frame * N_MOTION
     velocity = s.motion[at + VELOCITY]
+    # bounds are those of a place at rest; what is left of the velocity is rounding
     s.motion[at + VELOCITY] = 0.0
     for side in range(2):
         s.motion[DIRECTION] = s.motion[N_MOTION + DIRECTION] = 1.0 - 2.0 * side
@@ -153,11 +162,13 @@ def _hold(m: Model, holding: float, stage: Stage, s: Scratch) -> None:
             if m.kind[i] & DRY_FRICTION:
                 limit = _force(m, i, stage, s)
                 s.friction[2 + side] += limit
+                # the bound that counts is that of the side towards which the holding force acts
                 if (holding > 0) == (side == 1):
                     s.force[i] = limit
     bound = s.friction[3] if holding > 0 else s.friction[2]
     for i in range(m.law.size):
         if m.kind[i] & DRY_FRICTION:
+            # friction of guide and tank shares the load in proportion to what each can hold
             s.force[i] *= holding / bound if bound != 0.0 else 0.0
     s.motion[at + VELOCITY] = velocity
     s.motion[DIRECTION] = s.motion[N_MOTION + DIRECTION] = STICKS
@@ -168,6 +179,7 @@ def _hold(m: Model, holding: float, stage: Stage, s: Scratch) -> None:
 def _known_force(m: Model, stage: Stage, s: Scratch) -> float:
     """External force and those terms that depend neither on the acceleration nor on what friction has to hold."""
     later = USES_ACCELERATION | DRY_FRICTION if s.friction[0] == STICKS else USES_ACCELERATION
+    # masses that terms add move with the base, as the frozen ones of (2.31) do
     total = s.inputs[5] - m.added_mass * s.inputs[2]
     for i in range(m.law.size):
         if m.kind[i] & later:
@@ -183,11 +195,14 @@ def _implicit_force(m: Model, free: float, known: float, stage: Stage, s: Scratc
     """Sum of all forces where some depend on the acceleration or friction holds, and whether there is one."""
     inertia = 1.0 + m.added_mass * m.mobility
     if s.friction[0] == STICKS:
+        # The place stands still in the frame of its friction: the acceleration is known and the force is the
+        # unknown. An exact constraint, where a steep function of the velocity would make the equations stiff.
         a = -s.inputs[2] if m.friction_frame == ABSOLUTE else 0.0
         known += _forces_at(m, a, stage, s)
         holding = (inertia * a - free) / m.mobility - known
         _hold(m, holding, stage, s)
         return known + holding, True
+    # prescribed motion: the acceleration relative to it is zero, whatever the forces
     if m.mobility == 0.0:
         return known + _forces_at(m, 0.0, stage, s), True
     a = _solve_acceleration(m, free, known, stage, s)
@@ -202,6 +217,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
     base = s.inputs[2]
     x, v, free = 0.0, 0.0, 0.0
     for j in range(n):
+        # (2.26, 2.31): m q̈ = −c q̇ − k q − Γ a_s + ψ F, Γ = ∫ µψ dx with the tip mass
         residual = -m.stiffness[j] * y[j] - m.damping[j] * y[n + j] - m.base_participation[j] * base
         residual *= m.inverse_mass[j]
         s.residual[j] = residual
@@ -214,6 +230,8 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
         total, good = _implicit_force(m, free, total, stage, s)
     # all forces act at one place of the modes, so that the mass they add needs no system of equations
     a = (free + m.mobility * total) * m.inverse_inertia
+    # inertia of the added masses; a negative one takes out of the frozen liquid what a ball or a wave moves by
+    # itself
     total -= m.added_mass * a
     for j in range(n):
         dy[j] = y[n + j]
@@ -230,7 +248,10 @@ def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
     n, n_terms, base = m.stiffness.size, m.law.size, s.inputs[2]
     y, power = stage.state, s.powers[stage.row]
     for i in range(n_terms):
+        # the recorded force of a term contains its inertia, with the absolute acceleration
         s.force[i] -= m.mass[i] * s.motion[N_MOTION + ACCELERATION]
+        # on the modes by the relative velocity, which closes the balance of energy; in its own frame it is the
+        # loss
         power[2 * i] = s.force[i] * v
         power[2 * i + 1] = s.force[i] * s.motion[m.frame[i] * N_MOTION + VELOCITY]
     damped, inertia = 0.0, 0.0
@@ -250,6 +271,8 @@ def rates_by_call(m: Model, excited: Excited, now: Time, s: Scratch) -> bool:
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
 def advance(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
     """One Runge–Kutta step from `state` to `trial`, the rates at its start being in the first slopes."""
+    # Rates of the end of the step are taken as a fifth stage: they are the first of the next step and tell the
+    # events.
     y, k, p, new = s.state, s.slopes, s.powers, s.trial
     step = length.seconds
     good = True
@@ -263,6 +286,8 @@ def advance(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -
                 new[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
         now = Time(start.seconds + c * step, start.half_steps + c * length.half_steps)
         good &= rates(m, excited, now, Stage(new, k[stage], stage), s)
+    # Works are integrated with the weights of the state but beside it: they feed nothing back, and the balance
+    # of energy closes to the error of the integrator.
     for j in range(s.works.size):
         s.trial_works[j] = s.works[j] + step / 6.0 * (p[0, j] + 2.0 * (p[1, j] + p[2, j]) + p[3, j])
     return good

@@ -40,6 +40,7 @@ LONGEST_BRIDGE: Final = 5
 """Lost samples in a row that are bridged."""
 
 _FEWEST_SAMPLES = 12
+# Nominal releases are off by little; a wrong sign or unit is off by much.
 _DEFLECTIONS_AGREE = 0.3
 
 
@@ -110,9 +111,12 @@ def drive_of(recording: xr.Dataset, twin: Twin, *, block: Block = "all", by_nois
 def _driven_tank(recording: xr.Dataset, twin: Twin, *, by_noise: bool) -> Drive:
     names = acceleration_channels(recording)
     rate = run_attributes(recording).sampling_rate_hz
+    # by noise: a loud sensor would bring half of its noise into the drive; alike by default, which makes errors
+    # of the gains least
     weights = weights_by_noise(recording, names) if by_noise else None
     mean = mean_acceleration(recording, names, weights).values
     acceleration, n_driven, flags = _usable(recording, names, mean)
+    # the mean of a decay is part of its motion; of a run that goes on it is the sensor's offset
     if not _is_free(recording):
         acceleration -= acceleration.mean()
     motion = _integrated_twice(acceleration, rate)
@@ -145,8 +149,10 @@ def _driven_structure(recording: xr.Dataset, twin: Twin, block: Block) -> Drive:
         flags = (*flags, *_start_remarks(recording, start))
     if block == "structure":
         forces, motions = force_channels(recording), acceleration_channels(recording)
+        # (1.19): what the liquid does beyond a frozen one
         acting = twin.carried_mass_kg * mean_acceleration(recording).values - total_force(recording).values
         force, n_force, more = _usable(recording, [*forces, *motions], acting)
+        # the weight left in a force would deflect the structure
         force -= force.mean()
         n, flags = min(n, n_force), (*flags, *more)
         driven["force_n"] = force
@@ -208,6 +214,7 @@ def _usable(
     good = np.isfinite(series)
     n_driven = series.size
     for start, stop in runs(good, False):
+        # at the ends there is nothing to bridge to
         if stop - start > LONGEST_BRIDGE or start == 0 or stop == series.size:
             n_driven = start
             break
@@ -225,6 +232,7 @@ def _usable(
     n_bridged = int((~good).sum())
     if n_bridged:
         places = np.arange(n_driven)
+        # a few samples: the motion is smooth at many samples per cycle, and a simulation cannot stop and go on
         series[~good] = CubicSpline(places[good], series[good])(places[~good])
         flags.append(f"{which}: {n_bridged} lost samples bridged")
     n_clipped = sum(int(clipped_samples(recording[name]).sum()) for name in names)

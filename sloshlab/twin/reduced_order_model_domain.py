@@ -103,6 +103,7 @@ def _cycles_seen(simulation: Simulation, term: Term) -> MotionCycles:
     positions = np.arange(0.0, velocity.size, 1 / ratio) if ratio < 1 else np.empty(0)
     if positions.size < _SHORTEST:
         return motion_cycles(velocity, rate_hz)
+    # in the band that the model sees: higher modes would split cycles that it never noticed
     return motion_cycles(resampled(velocity, positions, rate_ratio=ratio), ratio * rate_hz)
 
 
@@ -114,6 +115,7 @@ def _of_training(cycles: MotionCycles, term: Term) -> MotionCycles:
 
 def _extended_to_the_end(excursions: list[Excursion], simulation: Simulation, term: Term) -> list[Excursion]:
     """A motion that dies away has no cycles in the end: too weak stays too weak."""
+    # a decay always leaves the domain in the end; nothing else may be stretched
     if not excursions or excursions[-1].reason != "too weak":
         return excursions
     end_s = simulation.time_s.size / simulation.sampling_rate_hz / math.sqrt(term.values["height_ratio"])

@@ -145,6 +145,7 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
     if model.agitation is not None:
         got = "a model with slow states among its regressors"
         raise InputError("rom", got=got, allowed="models without, or with a break-up", remedy="train another")
+    # the force would have to wait for the motion that it makes
     if min(model.delays.inputs) < 1:
         raise InputError(
             "rom: input delays",
@@ -174,6 +175,7 @@ def _table(model: ReducedOrderModel) -> FloatArray:
     sizes = [len(delays.inputs), len(delays.outputs), len(layers), model.theta.size, len(break_up), domain.size]
     parts = [[network, *sizes], [*delays.inputs, *delays.outputs], layers, model.theta, break_up, domain]
     numbers = np.concatenate([np.asarray(part, np.float64) for part in parts])
+    # its own length first: the law finds the workspace behind the table by it
     return np.concatenate([[numbers.size + 1.0], numbers])
 
 

@@ -143,6 +143,7 @@ def rest(numbers):
         lines[n_line + d] = -numbers[OUTPUT_OFFSET] / numbers[OUTPUT_SCALE]
     if table[6] > 0:
         work[_SHARE] = numbers[break_up_at(table) + N_VALUES + int(table[6]) - 1]
+    # without feedback four steps fill the forces of the cubic; with it the model has to come to rest first
     for _ in range(REST_STEPS if table[3] > 0 else 4):
         take_step(numbers, 0.0)
     work[0] = 0.0
@@ -159,6 +160,7 @@ def take_step(numbers, velocity):
         lines[d] = lines[d - 1]
         lines[n_line + d] = lines[n_line + d - 1]
     lines[0] = (velocity - numbers[INPUT_OFFSET]) / numbers[INPUT_SCALE]
+    # the force that was said to lie ahead is that of this instant now
     lines[n_line] = (work[_FORCES + 3] - offset) / scale
     for i in range(3):
         work[_FORCES + i] = work[_FORCES + i + 1]
@@ -168,6 +170,8 @@ def take_step(numbers, velocity):
         parameters = table[at : at + int(table[6])]
         work[_SHARE] = next_share(work[_SHARE], velocity, work[_VELOCITY], 1.0 / numbers[RATE], parameters)
         work[_VELOCITY] = velocity
+        # after the network, whose delay line of forces it never enters: a break-up goes with models without
+        # feedback
         ahead *= work[_SHARE]
     work[_FORCES + 3] = ahead
     work[0] += 1.0
@@ -177,6 +181,8 @@ def take_step(numbers, velocity):
 def force_between_instants(motion, parameters, memory, rates):
     """The cubic through the last four forces, of which one lies ahead."""
     at = _workspace_at(parameters)
+    # time since the last instant in steps of the model, 0 … 1. A held force would lag by half a step: 0.2 rad at
+    # 10.87 Hz for a model of 170 Hz.
     x = motion[TIME] * parameters[RATE] - (parameters[at] - 1.0)
     before, last, now, ahead = (
         parameters[at + 1], parameters[at + 2], parameters[at + 3], parameters[at + 4],
@@ -195,6 +201,7 @@ def step_of_model(motion, parameters, memory, rates):
     at = _workspace_at(parameters)
     table = carray(parameters, at)[N_VALUES:]
     numbers = carray(parameters, at + workspace_size(table))
+    # the first call; the workspace is zero until then
     if parameters[at] == 0.0:
         rest(numbers)
     take_step(numbers, motion[VELOCITY])

@@ -94,6 +94,7 @@ def _delayed(values: FloatArray, delay: float) -> FloatArray:
 
 def _high_passed(values: FloatArray, two_time_constants: float) -> FloatArray:
     """First-order high-pass by the bilinear rule, at rest in its first value."""
+    # bilinear rule: it stays stable when the time constant is shorter than a sample
     a = (two_time_constants - 1) / (two_time_constants + 1)
     b = two_time_constants / (two_time_constants + 1)
     return np.asarray(lfilter([b, -b], [1.0, -a], values - values[0]) + 0.0)

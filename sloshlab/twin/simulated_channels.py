@@ -108,6 +108,8 @@ def true_channel(
     order = ORDER_OF_DERIVATIVE[quantity]
     along = attributes.get("x_m")
     has_structure = simulation.twin.structure is not None
+    # the control accelerometer is on what the shaker moves: the tank, or the base where a structure carries the
+    # tank
     if place.startswith("root") or along == 0.0 or (place.startswith("control") and has_structure):
         return simulation.base_motion[:, order] if has_structure else None
     if place.startswith("beam"):
@@ -123,6 +125,7 @@ def _of_tank(simulation: Simulation, order: int) -> FloatArray:
 def _force(simulation: Simulation, place: str, attributes: Mapping[str, Any], n_cells: int) -> FloatArray | None:
     sign = -1.0 if attributes.get("block_from") == "tank" else 1.0
     if place.startswith("cell"):
+        # cells carry equal shares: the twin's tank does not tilt
         return sign * simulation.interface_force_n / n_cells
     return sign * simulation.interface_force_n if place in ("interface", "total") else None
 

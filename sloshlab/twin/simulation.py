@@ -67,6 +67,7 @@ class Simulation:
     @cached_property
     def places(self) -> FloatArray:
         """Displacement, velocity, acceleration of structure (relative) and tank (absolute), shape (n, 2, 3)."""
+        # made when they are asked for: they follow from the modes, and keeping them would cost every simulation
         relative = np.stack([self._relative(order) for order in range(3)], axis=-1)
         return np.stack([relative, relative + self.base_motion], axis=1)
 
@@ -107,6 +108,7 @@ class Simulation:
     @property
     def interface_force_n(self) -> FloatArray:
         """Force of the structure (or the shaker) on the tank, static weight removed."""
+        # (1.19) solved for the force: F_ext = (M_dry + m_l) ü − Δf
         inertia = self.twin.carried_mass_kg * self.acceleration_m_per_s2
         return np.asarray(inertia - self.tank_force_n - self.external_force_n)
 
@@ -128,6 +130,7 @@ class Simulation:
     def energy_residual_j(self) -> FloatArray:
         """Energy gained less the works that gave it; zero but for the integrator's error."""
         n = len(self.twin.terms)
+        # works on the modes: in the frame of its place a force of the tank also takes from the moving base
         given = self.works_j[:, 0 : 2 * n : 2].sum(axis=1) + self.works_j[:, 2 * n :].sum(axis=1)
         return np.asarray(self.mechanical_energy_j - self.mechanical_energy_j[0] - given)
 

@@ -33,6 +33,7 @@ from sloshlab.twin.twin import Twin
 
 FloatArray = npt.NDArray[np.float64]
 FORMAT: Final = 1
+# Checked before anything is read: a file may hold anything.
 _LARGEST_TEXT_BYTES, _LARGEST_ARRAYS_BYTES = 1_000_000, 200_000_000
 _MOST_TERMS = 1000
 _STRUCTURE_ARRAYS = (
@@ -60,6 +61,7 @@ def save_twin(twin: Twin, path: str | os.PathLike[str]) -> None:
     """
     file = Path(path)
     tables = {f"term_{i}": term.table for i, term in enumerate(twin.terms) if term.table.size}
+    # arrays first: a text without its arrays would be a twin that cannot be loaded
     if tables:
         _write_arrays(file.with_suffix(".nc"), tables)
     write_bytes(file, _text(twin).encode())
@@ -94,6 +96,7 @@ def load_twin(path: str | os.PathLike[str]) -> Twin:
 def _number(value: float) -> str:
     if math.isinf(value):
         return "inf" if value > 0 else "-inf"
+    # `repr` gives the shortest text that reads back as the same number
     return "nan" if math.isnan(value) else repr(float(value))
 
 

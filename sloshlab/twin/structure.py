@@ -99,6 +99,8 @@ class Structure:
         ----------
         step_s : float
         """
+        # Without it, 24 and 12 steps per period of the highest mode erred ten times as much as 12 and 8 do with
+        # it.
         decay = 0.5 * self.dampings_kg_per_s / self.masses_kg
         squared = self.stiffnesses_n_per_m / self.masses_kg - decay**2
         oscillates = (squared > 0.0) & (squared + decay**2 < (_LONGEST_STEP / step_s) ** 2)
@@ -106,6 +108,7 @@ class Structure:
         z = meant.copy()
         # Newton's method for R(z) = exp(λh), started at λh, where R is nearly the exponential already
         for _ in range(_N_NEWTON):
+            # R' is the series of the exponential up to z³, R one term more
             slope = 1 + z * (1 + z / 2 * (1 + z / 3))
             z = z - (slope + z**4 / 24 - np.exp(meant)) / slope
         stiffness = self.masses_kg * np.abs(z / step_s) ** 2
@@ -131,6 +134,7 @@ def single_degree_of_freedom(mass_kg: float, stiffness_n_per_m: float, damping_k
     6.56
     """
     mass, tip_value = np.array([mass_kg]), np.ones(1)
+    # ψ = 1 and Γ = m: the base moves the whole mass
     return Structure(mass, np.array([stiffness_n_per_m]), np.array([damping_kg_per_s]), tip_value, mass.copy())
 
 
@@ -176,6 +180,7 @@ def structure_of_rig(rig: Rig) -> Structure:
             "rig", got="no [structure]", remedy="prescribe the tank's motion, or describe the structure"
         )
     if described.kind == "sdof":
+        # on the guide the frozen liquid is added to the moving mass; modal data of a beam contain it already
         mass = (described.mass_kg or 0.0) + rig.liquid_mass_kg
         return single_degree_of_freedom(
             mass, described.stiffness_n_per_m or 0.0, described.damping_kg_per_s or 0.0

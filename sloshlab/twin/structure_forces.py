@@ -23,6 +23,8 @@ def _viscous(motion, parameters, memory, rates):
 
 @law
 def _coulomb(motion, parameters, memory, rates):
+    # DIRECTION, not the sign of v: the engine holds it within a step and knows sticking, where it asks for both
+    # signs
     return -parameters[0] * motion[DIRECTION]
 
 
@@ -33,6 +35,7 @@ def _asymmetric(motion, parameters, memory, rates):
 
 @law
 def _stribeck(motion, parameters, memory, rates):
+    # at rest this is the static force, which is what sticking can hold
     ratio = motion[VELOCITY] / parameters[2]
     return -(parameters[0] + (parameters[1] - parameters[0]) * exp(-ratio * ratio)) * motion[DIRECTION]
 
@@ -70,6 +73,7 @@ def _nothing(motion, parameters, memory, rates):
 @law
 def _clearance(motion, parameters, memory, rates):
     force = 0.0
+    # the force is continuous at the gap, its slope is not: a switch keeps the order of the scheme
     if memory[0] < 0:
         force -= parameters[1] * (motion[DISPLACEMENT] - parameters[0])
     if memory[1] < 0:
@@ -90,6 +94,8 @@ def _missing_mode(motion, parameters, memory, rates):
     damping, mass = 2 * parameters[1] * omega, parameters[2]
     stretch, closing = memory[0] - motion[DISPLACEMENT], memory[1] - motion[VELOCITY]
     force = mass * (omega * omega * stretch + damping * closing)
+    # its motion is relative to the base like that of the place, and a shaken base drives it as it drives any
+    # mode; felt by the relative motion only, modes of shaken structures stayed hidden
     rates[0], rates[1] = memory[1], -force / mass - motion[BASE_ACCELERATION]
     return force
 

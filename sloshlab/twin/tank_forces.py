@@ -32,6 +32,7 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 
 FloatArray = npt.NDArray[np.float64]
 _G = GRAVITY_M_PER_S2
+# Beyond them a quadratic fitted within the range of a shaker goes on to any value.
 _MOST_OCTAVES, _MOST_DOUBLINGS = 2.0, 3.0
 _RADIUS, _STIFFNESS, _DAMPING, _HARDENING, _FROZEN, _LIQUID, _HEIGHT, _IN_FLIGHT, _PULLS = range(9)
 
@@ -46,11 +47,16 @@ def _bouncing_ball(motion, parameters, memory, rates):
     """Force of the ball on the tank (2.3, 2.4) and its motion (2.1, with the right sign of F_b)."""
     radius = parameters[_RADIUS]
     mass = (1.0 - parameters[_FROZEN]) * parameters[_LIQUID]
+    # of the ball over the floor, which moves with the tank
     height = memory[0] - motion[DISPLACEMENT]
     closing = memory[1] - motion[VELOCITY]
+    # (2.3) is printed with ν = ż_b − ż_T always; the text lets ball and tank touch only in contact, the default
+    # here
     contact = parameters[_IN_FLIGHT] * parameters[_DAMPING] * closing
     for side in range(2):
+        # the switch, never the function itself: within a step the contact is held
         if memory[2 + side] < 0:
+            # s of (2.2): negative on the floor, positive under the ceiling
             overlap = height - radius if side == 0 else height - parameters[_HEIGHT] + radius
             stiffness = parameters[_STIFFNESS] * (
                 1.0 + parameters[_HARDENING] * overlap * overlap / (radius - abs(overlap))
@@ -59,6 +65,8 @@ def _bouncing_ball(motion, parameters, memory, rates):
             # towards the wall: damping pulls the ball back before it lets go, as printed; a liquid only pushes
             if (contact > 0.0) == (side == 0):
                 contact *= parameters[_PULLS]
+    # F_b is the force on the tank and enters the ball with a minus; printed with a plus in (2.1), its spring
+    # would pull
     rates[0], rates[1] = memory[1], -_G - contact / mass
     # m_b (a + g) of the equation: the term with a is the negative mass of the kind, the weight stands here
     return contact + mass * _G
@@ -84,6 +92,7 @@ def _ball_at_rest(values: Mapping[str, float]) -> tuple[float, float]:
         overlap = 0.5 * (low + high)
         gap = radius - overlap
         penalty = values["hardening_per_m"] * overlap**2 / gap if gap > 0 else np.inf
+        # k̂ (1 + α s²/(r₀ − |s|)) |s| = m_b g; the force rises with |s|, so that there is one root
         if values["stiffness_n_per_m"] * (1.0 + penalty) * overlap < weight:
             low = overlap
         else:
@@ -92,6 +101,7 @@ def _ball_at_rest(values: Mapping[str, float]) -> tuple[float, float]:
 
 
 def _check_ball(values: Mapping[str, float]) -> None:
+    # (2.2) has floor and ceiling contact at once otherwise
     if 2 * values["radius_m"] >= values["height_m"]:
         raise InputError(
             "bouncing_ball: radius_m",
@@ -129,6 +139,7 @@ BOUNCING_BALL = register(
         limits=("ball below the floor of its tank", "ball above the ceiling of its tank"),
         moves_with_place=True,
         memory=lambda values, table: _ball_at_rest(values),
+        # the structure carries the whole liquid as frozen: the ball takes its own mass out of it, β m_l stays
         mass=lambda values: -(1.0 - values["beta"]) * values["liquid_mass_kg"],
         check=_check_ball,
         equation="F_b + m_b (a + g); F_b = k̂ (1 + α s²/(r₀ − |s|)) s + c ν in contact (2.1–2.5)",
@@ -149,6 +160,7 @@ def _map_value(numbers, at, omega_bar, u_bar):
         j += 1
     p = (omega_bar - numbers[first + i]) / (numbers[first + i + 1] - numbers[first + i])
     q = (u_bar - numbers[second + j]) / (numbers[second + j + 1] - numbers[second + j])
+    # the nearest value beyond the edges, nothing is extrapolated; motion there is remarked on
     p, q = min(max(p, 0.0), 1.0), min(max(q, 0.0), 1.0)
     k = second + m + i * m + j
     below = numbers[k] * (1 - q) + numbers[k + 1] * q
@@ -160,9 +172,11 @@ def _map_value(numbers, at, omega_bar, u_bar):
 def _track(motion, parameters, memory, rates):
     """Frequency from running mean squares of v and a; amplitude from the present v and a."""
     # the present v and a give an amplitude at every instant, but not a frequency: at a turning point v is zero
+    # bounded, so that a motion that has died away gives a number
     omega = min(max(sqrt(memory[1] / memory[0]) if memory[0] > 0 else 0.0, 1e-3), 1e5)
     rates[0] = (motion[VELOCITY] ** 2 - memory[0]) / parameters[2]
     rates[1] = (motion[ACCELERATION] ** 2 - memory[1]) / parameters[2]
+    # u₀ of the harmonic motion that has the present v and a: Ω²u₀² = v² + (a/Ω)²
     return omega, sqrt(motion[VELOCITY] ** 2 + (motion[ACCELERATION] / omega) ** 2) / omega
 
 
@@ -192,6 +206,7 @@ def _viscous_map(motion, parameters, memory, rates):
     omega, amplitude = _track(motion, parameters, memory, rates)
     w_bar = _map_value(parameters, _TABLE, omega / sqrt(_G / parameters[1]), amplitude / parameters[1])
     share = _share_of_map(motion, parameters, memory, rates)
+    # c = (m_l/π) √(g/h) ω̄ W̄ with √(g/h) ω̄ = Ω
     return -share * parameters[0] / pi * omega * w_bar * motion[VELOCITY]
 
 
@@ -240,6 +255,7 @@ EFFECTIVE_MASS = register(
         "effective_mass",
         ("tank",),
         (Parameter("beta", "1", -0.99, 10.0), Parameter("liquid_mass_kg", "kg", 1e-9, 1e6)),
+        # the force is all inertia: as a mass it is part of the mass matrix and lags behind nothing
         _nothing,
         mass=lambda values: values["beta"] * values["liquid_mass_kg"],
         equation="−β m_l a",
@@ -284,6 +300,7 @@ def _varying_mass(motion, parameters, memory, rates):
     doublings = min(max(log2(max(level_g(memory[1]), 1e-6) / parameters[2]), -_MOST_DOUBLINGS), _MOST_DOUBLINGS)
     beta = parameters[3] + (parameters[4] + parameters[5] * octaves) * octaves
     beta += (parameters[6] + parameters[7] * doublings + parameters[8] * octaves) * doublings
+    # the mass that follows, (1 + β) m_l, stays positive
     return -parameters[0] * max(beta, -0.99) * motion[ACCELERATION]
 
 
@@ -304,6 +321,7 @@ VARYING_MASS = register(
             Parameter("averaging_s", "s", 1e-3, 100.0, 0.2),
         ),
         _varying_mass,
+        # the ratio of both is the stated frequency, their size next to nothing
         memory=lambda values, table: (1e-6, 1e-6 * (2 * pi * values["frequency_hz"]) ** 2),
         uses_acceleration=True,
         equation="−β(f, â) m_l a, β = β₀ + b₁ x + b₂ x² + b₃ y + b₄ y² + b₅ x y, x = log₂(f/f₀) within ±2, "
@@ -323,6 +341,7 @@ def _linear_response_update(motion, parameters, memory, rates):
     n = int(parameters[0])
     for i in range(n - 1, 0, -1):
         memory[1 + i] = memory[i]
+    # the history moves only after an output step, outside of the integration
     memory[1] = motion[VELOCITY]
     memory[0] = 0.0
     for i in range(n):
@@ -371,4 +390,5 @@ def table_of(map_: xr.DataArray, *, measured: xr.DataArray | None = None) -> Flo
     known = np.ones_like(values)
     if measured is not None:
         known = np.asarray(measured.transpose("omega_bar", "u_bar").values, dtype=np.float64)
+    # where it was measured comes last: the law reads the values only, the remarks both
     return np.concatenate([[omega_bar.size, u_bar.size], omega_bar, u_bar, values.ravel(), known.ravel()])

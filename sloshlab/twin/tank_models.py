@@ -71,4 +71,5 @@ def viscous(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term
 def bouncing_ball(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
     """The bouncing ball of (2.1); height and mass are those of the rig unless stated."""
     fixed = {"liquid_mass_kg": rig.liquid_mass_kg, "height_m": rig.tank.height_m}
+    # what the file states wins over what follows from the rig
     return (BOUNCING_BALL(**{**fixed, **parameters}),)

@@ -150,6 +150,7 @@ class ForceKind:
         values = {parameter.name: _checked(self.name, parameter, numbers) for parameter in self.parameters}
         if self.check is not None:
             self.check(values)
+        # a copy that cannot be written: terms are shared between twins
         array = np.array(table, dtype=np.float64).ravel()
         array.setflags(write=False)
         return Term(self, where, values, array)
@@ -157,6 +158,7 @@ class ForceKind:
 
 def _checked(kind: str, parameter: Parameter, numbers: Mapping[str, float]) -> float:
     value: Any = numbers.get(parameter.name, parameter.default)
+    # True and False are numbers to Python, but not to a person who fills in a rig file
     good = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
     if not good or not (math.isfinite(value) and parameter.low <= value <= parameter.high):
         raise InputError(
@@ -214,6 +216,7 @@ def register(kind: ForceKind) -> ForceKind:
         If another kind has this name.
     """
     other = _KINDS.setdefault(kind.name, kind)
+    # a module that is imported again registers its own kinds once more, which is no clash
     if other is not kind and other.law.function.__qualname__ != kind.law.function.__qualname__:
         raise InputError(f"force {kind.name}", got="a name that is taken", remedy="choose another name")
     _KINDS[kind.name] = kind

@@ -52,6 +52,7 @@ class Twin(Blocks):
         """
         structure = None if rig.structure is None else structure_of_rig(rig)
         friction = guide_friction_n(rig)
+        # a term, not a property of the structure: it sticks
         terms = (COULOMB_FRICTION(force_n=friction),) if friction > 0 else ()
         carried = rig.tank.dry_mass_kg + rig.liquid_mass_kg
         return cls(structure, (*terms, *tank_terms(rig, folder)), carried_mass_kg=carried)

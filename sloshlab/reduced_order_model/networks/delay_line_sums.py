@@ -28,6 +28,7 @@ class DelayLineSums(PairSums):
 
     def _prepare(self) -> None:
         p = self._network.n_inputs
+        # several times as long as the line, because every stretch repeats p − 1 samples of the one before
         self._length = max(_LENGTH, scipy.fft.next_fast_len(4 * p, real=True))
         self._has_samples = False
         self._spectra: Array = 0.0  # Σ F W conj(F z), shape (frequencies, pairs of neurons, p + 1)
@@ -37,17 +38,21 @@ class DelayLineSums(PairSums):
 
     def _add_second(self, factors: Array, extended: Array) -> None:
         xp, p = self._xp, self._network.n_inputs
+        # overlap-save: so many samples of each transform are free of wrap-around
         n, step = factors.shape[1], self._length - p + 1
         stretches = -(-n // step)
         line = xp.concat([xp.flip(extended[:p, 0]), extended[0, 1:]])  # x of all samples, p − 1 earlier ones first
         line = self._lengthened(line[None, :], stretches * step + p - 1)[0, :]
         padded = xp.reshape(self._lengthened(factors, stretches * step), (-1, stretches, step))
+        # time first: the transforms then run along memory for all pairs at once
         by_time = xp.permute_dims(padded, (2, 0, 1))
         by_time = xp.reshape(xp.reshape(by_time, (-1,)), by_time.shape)  # in this order in memory, too
         weights = xp.take(by_time, self._neurons[0], axis=1) * xp.take(by_time, self._neurons[1], axis=1)
         products = xp.stack(
             [self._products(line[s * step : (s + 1) * step + p - 1]) for s in range(stretches)], axis=1
         )
+        # products of spectra are added up, and one inverse transform at the end gives all lags: linear in the
+        # data
         found = self._transformed(weights) @ xp.conj(self._transformed(products))
         if self._has_samples:
             self._spectra += found
@@ -78,6 +83,8 @@ class DelayLineSums(PairSums):
         xp, p = self._xp, self._network.n_inputs
         correlations = xp.fft.irfft(xp.conj(self._spectra), n=self._length, axis=0)  # lag, pair, d
         rows, columns = (part.ravel() for part in np.indices((p, p)))
+        # every moment of two delays depends on their difference and one lag only: p² moments from p + 1
+        # transforms
         lag, difference = p - 1 - np.minimum(rows, columns), np.abs(rows - columns)
         flat = xp.reshape(xp.permute_dims(correlations[:p, :, :], (1, 0, 2)), (-1, p * (p + 1)))
         second = xp.reshape(self._taken(flat, lag * (p + 1) + difference), (-1, p, p))
@@ -95,4 +102,5 @@ class DelayLineSums(PairSums):
 def _n_threads() -> int:
     """As many as the products of matrices have."""
     wanted = os.environ.get("OMP_NUM_THREADS", "")
+    # several trainings at once each get their share of the cores by this variable
     return int(wanted) if wanted.isdigit() and int(wanted) else os.cpu_count() or 1

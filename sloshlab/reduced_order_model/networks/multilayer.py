@@ -81,6 +81,7 @@ class Multilayer:
         """Random weights that neither saturate nor vanish, whatever the number of inputs."""
         parts = []
         for before, after in zip(self._sizes[:-1], self._sizes[1:], strict=True):
+            # sums of n inputs have √n of their size
             parts += [rng.normal(size=before * after) / np.sqrt(before), rng.normal(scale=0.5, size=after)]
         return np.concatenate(parts)
 
@@ -119,6 +120,7 @@ class Multilayer:
     def _sensitivities(self, xp: Any, theta: Array, slopes: list[Array]) -> list[Array]:
         """∂ŷ/∂(W a + b) of the hidden layers, first layer first."""
         weights = self._weights(xp, theta)
+        # backwards from the output: one pass gives ∂ŷ/∂θ for all layers
         found = [weights[-1][0].T * slopes[-1]]
         for (matrix, _), slope in zip(weights[-2:0:-1], slopes[-2::-1], strict=True):
             found.append((matrix.T @ found[-1]) * slope)

@@ -146,6 +146,7 @@ class SumsOfJacobian:
         """Take some samples."""
         output, jacobian = self._network.jacobian(self._xp, self._theta, phi)
         error = target - output
+        # it begins as the number 0, so that library and device are those of the first block
         self._matrix = self._matrix + jacobian @ jacobian.T
         self._gradient = self._gradient + jacobian @ error
         self._squares += float(self._xp.sum(error * error))

@@ -71,6 +71,7 @@ class PairSums:
         features, output, factors = self._network.evaluated(xp, self._theta, phi)
         error = target - output
         extended = xp.concat([phi, xp.ones_like(phi[:1, :])], axis=0)
+        # φ̃ = (φ, 1) carries first and zeroth moments along with the second ones
         self._add_second(factors, extended)
         for first in range(0, phi.shape[1], _AT_ONCE):
             part = slice(first, min(first + _AT_ONCE, phi.shape[1]))
@@ -110,6 +111,7 @@ class PairSums:
     def _centre_block(self, centres: Array) -> Array:
         """Σ G_i G_j (φ − c_i)(φ − c_j)ᵀ for all pairs of neurons."""
         xp, (m, p) = self._xp, centres.shape
+        # sums over samples do not know the centres: (φ − c_i)(φ − c_j)ᵀ is expanded here, once
         moments = xp.take(self._second_moments(), xp.asarray(places(m), device=device(centres)), axis=0)
         moments = xp.reshape(moments, (m, m, p + 1, p + 1))
         second, first, zeroth = moments[:, :, :-1, :-1], moments[:, :, :-1, -1], moments[:, :, -1, -1]

@@ -59,6 +59,7 @@ class _RadialBasisNetwork:
     def initial(self, regressors: FloatArray, outputs: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Centres at samples that lie far from each other (k-means++), weights the outputs there."""
         chosen = _scattered(regressors, self.n_neurons, rng)
+        # a start that already says what was measured there; the weights are solved for in the first step anyway
         weights = outputs[chosen]
         offset = np.zeros(int(self.has_offset))
         return np.concatenate([regressors[:, chosen].T.ravel(), offset, weights])
@@ -127,11 +128,13 @@ class NormalisedRadialBasis(_RadialBasisNetwork):
     def linear_features(self, xp: Any, theta: Array, phi: Array) -> Array:
         """Return shares of the neurons, shape (n_neurons, m), of which each column sums to 1."""
         centres, _ = self.parts(xp, theta)
+        # ‖φ‖² is common to all neurons and cancels in the shares; left out, it costs no digits
         exponents = 2 * (centres @ phi) - xp.sum(centres * centres, axis=1)[:, None]
         shares = xp.exp(exponents - xp.max(exponents, axis=0)[None, :])
         return shares / xp.sum(shares, axis=0)[None, :]
 
     def _centre_factors(self, xp: Any, linear: Array, features: Array, output: Array) -> Array:
+        # derivative of a share: moving one centre takes from all others
         return 2 * features * (linear[:, None] - output[None, :])
 
 
@@ -169,5 +172,6 @@ def _scattered(regressors: FloatArray, n: int, rng: np.random.Generator) -> NDAr
         distance = np.sum((regressors - regressors[:, chosen[-1], None]) ** 2, axis=0)
         nearest = np.minimum(nearest, distance)
         total = nearest.sum()
+        # k-means++: centres drawn evenly would crowd where the slow run stays long
         chosen.append(int(rng.choice(m, p=nearest / total)) if total > 0 else int(rng.integers(m)))
     return np.array(chosen)
