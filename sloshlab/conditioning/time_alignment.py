@@ -190,9 +190,9 @@ def clock_delay(
     fits.sort(key=lambda fit: fit.residual_rms_s)
     # once more from the improved line: what is left then is far below a period, where the phase is exact
     best = _line_through_windows(reference, other, fits[0].line) or fits[0]
-    half_period_s = 0.25 / _highest_frequency_hz(reference)
+    quarter_period_s = 0.25 / _highest_frequency_hz(reference)
     # candidates that ended in the same line are no rivals
-    rivals = [fit for fit in fits[1:] if abs(fit.line.middle_s - best.line.middle_s) > half_period_s]
+    rivals = [fit for fit in fits[1:] if abs(fit.line.middle_s - best.line.middle_s) > quarter_period_s]
     status = AlignmentStatus.ALIGNED
     if best.correlation < _SMALLEST_CORRELATION:
         status = AlignmentStatus.NO_COMMON_MOTION

@@ -2,9 +2,9 @@
 
 The phase φ is that of the fundamental of the tank's acceleration, ü = a₀ cos φ. It is found in
 three steps, none of which needs the sweep law: the dominant frequency of short blocks; complex
-demodulation about it over two cycles, which rejects the mean, the harmonics and the
-subharmonics; a cubic spline through the demodulated phases. Demodulation is symmetric in time
-and therefore has no delay.
+demodulation about it over two cycles, which rejects the mean and the harmonics, but of a
+subharmonic leaves half; a cubic spline through the demodulated phases. Demodulation is symmetric
+in time and therefore has no delay.
 """
 
 from __future__ import annotations
