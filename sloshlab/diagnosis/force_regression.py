@@ -199,7 +199,7 @@ def ridge_regression(
 
     Parameters
     ----------
-    parts : sequence of Sums
+    parts : sequence of NormalSums
     prior : ndarray, shape (n_features,)
         Standard deviations of the coefficients over that of what is not explained.
     columns : optional
