@@ -51,10 +51,12 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
     found, best = diagnosis.findings, diagnosis.verdict.best
     rows = []
     for parameter in found.model.parameters:
+        # They belong to single runs and say nothing of the rig.
         if parameter.name.startswith(("release", "offset")):
             continue
         retuned = found.retuned.fit.values.get(parameter.name, parameter.believed)
         row = [parameter.name, text(parameter.believed, 4), text(parameter.tolerance, 2), text(retuned, 4)]
+        # In tolerances: how far a number moved means nothing without how well it was known.
         row.append(_moved(parameter, retuned))
         if best is not None:
             row.append(_moved(parameter, best.fit.values.get(parameter.name, parameter.believed)))
@@ -247,6 +249,7 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
             suspect = examination.cut.suspect if examination.cut else ""
             if candidate.effect.block == "sensor" and suspect:
                 own = candidate.channel.partition("<")[0]
+                # A fault of one channel while another one contradicts all the rest is unlikely.
                 (for_ if own == suspect else against).append(f"{suspect} contradicts the others")
         gain = found.retuned.held_out - one.held_out
         rows.append(

@@ -56,6 +56,7 @@ def frequencies_hz(n_samples: int, rate_hz: float) -> FloatArray:
 
 def in_frequency(series: FloatArray) -> ComplexArray:
     """Spectrum of a padded series."""
+    # Without padding the end of a run would drive its beginning.
     return np.asarray(np.fft.rfft(series, 2 * series.size), np.complex128)
 
 
@@ -66,6 +67,7 @@ def in_time(spectrum: ComplexArray, n_samples: int) -> FloatArray:
 
 def sample_variance(power: FloatArray, n_samples: int) -> float:
     """Variance of a sample of a padded series whose spectrum has this expected power."""
+    # Parseval for a real series of 2 n samples: all lines but the first and the last stand for two.
     return float((2 * power[1:-1].sum() + power[0] + power[-1]) / (2 * n_samples**2))
 
 

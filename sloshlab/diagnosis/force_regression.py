@@ -143,6 +143,7 @@ def state_features(stretch: Stretch, scales: Scales) -> tuple[FloatArray, NDArra
     """
     p, q = stretch.first / scales.first, stretch.v / scales.velocity
     first, second = (_chebyshev(part) for part in (p, q))
+    # Two steps at reversal beside the polynomials, which follow no step.
     columns = [np.tanh(q / width) for width in _SHARP]
     parity = [2] * len(columns)
     for i in range(DEGREE + 1):
@@ -209,6 +210,8 @@ def ridge_regression(
     xy = np.sum([part.xy for part in parts], axis=0)
     chosen = np.arange(xy.size)[columns]
     found = np.zeros(xy.size)
+    # Ridge regression is a Gaussian prior on the coefficients. Features of a nearly harmonic motion are so
+    # correlated that there is no stable solution without one.
     lift = np.diag(1 / prior[chosen] ** 2)
     found[chosen] = np.linalg.solve(xx[np.ix_(chosen, chosen)] + lift, xy[chosen])
     return found
@@ -218,5 +221,6 @@ def residual_sum_of_squares(parts: Sequence[NormalSums], numbers: FloatArray) ->
     """Residual sum of squares of a regression."""
     total = 0.0
     for part in parts:
+        # From sums alone, so that a bootstrap needs no residuals; by rounding it may be less than zero.
         total += part.yy - 2 * float(numbers @ part.xy) + float(numbers @ part.xx @ numbers)
     return max(total, 0.0)

@@ -136,6 +136,8 @@ class _Place:
             kept = slice(0, prev_fast_len(min(latent.force_n.size, _MOST_SAMPLES), real=True))
             force, motion, rate = latent.force_n[kept], latent.motion[kept], latent.run.attributes.sampling_rate_hz
             own_motion = motion[:, _MOTIONS_OF_BASELINE[latent.place]]
+            # The band is that of what is left: a spring that is a little off has most of its power at the
+            # resonance.
             own, *_ = np.linalg.lstsq(own_motion, force)
             middle = int(np.argmax(np.abs(motion[:, 1])))
             about = motion[max(0, middle - _N_PROBED // 2) : middle + _N_PROBED // 2]
@@ -148,6 +150,7 @@ class _Place:
             n, of_noise = n + force.size, of_noise + force.size * latent.standard_error_n**2
         if not pieces:
             return None
+        # All runs together, as the baseline's spring and damper are the same in all.
         baseline_motions, _ = np.linalg.qr(np.concatenate(motions) / np.concatenate(motions).std(axis=0))
         place = cls(pieces, np.concatenate(series), baseline_motions)
         place = replace(place, force_n=place._beyond_baseline(place.force_n))
@@ -244,6 +247,7 @@ class ForceStarts:
             share, numbers = min([(share, numbers), *others], key=lambda other: other[0])
         if share < 1.0 - _LEAST_EXPLAINED:
             share, numbers = _simplex_descent(left, numbers, then, _SHORT_STEP if sought else _LONG_STEP)
+        # `not … <`, so that infinity and no number are refused, too.
         if not share < 1.0 - _LEAST_EXPLAINED:
             return None
         best, *more = (
@@ -263,6 +267,8 @@ class ForceStarts:
         """
         try:
             extension = candidate.extension(numbers)
+            # On a short part first: a contact too stiff for its steps has an event in each, and the whole run
+            # would take long.
             if not all(_is_resolved(extension.terms, piece.fastest) for piece in place.pieces):
                 return None
             added = [self._added(extension, piece.drive) for piece in place.pieces]
@@ -277,6 +283,7 @@ class ForceStarts:
             return None
         force = _force_along(extension.terms, drive)
         if extension.liquid is not None:
+            # What acts on the liquid's forces adds the difference that it makes to them.
             liquid = tuple(term for term in self._model.twin.terms if term.place == "tank")
             force = force + _force_along(extension.liquid(liquid), drive) - _force_along(liquid, drive)
         return force
@@ -364,6 +371,7 @@ def _simplex_descent(
         return np.asarray(scale * np.exp(np.clip(at, -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)))
 
     def cost(at: FloatArray) -> float:
+        # A simplex needs numbers that can be compared; infinity less infinity is none.
         value = left(numbers(at))
         return value if np.isfinite(value) else 1e12
 
@@ -382,6 +390,7 @@ def _driven(rate_hz: float, motion: FloatArray) -> Excitation:
 def _force_along(terms: Sequence[Term], drive: Excitation) -> FloatArray:
     if not terms:
         return np.zeros(drive.n_samples)
+    # Without a structure the motion is prescribed, and where a force acts does not matter.
     alone = Twin(None, tuple(replace(term, place="tank") for term in terms))
     return np.asarray(alone.simulate(drive).require_done().forces_n.sum(axis=1))
 

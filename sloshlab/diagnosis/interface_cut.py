@@ -352,6 +352,7 @@ def _parts(
                         # count both.
                         (missed * _weighted(observation, shown[observation.channel], {})).sum(axis=1)
                     )
+            # Where a suspect is known the disagreement of the others with it is its own, and counts once.
             if SENSOR in part and observation in comparable and (not suspect or observation.channel == suspect):
                 left = _weighted(observation, forces.left[observation.channel], {})
                 power = (left**2).mean(axis=1)

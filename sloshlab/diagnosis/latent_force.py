@@ -347,6 +347,7 @@ def _release(structure: Structure, weights: FloatArray, order: int, n: int, rate
     pole = -decay + 1j * np.sqrt(np.maximum(omega**2 - decay**2, 0.0))
     start = structure.static_deflection(1.0)
     turning = np.where(pole.imag > 0, pole.imag, np.inf)
+    # Released from rest: with this factor the velocity at the start is zero. A mode that does not turn has none.
     factor = start * (1 - 1j * decay / turning) * weights
     time = np.arange(n) / rate_hz
     return np.asarray((np.exp(np.outer(time, pole)) * pole**order @ factor).real)

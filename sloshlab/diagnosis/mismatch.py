@@ -63,6 +63,7 @@ def mismatches(
         level = _acceleration_g(observed)
         for observation in observed:
             residual = observation.residual(readings[observation.run.name][observation.channel])
+            # Less one, the noise; cut off above, as a coefficient that is known too well would be all of it.
             excess = np.maximum(np.minimum(residual**2, 1e6) - 1.0, 0.0)
             blocks = level if level.size == excess.shape[0] else np.full(excess.shape[0], np.nan)
             found.append(

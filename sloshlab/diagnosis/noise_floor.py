@@ -134,7 +134,7 @@ def _noise_of_drives(
     }
     for run in case.runs:
         driving = model.driving(run)
-        # In free runs nothing drives: the accelerometer of a resting base shows a leak.
+        # In free runs nothing drives.
         if run.is_free or not plain[run.name]:
             continue
         for kept in driving:

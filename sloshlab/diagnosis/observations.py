@@ -319,6 +319,7 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
         # A repeated test has other levels at other times, so that its variance cannot be taken over place by
         # place.
         quiet = np.min([np.median(source.variance, axis=0) for source in alike], axis=0)
+        # The median over the repeats, so that a burst in one of them does not set it.
         share = float(
             np.median(
                 [

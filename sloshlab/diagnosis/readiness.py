@@ -122,6 +122,7 @@ def _sizes(run: CaseRun, channel: str, simulated: FloatArray) -> tuple[float, fl
     known = np.isfinite(values[:n])
     if known.sum() < _FEWEST_SAMPLES:
         return None
+    # About the mean, as the zero of most sensors means nothing.
     recorded, shown = float(values[:n][known].std()), float(simulated[:n][known].std())
     if recorded <= 1e-12 * max(1.0, float(np.abs(values[:n][known]).max())):
         raise InputError(

@@ -220,6 +220,8 @@ class Refinement:
             self.fits.progress(f"taking away one of two effects: {candidate.key} is left", 0, 1)
             return fitted(self.fits.problem((candidate,)), values, stages=INFLATION_STAGES[-2:])[0]
 
+        # From the pair's own optimum: one of the two may be enough where the retuned baseline did not lead to
+        # it.
         pieces = [partial(left_alone, candidate) for candidate in pair.fit.candidates]
         return self.fits.all_fitted(pieces, pair.fit.candidates)
 
