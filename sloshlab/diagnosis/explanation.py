@@ -98,6 +98,7 @@ class Explanation:
     @property
     def has_effect_at_bound(self) -> bool:
         """Whether a parameter rests at a bound of its effect: then something else is missing."""
+        # A bound of zero is none: what ends there is nothing, and its size says so.
         return any(
             bound != 0
             and not parameter.may_rest

@@ -81,6 +81,7 @@ def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
         rate = force.run.attributes.sampling_rate_hz
         omega = float(a.std() / max(v.std(), 1e-300))
         cycle = max(4, round(min(2 * np.pi / max(omega, 1e-300) * rate, x.size)))  # a run may not move at all
+        # Over whole cycles: squares ripple at twice the frequency of the motion, and levels must not.
         running = (uniform_filter1d(part**2, cycle, mode="nearest") for part in (a, v))
         # running sums fall below zero by rounding after a motion has stopped
         power_a, power_v = (np.maximum(power, 0.0) for power in running)

@@ -129,6 +129,7 @@ class _Place:
         series: list[FloatArray] = []
         motions: list[FloatArray] = []
         n, of_noise = 0, 0.0
+        # The largest first, as evaluations filter every sample and only some runs fit in.
         for latent in sorted(forces, key=lambda latent: -latent.power_n2):
             if latent.power_n2 <= 0.0 or (pieces and n + latent.force_n.size > _MOST_SAMPLES):
                 break
@@ -250,6 +251,7 @@ class ForceStarts:
         # `not … <`, so that infinity and no number are refused, too.
         if not share < 1.0 - _LEAST_EXPLAINED:
             return None
+        # The ends of the other descents too: no free-running fit leads from one of them to another.
         best, *more = (
             dict(zip(names, np.clip(reached, *bounds.T).tolist(), strict=True))
             for reached in (numbers, *(end for _, end in others))
@@ -274,6 +276,7 @@ class ForceStarts:
             added = [self._added(extension, piece.drive) for piece in place.pieces]
         except SloshlabError:
             return None
+        # In all runs or not at all: shares of some runs cannot be compared with those of all.
         known = [force for force in added if force is not None and np.isfinite(force).all()]
         return place.comparable(known) if len(known) == len(added) else None
 

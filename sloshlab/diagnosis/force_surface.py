@@ -36,6 +36,7 @@ def _surface(motion, parameters, memory, rates):
     force, at = parameters[4] * tanh(q / _SHARP), 5
     rate = _SLOWEST * parameters[3]
     for k in range(_N_REMEMBERED):
+        # Three relaxing dampers, slower than the motion, as fast, and faster: 0.2, 1 and 5 times its own rate.
         force += parameters[at] * memory[k]
         rates[k] = rate * (q - memory[k])
         rate *= _RATIO

@@ -119,5 +119,6 @@ def _acceleration_g(observed: Sequence[Observation]) -> FloatArray:
     chosen = [observation for observation in observed if observation.channel.startswith("acceleration")]
     if not chosen:
         return np.zeros(0)
+    # Per block as the misfit is, from the recording and not the simulation, which is what is doubted.
     power = np.mean([(observation.spectra**2).mean(axis=1) for observation in chosen], axis=0)
     return np.asarray(np.sqrt(2 * power) / GRAVITY_M_PER_S2)

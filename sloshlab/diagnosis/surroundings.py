@@ -123,6 +123,7 @@ def residual_peaks_hz(
         own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
         first += observation.spectra.size
         n = observation.spectra.shape[1]
+        # Over the noise, so that channels of all units add up and one that shows a mode well counts most.
         power[:n] += (own**2).sum(axis=0)
         count[:n] += observation.spectra.shape[0]
         frequencies[:n] = observation.frequencies_hz

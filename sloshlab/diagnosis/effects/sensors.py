@@ -149,6 +149,8 @@ def _advanced(numbers: Numbers) -> Reading:
 def _shifted(values: FloatArray, samples: float) -> FloatArray:
     """Values delayed by `samples`, by a linear phase; the series is reflected at its ends."""
     margin = min(values.size - 1, 64 + int(abs(samples)))
+    # Reflected about the end points, so that value and slope go on: a Fourier transform takes the series for
+    # periodic, and the jump between its ends would ring into the run.
     padded = np.concatenate(
         [2 * values[0] - values[margin:0:-1], values, 2 * values[-1] - values[-2 : -margin - 2 : -1]]
     )
@@ -322,6 +324,7 @@ def _interpolated(values: FloatArray, places: FloatArray) -> FloatArray:
     samples, known = np.arange(values.size), np.isfinite(values)
     if values.size <= _SPLINE_DEGREE or not known.any():
         return np.asarray(np.interp(places, samples, values))
+    # A spline through a lost sample would be lost throughout.
     whole = values if known.all() else np.interp(samples, samples[known], values[known])
     found = make_interp_spline(samples, whole, k=_SPLINE_DEGREE)(np.clip(places, 0, values.size - 1))
     return np.asarray(np.where(np.interp(places, samples, known) == 1.0, found, np.nan))

@@ -86,6 +86,7 @@ class Fits:
         Repeats have the same drive: one of them is enough for score tests of all candidates and for coarse fits.
         """
         test_of = {name: i for i, test in enumerate(self.tests) for name in test}
+        # A run of no known test is a test of its own.
         first: dict[object, list[Observation]] = {}
         for run in self.fitting:
             name = run[0].run.name
