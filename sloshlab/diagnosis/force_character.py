@@ -228,7 +228,7 @@ class _Regression:
         alone = ridge_regression(self.normal_sums, self.prior, own_)
         self.beyond_own_of_parts = [part.force_n - row @ alone for part, row in zip(parts, rows, strict=True)]
         self.beyond_own = np.concatenate(self.beyond_own_of_parts)
-        # Work is told with the damping left in, whose tolerance becomes the doubt of the work instead.
+        # What the block's own damping can follow stays in the windows: it becomes the doubt of their work.
         spring = alone.copy()
         spring[own_[1]] = 0.0
         self.beyond_spring_of_parts = [part.force_n - row @ spring for part, row in zip(parts, rows, strict=True)]
@@ -325,8 +325,8 @@ def _symmetry(fit: _Regression) -> list[Answer]:
     terms = (EVEN, ODD_IN_DISPLACEMENT, ODD_IN_VELOCITY, ODD_IN_BOTH)
     for which, (parity, term) in enumerate(zip(PARITIES, terms, strict=True)):
         largest = which == int(np.argmax(shares))
-        # An even part holds beside whatever else there is, an odd one only as the largest: that is what the
-        # terms say.
+        # An even part and one odd in both hold beside whatever else there is, one odd in a single motion only as
+        # the largest: that is what the terms say.
         says: dict[str, bool] = {}
         if high[which] < 2 * _SMALL_SHARE:
             says[term] = False

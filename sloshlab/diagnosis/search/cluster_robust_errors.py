@@ -52,7 +52,8 @@ def cluster_robust_errors(problem: FreeRunProblem, fit: FreeRunFit, jacobian: Bl
     # minimised.
     weights = robust_weights(residual)
     weighted, pull = jacobian.weighted(weights), weights * residual
-    # The bread of the sandwich C G C; with independent residuals G is C⁻¹ and the usual covariance is left.
+    # The bread of the sandwich C G C; with independent residuals and no prior G is C⁻¹ and the usual covariance
+    # is left.
     covariance = np.linalg.pinv(weighted.normal() + np.diag(problem.prior))
     error = np.zeros(theta.size)
     for n in _PARTS_OF_A_RUN:

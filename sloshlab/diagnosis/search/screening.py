@@ -260,8 +260,8 @@ class Screening:
         ):
             is_little = screened.gains.max() < _LEAST_PREDICTED
             is_little = is_little or float(np.max(screened.gains / top)) < _LEAST_SHARE_OF_PREDICTED_GAIN
-            # A score test is one small step. What no small step reaches must not be dropped by it: a resonance
-            # that is off by many of its widths, hysteresis, contacts.
+            # A score test is linear in the change that a start makes. What no such step reaches must not be
+            # dropped by it: a resonance that is off by many of its widths, hysteresis, contacts.
             is_kept = screened.distant_start is not None or (
                 screened in force_start and screened.matches_latent_force
             )
