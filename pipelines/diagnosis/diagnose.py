@@ -50,10 +50,12 @@ def diagnose_case(
     """
     target = output or folder / "diagnosis"
     case = read_case(folder, with_rig=twin is None)
+    # Before the search, which takes minutes: a folder that is in the way has to be said at once.
     require_free_folder(target, "diagnosis")
     own = [effect for file in effects for effect in load_user_effects(file)]
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
+        # The search finds, the gates judge and may ask for more fits; only then is it said where and how.
         found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
         found, verdict = answered(found, lambda what, done, of: advance(done, max(of, 1)))
     examination = examined(found)
@@ -66,6 +68,7 @@ def diagnose_case(
         found.model.save_extended(best.fit.values, explained_extension(best), complete / "extended_twin.toml")
         found.model.save_extended(found.retuned.fit.values, NOTHING, complete / "retuned_twin.toml")
         if report:
+            # Drawing is imported only where a report is wanted: the trial runs without.
             from pipelines.diagnosis.sections import page_of
             from pipelines.report.page import write_page
 

@@ -49,6 +49,7 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
     )
     plain_ticks_within_decades(axes.xaxis)
     for i, value in enumerate(values):
+        # A label just below one would lie on the line of the noise floor.
         beside = max(value, 1.0) if 0.75 < value < 1.0 else value
         axes.annotate(f"{value:.2f}", (beside, i), (4, 0), textcoords="offset points", va="center", fontsize=8)
     runs = ", ".join(run.name for run in found.split.held_out)
@@ -66,6 +67,7 @@ def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
     if not everything:
         raise NothingToDrawError("no candidate promised anything")
     n_singles = sum(len(explanation.keys) == 1 for explanation in everything)
+    # All single effects, as the reader compares names first; a search may have dozens of pairs.
     pairs = [explanation for explanation in everything if len(explanation.keys) > 1][
         : max(_MOST_ROWS - n_singles, 3)
     ]

@@ -68,6 +68,7 @@ def _in_time(axes: Axes, latent_force: LatentForce) -> None:
         latent_force.time_s.size, int(_CYCLES * 2 * np.pi / spread * latent_force.run.attributes.sampling_rate_hz)
     )
     power = np.convolve(latent_force.force_n**2, np.ones(n), "valid")
+    # A release has its largest motion at the start.
     start = int(power.argmax()) if not latent_force.run.is_free else 0
     part = slice(start, start + n)
     velocity = latent_force.motion[part, 1]
@@ -89,6 +90,7 @@ def _over(axes: Axes, latent_force: LatentForce, order: int, label: str) -> None
     step = max(1, latent_force.force_n.size // _MOST_POINTS)
     values = latent_force.motion[::step, order] * (1e3 if order == 0 else 1.0)
     axes.plot(values, latent_force.force_n[::step], ".", color=NEUTRAL_COLOUR, ms=1.5, alpha=0.5, rasterized=True)
+    # Classes of equal population without the extremes, in which single samples would make the mean.
     edges = np.quantile(values, np.linspace(0.005, 0.995, 31))
     middle, mean = [], []
     for low, high in pairwise(edges):

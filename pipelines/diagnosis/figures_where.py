@@ -128,6 +128,7 @@ def _profiles(axes: Axes, before: Profile | None, after: Profile | None, label: 
         known = np.isfinite(profile.excess)
         axes.plot(profile.middles[known], profile.excess[known], "o-", color=colour, lw=1.2, ms=2.5, label=name)
     axes.axhline(0.0, color="black", lw=0.8)
+    # The excess is below zero where a recording is followed better than its noise: no logarithm.
     axes.set_yscale("symlog", linthresh=_BOTTOM)
     top = float(np.nanmax(before.excess))
     axes.set_ylim(-0.5 if top < 5 else -1.0, 1.5 * max(top, 0.2))

@@ -51,10 +51,12 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
     found, best = diagnosis.findings, diagnosis.verdict.best
     rows = []
     for parameter in found.model.parameters:
+        # They belong to single runs and say nothing of the rig.
         if parameter.name.startswith(("release", "offset")):
             continue
         retuned = found.retuned.fit.values.get(parameter.name, parameter.believed)
         row = [parameter.name, text(parameter.believed, 4), text(parameter.tolerance, 2), text(retuned, 4)]
+        # In tolerances: how far a number moved means nothing without how well it was known.
         row.append(_moved(parameter, retuned))
         if best is not None:
             row.append(_moved(parameter, best.fit.values.get(parameter.name, parameter.believed)))
@@ -63,7 +65,8 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
     header += () if best is None else ("moved with the effect, in tolerances",)
     caption = (
         "A number that wants to move by more than its tolerance asks for a second look at the rig file; at 1.25 "
-        "tolerances, dampings at four, it is held. One of a mode that no run excites means nothing."
+        "tolerances, four of what belongs to one run or sensor, it is held. One of a mode that no run excites means "
+        "nothing."
     )
     return Table("The baseline's own parameters", header, tuple(rows), caption)
 
@@ -247,6 +250,7 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
             suspect = examination.cut.suspect if examination.cut else ""
             if candidate.effect.block == "sensor" and suspect:
                 own = candidate.channel.partition("<")[0]
+                # A fault of one channel while another one contradicts all the rest is unlikely.
                 (for_ if own == suspect else against).append(f"{suspect} contradicts the others")
         gain = found.retuned.held_out - explanation.held_out
         rows.append(

@@ -56,6 +56,7 @@ def run_cases(folder: Path, *, n_workers: int, time_limit_s: float, reports: boo
         raise InputError("--workers", got=str(n_workers), allowed=f"1 … {MOST_WORKERS}")
     if not time_limit_s > 0:
         raise InputError("--time-limit", got=f"{time_limit_s:g}", allowed="> 0")
+    # A process that could open the truths must not diagnose.
     require_no_key(folder, sys.argv, os.environ)
     n_cases = len(read_commitments(folder).cases)
     command = (*DIAGNOSE,) if reports else (*DIAGNOSE, "--no-report")
@@ -93,6 +94,7 @@ def score_trial(folder: Path, output: Path, *, key: Path | None) -> dict[str, An
 def score_of(folder: Path, key: Path | None) -> Score:
     """All scores of a trial that was run."""
     commitments = read_commitments(folder)
+    # Recordings first: a score is worth nothing if a file is not the one that was published.
     for case in commitments.cases:
         check_data(folder, case)
     truths = opened_truths(folder, commitments, None if key is None else read_key(key))
@@ -104,6 +106,8 @@ def score_of(folder: Path, key: Path | None) -> Score:
         outcomes[name] = Outcome(**json.loads((place / OUTCOME).read_bytes()))
         answers[name] = read_answer(place / "verdict.json")
     kinds = [truth["kind"] for truth in truths.values()]
+    # Rig and plan are drawn without knowing the class, so that whoever guesses it from all but the signals
+    # scores at chance.
     features = [metadata_features(folder / "cases" / name) for name in truths]
     rivals = {
         "the commonest class, said of every case": commonest(kinds),

@@ -105,6 +105,7 @@ def detection(score: Score) -> Figure | None:
         return None
     figure = new_figure(2.9)
     axes = figure.subplots()
+    # Apart by a little, as all marks lie at zero or one; the same for the same trial.
     offsets = np.random.default_rng(0).uniform(-0.03, 0.03, len(score.marks))
     for number, kind in enumerate(kinds):
         chosen = [(mark, offsets[k]) for k, mark in enumerate(score.marks) if mark.kind == kind]

@@ -50,8 +50,11 @@ def answered(found: Findings, progress: Progress = lambda what, done, of: None) 
         best = verdict.best
         if best is None or verdict.kind == "unknown":
             break
+        # Intervals first: whether a size is told from nothing needs them. A better place that they find may
+        # change the verdict.
         if not best.spread:
             found = with_randomised_baselines(found, best, progress)
+        # A mass of 0.005 ± 0.15 kg was named beside a cubic spring, in the place of a rocking base.
         elif len(best.keys) > 1 and (insignificant := _without_significant_size(found, best)):
             found = _without_pairs(found, best, insignificant)
         else:
@@ -71,6 +74,8 @@ def _without_significant_size(found: Findings, pair: Explanation) -> list[str]:
     problem, scale = FreeRunProblem(found.model, found.fitting, pair.fit.candidates), LikelihoodScale.of(found)
     insignificant = []
     for candidate in pair.fit.candidates:
+        # Without a refit: whatever the rest could take over would only lessen the loss, and one that is little
+        # already is enough.
         without = {**pair.fit.values, **{f"{candidate.key}.{name}": 0.0 for name in candidate.sizes}}
         residual = problem.residual(problem.theta_of(without))
         # A size that can be set to zero at no loss is no size, whatever its interval is.

@@ -30,5 +30,7 @@ class BaselineParameter:
     tolerance: float
     units: str = "1"
     is_reading: bool = False
+    # What belongs to one run or one sensor may be far off; masses, frequencies, losses and gains have a closer
+    # bound.
     most_tolerances: float = 4.0
     channel: str = ""

@@ -64,6 +64,7 @@ class BlockJacobian:
         """
         blocks, first = [], 0
         for number, size in enumerate(sizes):
+            # The pattern of zeros is found from the numbers, as an effect need not say which runs it changes.
             seen = [i for i, column in enumerate(columns) if number in column and column[number].any()]
             values = np.empty((size, len(seen)))
             for place, i in enumerate(seen):
@@ -99,6 +100,7 @@ class BlockJacobian:
         for block in (self.blocks[i] for i in chosen):
             size = block.values.shape[0]
             own = np.array([place[column] for column in block.columns.tolist()], np.intp)
+            # A copy, as `correct` changes values in place.
             blocks.append(_Block(slice(first, first + size), own, block.values.copy()))
             first += size
         return BlockJacobian(len(columns), tuple(blocks))
@@ -170,5 +172,7 @@ class BlockJacobian:
             own = step[block.columns]
             length = float(own @ own)
             if length > 0:
+                # Each block divides by the length of its own part of the step: the update of Schubert, row by
+                # row the least change that leaves zeros alone. Broyden's update would fill them.
                 missed = change[block.rows] - block.values @ own
                 block.values[...] += np.multiply.outer(missed, own / length)

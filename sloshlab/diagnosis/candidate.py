@@ -288,12 +288,14 @@ class Candidate:
 
     def scale(self, parameter: str) -> float:
         """Scale of a parameter, for its steps in a fit."""
+        # The largest start, as effects have no tolerance to be scaled by.
         sizes = [abs(start[f"{self.key}.{parameter}"]) for start in self.starts()]
         return max(max(sizes, default=1.0), 1e-12)
 
     def extension(self, numbers: Numbers) -> Extension:
         """What it adds, with these numbers."""
         added = self.effect.extension(numbers, self.surroundings, self.channel)
+        # Functions cannot be compared; names and numbers tell the caches of a model which simulation it is.
         key = ((self.key, *sorted(numbers.items())),)
         return replace(added, key=key)
 
@@ -341,9 +343,11 @@ def candidates(surroundings: Surroundings) -> list[Candidate]:
     """
     found: list[Candidate] = []
     for effect in known_effects():
+        # A twin of a user's own has no tank, whatever its module registers.
         if effect.block not in surroundings.blocks:
             continue
         try:
+            # What cannot act here is neither tried nor listed as failed.
             if not effect.needs(surroundings):
                 continue
             made = [Candidate(effect, surroundings, place) for place in effect.places(surroundings)]
@@ -370,6 +374,7 @@ def _require_sound(candidate: Candidate) -> None:
         raise InputError(
             "parameters and starts", got=f"{len(names)} and {len(starts)}", allowed="one or more of both"
         )
+    # Before the search, which would find it out after minutes.
     for numbers in starts:
         if set(numbers) != names:
             raise InputError("a start", got=", ".join(sorted(numbers)), allowed=", ".join(sorted(names)))

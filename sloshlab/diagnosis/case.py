@@ -137,8 +137,10 @@ def _same_test(first: CaseRun, other: CaseRun) -> bool:
         return False
     if _name_of_test(first) != _name_of_test(other):
         return False
+    # Repeats are compared coefficient by coefficient.
     if first.recording.sizes["time"] != other.recording.sizes["time"]:
         return False
+    # Recorded levels, as a driven run may state none: realisations of other sizes must not pass for scatter.
     return bool(abs(np.log(max(level(first), 1e-300) / max(level(other), 1e-300))) < _LEVELS_AGREE)
 
 

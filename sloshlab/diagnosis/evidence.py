@@ -104,6 +104,8 @@ def evidence(terms: tuple[str, ...], says: Mapping[str, bool]) -> Evidence:
     >>> evidence((DISSIPATIVE, WORK_1, ONSET), {DISSIPATIVE: True, WORK_1: False})
     Evidence(speaks_for=('takes energy',), speaks_against=('work ∝ amplitude',), still_open=('onset',))
     """
+    # Tests know of no candidate: an effect says beforehand what holds of it, and fits decide. A term that no
+    # test could tell is neither for nor against.
     return Evidence(
         tuple(term for term in terms if says.get(term) is True),
         tuple(term for term in terms if says.get(term) is False),

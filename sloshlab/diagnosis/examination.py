@@ -55,6 +55,7 @@ class Examination:
         """Terms that tests on a block found to hold, and not to hold."""
         if block == "sensor":
             return decided_terms(self.sensor)
+        # What a base does beyond its measured motion is asked for as a force on the structure.
         for place in (block, EITHER) if block != "excitation" else ("structure", EITHER):
             character = self.characters.get(place)
             if character is not None:
@@ -104,6 +105,7 @@ def _damping_shift(model: RigModel, run: RunForces, place: str, values: Mapping[
     shift = 0.0
     if run.structure is not None and place != "tank":
         factor = values.get("damping of mode 1", 1.0)
+        # Of the first mode as seen from the tank, where the latent force acts.
         retuned = float(run.structure.dampings_kg_per_s[0] / run.structure.mode_shape[0] ** 2)
         shift += retuned * (1.0 - 1.0 / max(factor, 1e-6))
     if place != "structure":
@@ -118,6 +120,7 @@ def owning_block(examination: Examination) -> str:
     """The block that surely owns most of the mismatch; empty where the cut cannot tell."""
     if examination.cut is None:
         return ""
+    # Sure by its interval, too: a wrong answer is worse than none.
     sure = [cut.block for cut in examination.cut.blocks if cut.share > _SHARE_OF_AN_OWNER and cut.low > 0.5]
     return sure[0] if len(sure) == 1 and sure[0] != EITHER else ""
 
@@ -183,6 +186,7 @@ def _in_the_cycle(phase: FloatArray, excess: FloatArray) -> str:
         return ""
     best = max(sizes, key=lambda words: sizes[words])
     if best in ("about the lowest point", "about the highest point"):
+        # The force of a symmetric reversal is as large at both ends of the stroke.
         other = min(sizes["about the lowest point"], sizes["about the highest point"])
         if sizes[best] < 2 * other:
             best = "at velocity reversals"

@@ -65,6 +65,7 @@ class Explanation:
         by_test: dict[str, list[float]] = {}
         for (test, _), in_common in self.repeatable.items():
             by_test.setdefault(test, []).append(in_common)
+        # Per test and not in one mean: what one test shares is left, however little others do.
         return list(by_test.values())
 
     @property
@@ -97,6 +98,7 @@ class Explanation:
     @property
     def has_effect_at_bound(self) -> bool:
         """Whether a parameter rests at a bound of its effect: then something else is missing."""
+        # A bound of zero is none: what ends there is nothing, and its size says so.
         return any(
             bound != 0
             and not parameter.may_rest
@@ -184,5 +186,6 @@ def explained_extension(explanation: Explanation) -> Extension:
 
 def largest_strength(before: Mapping[_Place, float], after: Mapping[_Place, float]) -> float:
     """Effect size: √(before/after − 1) of the place that shows most, neither below the noise floor."""
+    # What is removed below the noise floor is what one run happened to have.
     removed = [max(before[place], 1.0) / max(left, 1.0) - 1.0 for place, left in after.items() if place in before]
     return float(np.sqrt(max([0.0, *removed])))

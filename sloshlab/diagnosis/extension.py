@@ -80,6 +80,7 @@ def _composed(
 ) -> Callable[[_Changed], _Changed] | None:
     if first is None or second is None:
         return first or second
+    # In the order of the effects: the second changes terms that the first may have replaced.
     return lambda unchanged: second(first(unchanged))
 
 

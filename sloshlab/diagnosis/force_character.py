@@ -150,6 +150,8 @@ def force_character(
     seed : int
         Of the draws for intervals.
     """
+    # A dissipative force is hidden first of all in a damping that was retuned too high; what was added there is
+    # asked for with the force.
     shifted = [_with_damping(force, damping_shift) for force in forces]
     parts = stretches(shifted)
     noise = float(np.sqrt(np.mean([force.standard_error_n**2 for force in forces])))
@@ -216,13 +218,17 @@ class _Regression:
         spread = float(np.median([part.a.std() / max(part.v.std(), 1e-300) for part in parts]))
         duration = sum(float(part.time_s[-1] - part.time_s[0]) for part in parts)
         n = sum(part.force_n.size for part in parts)
+        # Samples are far closer than independent readings, of which there are about as many as the motion has
+        # radians.
         per_sample = np.sqrt(max(4.0, duration * spread) / n)
         self.prior = np.full(widths[-1], 3.0 / per_sample)
         self.prior[own_] = np.where(own > 0, 1.0 / (scales.force / per_sample), 1e-9)
         self.rows = rows
+        # The block's own parameters first, within their tolerances: what they can follow is not missing.
         alone = ridge_regression(self.normal_sums, self.prior, own_)
         self.beyond_own_of_parts = [part.force_n - row @ alone for part, row in zip(parts, rows, strict=True)]
         self.beyond_own = np.concatenate(self.beyond_own_of_parts)
+        # What the block's own damping can follow stays in the windows: it becomes the doubt of their work.
         spring = alone.copy()
         spring[own_[1]] = 0.0
         self.beyond_spring_of_parts = [part.force_n - row @ spring for part, row in zip(parts, rows, strict=True)]
@@ -251,6 +257,8 @@ class _Regression:
         """
         n = len(self.normal_sums)
         rest = {name: np.zeros(n) for name in self.sets}
+        # Judged on stretches that were not fitted: memory and time have more features than the state and would
+        # win on the same.
         for first in (0, 1):
             fitted, judged = self.normal_sums[1 - first :: 2], range(first, n, 2)
             for name, columns in self.sets.items():
@@ -263,6 +271,7 @@ class _Regression:
         found: dict[str, list[float]] = {name: [] for name in self.sets}
         for drawn in draws:
             own = float(rest["own"][drawn].sum())
+            # A share of what can be explained, the noise left out.
             whole = max(own - float(expected[drawn].sum()), 0.1 * own, 1e-300)
             for name, values in rest.items():
                 found[name].append((own - float(values[drawn].sum())) / whole)
@@ -289,6 +298,7 @@ def _energy(found: Windows, own_damping: float, generator: np.random.Generator) 
     n = int(keep.sum())
     value = share(np.arange(n))
     low, high = _quantiles([share(generator.integers(0, n, n)) for _ in range(_N_DRAWS)])
+    # The damping is off by the same in all windows: these doubts add up and do not average out.
     margin = _NORMAL_90 * float(doubt[keep].sum() / scale[keep].sum())
     low = max(value - float(np.hypot(value - low, margin)), -1.0)
     high = min(value + float(np.hypot(high - value, margin)), 1.0)
@@ -315,6 +325,8 @@ def _symmetry(fit: _Regression) -> list[Answer]:
     terms = (EVEN, ODD_IN_DISPLACEMENT, ODD_IN_VELOCITY, ODD_IN_BOTH)
     for which, (parity, term) in enumerate(zip(PARITIES, terms, strict=True)):
         largest = which == int(np.argmax(shares))
+        # An even part and one odd in both hold beside whatever else there is, one odd in a single motion only as
+        # the largest: that is what the terms say.
         says: dict[str, bool] = {}
         if high[which] < 2 * _SMALL_SHARE:
             says[term] = False
@@ -360,6 +372,7 @@ def _history(fit: _Regression, noise_n: float) -> list[Answer]:
 def _added_share(question: str, quantity: str, draws: FloatArray, term: str) -> Answer:
     value = float(draws[0])
     low, high = _quantiles(draws)
+    # A term holds, or does not, only by the whole interval; between them it is open and no evidence.
     says = {term: True} if low > _SMALL_SHARE else {term: False} if high < _SMALL_SHARE else {}
     finding = term if says.get(term) else f"not: {term}" if term in says else CANNOT_TELL
     return Answer(question, finding, f"share of the variance, {quantity}", "1", value, low, high, says)
@@ -387,6 +400,7 @@ def work_exponent_answers(found: Windows, generator: np.random.Generator) -> lis
                     says[term] = False
                 elif high - low < 0.9:
                     says[term] = True
+            # Where two exponents are possible none of them holds; those that are excluded stay so.
             if sum(says.values()) > 1:
                 says = {term: holds for term, holds in says.items() if not holds}
         elif low > 0.35:

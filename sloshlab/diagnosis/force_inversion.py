@@ -56,6 +56,7 @@ def frequencies_hz(n_samples: int, rate_hz: float) -> FloatArray:
 
 def in_frequency(series: FloatArray) -> ComplexArray:
     """Spectrum of a padded series."""
+    # Without padding the end of a run would drive its beginning.
     return np.asarray(np.fft.rfft(series, 2 * series.size), np.complex128)
 
 
@@ -66,6 +67,7 @@ def in_time(spectrum: ComplexArray, n_samples: int) -> FloatArray:
 
 def sample_variance(power: FloatArray, n_samples: int) -> float:
     """Variance of a sample of a padded series whose spectrum has this expected power."""
+    # Parseval for a real series of 2 n samples: all lines but the first and the last stand for two.
     return float((2 * power[1:-1].sum() + power[0] + power[-1]) / (2 * n_samples**2))
 
 
@@ -86,6 +88,7 @@ def response(structure: Structure, weights: FloatArray, order: int, frequency_hz
     >>> float(abs(response(single_degree_of_freedom(2.0, 800.0), np.ones(1), 0, np.zeros(1))[0]))
     0.00125
     """
+    # Linear modes only: friction and contacts of the baseline are added as forces along the motion.
     s = 2j * np.pi * frequency_hz
     stiffness = (
         structure.stiffnesses_n_per_m[:, None]
@@ -108,6 +111,7 @@ def modal_weights(structure: Structure, rig: Rig, name: str, along_m: float | No
         Its position along the beam.
     """
     quantity, _, place = name.partition("_")
+    # At the root of a beam no mode moves relative to the base.
     if quantity not in ORDERS or along_m == 0.0:
         return None
     if place.startswith("beam"):
@@ -130,6 +134,8 @@ def wiener_gain(power: FloatArray, noise: FloatArray, frequency_hz: FloatArray, 
         The gain is zero beyond 0.4 of it.
     """
     width = max(3, round(_SMOOTHING_HZ / (frequency_hz[1] - frequency_hz[0])))
+    # The power of the force is not known and is taken from its neighbourhood; one line alone would be its own
+    # estimate and keep all of its noise.
     own = np.maximum(uniform_filter1d(power - noise, width, mode="nearest"), 0.0)
     in_band = frequency_hz < _LARGEST_SHARE_OF_RATE * rate_hz
     return np.asarray(np.where(in_band, own / np.maximum(own + noise, 1e-300), 0.0))
@@ -156,21 +162,27 @@ def inverted_force(
 
     Returns
     -------
-    asked : AskedForce
+    inverted : InvertedForce
     at_release : float
         How far the release was off [m]; zero without `released`.
     """
     below = np.zeros(frequency_hz.size)
     above, of_release = np.zeros(frequency_hz.size, complex), np.zeros(frequency_hz.size, complex)
     for name, (receptance, noise) in seen.items():
+        # Generalised least squares over the channels: each counts by the inverse of its noise, so that a
+        # displacement tells the slow part of a force and an accelerometer the fast one.
         weighted = receptance.conj() / noise
         above += weighted * missed[name]
         below += (weighted * receptance).real
         if released is not None:
             of_release += weighted * released[name]
+    # Where no channel sees a mode the force is undetermined: zero, with no noise, rather than a division by
+    # nothing.
     noise = np.where(below > 0, 1 / np.where(below > 0, below, 1.0), 0.0)
     force, at_release = above * noise, 0.0
     if released is not None:
+        # A release that was off by a little would be asked for as an impulse at the start. Its size is fitted by
+        # the same weights, over the frequencies where the force stands out of the noise.
         start = of_release * noise
         share = wiener_gain(np.abs(force) ** 2, noise, frequency_hz, rate_hz)
         size = float((share * np.abs(start) ** 2).sum())

@@ -88,6 +88,7 @@ def windows(parts: Sequence[Stretch], forces: Sequence[FloatArray], own_damping:
         for piece in np.array_split(np.arange(part.time_s.size), n):
             v, a, force = part.v[piece], part.a[piece], part.force_n[piece]
             rms_v, rms_a = float(np.sqrt(np.mean(v**2))), float(np.sqrt(np.mean(a**2)))
+            # Exact for a harmonic motion.
             omega = max(rms_a / max(rms_v, 1e-300), 1e-12)
             period = 2 * np.pi / omega
             power = float(np.mean(force * v))
@@ -134,6 +135,8 @@ def work_exponents(found: Windows, generator: np.random.Generator) -> WorkExpone
     """
     doubt = np.maximum(found.work_doubt_j, 0.05 * np.abs(found.work_j))
     sure = found.work_j > _SIGNIFICANT * doubt
+    # Only windows whose work is beyond doubt have a logarithm that means something; where fewer than half have,
+    # those that are left are a biased choice.
     if sure.sum() < 12 or sure.mean() < 0.5:
         few = "too few cycles take energy beyond doubt"
         return WorkExponents(None, None, {"amplitude": few, "frequency": few})
@@ -151,6 +154,7 @@ def work_exponents(found: Windows, generator: np.random.Generator) -> WorkExpone
     names = np.unique(stretch)
 
     def slopes(chosen: NDArray[np.int64]) -> FloatArray:
+        # Whole stretches are drawn: windows of one decay follow each other and are not independent.
         rows = np.concatenate([np.flatnonzero(stretch == name) for name in chosen])
         w = weight[rows, None]
         return np.asarray(np.linalg.lstsq(columns[rows] * w, logs[0][rows] * w[:, 0], rcond=None)[0][1:])
@@ -202,6 +206,8 @@ def onset(
     motion = np.concatenate([part.own for part in parts]) * np.where(own > 0, 4 * own, 0.0)
     if _span(np.log(level[moves])) < np.log(_LEAST_SPAN):
         return None
+    # Classes of equal population: in a decay most samples are small, and equal widths would leave the upper ones
+    # empty.
     edges = np.quantile(level[moves], np.linspace(0, 1, _N_LEVELS + 1))
 
     def reached(rows: NDArray[np.int64]) -> int:
@@ -211,6 +217,8 @@ def onset(
             inside = rows[moves[rows] & (level[rows] <= edges[upper])]
             if inside.size < 8:
                 return count
+            # The block's own numbers are fitted to the lower levels alone, so that what sets in above cannot
+            # hide in them.
             squares = motion[inside].T @ motion[inside]
             independent = max(4.0, inside.size / 30)
             lift = inside.size / independent * float(np.var(force[inside]))
@@ -287,6 +295,7 @@ def _shares_of_orders(latent_force: LatentForce, series: FloatArray) -> list[Flo
     moves = np.flatnonzero(np.abs(v) > _AT_REST * np.abs(v).max())
     if not moves.size:
         return None
+    # Where the motion has come to rest there is no phase to resample over.
     v, series = v[: moves[-1] + 1], series[: moves[-1] + 1]
     main = omega / (2 * np.pi)
     if main < 4 * rate / v.size or 1.6 * main > 0.45 * rate:
@@ -295,12 +304,15 @@ def _shares_of_orders(latent_force: LatentForce, series: FloatArray) -> list[Flo
     if np.mean(narrow**2) < _NARROW * np.mean(v**2):
         return None
     phase = np.unwrap(np.angle(hilbert(narrow)))
+    # A phase that runs backwards is one of several frequencies.
     if np.mean(np.diff(phase) <= 0) > 0.02:
         return None
+    # Interpolation needs places that grow.
     phase = np.maximum.accumulate(phase)
     per_cycle = max(16, min(256, int(rate / main)))
     turns = np.arange(phase[0], phase[-1], 2 * np.pi / per_cycle)
     resampled = np.interp(turns, phase, series)
+    # An even number, so that half orders fall on lines of the transform.
     n_cycles = 8
     pieces = [resampled[i : i + n_cycles * per_cycle] for i in range(0, resampled.size, n_cycles * per_cycle)]
     found = []
@@ -312,6 +324,7 @@ def _shares_of_orders(latent_force: LatentForce, series: FloatArray) -> list[Flo
         total = float(power[1:].sum())
         if total <= 0:
             continue
+        # Three lines: the main lobe of a Hann window.
         lines = [float(power[round(n_cycles * order) - 1 : round(n_cycles * order) + 2].sum()) for order in ORDERS]
         found.append(np.array([*[line / total for line in lines], total]))
     return found or None

@@ -81,6 +81,7 @@ def stretches(forces: Sequence[LatentForce]) -> list[Stretch]:
         rate = force.run.attributes.sampling_rate_hz
         omega = float(a.std() / max(v.std(), 1e-300))
         cycle = max(4, round(min(2 * np.pi / max(omega, 1e-300) * rate, x.size)))  # a run may not move at all
+        # Over whole cycles: squares ripple at twice the frequency of the motion, and levels must not.
         running = (uniform_filter1d(part**2, cycle, mode="nearest") for part in (a, v))
         # running sums fall below zero by rounding after a motion has stopped
         power_a, power_v = (np.maximum(power, 0.0) for power in running)
@@ -143,6 +144,7 @@ def state_features(stretch: Stretch, scales: Scales) -> tuple[FloatArray, NDArra
     """
     p, q = stretch.first / scales.first, stretch.v / scales.velocity
     first, second = (_chebyshev(part) for part in (p, q))
+    # Two steps at reversal beside the polynomials, which follow no step.
     columns = [np.tanh(q / width) for width in _SHARP]
     parity = [2] * len(columns)
     for i in range(DEGREE + 1):
@@ -199,7 +201,7 @@ def ridge_regression(
 
     Parameters
     ----------
-    parts : sequence of Sums
+    parts : sequence of NormalSums
     prior : ndarray, shape (n_features,)
         Standard deviations of the coefficients over that of what is not explained.
     columns : optional
@@ -209,6 +211,8 @@ def ridge_regression(
     xy = np.sum([part.xy for part in parts], axis=0)
     chosen = np.arange(xy.size)[columns]
     found = np.zeros(xy.size)
+    # Ridge regression is a Gaussian prior on the coefficients. Features of a nearly harmonic motion are so
+    # correlated that there is no stable solution without one.
     lift = np.diag(1 / prior[chosen] ** 2)
     found[chosen] = np.linalg.solve(xx[np.ix_(chosen, chosen)] + lift, xy[chosen])
     return found
@@ -218,5 +222,6 @@ def residual_sum_of_squares(parts: Sequence[NormalSums], numbers: FloatArray) ->
     """Residual sum of squares of a regression."""
     total = 0.0
     for part in parts:
+        # From sums alone, so that a bootstrap needs no residuals; by rounding it may be less than zero.
         total += part.yy - 2 * float(numbers @ part.xy) + float(numbers @ part.xx @ numbers)
     return max(total, 0.0)

@@ -129,6 +129,7 @@ class _Place:
         series: list[FloatArray] = []
         motions: list[FloatArray] = []
         n, of_noise = 0, 0.0
+        # The largest first, as evaluations filter every sample and only some runs fit in.
         for latent in sorted(forces, key=lambda latent: -latent.power_n2):
             if latent.power_n2 <= 0.0 or (pieces and n + latent.force_n.size > _MOST_SAMPLES):
                 break
@@ -136,6 +137,8 @@ class _Place:
             kept = slice(0, prev_fast_len(min(latent.force_n.size, _MOST_SAMPLES), real=True))
             force, motion, rate = latent.force_n[kept], latent.motion[kept], latent.run.attributes.sampling_rate_hz
             own_motion = motion[:, _MOTIONS_OF_BASELINE[latent.place]]
+            # The band is that of what is left: a spring that is a little off has most of its power at the
+            # resonance.
             own, *_ = np.linalg.lstsq(own_motion, force)
             middle = int(np.argmax(np.abs(motion[:, 1])))
             about = motion[max(0, middle - _N_PROBED // 2) : middle + _N_PROBED // 2]
@@ -148,6 +151,7 @@ class _Place:
             n, of_noise = n + force.size, of_noise + force.size * latent.standard_error_n**2
         if not pieces:
             return None
+        # All runs together, as the baseline's spring and damper are the same in all.
         baseline_motions, _ = np.linalg.qr(np.concatenate(motions) / np.concatenate(motions).std(axis=0))
         place = cls(pieces, np.concatenate(series), baseline_motions)
         place = replace(place, force_n=place._beyond_baseline(place.force_n))
@@ -244,8 +248,10 @@ class ForceStarts:
             share, numbers = min([(share, numbers), *others], key=lambda other: other[0])
         if share < 1.0 - _LEAST_EXPLAINED:
             share, numbers = _simplex_descent(left, numbers, then, _SHORT_STEP if sought else _LONG_STEP)
+        # `not … <`, so that infinity and no number are refused, too.
         if not share < 1.0 - _LEAST_EXPLAINED:
             return None
+        # The ends of the other descents too: no free-running fit leads from one of them to another.
         best, *more = (
             dict(zip(names, np.clip(reached, *bounds.T).tolist(), strict=True))
             for reached in (numbers, *(end for _, end in others))
@@ -263,11 +269,14 @@ class ForceStarts:
         """
         try:
             extension = candidate.extension(numbers)
+            # On a short part first: a contact too stiff for its steps has an event in each, and the whole run
+            # would take long.
             if not all(_is_resolved(extension.terms, piece.fastest) for piece in place.pieces):
                 return None
             added = [self._added(extension, piece.drive) for piece in place.pieces]
         except SloshlabError:
             return None
+        # In all runs or not at all: shares of some runs cannot be compared with those of all.
         known = [force for force in added if force is not None and np.isfinite(force).all()]
         return place.comparable(known) if len(known) == len(added) else None
 
@@ -277,6 +286,7 @@ class ForceStarts:
             return None
         force = _force_along(extension.terms, drive)
         if extension.liquid is not None:
+            # What acts on the liquid's forces adds the difference that it makes to them.
             liquid = tuple(term for term in self._model.twin.terms if term.place == "tank")
             force = force + _force_along(extension.liquid(liquid), drive) - _force_along(liquid, drive)
         return force
@@ -364,6 +374,7 @@ def _simplex_descent(
         return np.asarray(scale * np.exp(np.clip(at, -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)))
 
     def cost(at: FloatArray) -> float:
+        # A simplex needs numbers that can be compared; infinity less infinity is none.
         value = left(numbers(at))
         return value if np.isfinite(value) else 1e12
 
@@ -382,6 +393,7 @@ def _driven(rate_hz: float, motion: FloatArray) -> Excitation:
 def _force_along(terms: Sequence[Term], drive: Excitation) -> FloatArray:
     if not terms:
         return np.zeros(drive.n_samples)
+    # Without a structure the motion is prescribed, and where a force acts does not matter.
     alone = Twin(None, tuple(replace(term, place="tank") for term in terms))
     return np.asarray(alone.simulate(drive).require_done().forces_n.sum(axis=1))
 

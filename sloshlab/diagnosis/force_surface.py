@@ -29,11 +29,14 @@ _SLOWEST, _RATIO = 0.2, 5.0
 def _surface(motion, parameters, memory, rates):
     """Σ c_ij T_i(p) T_j(q), i + j ≤ 5, c tanh(q/0.05), Σ m_k z_k, ż = r (q − z); p is x or a, q is v, scaled."""
     p = motion[DISPLACEMENT] if parameters[2] == 0.0 else motion[ACCELERATION]
+    # Beyond ±1 polynomials of fifth degree explode, and with them a free-running simulation.
     p = min(max(p / parameters[0], -1.0), 1.0)
     q = min(max(motion[VELOCITY] / parameters[1], -1.0), 1.0)
+    # What remembers makes it a ceiling for hysteresis and relaxation as well.
     force, at = parameters[4] * tanh(q / _SHARP), 5
     rate = _SLOWEST * parameters[3]
     for k in range(_N_REMEMBERED):
+        # Three relaxing dampers, slower than the motion, as fast, and faster: 0.2, 1 and 5 times its own rate.
         force += parameters[at] * memory[k]
         rates[k] = rate * (q - memory[k])
         rate *= _RATIO

@@ -48,6 +48,7 @@ def forked(work: Callable[..., None], *arguments: Any) -> tuple[ForkProcess, Con
     arguments : object
         Whatever there is; nothing of them is sent.
     """
+    # Effects are functions, which cannot be sent to a process that is started anew.
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
     process = context.Process(target=_in_fork, args=(os.getpid(), ours, theirs, work, arguments), daemon=True)

@@ -99,6 +99,7 @@ def fitted(
     theta = problem.theta_of(start)
     residual = problem.residual(theta)
     if not np.isfinite(residual).all():
+        # Infinite residuals are runs that do not reach their end: there is no slope to follow from there.
         empty = FreeRunFit(
             problem.candidates, problem.values(theta), np.inf, np.inf, trouble="does not run from its start"
         )
@@ -127,6 +128,7 @@ class _LevenbergMarquardt:
         is_wanted = not self.jacobian.blocks
         for iteration in range(n_iterations if inflation > 0 else 2 * n_iterations):
             if is_wanted:
+                # Wide differences while the noise is inflated, fine ones for the optimum itself.
                 self.jacobian = self.problem.jacobian(
                     self.theta, self.residual, range(self.theta.size), coarse=inflation > 0
                 )
@@ -134,8 +136,11 @@ class _LevenbergMarquardt:
             least = tolerance * (1.0 if inflation > 0 else _LAST_STAGE_FACTOR)
             gain, predicted, damping = self._step(inflation_weights, damping, _LEAST_PREDICTED_SHARE * least)
             is_done = gain < least and (iteration > 0 or gain <= 0)
+            # A corrected Jacobian may point nowhere where the true one still does. The last stage therefore ends
+            # only with one that was computed where the fit is, which also gives the covariance.
             if is_done and (is_fresh or not needs_fresh):
                 break
+            # A step that brings far less than predicted shows that a corrected Jacobian has become wrong.
             is_wanted = is_done or gain < _LEAST_GAIN_RATIO * predicted
             is_fresh = is_fresh and gain <= 0
 
@@ -145,14 +150,18 @@ class _LevenbergMarquardt:
         No step is made where the steps small enough to succeed predict less than the least decrease.
         """
         theta, residual, prior = self.theta, self.residual, self.prior
+        # Iteratively reweighted least squares: Huber's weights of the present residuals are kept for this step.
         limit = _limit(inflation_weights * residual)
         weights = inflation_weights * robust_weights(inflation_weights * residual, limit)
         normal, pull = self.jacobian.normal_equations(weights, residual)
+        # Gauss–Newton Hessian of half the cost. The prior enters as one more reading of each baseline parameter,
+        # known to its tolerance; parameters of effects have none and must be told by the recordings.
         self.hessian = normal + np.diag(prior)
         expected = self.problem.expected
         gradient = pull + prior * (theta - expected)
 
         def cost(at: FloatArray, r: FloatArray) -> float:
+            # A simulation that does not reach its end costs infinitely much, so that the step to it is refused.
             if not np.isfinite(r).all():
                 return np.inf
             return huber_cost(inflation_weights * r, limit) + float((prior * (at - expected) ** 2).sum())
@@ -166,6 +175,7 @@ class _LevenbergMarquardt:
             step = tried - theta
             # Decrease by the undamped model, so that it can be compared with the actual one.
             predicted = -float(2 * gradient @ step + step @ self.hessian @ step)
+            # Written with `not … >`, so that a prediction that is no number ends the loop, too.
             if not predicted > least * before:
                 break
             new = self.problem.residual(tried)
@@ -179,12 +189,16 @@ class _LevenbergMarquardt:
 
     def fit(self) -> FreeRunFit:
         """The fit as it is now."""
+        # The misfit without inflated noise, whatever the last stage was, so that fits of different stages can be
+        # compared.
         misfit = huber_cost(self.residual)
         return FreeRunFit(
             self.problem.candidates,
             self.problem.values(self.theta),
             misfit + float((self.prior * (self.theta - self.problem.expected) ** 2).sum()),
             misfit,
+            # Effects have no prior, so that the Hessian is singular where nothing tells their parameters: no
+            # inverse then.
             np.asarray(np.linalg.pinv(self.hessian), np.float64),
             self.problem.names,
             self.problem.scales,
@@ -205,9 +219,12 @@ def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
     for observation in (observation for run in problem.runs for observation in run):
         own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
         first += observation.spectra.size
+        # The residual in units of the channel over its power: the same ratio as the noise inflation, which is of
+        # the RMS.
         left = float(np.mean(own**2 * observation.variance)) / max(float(np.mean(observation.spectra**2)), 1e-300)
         largest = max(largest, float(np.sqrt(left)))
     return (
+        # The last stage is without inflation and has to remain in any case.
         tuple(inflation for inflation in INFLATION_STAGES if inflation < _LARGEST_INFLATION_RATIO * largest)
         or INFLATION_STAGES[-1:]
     )
@@ -272,6 +289,7 @@ def coarsely_fitted(
     first, second = stages[0], stages[min(1, len(stages) - 1)]
     best: CoarseFit | None = None
     for start in starts:
+        # A warm start saves the derivatives by all baseline parameters, most of the simulations of a fit.
         known = _extended_jacobian(problem, start.values, near) if near is not None and start.is_near else None
         fit, jacobian = fitted(
             problem, start.values, n_iterations=n_iterations, stages=(first,), known=known, is_last=False
@@ -298,7 +316,7 @@ def extended_to_all_runs(
 
     Parameters
     ----------
-    coarse_fit : BegunFit
+    coarse_fit : CoarseFit
     problem : FreeRunProblem
         Of all runs.
     others : mapping
@@ -306,6 +324,7 @@ def extended_to_all_runs(
     near : BlockJacobian
         Of all runs, without the last candidate.
     """
+    # The coarse fit has no releases, offsets and fluctuations of the runs that it left out.
     values = {**others, **coarse_fit.fit.values}
     known = _extended_jacobian(problem, values, near) or BlockJacobian(len(problem.names), ())
     return CoarseFit(problem, replace(coarse_fit.fit, values=values), known, coarse_fit.cost)
@@ -382,6 +401,7 @@ def _extended_jacobian(
 def inflated_cost(problem: FreeRunProblem, fit: FreeRunFit, inflation: float) -> float:
     """Cost of a fit with inflated noise, its prior included."""
     residual = problem.residual(problem.theta_of(fit.values))
+    # Cost less misfit is the prior, which is never inflated: what is believed does not depend on the stage.
     return huber_cost(problem.inflation_weights(inflation) * residual) + fit.cost - fit.misfit
 
 
@@ -403,11 +423,14 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
     jacobian : BlockJacobian, shape (n_residuals, n)
     """
     best = fitted(problem, problem.model.believed, n_iterations=n_iterations)
+    # Other minima can leave no less than noise.
     if problem.is_down_to_noise(best[0]):
         return best
     inflation = INFLATION_STAGES[1]
     inflation_weights, reached = problem.inflation_weights(inflation), inflated_cost(problem, best[0], inflation)
     # parameters that change only readings are linear and have no local minima: they are not drawn
+    # A quasi-random sequence covers the prior more evenly than 32 random draws; its fixed seed gives the same
+    # case the same answer.
     draws = norm.ppf(qmc.Halton(problem.n_baseline, seed=0).random(_N_DRAWN))
     draws = np.clip(draws, -2.0, 2.0) * problem.changes_motion
     costs = [
@@ -456,6 +479,7 @@ def fitted_from_scaled(
     other, _ = fitted(problem, start, n_iterations=n_iterations, stages=(inflation,))
     if other.trouble:
         return other
+    # Compared at the same inflation: with the full noise a fit that is still on its way always looks worse.
     if inflated_cost(problem, other, inflation) > _ABANDON_COST_RATIO * inflated_cost(problem, fit, inflation):
         return replace(other, trouble="was left behind")
     if abs(other.values[name] - fit.values[name]) < _SAME_MINIMUM * abs(fit.values[name]):
@@ -471,6 +495,8 @@ def _step_within_bounds(
     A step clipped at a bound need not be a descent direction where parameters are correlated. It is clipped
     nevertheless where the model is not finite, or singular to rounding.
     """
+    # Cutting the step off at a bound was tried: fits of the baseline and of effects stopped wherever masses and
+    # gains trade against an effect.
     low = (problem.low - problem.centres) / problem.scales
     high = (problem.high - problem.centres) / problem.scales
     tried = theta - np.linalg.solve(hessian, gradient)
@@ -480,7 +506,9 @@ def _step_within_bounds(
         upper = cholesky(hessian)
     except np.linalg.LinAlgError:
         return np.asarray(np.clip(tried, low, high))
+    # With H = UᵀU the model ½ sᵀH s + gᵀs is ½ |U s + U⁻ᵀg|² and a constant: bounded linear least squares.
     target = solve_triangular(upper, -gradient, trans="T")
+    # Where rounding has left theta outside its bounds, the step of zero stays within these.
     down = np.minimum(low - theta, 0.0) - _LEAST_ROOM
     up = np.maximum(high - theta, 0.0) + _LEAST_ROOM
     step = lsq_linear(upper, target, (down, up), method="bvls").x

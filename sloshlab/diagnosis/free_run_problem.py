@@ -128,6 +128,9 @@ class FreeRunProblem:
                 for parameter in candidate.effect.parameters
             ]
         )
+        # Baseline parameters are scaled by their tolerances, so that the negative logarithm of their prior is
+        # half the sum of squares of theta; those of effects by their starts, about zero, where the effect is
+        # absent.
         self.scales = np.array(
             [parameter.tolerance for parameter in self._baseline]
             + [
@@ -140,6 +143,8 @@ class FreeRunProblem:
             [parameter.believed for parameter in self._baseline] + [0.0] * (len(self.names) - len(self._baseline))
         )
         self.n_baseline = len(self._baseline)
+        # Fits about other baselines move the means of the prior, not the places where parameters are counted
+        # from: scaled parameters of all fits stay comparable.
         self.expected = np.array(
             [
                 ((expected or {}).get(parameter.name, parameter.believed) - parameter.believed)
@@ -148,6 +153,8 @@ class FreeRunProblem:
             ]
             + [0.0] * (len(self.names) - self.n_baseline)
         )
+        # A gain or an offset needs the derivative of one channel only. An effect on a sensor that drives changes
+        # the motion and with it every channel.
         driving = {name for run in self.runs for name in model.driving(run[0].run)}
         self._channels_changed = [
             (parameter.channel,) if parameter.channel else () for parameter in self._baseline
@@ -190,6 +197,7 @@ class FreeRunProblem:
 
     def values(self, theta: FloatArray) -> dict[str, float]:
         """Parameters by name in their own units."""
+        # Starts and finite differences may lie outside the bounds; the simulation never does.
         physical = np.clip(self.centres + theta * self.scales, self.low, self.high)
         return {**self.fixed, **dict(zip(self.names, physical.tolist(), strict=True))}
 
@@ -201,11 +209,14 @@ class FreeRunProblem:
     def at_bounds(self, theta: FloatArray) -> NDArray[np.bool_]:
         """Which parameters are as large or as small as they may be."""
         physical = self.centres + theta * self.scales
+        # To a relative tolerance: scaled values reach a bound only to rounding.
         near = 1e-6 * (self.high - self.low)
         return np.asarray((physical <= self.low + near) | (physical >= self.high - near))
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
+        # Runs are shared between threads only where nothing else is: three of them take two threads as long as
+        # four would. Columns of a Jacobian and whole sets of parameters share better.
         if is_single_threaded() or len(self.runs) == 1:
             return self._of_runs_in_turn(theta)
         values, beside = self.values(theta), self._second_process()
@@ -228,6 +239,8 @@ class FreeRunProblem:
         self, runs: Sequence[Sequence[Observation]], values: Mapping[str, float], beside: SecondProcess | None
     ) -> FloatArray:
         """Residuals of runs, by the second process where there is one and it has nothing else to do."""
+        # Threads of one interpreter wait for each other, as half of a simulation is Python; a second process
+        # does not.
         self.n_simulations += len(runs)
         found = None if beside is None else beside.done(runs, values, self.candidates)
         return residuals_of_runs(self.model, runs, values, self.candidates) if found is None else found
@@ -260,8 +273,11 @@ class FreeRunProblem:
             is_effect, is_damping = column >= self.n_baseline, self.names[column].startswith("damping")
             step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
             if is_effect:
+                # Relative to the parameter, which may have moved far from the start that scales it; an effect of
+                # size nothing still needs a step.
                 step *= max(abs(theta[column]), 0.05)
             elif is_damping and coarse:
+                # Only in coarse stages: the optimum itself is sought with the fine step.
                 step *= _TOLERANCES_OF_DAMPING
             moved = theta.copy()
             physical = self.centres[column] + (theta[column] + step) * self.scales[column]
@@ -273,6 +289,7 @@ class FreeRunProblem:
 
         def derivative(place: FloatArray, column: int) -> dict[int, FloatArray]:
             found = self._moved(place, column, beside)
+            # In place, as a column is as large as all recordings that it changes.
             for block, moved in found.items():
                 moved -= at[self._rows[block]]
                 moved /= place[column] - theta[column]
@@ -293,6 +310,8 @@ class FreeRunProblem:
 
     def _moved(self, theta: FloatArray, column: int, beside: SecondProcess | None) -> dict[int, FloatArray]:
         """Residuals of the channels of runs which a parameter changes, by their number, after it was moved."""
+        # The sparsity of the Jacobian: a release or an offset is simulated for its run alone, a gain for its
+        # channel alone.
         owner, seen_by = run_of(self.names[column], self.model), self._channels_changed[column]
         runs: list[list[Observation]] = []
         blocks: list[int] = []
@@ -332,6 +351,8 @@ def residuals_of_runs(
             names = [observation.channel for observation in run]
             readings = model.simulate(run[0].run, values, extension_of(candidates, values), names)
         except SloshlabError:
+            # A simulation that fails describes nothing. It must not end the search, which tries many parameters
+            # that do not run.
             found += [np.full(observation.spectra.size, np.inf) for observation in run]
         else:
             found += [observation.residual(readings[observation.channel]).ravel() for observation in run]
@@ -383,11 +404,14 @@ def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) ->
     for observation in observed:
         own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
         first += observation.spectra.size
+        # Without the loudest quarter of the times a quarter of a second of noise in one channel looks like
+        # missing physics, as it did in the second sealed trial.
         times = [
             huber_cost(row[known]) / known.sum()
             for row, known in zip(own, observation.informative, strict=True)
             if known.any()
         ]
+        # Times are weighted by how many of their coefficients are informative: a quiet time tells little.
         counts = [int(known.sum()) for known in observation.informative if known.any()]
         for k in np.argsort(times)[: int(np.ceil(_QUIETER_SHARE * len(times)))]:
             total, n = total + times[k] * counts[k], n + counts[k]
@@ -421,8 +445,11 @@ def repeatable_mean_squares(
     for observation in observed:
         own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
         first += observation.spectra.size
+        # What a channel need not describe may well repeat, such as the ripple of a servo axis: it must forbid no
+        # name.
         if not observation.is_rough:
             parts[observation.run.name, observation.channel] = (
+                # A product of two residuals is not robust by itself: one burst would outweigh all the rest.
                 np.clip(own, -HUBER_LIMIT, HUBER_LIMIT),
                 observation.informative,
             )
@@ -434,6 +461,7 @@ def repeatable_mean_squares(
             total, n = 0.0, 0
             for name, other in combinations([run for run in test if (run, channel) in parts], 2):
                 (first_left, shown), (other_left, shown_too) = parts[name, channel], parts[other, channel]
+                # Repeats start alike but may be longer or shorter by some blocks.
                 both = tuple(slice(0, min(sizes)) for sizes in zip(shown.shape, shown_too.shape, strict=True))
                 known = shown[both] & shown_too[both]
                 total += float(first_left[both][known] @ other_left[both][known])
@@ -474,6 +502,7 @@ def _means(
 def robust_weights(residual: FloatArray, limit: float = HUBER_LIMIT) -> FloatArray:
     """Square roots of Huber's weights, for iteratively reweighted least squares."""
     size = np.abs(residual)
+    # Square roots, since they multiply rows of the Jacobian and the residual, of which products are summed.
     return np.asarray(np.where(size > limit, np.sqrt(limit / np.maximum(size, 1e-300)), 1.0))
 
 

@@ -145,10 +145,12 @@ def interface_cut(
     """
     usable = [run for run in runs if run]
     together = [_forces(model, run, values) for run in usable]
+    # A run in which the retuned baseline does not reach its end cannot be cut, the others can.
     kept = [(run, found) for run, found in zip(usable, together, strict=True) if found is not None]
     usable, found = [run for run, _ in kept], [forces for _, forces in kept]
     sensors = _sensor_checks(model, usable, found, values)
     suspect, remark = _suspect_channel(sensors)
+    # Its fault would be inverted into a force, and the blocks charged with what one sensor invents.
     if suspect:
         found = [run_forces(model, run, values, {suspect}) for run in usable]
     blocks = _blocks(model, usable, found, suspect, seed)
@@ -165,6 +167,7 @@ def _forces(model: RigModel, run: Sequence[Observation], values: Mapping[str, fl
 def _weighted(observation: Observation, series: FloatArray, values: Mapping[str, float]) -> FloatArray:
     """Spectra in standard deviations of a series in true units."""
     spectra = observation.of(series) * values.get(f"gain of {observation.channel}", 1.0)
+    # Clipped, as coefficients without noise would outweigh all others.
     return np.asarray(np.clip(spectra / np.sqrt(observation.variance), -_LARGEST_RATIO, _LARGEST_RATIO))
 
 
@@ -195,10 +198,14 @@ def _sensor_checks(
     for name, ratio in together.items():
         without, missing_force_n2 = ratio, float("nan")
         alike = [other for other in together if other.startswith("force") == name.startswith("force")]
+        # Leave one out: without the faulty channel the others agree. Each costs an inversion of all runs, so
+        # that this is done only where channels disagree.
         if max(together.values()) > _CONSISTENT and len(alike) > 1:
             again = [run_forces(model, run, values, {name}) for run in runs]
             others = _disagreements(runs, again, values)
             alone = others.pop(name)
+            # A faulty channel pulls the common force towards itself and hides a part of its fault, but not where
+            # it is left out.
             ratio = max(ratio, alone)
             without = max((others[other] for other in alike if other != name), default=ratio)
             missing_force_n2 = float(np.mean([_missing_force_power_n2(model, forces) for forces in again]))
@@ -216,6 +223,8 @@ def _suspect_channel(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
         worst = max((sensor.ratio for sensor in group), default=0.0)
         if worst <= _CONSISTENT:
             continue
+        # Two channels that contradict each other are symmetric. What breaks the tie is that a false reading asks
+        # the blocks for forces, and the true one does not.
         if len(group) == 2:
             best, second = sorted(group, key=lambda sensor: sensor.missing_force_without_n2)
             if second.missing_force_without_n2 > _FEWER_FORCES * best.missing_force_without_n2:
@@ -227,6 +236,7 @@ def _suspect_channel(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
             return "", f"{names} contradict each other; with two of them alone nothing says which is wrong"
         best, second = sorted(group, key=lambda sensor: _excess(sensor.disagreement_without))[:2]
         left, next_left = _excess(best.disagreement_without), _excess(second.disagreement_without)
+        # Both are needed: leaving it out must help much, and leaving out any other must help less.
         if left < _EXPLAINED * _excess(worst) and next_left > _RUNNER_UP * left:
             return best.channel, ""
         return "", "channels of one motion contradict each other, and leaving out one does not make them agree"
@@ -236,6 +246,7 @@ def _suspect_channel(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
 def _missing_force_power_n2(model: RigModel, forces: RunForces) -> float:
     """Mean square of what the blocks lack beyond noise and their own parameters; never zero."""
     sizes = [
+        # Never zero, since sizes are compared by their ratio.
         max(own.power_n2, _RESOLVED * own.standard_error_n**2)
         for own in (beyond_own_parameters(model, forces, force) for force in forces.forces)
     ]
@@ -243,6 +254,7 @@ def _missing_force_power_n2(model: RigModel, forces: RunForces) -> float:
 
 
 def _excess(ratio: float) -> float:
+    # Mean square beyond noise; the floor keeps ratios of two channels without excess finite.
     return max(ratio**2 - 1.0, 0.02)
 
 
@@ -322,6 +334,7 @@ def _parts(
             force = forces.at(place)
             if force is not None:
                 own = beyond_own_parameters(model, forces, force)
+                # A force within its own noise explains mismatch only by fitting that noise.
                 if own.power_n2 < _RESOLVED * own.standard_error_n**2:
                     continue
                 series[place] = channel_responses(forces, observed, model.rig, own)
@@ -334,11 +347,16 @@ def _parts(
             for place, shown in series.items():
                 if observation.channel != suspect:
                     part[place] += _per_part(
+                        # The inner product of mismatch and response: a response that does not look like the
+                        # mismatch counts for nothing, and one against it is subtracted. A sum of squares would
+                        # count both.
                         (missed * _weighted(observation, shown[observation.channel], {})).sum(axis=1)
                     )
+            # Where a suspect is known the disagreement of the others with it is its own, and counts once.
             if SENSOR in part and observation in comparable and (not suspect or observation.channel == suspect):
                 left = _weighted(observation, forces.left[observation.channel], {})
                 power = (left**2).mean(axis=1)
+                # Less one for each coefficient: that much is noise.
                 beyond = np.where(power.mean() > _CONSISTENT**2, (left**2 - 1.0).sum(axis=1), 0.0)
                 part[SENSOR] += _per_part(beyond)
         parts.append(part)
@@ -359,11 +377,13 @@ def _shares(parts: Sequence[Mapping[str, FloatArray]], seed: int) -> dict[str, t
     )
 
     def share(columns: NDArray[Any]) -> FloatArray:
+        # Shares are of sums, not means of shares: a stretch in which nothing moves says nothing about them.
         size = np.maximum(table[:, columns].sum(axis=1), 0.0)
         return size / size.sum() if size.sum() > 0 else np.full(len(names), np.nan)
 
     best = share(np.arange(table.shape[1]))
     generator = np.random.default_rng(seed)
+    # Block bootstrap: whole stretches of all runs are drawn, as residuals within one are not independent.
     draws = [share(np.asarray(generator.integers(0, table.shape[1], table.shape[1]))) for _ in range(_N_DRAWS)]
     low, high = np.nanquantile(np.array(draws), (0.05, 0.95), axis=0) if np.isfinite(best).all() else (best, best)
     return {
@@ -389,7 +409,10 @@ def own_tolerances(model: RigModel, forces: RunForces, place: str) -> FloatArray
     own = np.zeros(3)
     structure = forces.structure
     if structure is not None and place in (STRUCTURE, EITHER):
+        # Modal numbers as seen from the tank, where the force acts: divided by the square of the deflection
+        # there.
         scale = 1.0 / structure.mode_shape[0] ** 2
+        # Twice, as a stiffness goes with the square of the frequency.
         own[0] = 2 * tolerance("frequency of mode 1") * structure.stiffnesses_n_per_m[0] * scale
         own[1] = tolerance("damping of mode 1") * structure.dampings_kg_per_s[0] * scale
         own[2] = tolerance("modal mass of mode 1") * structure.masses_kg[0] * scale
@@ -418,10 +441,14 @@ def beyond_own_parameters(model: RigModel, forces: RunForces, force: LatentForce
     if not free.any():
         return force
     scaled = force.motion[:, free] * tolerances[free]
+    # RMS of acceleration over that of velocity is the angular frequency of the motion. Samples are far closer
+    # than independent readings; about as many as the motion has radians are taken for those.
     spread = force.motion[:, 2].std() / max(force.motion[:, 1].std(), 1e-300)
     duration = force.time_s[-1] - force.time_s[0]
     independent = max(4.0, duration * spread)
     squares = scaled.T @ scaled
+    # Ridge regression: the prior of a number in tolerances is a unit normal one. All of the force is taken for
+    # noise, so that little of it goes to the block's own numbers unless the motion says so.
     ridge = force.force_n.size / independent * float(np.var(force.force_n))
     ridge = max(ridge, 1e-9 * float(np.trace(squares)), 1e-30)
     numbers = np.linalg.solve(squares + ridge * np.eye(scaled.shape[1]), scaled.T @ force.force_n)

@@ -43,8 +43,11 @@ def lapped_spectra(values: ArrayLike, n_bands: int) -> FloatArray:
     n = n_bands
     n_blocks = -(-series.size // n) + 1
     padded = np.zeros((n_blocks + 1) * n)
+    # A block of zeros on each side: every sample is seen by two blocks, without which the transform is not
+    # orthonormal.
     padded[n : n + series.size] = series
     halves = padded.reshape(n_blocks + 1, n)
+    # Squares of the two halves add to one (Princen and Bradley's condition).
     window = np.sin(np.pi * (np.arange(2 * n) + 0.5) / (2 * n))
     first, second = halves[:-1] * window[:n], halves[1:] * window[n:]
     h = n // 2

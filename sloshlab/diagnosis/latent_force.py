@@ -133,6 +133,7 @@ def run_forces(
         If the baseline does not reach the end of the run.
     """
     run = observed[0].run
+    # A fault of a driving channel is taken out of the drive; one of another channel only changes what it reads.
     undone = [fault for fault in extension.faults if fault.channel in model.driving(run)]
     simulation = model._simulation(run, values, extension, undone)
     readings = model.simulate(run, values, extension)
@@ -174,6 +175,8 @@ def channel_responses(
     moved = np.zeros(frequency.size, complex)
     if structure is not None:
         moved = forces.carried_mass_kg * response(structure, structure.mode_shape, 2, frequency)
+    # F = M ü − f between structure and tank: a force on the tank moves it and is itself seen by the cell, one on
+    # the structure only moves it.
     of_force = moved - (1.0 if force.place == TANK else 0.0)
     shown = {}
     for observation in observed:
@@ -201,9 +204,11 @@ def _missed(
     known = observation.known[:n]
     difference[:n][known] = (recorded_[:n] - reading[:n])[known]
     if not observation.keeps_mean:
+        # The mean of a channel whose zero means nothing would be asked for as a constant force.
         difference[:n][known] -= difference[:n][known].mean()
     if is_free:
         difference[0] = 2 * difference[1] - difference[2]  # the first sample may still be held
+    # Divided by the gain: forces are in true newtons, not in those of a sensor that reads too much.
     return difference * _taper(recorded_.size, is_free) / values.get(f"gain of {observation.channel}", 1.0)
 
 
@@ -213,6 +218,7 @@ def _taper(n: int, is_free: bool) -> FloatArray:
     ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(m) + 0.5) / m)
     window = np.ones(n)
     window[n - m :] = ramp[::-1]
+    # The first cycles of a release hold most of its information.
     if not is_free:
         window[:m] = ramp
     return window
@@ -229,6 +235,8 @@ def _noise_power(observation: Observation, frequency_hz: FloatArray) -> FloatArr
     It grows below 1.5 Hz: accelerometers drift, and displacements of a base are integrated from accelerometers.
     """
     variance = np.interp(frequency_hz, observation.frequencies_hz, np.median(observation.variance, axis=0))
+    # Without this a driven base that is slowly off asks for a force which is not there. Displacements of a decay
+    # are read by a sensor of their own.
     if _order(observation.channel) == 2 or (_order(observation.channel) == 0 and not observation.run.is_free):
         variance = variance * (1 + (_SLOW_HZ / np.maximum(frequency_hz, 1e-3 * _SLOW_HZ)) ** 4)
     return np.asarray(variance * observation.known.size)
@@ -250,9 +258,12 @@ def _on_structure(
     orders = [response(structure, structure.mode_shape, order, frequency) for order in range(3)]
     moved = np.stack([in_time(transfer * inverted.spectrum, n) for transfer in orders], axis=-1)[:sampled]
     started = np.stack([_release(structure, structure.mode_shape, order, n, rate) for order in range(3)], axis=-1)
+    # The force acts along the motion that was recorded, not along the one that was simulated without it.
     moved = moved + at_release * started[:sampled]
     relative, absolute = simulation.places[:sampled, 0] + moved, simulation.places[:sampled, 1] + moved
     force = in_time(inverted.spectrum, n)[:sampled]
+    # The baseline's own springs and dampers are other forces along another motion. What they change by is not
+    # missing.
     on_structure = _change_of_baseline_force(simulation, simulation.twin, STRUCTURE, relative, rate)
     in_tank = _change_of_baseline_force(simulation, simulation.twin, TANK, absolute, rate)
     kept = _untapered(n, run.is_free)
@@ -264,10 +275,13 @@ def _on_structure(
         return LatentForce(run, place, series[kept], error, time[kept], motion[kept])
 
     measured = _measured(observed, believed, missed)
+    # Motion alone tells the sum of both forces only.
     if measured is None:
         return (latent(EITHER, force - on_structure - in_tank, inverted.noise, relative),), left
     missed_force, force_noise = measured
     inertia = simulation.twin.carried_mass_kg * orders[2]
+    # What a wrong release adds to the force between structure and tank is inertia, no missing force of the
+    # liquid.
     of_release = at_release * simulation.twin.carried_mass_kg * started[:, 2] * _taper(n, run.is_free)
     liquid = (
         inertia * inverted.spectrum - in_frequency(missed_force - of_release) - in_frequency(_padded(in_tank, n))
@@ -277,6 +291,7 @@ def _on_structure(
     # noisy.
     kept_share = wiener_gain(np.abs(liquid) ** 2, noise, frequency, rate)
     in_liquid = in_time(kept_share * liquid, n)[:sampled]
+    # The remainder, so that both parts add up to the inverted force whatever the regularisation took.
     of_structure = force - in_tank - in_liquid - on_structure
     return (
         latent(STRUCTURE, of_structure, inverted.noise + kept_share * noise, relative),
@@ -309,6 +324,8 @@ def _inverted_force_at_tank(
                 released[observation.channel] = in_frequency(
                     _release(structure, weights, _order(observation.channel), n, rate) * _taper(n, True)
                 )
+    # All channels have a residual after the inversion, also those that were left out of it: that is what tests
+    # them.
     spectra = {name: in_frequency(missed[name]) for name in receptances}
     seen = {
         observation.channel: (receptances[observation.channel], _noise_power(observation, frequency))
@@ -330,6 +347,7 @@ def _release(structure: Structure, weights: FloatArray, order: int, n: int, rate
     pole = -decay + 1j * np.sqrt(np.maximum(omega**2 - decay**2, 0.0))
     start = structure.static_deflection(1.0)
     turning = np.where(pole.imag > 0, pole.imag, np.inf)
+    # Released from rest: with this factor the velocity at the start is zero. A mode that does not turn has none.
     factor = start * (1 - 1j * decay / turning) * weights
     time = np.arange(n) / rate_hz
     return np.asarray((np.exp(np.outer(time, pole)) * pole**order @ factor).real)
@@ -350,6 +368,8 @@ def _on_shaker(
     frequency = frequencies_hz(n, rate)
     sampled = min(n, simulation.places.shape[0])
     motions = [observation for observation in observed if _order(observation.channel) == 2]
+    # The tank's own motion is measured: the mean of the accelerometers that are believed is the input, and their
+    # differences from it are left to the sensors.
     good = [motion for motion in motions if motion in believed] or motions
     mean = np.mean([missed[observation.channel] for observation in good], axis=0) if good else np.zeros(n)
     left = {motion.channel: missed[motion.channel] - mean for motion in motions}
@@ -359,6 +379,7 @@ def _on_shaker(
     missed_force, force_noise = measured
     carried = simulation.twin.carried_mass_kg
     of_noise = np.interp(frequency, *force_noise)
+    # The mean of n accelerometers has 1/n² of the sum of their noise powers.
     for observation in good:
         of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(observation, frequency)
     wanted = in_frequency(carried * mean - missed_force)
@@ -387,6 +408,7 @@ def _measured(
     if not chosen:
         return None
     n_cells = sum(observation.channel.startswith("force_cell") for observation in observed)
+    # Cells that are left out are taken to carry as much as the others do.
     scale = n_cells / len(cells) if cells else 1.0
     total = scale * np.sum([_sign(observation) * missed[observation.channel] for observation in chosen], axis=0)
     frequency = chosen[0].frequencies_hz
@@ -416,6 +438,8 @@ def _change_of_baseline_force(
     chosen = [i for i, term in enumerate(twin.terms) if term.place == place]
     if not chosen:
         return np.zeros(motion.shape[0])
+    # The forces alone, on a prescribed motion: contacts and forces with memory are integrated by the same
+    # engine.
     simulated = simulation.forces_n[: motion.shape[0], chosen].sum(axis=1)
     alone = Twin(None, tuple(_moved_to_tank(twin.terms[i]) for i in chosen))
     drive = recorded(rate_hz, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])

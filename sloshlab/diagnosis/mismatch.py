@@ -63,6 +63,7 @@ def mismatches(
         level = _acceleration_g(observed)
         for observation in observed:
             residual = observation.residual(readings[observation.run.name][observation.channel])
+            # Less one, the noise; cut off above, as a coefficient that is known too well would be all of it.
             excess = np.maximum(np.minimum(residual**2, 1e6) - 1.0, 0.0)
             blocks = level if level.size == excess.shape[0] else np.full(excess.shape[0], np.nan)
             found.append(
@@ -118,5 +119,6 @@ def _acceleration_g(observed: Sequence[Observation]) -> FloatArray:
     chosen = [observation for observation in observed if observation.channel.startswith("acceleration")]
     if not chosen:
         return np.zeros(0)
+    # Per block as the misfit is, from the recording and not the simulation, which is what is doubted.
     power = np.mean([(observation.spectra**2).mean(axis=1) for observation in chosen], axis=0)
     return np.asarray(np.sqrt(2 * power) / GRAVITY_M_PER_S2)

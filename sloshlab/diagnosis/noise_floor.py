@@ -77,6 +77,8 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
             for run in case.runs
         }
     sensors = {name: _with_simulated(observed, raw[name]) for name, observed in plain.items()}
+    # The noise of drives goes in before the scatter of repeats, as a lower limit to it: a resonance passes that
+    # noise in a band so narrow that two repeats tell little of it.
     noise = _noise_of_drives(case, model, sensors, fit)
     plain = {
         name: [
@@ -88,6 +90,7 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     repeated: list[Observation] = []
     alone: list[CaseRun] = []
     for test in case.tests():
+        # A test that was not repeated has to wait for the scatter of all that were.
         if len(test) < 2:
             alone += test
             continue
@@ -100,6 +103,7 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     return {
         name: within_informative_bands(
             [
+                # Judged by the final variance: whether something stands out of the noise depends on all of it.
                 _ignored_where_drive_noise_dominates(observation, of_sensor, noise)
                 for observation, of_sensor in zip(observed, sensors[name], strict=True)
             ]
@@ -118,6 +122,7 @@ def _noise_of_drives(
     (`_spectrum_of_drive_noise`). Of several that drive together each may have to do so alone, beside an effect on
     the others, and the noisiest counts.
     """
+    # A twin of a user's own cannot be asked what the noise of its drive makes of its channels.
     if not isinstance(model, RigModel) or case.rig is None:
         return {}
     found: dict[tuple[str, str], FloatArray] = {}
@@ -129,6 +134,7 @@ def _noise_of_drives(
     }
     for run in case.runs:
         driving = model.driving(run)
+        # In free runs nothing drives.
         if run.is_free or not plain[run.name]:
             continue
         for kept in driving:
@@ -136,6 +142,7 @@ def _noise_of_drives(
             recording = run.recording.drop_vars([name for name in driving if name != kept])
             kept_alone, spectrum = replace(run, recording=recording), spectrum_of[kept]
             for place, noise in _propagated_noise(case, kept_alone, kept, spectrum, plain=plain, fit=fit).items():
+                # The maximum, not the sum: one sensor at a time drives alone.
                 found[place] = np.maximum(found.get(place, 0.0), _over_bands_of_a_resonance(noise))
     return found
 
@@ -202,6 +209,7 @@ def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
     ratios: list[FloatArray] = []
     frequencies: FloatArray = np.zeros(1)
     for test in case.tests():
+        # Only repeats tell noise from motion; runs of other tests move otherwise.
         for first, other in itertools.pairwise(run for run in test if name in run.recording and not run.is_free):
             rate = first.attributes.sampling_rate_hz
             a, b = (np.asarray(run.recording[name].values, np.float64) for run in (first, other))
@@ -210,6 +218,7 @@ def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
                 continue
             # The signal of repeats cancels; the noise of two independent readings adds.
             difference = (a - b) / np.sqrt(2)
+            # Drives that were not repeated exactly would be taken for noise.
             if not np.isfinite(difference).all() or difference.std() > _MOST_OF_STATED * std:
                 continue
             n = min(a.size, round(_SECONDS_OF_A_SPECTRUM * rate))
@@ -217,14 +226,17 @@ def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
             if ratios and density.shape != ratios[0].shape:
                 continue
             frequencies = frequency
+            # 2σ²/f_s is the one-sided density of white noise of this standard deviation.
             ratios.append(density / (2 * std**2 / rate))
     if not ratios:
         return _WHITE
     mean = np.mean(ratios, axis=0)
+    # Averaged over an octave: a periodogram of few segments scatters by its own size.
     low = np.minimum(np.searchsorted(frequencies, frequencies / np.sqrt(2)), frequencies.size - _FEWEST_LINES)
     high = np.maximum(np.searchsorted(frequencies, frequencies * np.sqrt(2)), low + _FEWEST_LINES)
     sums = np.concatenate([[0.0], np.cumsum(mean)])
     high = np.minimum(high, mean.size)
+    # Never below one: the stated noise, that of high frequencies, is the least.
     return _NoiseSpectrum(frequencies, np.maximum((sums[high] - sums[low]) / (high - low), 1.0))
 
 
@@ -244,6 +256,8 @@ def _propagated_noise(
     std, values = noise_of_sensor(run, driving), np.asarray(variable.values, np.float64)
     found: dict[tuple[str, str], FloatArray] = {}
     with suppress(SloshlabError):
+        # The recorded drive has its noise already, in a draw that nobody knows. As much noise once more changes
+        # the simulation by as much, on average.
         noise_free = _readings(case, run, fit)
         # Fixed seeds: the same case gives the same answer.
         for seed in range(_N_NOISE_DRAWS):
@@ -262,6 +276,8 @@ def _propagated_noise(
                     )
     for observation in plain[run.name]:
         if observation.channel not in run.recording.data_vars:
+            # A sensor that was left out of the drive is compared with the motion of the one kept, and so with
+            # its noise.
             found[run.name, observation.channel] = np.full(observation.spectra.shape, std**2)
     return found
 
@@ -272,6 +288,8 @@ def _over_bands_of_a_resonance(square: FloatArray) -> FloatArray:
     Noise through a resonance is steady and narrow; where the resonance is, only the fit will tell, and neither
     bands of too little nor of too much variance must attract it.
     """
+    # A smear over neighbouring bands instead was tried: fits moved modes out of the compared bands, damped them
+    # and lessened their share in the motion of the base.
     steady = uniform_filter(square, (_N_BLOCKS, 1), mode="nearest")
     bands = np.arange(square.shape[1])
     reach = np.ceil(_RELATIVE_REACH * (bands + 0.5)).astype(int)
@@ -282,6 +300,7 @@ def _over_bands_of_a_resonance(square: FloatArray) -> FloatArray:
 
 def _readings(case: Case, run: CaseRun, fit: FreeRunFit) -> dict[str, FloatArray]:
     assert case.rig is not None
+    # A model of its own, as drives are cached by the name of a run and this run has another drive.
     return RigModel(case.rig, case.folder, [run]).simulate(run, fit.values, NOTHING)
 
 

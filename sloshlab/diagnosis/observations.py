@@ -93,6 +93,8 @@ class Observation:
         The simulation counts, too: driven by a faulty sensor it moves where nothing is recorded.
         """
         shown = [spectra for spectra in (self.spectra, self.simulated) if spectra is not None]
+        # The square of a single coefficient of noise scatters by its own size. The mean of nine independent ones
+        # exceeds four variances in 4 of 100 000 cases (χ² with nine degrees of freedom).
         power = np.max([uniform_filter(spectra**2, (3, 3), mode="nearest") for spectra in shown], axis=0)
         return np.asarray(power > _INFORMATIVE * self.variance)
 
@@ -104,6 +106,9 @@ class Observation:
         """Whitened residual: recorded minus simulated spectra in standard deviations, shape (n_blocks,
         n_bands).
         """
+        # Division by the standard deviation of each coefficient makes the sum of squares a negative
+        # log-likelihood of independent normal errors; the lapped transform is orthogonal and keeps white noise
+        # white.
         return np.asarray((self.spectra - self.of(values)) / self._deviation)
 
     @cached_property
@@ -138,16 +143,22 @@ def observations(
     for name in names:
         variable = run.recording[name]
         values = np.asarray(variable.values, np.float64)
+        # Samples at the end of a stated range are known to be beyond it only, which no residual can say.
         known = np.isfinite(values) & ~clipped_samples(variable)
         # Less than two blocks have no spectrum to compare.
         if known.sum() < 2 * n_bands:
             continue
+        # The zero of accelerometers and force sensors means nothing; a displacement has a static part.
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
         spectra = _spectra(values, known, keeps_mean, n_bands, run)
+        # Without it a channel that states no noise and has quiet high bands would be known beyond its
+        # quantisation.
         least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
         variance = np.full(spectra.shape, max(_stated_variance(variable), _white_level(spectra), least, 1e-300))
         is_rough = float(variable.attrs.get("known_to", 0.0)) > 0.0
         observation = Observation(run, name, keeps_mean, known, spectra, variance, is_rough=is_rough)
+        # In a refit, drift that integration had removed from the base became physics: these bands must not be
+        # fitted.
         lost = slow_displacements(observation, driving)
         if lost.any():
             times = observation.times_s
@@ -196,6 +207,8 @@ def _n_bands(run: CaseRun) -> int:
 
 def _stated_variance(variable: xr.DataArray) -> float:
     """Variance of the noise and of what no model need describe, as the recording states them; zero where not."""
+    # `known_to` counts as if it were white noise. That is right for the size of a residual, not for its repeats,
+    # which is why the channel is marked as rough.
     return float(variable.attrs.get("noise_std", 0.0)) ** 2 + float(variable.attrs.get("known_to", 0.0)) ** 2
 
 
@@ -213,10 +226,12 @@ def within_informative_bands(observed: Sequence[Observation]) -> list[Observatio
     observed : sequence of Observation
         Of one run.
     """
+    # Channels of different rates have no bands in common.
     if len({observation.n_bands for observation in observed}) != 1:
         return list(observed)
     n_bands, highest = observed[0].n_bands, 0
     for observation in observed:
+        # Bands that hold only noise add a constant to the cost, and time to every residual.
         shown = np.flatnonzero(observation.informative.mean(axis=0) > _LEAST_SHARE_OF_BLOCKS)
         highest = max(highest, int(shown[-1]) + 1 if shown.size else 0)
     n_kept = min(n_bands, max(highest + n_bands // 16, n_bands // 8))
@@ -263,7 +278,10 @@ def with_scatter(
         if len(parts) != n:
             continue
         stacked = np.stack(parts)
+        # About the mean of the repeats, not about zero: what the simulation misses in every repeat alike stays
+        # visible, and the chaos of a liquid does not count.
         about = ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0) / (n - 1)
+        # Two repeats leave one degree of freedom per coefficient; 27 neighbours together tell a variance.
         scatter[name] = uniform_filter(about, (3, 9), mode="nearest")
     return [
         [
@@ -298,7 +316,10 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
             weighted.append(observation)
             continue
         alike = [source for source in alike if source.informative.any()]
+        # A repeated test has other levels at other times, so that its variance cannot be taken over place by
+        # place.
         quiet = np.min([np.median(source.variance, axis=0) for source in alike], axis=0)
+        # The median over the repeats, so that a burst in one of them does not set it.
         share = float(
             np.median(
                 [
@@ -313,6 +334,7 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
 
 
 def _weighted(observation: Observation, variance: FloatArray) -> Observation:
+    # Repeats that agree by chance must not make a coefficient better known than its sensor.
     return replace(observation, variance=np.maximum(variance, observation.variance))
 
 
@@ -324,10 +346,12 @@ def _spectra(
     An abrupt end leaks the scatter of strong bands into weak ones, where it would count far too much. A release
     has a short taper at its start: its first cycles hold most of the information.
     """
+    # Lost samples are zero in the recording and in the simulation alike, so that they leave no residual.
     masked = np.zeros(known.size)
     n = min(known.size, values.size)
     chosen = known[:n]
     part = values[:n][chosen]
+    # The mean of the known samples alone, on both sides: zeros of the lost ones would shift it.
     masked[:n][chosen] = part if keeps_mean or not part.size else part - part.mean()
     n_in, n_out = max(1, n_bands // (32 if run.is_free else 2)), max(1, n_bands // 2)
     if n_in + n_out <= masked.size:

@@ -53,6 +53,7 @@ def in_parallel(pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Ca
     fork, line = forked(_work_off_queue, pieces, taken, known)
     try:
         with _sharing_cores():
+            # Threads of this process would share its core with the fork.
             results = {i: pieces[i]() for i in _untaken_pieces(taken, len(pieces))}
         with suppress(OSError, EOFError):  # the fork was killed
             results |= _Reader(io.BytesIO(line.recv_bytes()), known).load()

@@ -122,7 +122,9 @@ def _sizes(run: CaseRun, channel: str, simulated: FloatArray) -> tuple[float, fl
     known = np.isfinite(values[:n])
     if known.sum() < _FEWEST_SAMPLES:
         return None
+    # About the mean, as the zero of most sensors means nothing.
     recorded, shown = float(values[:n][known].std()), float(simulated[:n][known].std())
+    # Rounding of a constant, whatever its size.
     if recorded <= 1e-12 * max(1.0, float(np.abs(values[:n][known]).max())):
         raise InputError(
             f"recording {run.name}: {channel}",
@@ -136,6 +138,8 @@ def _sizes(run: CaseRun, channel: str, simulated: FloatArray) -> tuple[float, fl
 def _require_same_magnitude(ratios: Mapping[str, list[tuple[float, str, float, float]]]) -> None:
     """A channel that is off in every run; one that moves in some is no matter of units."""
     for channel, found in ratios.items():
+        # A friction that holds a tank in one run makes a ratio of any size; wrong units make the same one in
+        # all.
         off = [ratio for ratio in found if not 1 / LARGEST_RATIO < ratio[0] < LARGEST_RATIO]
         if off and len(off) == len(found):
             _, name, recorded, simulated = max(off, key=lambda ratio: abs(np.log(ratio[0])))

@@ -163,6 +163,7 @@ def _sorted_by(
     if motion is None or motion[0].size != excess.shape[0]:
         return _Block(excess, np.full(excess.shape, np.nan), missing, missing)
     amplitude, frequency, purity = motion
+    # An order means nothing where the motion has several frequencies.
     pure = np.where(purity > _NARROW, frequency, np.nan)
     order = observation.frequencies_hz[None, :] / pure[:, None]
     return _Block(excess, order, amplitude / GRAVITY_M_PER_S2, 2 * np.pi * pure)
@@ -185,12 +186,14 @@ def _phase(observed: Sequence[Observation]) -> FloatArray | None:
     power = np.abs(np.fft.rfft(series - series.mean())) ** 2
     frequency = np.fft.rfftfreq(series.size, 1 / rate)
     main = float(frequency[power.argmax()])
+    # Fewer than four cycles, or than four samples in each, have no phase.
     if not 4 * rate / series.size < main < 0.25 * rate:
         return None
     narrow = sosfiltfilt(butter(2, (main / 1.6, 1.6 * main), "bandpass", fs=rate, output="sos"), series)
     if np.mean(narrow**2) < _NARROW * np.mean((series - series.mean()) ** 2):
         return None
     phase = np.angle(hilbert(narrow))
+    # Where the motion has died away the phase is that of a ringing filter.
     size = np.abs(hilbert(narrow))
     return np.asarray(np.where(size > 0.03 * size.max(), phase, np.nan))
 
@@ -201,6 +204,7 @@ def _in_time(observation: Observation, values: FloatArray) -> FloatArray:
     n = min(recorded.size, values.size)
     rest = np.full(recorded.size, np.nan)
     rest[:n] = np.where(observation.known[:n], recorded[:n] - values[:n], np.nan)
+    # As in the comparison itself, a mean that means nothing is no residual.
     if not observation.keeps_mean:
         rest -= np.nanmean(rest)
     return np.asarray(np.minimum(rest**2 / float(np.median(observation.variance)), _LARGEST) - 1.0)

@@ -43,8 +43,12 @@ class ScoreTest:
         inflation_weights = problem.inflation_weights(inflation)
         # A wide Huber limit: far from the optimum large residuals are what an effect has to explain.
         self._weights = inflation_weights * robust_weights(inflation_weights * residual, 10.0)
+        # Everything that does not depend on the candidate is computed once: a search tests seventy to ninety of
+        # them, each from several starts.
         self._weighted, self._left = jacobian.weighted(self._weights), self._weights * residual
         self._can_move = np.flatnonzero(~problem.at_bounds(theta))
+        # The prior is part of the nuisance parameters' information, so that a gain cannot be had by moving a
+        # mass out of what is believed of it.
         prior = problem.prior
         movable = np.ix_(self._can_move, self._can_move)
         self._inverse = np.linalg.pinv((self._weighted.normal() + np.diag(prior))[movable])
@@ -56,6 +60,7 @@ class ScoreTest:
         touched = self._weighted.transposed_times(direction)[self._can_move]
         # What the parameters of the fit can follow is no gain of the effect (projection onto their complement).
         followed = self._inverse @ touched
+        # Schur complement: information about the effect that is left when the baseline may follow.
         size = float(direction @ direction - followed @ touched)
         along = float(direction @ self._left - followed @ self._gradient)
         inflation = along / size if size > 0 else 0.0

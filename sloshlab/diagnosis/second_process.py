@@ -67,6 +67,7 @@ class SecondProcess:
 
     def done(self, runs: Runs, values: Values, candidates: Sequence[Candidate]) -> FloatArray | None:
         """The work on some runs; None where it is busy, has failed or has ended."""
+        # Nobody waits for it: the caller simulates by itself meanwhile.
         if not self._is_busy.acquire(blocking=False):
             return None
         try:
@@ -76,6 +77,7 @@ class SecondProcess:
             )
             n = self._line.recv()
             self.n_done += n is not None
+            # Residuals come through shared memory, not as messages; the next work writes over them.
             return None if n is None else self._shared[:n].copy()
         except (OSError, EOFError):
             return None
@@ -119,6 +121,7 @@ def second_process(
         unknown = [candidate for candidate in candidates if candidate not in present.candidates]
         if not unseen and not unknown:
             return present
+        # Ended before the next one is made: each kept the memory of its messages.
         present.ending()
         observed, candidates = [*present.observed.all, *unseen], [*present.candidates.all, *unknown]
     found = _PRESENT[model] = SecondProcess(work, model, observed, candidates)

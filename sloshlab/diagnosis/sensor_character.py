@@ -105,13 +105,17 @@ def _forms(observation: Observation, error: FloatArray) -> Mapping[str, FloatArr
     recording = observation.run.recording
     rate = observation.run.attributes.sampling_rate_hz
     reading = np.nan_to_num(np.asarray(recording[observation.channel].values, np.float64))
+    # What the other sensors say, not what this one reads: a regression on a faulty reading is biased towards its
+    # fault.
     truth = reading - error
     truth = truth - (0.0 if observation.keeps_mean else truth.mean())
     time = np.arange(truth.size) / rate
     time = time - time.mean()
     slope = np.gradient(truth) * rate
     integral = np.cumsum(truth - truth.mean()) / rate
+    # An integral drifts by what the zero of the reading is off; the trend is a form of its own.
     integral = integral - np.polyval(np.polyfit(time, integral, 1), time)
+    # A sensor that clips reads its limit as its largest value.
     limit = float(np.abs(reading).max())
     lines = [part for line in _MAINS_HZ if line < 0.5 * rate for part in _line(line, time)]
     forms = {

@@ -51,6 +51,8 @@ def split(case: Case) -> Split:
         # Interpolation between levels is validated, not extrapolation: the smallest and the largest level are
         # fitted.
         if len(ordered) >= 3:
+            # Whole tests: repeats of a fitted test share its drive and would judge an effect that was fitted to
+            # just that.
             for test in ordered[1:-1:2]:
                 held += test
     limits = []

@@ -48,7 +48,9 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
         place = model.motion(run, fit.values)
         largest = np.maximum(largest, np.abs(place).max(axis=0))
         rms = place.std(axis=0)
+        # RMS of acceleration over that of velocity; of one frequency it is exact.
         frequencies.append(rms[2] / max(rms[1], 1e-12) / (2 * np.pi))
+        # One for a harmonic motion and more for any other (Cauchy and Schwarz).
         spreads.append(rms[2] * rms[0] / max(rms[1] ** 2, 1e-300))
     return Surroundings(
         rig=cast(Rig, rig),
@@ -85,6 +87,7 @@ def _incoherent_with_base(fitting: Sequence[Sequence[Observation]]) -> frozenset
             if not np.isfinite(run.recording[name].values).any():
                 continue
             own = _analytic(run.recording[name].values)
+            # Sums over runs, not means of coherences: a gain and a delay have to be the same in all of them.
             part = np.array([np.vdot(base, own), np.vdot(base, base), np.vdot(own, own)])
             products.setdefault(name, []).append(part)
     sums = {name: np.abs(np.sum(parts, axis=0)) for name, parts in products.items()}
@@ -120,6 +123,7 @@ def residual_peaks_hz(
         own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
         first += observation.spectra.size
         n = observation.spectra.shape[1]
+        # Over the noise, so that channels of all units add up and one that shows a mode well counts most.
         power[:n] += (own**2).sum(axis=0)
         count[:n] += observation.spectra.shape[0]
         frequencies[:n] = observation.frequencies_hz

@@ -31,6 +31,7 @@ def named_and_units(parameter: str) -> tuple[str, str]:
     >>> named_and_units("stribeck_velocity_m_per_s"), named_and_units("ratio")
     (('stribeck velocity', 'm/s'), ('ratio', ''))
     """
+    # Longer endings come first in the list, as `_m` is the end of `_n_per_m`, too.
     for ending, units in _UNITS:
         if parameter.endswith(ending):
             return parameter.removesuffix(ending).replace("_", " "), units

@@ -30,6 +30,7 @@ def load_user_effects(path: str | Path) -> tuple[Effect, ...]:
         If it cannot be run, or registers no effect; one line that says why.
     """
     file = str(Path(path).resolve())
+    # Names of effects are taken once; a file that is loaded again would find its own names taken.
     for effect in _LOADED.pop(file, ()):
         withdraw(effect)
     before = known_effects()

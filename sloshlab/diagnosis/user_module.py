@@ -44,6 +44,7 @@ def user_module(path: str | Path, what: str) -> ModuleType:
     if specification is None or specification.loader is None:
         raise InputError(f"{what} {file}", got="a file that Python cannot load")
     module = importlib.util.module_from_spec(specification)
+    # Before it is run, as dataclasses look up the module of their class.
     sys.modules[name] = module
     try:
         specification.loader.exec_module(module)

@@ -30,6 +30,7 @@ def _rocks(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     return Extension(structure=BaseRocking(at.rig.structure, numbers["compliance_rad_per_n_m"]).of)
 
 
+# The root turns without mass or damping of its own, in the modes that the rig file has.
 ROCKING = register(
     Effect(
         "base_rocking",

@@ -102,6 +102,7 @@ def force_effect(
 
     def extension(numbers: Numbers, surroundings: Surroundings, channel: str) -> Extension:
         del channel
+        # Numbers that scale with the size of the effect are known from the rig and not fitted beside it.
         known = fixed(surroundings) if fixed is not None else {}
         return Extension(terms=(kind(place=block, **{**known, **numbers}),))
 

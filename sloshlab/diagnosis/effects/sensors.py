@@ -105,6 +105,7 @@ def _scaled(factor: Callable[[Numbers], float]) -> Callable[[Numbers], Reading]:
     return of
 
 
+# A gain of the only measured force is a mass: F = M ü.
 GAIN = _sensor_effect(
     "sensor_gain",
     "y → (1 + ε) y",
@@ -148,6 +149,8 @@ def _advanced(numbers: Numbers) -> Reading:
 def _shifted(values: FloatArray, samples: float) -> FloatArray:
     """Values delayed by `samples`, by a linear phase; the series is reflected at its ends."""
     margin = min(values.size - 1, 64 + int(abs(samples)))
+    # Reflected about the end points, so that value and slope go on: a Fourier transform takes the series for
+    # periodic, and the jump between its ends would ring into the run.
     padded = np.concatenate(
         [2 * values[0] - values[margin:0:-1], values, 2 * values[-1] - values[-2 : -margin - 2 : -1]]
     )
@@ -191,6 +194,7 @@ def _high_passed(numbers: Numbers) -> Reading:
 def _high_pass_undone(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
         del others, recorded
+        # Less its mean, whose integral would be a ramp.
         return np.asarray(values + np.nancumsum(values - np.nanmean(values)) / (numbers["time_constant_s"] * rate))
 
     return reading
@@ -217,6 +221,7 @@ def _clipped(numbers: Numbers) -> Reading:
     return reading
 
 
+# At the largest reading nothing clips and nothing changes, so that starts lie below it, too.
 CLIPPING = _sensor_effect(
     "sensor_clipping",
     "y → min(max(y, −limit), limit), limit in the unit of the channel",
@@ -231,6 +236,8 @@ CLIPPING = _sensor_effect(
 def _drifted(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
         del others, recorded
+        # From zero at the first sample, as the equation says: a drift about its mean would be a shifted offset
+        # as well.
         time = np.arange(values.size) / rate
         return np.asarray(values + numbers["rate"] * time)
 
@@ -254,6 +261,8 @@ def _with_hum(line_hz: float, sign: float) -> Callable[[Numbers], Reading]:
         def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
             """Its phase and the mains' frequency are free in every run: those of the residual."""
             del others
+            # Phase and frequency of the mains differ from run to run; free numbers for each run would be far
+            # more than the amplitude.
             left = recorded - values if sign > 0 else recorded
             return np.asarray(values + sign * numbers["amplitude"] * _line(np.nan_to_num(left), rate, line_hz))
 
@@ -315,6 +324,7 @@ def _interpolated(values: FloatArray, places: FloatArray) -> FloatArray:
     samples, known = np.arange(values.size), np.isfinite(values)
     if values.size <= _SPLINE_DEGREE or not known.any():
         return np.asarray(np.interp(places, samples, values))
+    # A spline through a lost sample would be lost throughout.
     whole = values if known.all() else np.interp(samples, samples[known], values[known])
     found = make_interp_spline(samples, whole, k=_SPLINE_DEGREE)(np.clip(places, 0, values.size - 1))
     return np.asarray(np.where(np.interp(places, samples, known) == 1.0, found, np.nan))
@@ -390,6 +400,7 @@ def _largest_leaks(at: Surroundings) -> Mapping[str, tuple[float, float]]:
     to, _, source = at.channel.partition("<")
     most = _LARGEST_LEAK * _ratio_of_readings(at)
     if to.partition("_")[0] == source.partition("_")[0]:
+        # A tenth for all was the bound before a base was found to add 14 % to the reading of a tank.
         is_base = to.endswith("_root")  # one that rests reads nothing else
         most = max(most, _LARGEST_LEAK) if is_base else _LARGEST_LEAK_OF_ITS_KIND * _ratio_of_readings(at)
     return {"ratio": (-most, most)}

@@ -71,6 +71,8 @@ VISCOUS = force_effect(
     separated_by=_OTHER_LEVELS + ", and at two frequencies",
     spoken_for_by=VISCOUS_CHARACTER,
 )
+# Dry friction gives the cost local minima, and what is named beside it is a draw to a degree: two simulations
+# that agree to three parts in a million have ended in different ones.
 COULOMB = force_effect(
     COULOMB_FRICTION,
     "structure",
@@ -83,10 +85,13 @@ COULOMB = force_effect(
 
 def _clearly_asymmetric(force_n: float) -> list[dict[str, tuple[float, float]]]:
     """More than twice as large in one direction, about the force that was found without a direction."""
+    # Fitted within these bounds and listed beside Coulomb friction: where no channel tells its constant part,
+    # asymmetric friction would be called by that name.
     more, less = (1.35 * force_n, 2.0 * force_n), (0.0, 0.65 * force_n)
     return [{"force_up_n": more, "force_down_n": less}, {"force_up_n": less, "force_down_n": more}]
 
 
+# The same force as dry friction of (F₊ + F₋)/2 with a constant force of (F₋ − F₊)/2, whatever is recorded.
 ASYMMETRIC = force_effect(
     ASYMMETRIC_FRICTION,
     "structure",
@@ -100,6 +105,8 @@ ASYMMETRIC = force_effect(
     includes=("coulomb_friction", "constant_force"),
     differs=_clearly_asymmetric,
 )
+# Where friction falls with the speed over all of the motion, what it takes away is what a damper adds: then it
+# cannot be told from Coulomb friction and a damper.
 STRIBECK = force_effect(
     STRIBECK_FRICTION,
     "structure",
@@ -125,6 +132,7 @@ DRAG = force_effect(
     separated_by=_OTHER_LEVELS,
     spoken_for_by=DRAG_CHARACTER,
 )
+# Per static stiffness of the structure, as a loss factor is stated; fitted together, both would be one number.
 STRUCTURAL = force_effect(
     STRUCTURAL_DAMPING,
     "structure",
@@ -153,6 +161,7 @@ LINEAR_STRUCTURAL = force_effect(
 
 def _bouc_wen(at: Surroundings) -> list[Numbers]:
     stiffness = 0.05 * _stiffness(at)
+    # Products that a recording can tell: force and shape of a Bouc–Wen loop depend on β γ and β δ only.
     return [
         {
             "stiffness_n_per_m": stiffness,
@@ -165,6 +174,7 @@ def _bouc_wen(at: Surroundings) -> list[Numbers]:
     ]
 
 
+# An exponent of one is a value like any other, so that it may rest at that bound.
 BOUC_WEN = force_effect(
     HYSTERESIS,
     "structure",
@@ -209,6 +219,7 @@ CUBIC = force_effect(
     separated_by="a larger range of amplitudes on both sides of rest",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION, THIRD_ORDER),
 )
+# A cubic spring about an offset is a cubic and a quadratic one.
 QUADRATIC = force_effect(
     QUADRATIC_STIFFNESS,
     "structure",
@@ -225,6 +236,7 @@ STIFFNESS = force_effect(
     separated_by="a known mass added to the tank",
     spoken_for_by=INERTIAL_CHARACTER,
 )
+# Its size is the stiffness: a larger gap is less of it.
 GAP = force_effect(
     CLEARANCE,
     "structure",
@@ -257,6 +269,7 @@ MODE = force_effect(
     includes=("mass_error", "stiffness_change", "viscous_damping"),
     size=("participation",),
 )
+# Of either sign, as a stiffness: on one mode a mass is a softer spring with less damping, whatever moves it.
 MASS = force_effect(
     MASS_ERROR,
     "structure",
@@ -266,6 +279,7 @@ MASS = force_effect(
     separated_by="a known mass added to the tank",
     spoken_for_by=INERTIAL_CHARACTER,
 )
+# It shows in the static part of a displacement, where the zero of the sensor may be off by as much.
 OFFSET = force_effect(
     CONSTANT_FORCE,
     "structure",

@@ -93,6 +93,7 @@ MASS = force_effect(
     separated_by="a known mass added to the tank, and a run with frozen liquid",
     spoken_for_by=INERTIAL_CHARACTER,
 )
+# A share β of the liquid's mass that does not follow is a mass of the tank: the two are always listed together.
 EFFECTIVE = force_effect(
     EFFECTIVE_MASS,
     "tank",
@@ -103,6 +104,7 @@ EFFECTIVE = force_effect(
     separated_by="runs with frozen and moving liquid, at several amplitudes",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION),
 )
+# Detunes a beam like a cubic spring or hysteresis, in the place of which it is tried.
 FADING = force_effect(
     FADING_MASS,
     "tank",
@@ -167,6 +169,8 @@ def _damping(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     return Extension(terms=(damper,))
 
 
+# A liquid whose damping fluctuates within a run, not only from run to run, looks like this too: a false alarm of
+# the second sealed trial was one.
 SLOSHING = register(
     Effect(
         "liquid_sloshing",
@@ -237,6 +241,8 @@ def _damps(at: Surroundings) -> bool:
 # A liquid that has broken up stays so: with a state that fell back as soon as the motion calmed down, a liquid
 # that is broken up for good could not be described.
 _NEVER_CALM_S: Final = 1e9
+# A level that agitates the liquid at once, like a step, left fits in local minima. A soft one leads out of them,
+# and its sharpness follows the recordings.
 DELAY = register(
     Effect(
         "breakup_delay",
@@ -273,6 +279,7 @@ DELAY = register(
         size=("time_constant_s",),
     )
 )
+# Work per cycle goes with the damping and the square of the level, so that (a_s/â)² keeps it where it is.
 SATURATION = register(
     Effect(
         "high_g_saturation",
@@ -306,6 +313,7 @@ def _knows_work(at: Surroundings) -> bool:
 
 
 # Work per cycle may go on growing, less than with the square of the level.
+# In a simulated tank W̄ falls with the power 0.76 from 4 g on, not with the square.
 GRADUAL_SATURATION = register(
     Effect(
         "gradual_saturation",
@@ -369,6 +377,8 @@ def _impact(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     return Extension(terms=(ball,))
 
 
+# Where impacts are violent the bounces are chaotic: with the true numbers one run of three was followed to the
+# noise and the others not at all.
 IMPACT = register(
     Effect(
         "ceiling_impact",
@@ -391,6 +401,7 @@ IMPACT = register(
         sought_at=lambda at: [_impact_numbers(at, *place) for place in _PLACES_OF_AN_IMPACT],
     )
 )
+# The tank has to rotate to drive it: on a beam's tip it does, in a guide it does not.
 LATERAL = force_effect(
     LATERAL_MODE,
     "tank",
@@ -406,6 +417,7 @@ LATERAL = force_effect(
     includes=("mass_error", "effective_mass"),
     size=("mass_kg",),
 )
+# A parametric instability: the wave is at half the frequency of the motion.
 FARADAY = force_effect(
     FARADAY_WAVE,
     "tank",
@@ -431,6 +443,8 @@ LOSS = force_effect(
     separated_by="the same test at the beginning and at the end of the day",
     spoken_for_by=(TIME_VARYING, ODD_IN_DISPLACEMENT),
 )
+# Far from its resonance it is a mass: trapped air of next to no stiffness was named for a mass that was missing,
+# before its special cases were tried in its place.
 CUSHION = force_effect(
     AIR_CUSHION,
     "tank",

@@ -25,6 +25,7 @@ def ceilings(fits: Fits, at: Surroundings, known: Sequence[Explanation], retuned
     best = best_fitting(known)
     if best is None:
         return _with_force_surface(fits, at, retuned)
+    # No description can leave less than noise.
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
     alone = _with_force_surface(fits, at, retuned)

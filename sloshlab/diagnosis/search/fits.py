@@ -73,6 +73,7 @@ class Fits:
         tests: Sequence[Sequence[str]] = (),
     ) -> None:
         self.model, self.fitting, self.held_out = model, fitting, held_out
+        # Nobody reads the progress of a fork.
         self.progress: Progress = lambda what, done, of: None if is_fork() else progress(what, done, of)
         self.tests = tests
         self.failed: dict[str, str] = {}
@@ -85,6 +86,7 @@ class Fits:
         Repeats have the same drive: one of them is enough for score tests of all candidates and for coarse fits.
         """
         test_of = {name: i for i, test in enumerate(self.tests) for name in test}
+        # A run of no known test is a test of its own.
         first: dict[object, list[Observation]] = {}
         for run in self.fitting:
             name = run[0].run.name
@@ -92,6 +94,7 @@ class Fits:
         if len(first) == len(self.fitting):
             return self
         fewer = Fits(self.model, list(first.values()), self.held_out, self.progress, self.tests)
+        # The same dictionaries, not copies: what fails in a coarse fit is reported, too.
         fewer.failed, fewer.screened = self.failed, self.screened
         return fewer
 
@@ -125,6 +128,7 @@ class Fits:
         candidates : iterable of Candidate
             Those that results may contain.
         """
+        # A user's own twin may not bear a fork, and of many readings each process would hold its own.
         if not self.model.may_be_forked:
             return [piece() for piece in pieces]
         return in_parallel(pieces, candidates)
@@ -162,12 +166,15 @@ class Fits:
     def validated(self, fit: FreeRunFit) -> Explanation:
         """A fit with its held-out error; only releases and offsets of the held-out runs are fitted to them."""
         shared = {name: value for name, value in fit.values.items() if not run_of(name, self.model)}
+        # Releases and offsets are nuisance parameters of single runs: unknown in a run that was not fitted, and
+        # no part of what is validated.
         problem = _ProblemWithFixedEffects(self.model, self.held_out, fit.candidates, shared)
         # Held-out runs must not choose anything: only what belongs to the single run is fitted to it.
         own: dict[str, float] = {}
         for run in self.held_out:
             own |= self._run_parameters(run, fit, shared)
         residual = problem.residual(problem.theta_of({**fit.values, **own}))
+        # An explanation that does not run on held-out data stays in the list and loses every comparison.
         if not np.isfinite(residual).all():
             return Explanation(fit, np.inf, np.inf)
         observed = [observation for run in problem.runs for observation in run]
@@ -178,6 +185,7 @@ class Fits:
         rms = float(np.sqrt(huber_cost(chosen) / chosen.size))
         fitted_to = self.problem_of(fit)
         at_fit = fitted_to.residual(fitted_to.theta_of(fit.values))
+        # Fitted and held-out runs together: repeats of one test may be divided between them.
         observed_and_fitted = [*observed, *(observation for run in fitted_to.runs for observation in run)]
         of_all = np.concatenate([residual, at_fit])
         return Explanation(
@@ -204,6 +212,8 @@ class Fits:
         usual = fit.misfit / max(self.n_coefficients, 1)
         n = max(sum(observation.spectra.size for observation in run), 1)
         releases = [name for name in problem.names if name == f"{RELEASE}{run[0].run.name}"]
+        # Only runs that are worse than the fitted ones: a held-out run in another local minimum of its release
+        # would speak against a right explanation.
         if not releases or best.trouble or best.misfit / n < _LEAST_MISFIT_RATIO * usual:
             return best.values
         [release] = releases
@@ -219,6 +229,7 @@ class Fits:
         channels, a sensor fault shows in the repeated runs, too, and a burst of noise in one channel is neither.
         Then nothing more can be found, and no force surface is better. False where no test was repeated.
         """
+        # What repeats share tells nothing of a run without one.
         repeated = {run for test in self.tests if len(test) > 1 for run in test}
         alone: dict[str, list[float]] = {}
         for (run, _), left in explanation.by_run.items():
@@ -231,6 +242,7 @@ class Fits:
     def has_little_repeatable(self, explanation: Explanation) -> bool:
         """Whether next to nothing of the residual is repeatable; False where no test was repeated."""
         shared = explanation.repeatable_by_test
+        # Without repeats nothing is known to be noise, so that the search must go on.
         return bool(shared) and all(
             max(left) < _LITTLE_REPEATABLE_IN_A_CHANNEL and float(np.mean(left)) < _LITTLE_REPEATABLE
             for left in shared
@@ -246,6 +258,7 @@ class Fits:
         them.
         """
         problem = self.problem_of(fit)
+        # Those at a bound have taken what they could of an effect; the others are estimates worth keeping.
         at_bounds = problem.at_bounds(problem.theta_of(fit.values))[: problem.n_baseline]
         strained = [name for name, is_at in zip(problem.names, at_bounds, strict=False) if is_at]
         return {**fit.values, **{name: self.model.believed[name] for name in strained}}
@@ -266,5 +279,7 @@ class _ProblemWithFixedEffects(FreeRunProblem):
         effects_: Sequence[Candidate],
         fixed: dict[str, float],
     ) -> None:
+        # No candidates in the base class, so that their parameters are not free; they are simulated all the
+        # same.
         super().__init__(model, runs, (), fixed)
         self.candidates = tuple(effects_)

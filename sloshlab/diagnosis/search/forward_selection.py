@@ -55,8 +55,10 @@ class ForwardSelection:
         # Near the recordings, soft stages would hide what is missing, and the Jacobian of the base is a warm
         # start.
         stages = stages_for(self.fits.problem_of(base), base)
+        # A baseline at its bounds is nowhere near: it has taken as much of the effect as its bounds allow.
         is_near = stages != INFLATION_STAGES and not self.fits.rests_on_baseline_bounds(base)
         base_jacobian = self.subset.jacobian_of_part(jacobian, base, self.fits)
+        # Gains on one repeat of every test, in units of those on all runs: thresholds are of these.
         more = self.fits.n_coefficients / self.subset.n_coefficients
         chosen = self.screening.chosen(base, base_jacobian, pool, what, stages, is_near=is_near, more=more)
         coarse_fits = self._coarse_fits(base, base_jacobian, chosen, what, stages)
@@ -64,6 +66,7 @@ class ForwardSelection:
         done = self._refined(base, jacobian, selected, what, stages)
         self.fits.failed |= {fit.candidates[-1].key: fit.trouble for fit in done if fit.trouble}
         kept = self.fits.all_validated(done, [*base.candidates, *pool])
+        # Look-alikes before nesting models, which start from the best of all that is known.
         kept += self.substitution.look_alikes(base, kept, pool, what)
         return [*kept, *self.substitution.nesting_models(base, kept, pool, what)]
 
@@ -103,6 +106,7 @@ class ForwardSelection:
         more: float,
     ) -> list[CoarseFit]:
         """Those that gained most, the best first; the others are noted with their gains."""
+        # Gains are compared after the second stage, in the same inflated noise for all.
         lowest = min((coarse_fit.cost for coarse_fit, _ in coarse_fits), default=0.0)
         best_force_match = min(
             (screened for _, screened in coarse_fits),
@@ -134,6 +138,8 @@ class ForwardSelection:
         def to_the_end(i: int, coarse_fit: CoarseFit) -> FreeRunFit:
             n = len(selected)
             self.fits.progress(f"{what}: {coarse_fit.fit.candidates[-1].key}, to the end", n + i, 2 * n)
+            # The last stages need all runs; the others on one repeat of every test take half the time where
+            # tests are repeated.
             if self.subset is not self.fits:
                 coarse_fit = extended_to_all_runs(
                     coarse_fit, self.fits.problem(coarse_fit.fit.candidates), base.values, jacobian
@@ -142,6 +148,7 @@ class ForwardSelection:
 
         pieces = [partial(to_the_end, i, coarse_fit) for i, coarse_fit in enumerate(selected)]
         done = self.fits.in_parallel(pieces, [of for coarse_fit in selected for of in coarse_fit.fit.candidates])
+        # Far from the recordings a fit ends in the local minimum of the size that it began with.
         if stages == INFLATION_STAGES:
             done[:_MOST_SIZE_SCANS] = [self._size_scanned(fit, stages) for fit in done[:_MOST_SIZE_SCANS]]
         return done

@@ -61,8 +61,11 @@ def findings_of(
             raise InputError(f"case {case.name}", got="neither a rig nor a twin", allowed="one of them")
         model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs))
     require_comparable(case, model)
+    # Before any fit: what is held out must not depend on what is found.
     parts = split(case)
     progress("retuning the baseline", 0, 1)
+    # The noise floor uses all runs, held-out ones too: it says how well readings are known and chooses no
+    # effect.
     weighted = weighted_observations(case, model)
     fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
     held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]]
@@ -72,8 +75,11 @@ def findings_of(
     # the cost of what is believed has no prior term: there is no deviation from it
     at_believed = huber_cost(problem.residual(problem.theta_of(believed_values)))
     believed = fits.validated(FreeRunFit((), believed_values, at_believed, at_believed))
+    # A plain refit can hide physics (leaving out the dry friction of a servo axis doubles its damping), and a
+    # wrong mass is no missing physics: retuning within tolerances comes before any question about effects.
     retuned_fit, jacobian = fitted_baseline(problem)
     retuned = fits.validated(retuned_fit)
+    # Of the retuned baseline: places in frequency where it misses most are starts for modes.
     surroundings = surroundings_of(problem, retuned_fit, case.rig)
     pool = candidates(surroundings)
     fits.share_with_second_process(pool)
@@ -142,6 +148,8 @@ def _restarted_from_other_sizes(
     best = best_fitting([*known, *found])
     if best not in found:
         return found
+    # Without this structural damping stayed in the local minimum that viscous damping had left, and was missing
+    # among the alternatives.
     alike = Substitution(fits).look_alikes(retuned, [best], pool, "fitting one effect", _LOOK_ALIKES_AFTER_RESTART)
     return [*found, *alike]
 
@@ -167,6 +175,7 @@ def _second_effects(
     largest = max(largest_strength(retuned.by_run, explanation.by_run) for explanation in known)
     if largest < _LEAST_STRENGTH_FOR_PAIRS and fits.has_little_repeatable(retuned):
         return []
+    # No channel has more than noise left for a second effect.
     if fits.problem_of(best.fit).is_down_to_noise(best.fit):
         return []
     more = ForwardSelection(fits)
@@ -176,6 +185,8 @@ def _second_effects(
     alone = []
     pair = best_fitting(pairs)
     special = _nested_model_of(best, known, retuned)
+    # Stribeck friction stands for Coulomb friction and a damper together; beside it alone the damper gains
+    # nothing.
     if special is not None and (pair is None or not fits.is_complete(pair)):
         pairs += more.fitted(special.fit, fits.jacobian(special.fit), pool, "fitting one beside a special case")
         pair = best_fitting(pairs)
@@ -184,11 +195,14 @@ def _second_effects(
     # The first effect was chosen without the second one and need not be one of the two.
     alone += Refinement(fits).backward_eliminated([pair for pair in pairs if pair.keys[:-1] == best.keys])
     cost = min((explanation.fit.cost for explanation in alone), default=best.fit.cost)
+    # An effect of the pair that is better alone than the best one so far has changed the choice: its look-alikes
+    # and nesting models have not been tried.
     if cost < best.fit.cost:
         alone += more.substitution.look_alikes(retuned.fit, alone, pool, "fitting one effect")
         alone += more.substitution.nesting_models(retuned.fit, alone, pool, "fitting one effect")
     if pair is None or pair.fit.cost > _SHARE_LEFT_BY_A_PAIR * best.fit.cost:
         return [*pairs, *alone]
+    # A spring stood in for a mode beside a hum: the best effect alone need not be one of the two.
     if pair.held_out_rms > LARGEST_REMAINDER:
         second = best_fitting([explanation for explanation in alone if explanation.keys == pair.keys[1:]])
         if second is not None:
@@ -210,5 +224,7 @@ def _candidates_beside(best: Explanation, at: Surroundings, pool: Sequence[Candi
     if not forces:
         return []
     known = {candidate.key for candidate in pool}
+    # A late break-up and saturation act on the damping of a moving liquid. A twin that believes it frozen has
+    # none until the first effect brings it.
     beside = candidates(replace(at, twin=replace(at.twin, terms=(*at.twin.terms, *forces))))
     return [candidate for candidate in beside if candidate.key not in known]

@@ -87,11 +87,14 @@ def multi_start_refined(fits: Fits, known: Sequence[Explanation]) -> list[Explan
         else:
             other = _fitted_from_restart(problem, start, fit)
         if not _is_better(other, fit):
+            # A repeated move that fails is no restart in vain: it only says that the move ends here.
             n_in_vain += further is None
             further = None
             # After a scan in vain the releases are at their best for this fit until it moves.
             if not may_scan_releases:
                 continue
+            # Where contacts and friction make the residual jump with the release, derivatives by it mean
+            # nothing.
             other = _with_releases_scanned(problem, fit)
             may_scan_releases = _gain(other, fit) > _LEAST_RELATIVE_GAIN
             if not may_scan_releases:
@@ -139,6 +142,7 @@ def _with_releases_scanned(problem: FreeRunProblem, fit: FreeRunFit) -> FreeRunF
 
     With contacts and friction the residual is a discontinuous function of the release, of every run by itself.
     """
+    # Run by run: a release changes no other run, and 41 places of each are cheap.
     values, theta = dict(fit.values), problem.theta_of(fit.values)
     residual = problem.residual(theta)
     for column, name in enumerate(problem.names):
@@ -159,6 +163,7 @@ def _perturbed_starts(
     """Values of a fit, those of one effect times log-normal factors; another Halton sequence at every turn."""
     names = [f"{perturbed.key}.{parameter.name}" for parameter in perturbed.effect.parameters]
     log_deviation = log_deviations[turn % len(log_deviations)]
+    # Log-normal, since sizes of effects span decades and keep their sign.
     factors = np.exp(log_deviation * norm.ppf(qmc.Halton(len(names), seed=turn).random(_N_PERTURBED_STARTS)))
     return [
         {**fit.values, **{name: fit.values[name] * float(factor) for name, factor in zip(names, row, strict=True)}}

@@ -55,6 +55,7 @@ def with_randomised_baselines(
     candidates = best.fit.candidates
     fits = Fits(found.model, found.fitting, found.held_out, progress, found.case.names_by_test())
     plain = fits.problem(candidates)
+    # Six fits estimate a spread to a third of it at best, which Student's t below allows for.
     draws = norm.ppf(qmc.Halton(len(plain.names), seed=0).random(_N_DRAWN))
     at_best, is_baseline = plain.theta_of(best.fit.values), plain.prior > 0
     at_best_softly = inflated_cost(plain, best.fit, INFLATION_STAGES[-3])
@@ -65,6 +66,9 @@ def with_randomised_baselines(
         far = (i + 1) / _N_DRAWN
         # Starts reach further from draw to draw, so that near and far local minima are both found.
         start = np.where(is_baseline, at_best + far * draw, at_best * np.exp(far * _START_DEVIATION * draw))
+        # The prior mean is moved, the recordings stay: what they tell brings the fit back, and what they do not
+        # tell stays where it was drawn. Fits from other starts alone would end in the same place, local minima
+        # aside.
         problem = FreeRunProblem(found.model, found.fitting, candidates, expected=expected)
         fit, jacobian = fitted(
             problem, plain.values(start), n_iterations=6, stages=INFLATION_STAGES[-3:-2], is_last=False
@@ -76,13 +80,16 @@ def with_randomised_baselines(
     draws = np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)
     reached = fits.in_parallel([partial(from_draw, i, draw) for i, draw in enumerate(draws)], candidates)
     ends = [best.fit, *(fit for fit in reached if not fit.trouble)]
+    # By misfit: costs of different priors cannot be compared.
     lowest = min(ends, key=lambda end: end.misfit)
     better = best
+    # A better place with a moved prior is an answer only after a fit with the prior as believed.
     if lowest.misfit < best.fit.misfit - _LEAST_COST_DECREASE:
         fit, _ = fitted(plain, lowest.values, n_iterations=6, stages=INFLATION_STAGES[-2:])
         if not fit.trouble and fit.cost < best.fit.cost - _LEAST_COST_DECREASE:
             better = fits.validated(fit)
             ends.append(fit)
+    # Either a share or what chance gives: in short recordings a share of the misfit is less than chance.
     most = max((1 + _AS_GOOD) * lowest.misfit, lowest.misfit + _LEAST_COST_DECREASE)
     spread = _spread([end for end in ends if end.misfit < most], better)
     problem = fits.problem_of(better.fit)

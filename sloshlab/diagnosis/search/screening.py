@@ -60,7 +60,7 @@ class ScreenedCandidate:
     candidate : Candidate
     gains : ndarray, shape (n_score_tests,)
         Decreases of the cost that score tests predict.
-    scored_starts : list of _Look
+    scored_starts : list of _ScoredStart
         Its starts, the one with the largest predicted gain first.
     force_start : ForceStart or None
         Its parameters with which its own force is most like the latent force, where that is known.
@@ -137,6 +137,7 @@ class Screening:
             sets = [*starts_with_smaller_sizes(here), *([force_start.numbers] if force_start else [])]
             at_starts = extended.residuals([extended.theta_of({**base.values, **start}) for start in sets])
             for start, moved in zip(sets, at_starts, strict=True):
+                # A start that explodes is no reason to drop the candidate as long as another one runs.
                 if np.isfinite(moved).all():
                     gains = [scored_start.gain(moved - residual) for scored_start in score_tests]
                     scored_starts.append(
@@ -149,6 +150,7 @@ class Screening:
             if not scored_starts:
                 return None
             scored_starts.sort(key=lambda scored_start: -float(scored_start.gains.max()))
+            # With and without inflated noise a candidate may have its best start elsewhere.
             gains_of = np.max([scored_start.gains for scored_start in scored_starts], axis=0)
             distant_start = (
                 None if is_near or base.candidates else self._distant_start(candidate, residual, stages[0])
@@ -177,6 +179,8 @@ class Screening:
         if not sizes:
             return None
         problem, believed = self.fits.problem((candidate,)), self.fits.model.believed
+        # Beside the baseline as believed: the retuned one has its frequency already where a wrong mass has moved
+        # it.
         costs = costs_at(problem, [{**believed, **size} for size in sizes], inflation)
         least = int(np.argmin(costs))
         return sizes[least] if costs[least] < huber_cost(problem.inflation_weights(inflation) * residual) else None
@@ -206,6 +210,7 @@ class Screening:
         sets = _force_matched_numbers(screened)
         if len(sets) < 2:
             return sets[0] if sets else {}
+        # Without inflated noise, as these starts are meant to be near.
         costs = costs_at(problem, [{**base.values, **numbers} for numbers in sets], 0.0)
         return sets[int(np.argmin(costs))]
 
@@ -246,6 +251,7 @@ class Screening:
         """
         if not all_screened:
             return []
+        # Over the largest gain in each of the two noises: absolute gains in inflated noise are small for all.
         top = np.maximum(np.max([screened.gains for screened in all_screened], axis=0), _LEAST_PREDICTED)
         force_start = sorted(all_screened, key=lambda screened: screened.unexplained_share)[:_MOST_BY_FORCE]
         chosen = []
@@ -254,6 +260,8 @@ class Screening:
         ):
             is_little = screened.gains.max() < _LEAST_PREDICTED
             is_little = is_little or float(np.max(screened.gains / top)) < _LEAST_SHARE_OF_PREDICTED_GAIN
+            # A score test is linear in the change that a start makes. What no such step reaches must not be
+            # dropped by it: a resonance that is off by many of its widths, hysteresis, contacts.
             is_kept = screened.distant_start is not None or (
                 screened in force_start and screened.matches_latent_force
             )

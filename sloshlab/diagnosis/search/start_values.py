@@ -65,6 +65,7 @@ def starts_with_smaller_sizes(candidate: Candidate) -> list[dict[str, float]]:
 
 def resized(candidate: Candidate, start: dict[str, float], factor: float) -> dict[str, float]:
     """A start with the size of the first Gauss–Newton step, limited to a tenth to ten times of it."""
+    # Beyond a tenth or ten times the linearisation that gave the factor says nothing.
     return candidate.sized(start, min(max(factor, 0.1), 10.0))
 
 

@@ -66,6 +66,7 @@ class Substitution:
     ) -> list[Explanation]:
         """Effects that the same recordings may show as the best one, in its place, `most` of them fitted."""
         best = best_fitting(kept)
+        # For a first effect only; those of a pair are exchanged later, by `exchanged`.
         if best is None or base.candidates or base.cost - best.fit.cost < LEAST_COST_DECREASE:
             return []
         before, after = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (base, best.fit))
@@ -77,6 +78,8 @@ class Substitution:
             self.fits.progress(f"{what}: {candidate.key} in place of {special.effect.name}", 0, 1)
             problem = self.fits.problem((*base.candidates, candidate))
             sizes = starts_of_many_sizes(candidate)
+            # Beside the best effect's baseline, and beside the retuned one with parameters at their bounds set
+            # back: they may have stood for what the look-alike would explain.
             starts = [
                 {**at, **size} for at in (best.fit.values, self.fits.reset_from_bounds(base)) for size in sizes
             ]
@@ -147,6 +150,8 @@ class Substitution:
         pool : sequence of Candidate
         """
         reached, before = (inflated_cost(self.fits.problem_of(fit), fit, _COARSE_STAGE) for fit in (wider, base))
+        # Fits of several parameters are long: only what begins nearer to the wider fit than to the baseline is
+        # fitted.
         most = 0.5 * (reached + before)
         found: list[_NearStart] = []
         chosen = [
@@ -178,6 +183,7 @@ class Substitution:
             if explanation is best or is_nested_in(explanation.fit.candidates[-1], last)
         ]
         found = []
+        # Worst first: a dictionary keeps the last fit of each effect, which is its best.
         for special in {
             special.keys[-1]: special for special in sorted(specials, key=lambda special: -special.fit.cost)
         }.values():
@@ -222,12 +228,15 @@ class Substitution:
         self, problem: FreeRunProblem, candidate: Candidate, special: Candidate, fit: FreeRunFit
     ) -> list[Callable[[], FreeRunFit]]:
         """Fits of a nesting effect within bounds where it clearly differs from its nested model."""
+        # Which range is distinct is told by the one number of the nested model.
         if len(special.effect.parameters) > 1:
             return []
         size = fit.values[f"{special.key}.{special.effect.parameters[0].name}"]
         pieces: list[Callable[[], FreeRunFit]] = []
         for limits in candidate.effect.differs(size):
             bounded = replace(candidate, effect=replace(candidate.effect, limits=_constant_limits(limits)))
+            # Free asymmetric friction falls back to the symmetric one where nothing tells them apart; held
+            # within these bounds it shows whether it describes as much, and is then listed as an equal.
             start = {f"{candidate.key}.{name}": 0.5 * (low + high) for name, (low, high) in limits.items()}
             within = self.fits.problem((*problem.candidates[:-1], bounded))
             pieces.append(partial(_fitted_within, within, {**fit.values, **start}, problem.candidates))
@@ -253,6 +262,8 @@ class Substitution:
                 problem = self.fits.problem((*others, special))
                 sizes = starts_from_nesting(special, general, wider.fit)
                 start = best_start(problem, [{**wider.fit.values, **size} for size in sizes], _COARSE_STAGE)
+                # A fit can only improve on its start, so that a worse start may still end better. It is not
+                # tried then: a fit of the same effects is known already.
                 at_start = huber_cost(problem.residual(problem.theta_of(start)))
                 if at_start < tried.get(frozenset((special.key, *(other.key for other in others))), np.inf):
                     pieces.append(partial(_fitted_closely, problem, start))
@@ -292,6 +303,7 @@ def _constant_limits(limits: Limits) -> Callable[[Surroundings], Limits]:
 
 def is_nested_in(special: Candidate, general: Candidate) -> bool:
     """Whether an effect is nested in another one of the same block."""
+    # Within a block: a damper of the tank is no special case of one of the structure.
     return general.effect.block == special.effect.block and special.effect.known_as in general.effect.includes
 
 

@@ -91,6 +91,7 @@ class AddedForce:
                 got="no internal states for a force with memory",
                 remedy="integrate `with_rates` beside the twin's own states",
             )
+        # A user's integrator knows no events at which friction could turn, so that it turns smoothly.
         direction = tanh(velocity_m_per_s / self.friction_speed_m_per_s)
         total, at = 0.0, 0
         rates = np.empty(self.n_states)
@@ -134,12 +135,14 @@ class _Part:
         if states is not None and self.n_states:
             self._memory[: self.n_states] = states
         if self._switch is not None:
+            # Contacts open and close only as the force is asked for, with the integrator's own step.
             self._switch()
             for k in range(self._n_switches):
                 self._memory[self.n_states + k] = -1.0 if self._events[k] < 0.0 else 1.0
         upward = self._law()
         if not self._is_dry:
             return upward
+        # Compiled laws know two directions; between them their forces are mixed.
         motion[DIRECTION] = -1.0
         return 0.5 * ((1.0 + direction) * upward + (1.0 - direction) * self._law())
 

@@ -138,6 +138,7 @@ class TwinRun:
 
     def start(self, channel: str, n_samples: int = 6) -> tuple[float, float]:
         """Value and slope per second at the first sample, by a cubic through the first ones."""
+        # A cubic through some samples: a difference of the first two would carry the noise of both.
         first = self.channels[channel][:n_samples]
         *_, slope, value = np.polyfit(np.arange(first.size), first, min(3, first.size - 1))
         return float(value), float(slope) * self.sampling_rate_hz

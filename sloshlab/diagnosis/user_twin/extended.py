@@ -33,6 +33,7 @@ def save_extended(module: str, values: Mapping[str, float], extension: Extension
     path : Path
     """
     lines = [f"sloshlab_user_twin = {FORMAT}", f"module = {json.dumps(module)}", "", "[parameters]"]
+    # The shortest text that reads back as the same number.
     lines += [f"{json.dumps(name)} = {float(value)!r}" for name, value in values.items()]
     for term in extension.terms:
         lines += ["", "[[terms]]", f"name = {json.dumps(term.name)}"]

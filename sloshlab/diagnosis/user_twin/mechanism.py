@@ -127,6 +127,8 @@ def engine_twin(mechanism: Mechanism, terms: Sequence[Term], n_samples: int) -> 
             "mechanism", got=f"matrices {mass.shape}, {stiffness.shape}, {damping.shape}", allowed="one shape"
         )
     along = _vector(mechanism.acts_along, n, "acts_along", np.eye(n)[0])
+    # Masses go into the matrix and not into the forces: they change the modes, and with them what every channel
+    # reads.
     added = sum(term.mass_kg for term in everything if term.kind is MASS_ERROR)
     mass = mass + added * np.outer(along, along)
     modes, stiffnesses, dampings = _modal(mass, stiffness, damping)
@@ -182,6 +184,7 @@ def _modal(
             allowed="a positive definite matrix",
             remedy="a soft spring where a body is free",
         )
+    # The engine moves uncoupled modes; what dampers couple beyond a little would silently be left out.
     coupled = modes.T @ damping @ modes
     own = np.diag(coupled).copy()
     between = np.sqrt(np.abs(np.outer(own, own)))

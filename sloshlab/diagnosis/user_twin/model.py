@@ -53,6 +53,7 @@ class UserTwinModel:
         self.name, self.described = name, twin
         self.runs: tuple[CaseRun, ...] = tuple(runs)
         self.blocks: tuple[str, ...] = ("structure", "sensor")
+        # A user's own code may not bear a fork.
         self.may_be_forked = False
         self._lock, self._user_code_lock = threading.Lock(), threading.Lock()
         self._truths: OrderedDict[tuple[Any, ...], tuple[dict[str, FloatArray], FloatArray]] = OrderedDict()
@@ -135,6 +136,8 @@ class UserTwinModel:
         self, run: CaseRun, values: Mapping[str, float], extension: Extension
     ) -> tuple[dict[str, FloatArray], FloatArray]:
         own = self._own(run, values)
+        # A fault of a driving channel changes the motion and is part of the key, others are read from the same
+        # motion.
         undone = tuple(fault for fault in extension.faults if fault.channel in self.described.driving)
         forces = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
         key = (run.name, *own.values(), tuple(forces), tuple(fault.key for fault in undone))
@@ -187,6 +190,7 @@ class UserTwinModel:
         self, run: TwinRun, own: Mapping[str, float], extension: Extension
     ) -> tuple[dict[str, FloatArray], FloatArray]:
         assert isinstance(self.described, FreeTwin)
+        # The largest speed is known once the baseline has run; that run adds no friction.
         speed = self.described.friction_speed_m_per_s or self._speed_m_per_s or 1e-3
         added = AddedForce(extension.terms, speed)
         with self._user_code_lock:
@@ -319,6 +323,8 @@ class UserTwinModel:
             except SloshlabError as error:
                 text = str(error).removeprefix(f"{self.name}: ")
                 raise InputError(f"{self.name} cannot run as believed: {text}") from error
+            # Below 0.002 of the largest speed friction is not dry; an explicit step has to stay below 2 × mass ×
+            # speed / friction force.
             self._speed_m_per_s = max(self._speed_m_per_s, 2e-3 * float(np.abs(motion[:, 1]).max()))
 
 

@@ -61,10 +61,14 @@ class LikelihoodScale:
         held_out = min(description.held_out for description in described) / max(found.n_held_out, 1)
         n = max(found.n_fitting + found.n_held_out, 2)
         held_out_runs = frozenset(run.name for run in found.split.held_out)
+        # Twice the variance, as the sum of squares is −2 log L times it. Never less than the noise floor: a
+        # description that leaves less has fitted noise.
         return cls(2.0 * max(1.0, fitting), 2.0 * max(1.0, held_out), 0.5 * float(np.log(n)), held_out_runs)
 
     def fit_gain(self, before: Explanation, after: Explanation) -> float:
         """Log-likelihood ratio on the fitted runs, prior of the baseline included."""
+        # The cost and not the misfit: what is gained by moving the baseline away from what is believed counts
+        # less.
         return (before.fit.cost - after.fit.cost) / self.fitting
 
     def held_out_gain(self, before: Explanation, after: Explanation) -> float:
@@ -87,6 +91,8 @@ def gains_beyond_chance(more: Explanation, less: Explanation, scale: LikelihoodS
 
 def gains_beyond_shared_noise(more: Explanation, less: Explanation, scale: LikelihoodScale) -> bool:
     """The same with twice the least ratio, even if all channels had one common noise, as on a driven rig."""
+    # Channels that share the noise of their drive are no independent readings. At worst they are one, and a sum
+    # over n of them counts it n times.
     alike = _SHARED_NOISE_FACTOR * max(len({channel for _, channel in more.by_run}), 1)
     return gains_beyond_chance(
         more, less, replace(scale, fitting=alike * scale.fitting, held_out=alike * scale.held_out)
@@ -102,6 +108,7 @@ def improves_relevantly(more: Explanation, less: Explanation, scale: LikelihoodS
     """Beyond chance, and with an effect size worth naming in a channel of any run, twice that on fitted ones."""
     if not gains_beyond_chance(more, less, scale):
         return False
+    # Run by run and not their mean: an effect such as a clearance may show in the largest run alone.
     held_out_runs = {place: left for place, left in more.by_run.items() if place[0] in scale.held_out_runs}
     fitted = {place: left for place, left in more.by_run.items() if place[0] not in scale.held_out_runs}
     return (
@@ -117,11 +124,13 @@ def explains_half(less: Explanation, more: Explanation) -> bool:
 
 def is_unmistakable(less: Explanation, more: Explanation) -> bool:
     """Whether what an explanation adds is there although the interval of its size may hold zero."""
+    # The interval of a mass of 14 noise floors held zero, since gains and other masses trade against it.
     return explains_half(less, more) or largest_strength(less.by_run, more.by_run) >= _CLEAR
 
 
 def with_least_residuals(found: Findings, explanation: Explanation) -> Explanation:
     """With the least residual of each run over all fits of the same effects, of which friction makes many."""
+    # Otherwise a second effect seems to gain where a fit of the first alone had ended in another local minimum.
     alike = [explanation, *(other for other in found.explanations if set(other.keys) == set(explanation.keys))]
     by_run = {
         place: min(other.by_run.get(place, left) for other in alike) for place, left in explanation.by_run.items()

@@ -22,7 +22,9 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
     found : Findings
     verdict : Verdict
     """
+    # The best of all on held-out runs: a name that leaves less than any force surface is the ceiling itself.
     ceiling = min([*found.ceilings, *found.explanations, found.retuned], key=lambda ceiling: ceiling.held_out)
+    # The nearest effect of an unknown is no answer.
     after = verdict.best if verdict.kind in ("named", "indistinguishable") else None
     return {
         "format": 1,

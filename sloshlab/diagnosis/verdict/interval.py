@@ -59,7 +59,11 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
     if name not in best.fit.names:
         return 0.0
     of_noise, of_belief = best.fit.standard_errors(name)
+    # With 2 in place of 1.25, and few runs widened more, errors of 95 numbers of opened cases were 0.18 of the
+    # half width at the median: these intervals were too wide.
     scatter = _ERRORS_OVER_STANDARD_ERRORS * of_noise * max(1.0, best.held_out_rms)
+    # A liquid that damps more for a while is no noise: of 87 numbers of opened cases 72 were held without this,
+    # 80 with it.
     scatter = max(scatter, best.scatter.get(name, 0.0))
     is_between = _named(candidate, parameter).is_between_readings
     # A rate per second ends like a time but scales with the reading.
@@ -67,6 +71,7 @@ def _half_width(best: Explanation, candidate: Candidate, parameter: str) -> floa
     power = next(
         (power for ending, power in _POWER_OF_LENGTH.items() if parameter.endswith(ending)), int(is_between)
     )
+    # The recordings cannot tell an effect from the scale of the sensors that show it.
     of_gain = 0.0 if is_free else _CALIBRATION * float(np.hypot(1.0, power)) * abs(best.fit.values[name])
     elsewhere = max(best.spread.get(name, 0.0), of_belief, of_gain)
     # Noise and baseline are independent; gains are part of the baseline and must not count twice.

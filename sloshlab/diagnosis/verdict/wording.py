@@ -94,6 +94,7 @@ def where_of(found: Findings) -> str:
 def explained_share(found: Findings, best: Explanation) -> float:
     """Share of what any description explains of the held-out runs beyond the retuned baseline."""
     ceiling = min(ceiling.held_out_rms for ceiling in (*found.ceilings, *found.explanations, best))
+    # Squares, as shares of a variance add up; beyond the retuned baseline, as retuning explains no physics.
     possible = found.retuned.held_out_rms**2 - ceiling**2
     gained = found.retuned.held_out_rms**2 - best.held_out_rms**2
     return min(max(gained / possible, 0.0), 1.0) if possible > 0 else 0.0
