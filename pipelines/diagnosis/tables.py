@@ -65,8 +65,8 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
     header += () if best is None else ("moved with the effect, in tolerances",)
     caption = (
         "A number that wants to move by more than its tolerance asks for a second look at the rig file; at 1.25 "
-        "tolerances, four of what belongs to one run or sensor, it is held. One of a mode that no run excites means "
-        "nothing."
+        "tolerances, four of what belongs to one run or sensor, it is held. One of a mode that no run excites "
+        "means nothing."
     )
     return Table("The baseline's own parameters", header, tuple(rows), caption)
 
