@@ -10,6 +10,7 @@ from pipelines.ball.line_stages import ball_from_shaker
 from pipelines.ball.results import BallExperiment
 from pipelines.ball.settings import BallSettings
 from sloshlab.errors import AnalysisError
+from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import read_attributes
 from sloshlab.rig import Rig
 
@@ -32,14 +33,15 @@ def analyse_ball(paths: Sequence[Path], rig_path: Path, settings: BallSettings) 
     """
     rig = Rig.from_toml(rig_path)
     described = [(path, read_attributes(path)) for path in paths]
-    kinds = {"decay" if run.experiment == "sdof_free" else run.experiment.split("_")[0] for _, run in described}
-    if kinds not in ({"decay"}, {"shaker"}):
+    experiments = [EXPERIMENTS[run.experiment] for _, run in described]
+    decays = all(known.moves == "release" and known.structure == "sdof" for known in experiments)
+    if not decays and not all(known.moves == "shaker" for known in experiments):
         raise AnalysisError(
             "runs for a ball",
             got=", ".join(sorted({run.experiment for _, run in described})),
             allowed="sdof_free alone, or shaker_sweep and shaker_vfa",
             remedy="give the runs of one experiment",
         )
-    if kinds == {"decay"}:
+    if decays:
         return ball_from_decays(described, rig, rig_path, settings)
     return ball_from_shaker(paths, rig, rig_path, settings)
