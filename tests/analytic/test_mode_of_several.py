@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import signal as signals
 
 from sloshlab.errors import AnalysisError
 from sloshlab.modal.mode_band import band_of_mode, decay_in_band
-from sloshlab.modal.single_mode_fit import fit_single_mode
+from sloshlab.modal.single_mode_fit import _refuse_what_is_no_mode, fit_single_mode
 from sloshlab.modal.spectra import Spectra, random_spectra
 
 FREQUENCIES_HZ, RATE_HZ = (10.87, 78.31, 226.5), 1024.0
@@ -32,6 +34,8 @@ def test_a_mode_decays_as_its_own_pole_beside_what_leaks_from_others() -> None:
 
 
 def test_the_band_ends_below_half_the_rate_and_a_low_rate_is_refused() -> None:
+    low, high = band_of_mode(FREQUENCIES_HZ, 1, 1000.0)
+    assert (low, high) == pytest.approx((np.sqrt(10.87 * 78.31), np.sqrt(78.31 * 226.5)))
     low, high = band_of_mode(FREQUENCIES_HZ, 2, 600.0)
     assert low == pytest.approx(np.sqrt(78.31 * 226.5))
     assert high == pytest.approx(0.48 * 600.0)
@@ -73,3 +77,24 @@ def test_what_is_no_mode_is_refused_with_the_reason(
 ) -> None:
     with pytest.raises(AnalysisError, match=match):
         fit_single_mode(spectra, output, band)
+
+
+@pytest.mark.parametrize(
+    ("constant", "error", "match"),
+    [
+        (0.79, 0.009, None),
+        (0.80, 0.009, "no peak near 10 Hz stands out of what other modes leave there"),
+        (0.79, 0.011, "ζ = 0.02 with a standard error of 0.011: not told"),
+    ],
+)
+def test_a_peak_stands_out_of_what_other_modes_leave(constant: float, error: float, match: str | None) -> None:
+    """|R/(jω − p)| at ω = |p| is |R|/(ζ|p|): 1/(0.02 · 2π · 10) = 0.796 for R = j."""
+    fit = SimpleNamespace(
+        frequency_hz=[10.0], damping_ratio=[0.02], damping_ratio_std=[error], residues=np.array([[1j]]),
+        fit=SimpleNamespace(constant=[constant]),
+    )  # fmt: skip
+    if match is None:
+        _refuse_what_is_no_mode(fit, 8.0, 12.0)
+    else:
+        with pytest.raises(AnalysisError, match=match):
+            _refuse_what_is_no_mode(fit, 8.0, 12.0)

@@ -54,6 +54,30 @@ def test_nothing_is_read_from_windows_without_motion():
     assert frequency_response_of(windows.isel(window=[])) is None
 
 
+@pytest.mark.parametrize("place", [1.9, 2.0, 2.3, 2.6])
+def test_vertex_of_a_parabola_through_uneven_points_is_exact(place):
+    """5 − 3 (x − p)² has its vertex (p, 5), wherever three points about it lie."""
+    x = np.array([0.5, 1.0, 2.2, 3.7, 4.0])
+    assert vertex(x, 5 - 3 * (x - place) ** 2) == pytest.approx((place, 5.0), rel=1e-12)
+
+
+def test_response_leads_or_lags_as_e_plus_j_omega_t_says():
+    """ü/F = 1/(m − jγ/Ω): with damping the acceleration leads the force by arctan(γ/(Ωm))."""
+    windows = xr.Dataset(
+        {
+            "time_s": ("window", [0.0, 1.0, 2.0]),
+            "frequency_hz": ("window", [9.0, 10.0, 11.0]),
+            "acceleration_g": ("window", [1.0, 2.0, 1.0]),
+            "apparent_mass_kg": ("window", [2.0, 2.0, 2.0]),
+            "gamma_kg_per_s": ("window", [30.0, 30.0, 30.0]),
+            "work_j": ("window", [1.0, 2.0, 1.0]),
+        }
+    )
+    response = frequency_response_of(windows)
+    expected = np.arctan2(30.0, 2 * np.pi * np.array([9.0, 10.0, 11.0]) * 2.0)
+    np.testing.assert_allclose(np.angle(response.accelerance_per_kg), expected, rtol=1e-12)
+
+
 def test_vertex_falls_back_to_the_largest_value_where_no_parabola_fits():
     assert vertex(np.array([1.0, 2.0, 1.5]), np.array([1.0, 3.0, 2.0])) == (2.0, 3.0)
     assert vertex(np.array([1.0, 2.0]), np.array([1.0, 3.0])) == (2.0, 3.0)
@@ -85,5 +109,6 @@ def test_work_that_is_negative_throughout_is_told(sign, gives):
 
 def test_a_threshold_is_crossed_between_levels_by_their_logarithm():
     assert crossing_level([0.5, 1.0, 4.0], [0.0, 0.1, 0.5], 0.3) == pytest.approx(2.0, rel=1e-12)
+    assert crossing_level([2.0, 8.0], [0.0, 1.0], 0.5) == pytest.approx(4.0, rel=1e-12)
     assert math.isnan(crossing_level([0.5, 1.0], [0.4, 0.5], 0.3))
     assert math.isnan(crossing_level([], [], 0.3))
