@@ -360,3 +360,21 @@ def test_impossible_input_is_refused_in_one_line(rig: Rig, settings: dict, what:
     with pytest.raises(InputError, match=what) as caught:
         virtual_structure_run(rig, **settings)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("rig", "experiment", "deflection_m", "duration_s"),
+    [
+        # a weight of 7 kg pulls the beam down by so much, says the source
+        (BEAM, "beam_free", -0.0146, 8.0),
+        # the guided tank is held 64 mm above its rest (chapter 2)
+        (SDOF, "sdof_free", 0.064, 6.0),
+    ],
+)
+def test_a_release_begins_where_the_source_lets_go(
+    rig: Rig, experiment: str, deflection_m: float, duration_s: float
+) -> None:
+    run = virtual_structure_run(rig, experiment=experiment, configuration="frozen", imperfect=False)
+    assert run.attrs["initial_displacement_m"] == deflection_m
+    assert run.sizes["time"] == duration_s * run.attrs["sampling_rate_hz"]
+    assert float(run["displacement_tank"][0]) == pytest.approx(deflection_m, rel=2e-3)
