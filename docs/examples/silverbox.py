@@ -39,8 +39,8 @@ def trained(x, y, *, neurons=20, delays=2, spread=1.0, epochs=150):
         Delays.tapped(delays, delays, with_present=True),
         [training],
         [validation],
-        RATE_HZ,
-        TrainingSettings(n_epochs=epochs, input_spread=spread, least_gain=0.0),
+        sampling_rate_hz=RATE_HZ,
+        settings=TrainingSettings(n_epochs=epochs, input_spread=spread, least_gain=0.0),
     )
 
 
