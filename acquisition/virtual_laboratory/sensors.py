@@ -59,12 +59,12 @@ class Laboratory:
         # a stream of its own: nothing that is drawn for a run can change the laboratory
         generator = np.random.default_rng([seed, 7301])
 
-        def one() -> float:
+        def near_one() -> float:
             return float(1 + np.clip(0.004 * generator.standard_normal(), -0.01, 0.01))
 
         return cls(
-            dry_mass_factor=one(),
-            gain={channel: one() for channel in channels},
+            dry_mass_factor=near_one(),
+            gain={channel: near_one() for channel in channels},
             cell_1_share=float(generator.uniform(0.47, 0.53)),
             rocking=0.01,
             offset_share={channel: float(generator.uniform(-0.004, 0.004)) for channel in channels},
