@@ -117,7 +117,7 @@ def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
     AnalysisError
         If sensors cannot see a mode, the first mode does not decay, or channels are missing.
     """
-    is_random = has_spectra(run.attributes)
+    stages, is_random = EXPERIMENTS[run.attributes.experiment].stages, has_spectra(run.attributes)
     rate_hz = run.attributes.sampling_rate_hz
     motion = _motion(run, rig, is_random)
     its_filter, response = _modal_response(motion, rig, settings, rate_hz, is_random)
@@ -135,7 +135,7 @@ def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
         sensors=motion.sensors,
         modal_filter=its_filter,
         response=response,
-        decays=() if is_random else _decays(response, modes, settings, rate_hz),
+        decays=_decays(response, modes, settings, rate_hz) if "decays" in stages else (),
         random=_random(motion, response, modes, settings, rate_hz) if is_random else None,
         flags=tuple(flags),
     )

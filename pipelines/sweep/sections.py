@@ -21,6 +21,7 @@ from pipelines.sweep import (
     tables,
 )
 from pipelines.sweep.selection import by_level, rig_text, runs_of
+from sloshlab.experiments import EXPERIMENTS
 
 if TYPE_CHECKING:
     from pipelines.sweep.results import RigResult, SweepExperiment
@@ -39,7 +40,10 @@ def planned_sections(experiment: SweepExperiment) -> tuple[SectionPlan, ...]:
         return (_work_section(experiment), _quality_section(experiment), *_last_sections(experiment))
     prefixes = rig_prefixes(experiment.rigs)
     fills = [_rig_section(experiment, rig, prefix) for rig, prefix in zip(experiment.rigs, prefixes, strict=True)]
-    return (*fills, *_fill_section(experiment), _quality_section(experiment), *_last_sections(experiment))
+    sections = {"fill_levels": fills, "sensitivity": _fill_section(experiment)}
+    filled = {name for run in experiment.runs for name in EXPERIMENTS[run.attributes.experiment].report_sections}
+    own = [plan for name, plans in sections.items() if name in filled for plan in plans]
+    return (*own, _quality_section(experiment), *_last_sections(experiment))
 
 
 def rig_prefixes(rigs: Sequence[RigResult]) -> tuple[str, ...]:
