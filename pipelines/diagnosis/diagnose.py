@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,8 @@ from pipelines.report.free_place import require_free_folder
 from pipelines.report.outputs import provenance_of, report_lines
 from pipelines.report.progress import amounts
 from sloshlab import atomic_file
+from sloshlab.consistency.finding import ConsistencyExamination
+from sloshlab.consistency.samples import examined_samples
 from sloshlab.diagnosis.answer import answered
 from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.examination import examination_facts, examined, owning_block, seen_at
@@ -49,7 +52,7 @@ def diagnose_case(
         Python modules with effects of a user's own; their code is run.
     """
     target = output or folder / "diagnosis"
-    case = read_case(folder, with_rig=twin is None)
+    case, recordings = _examined(read_case(folder, with_rig=twin is None))
     # Before the search, which takes minutes: a folder that is in the way has to be said at once.
     require_free_folder(target, "diagnosis")
     own = [effect for file in effects for effect in load_user_effects(file)]
@@ -61,7 +64,7 @@ def diagnose_case(
     examination = examined(found)
     verdict = with_place(found, verdict, seen_at(examination, verdict.best), owning_block(examination))
     facts = {**verdict_facts(found, verdict), **examination_facts(examination, found)}
-    diagnosis = Diagnosis(found, verdict, examination, _provenance(case, command, twin, effects))
+    diagnosis = Diagnosis(found, verdict, examination, _provenance(case, command, twin, effects), recordings)
     with atomic_file.filled_folder(target) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned
@@ -76,7 +79,21 @@ def diagnose_case(
     lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
     if own:
         lines.append("effects of your own: " + ", ".join(f"{effect.block}.{effect.name}" for effect in own))
-    return {"lines": lines + report_lines(target, written=report), "flags": list(found.split.limits), **facts}
+    return {"lines": lines + report_lines(target, written=report), "flags": list(diagnosis.flags), **facts}
+
+
+def _examined(case: Case) -> tuple[Case, tuple[ConsistencyExamination, ...]]:
+    """The case without samples that were not measured, and what was found of them.
+
+    Delays, gains and limits of sensors stay: they are effects that the diagnosis finds by itself.
+    """
+    runs, examinations = [], []
+    for run in case.runs:
+        found, wrong = examined_samples(run.recording, checks=("held samples", "filled samples", "spikes"))
+        examination = ConsistencyExamination(run.name, tuple(found), (), wrong)
+        runs.append(dataclasses.replace(run, recording=examination.measured_only(run.recording)))
+        examinations.append(examination)
+    return dataclasses.replace(case, runs=tuple(runs)), tuple(examinations)
 
 
 def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:

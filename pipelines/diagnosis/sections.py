@@ -11,7 +11,7 @@ from pipelines.report.citations import Citation
 from pipelines.report.figure import ReportFigure
 from pipelines.report.page import Page
 from pipelines.report.sections import FigurePlan, SectionPlan
-from pipelines.report.tables import Table, provenance_table
+from pipelines.report.tables import Table, consistency_tables, provenance_table
 from sloshlab import __version__
 
 _TRANSFORM = Citation(
@@ -65,6 +65,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
             (tables.effect_parameter_table(diagnosis), tables.baseline_table(diagnosis)),
         ),
         "What remains": ({}, (tables.remains_table(diagnosis), tables.limits_table(diagnosis))),
+        "Recordings": ({}, consistency_tables(diagnosis.recordings)[:1]),
     }
     plans = tuple(
         SectionPlan(
@@ -77,7 +78,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
     return Page(
         title="What was left out",
         subtitle=f"{diagnosis.findings.case.name} · sloshlab {__version__}",
-        flags=diagnosis.findings.split.limits,
+        flags=diagnosis.flags,
         lead=diagnosis.verdict.statement,
         summary=_sentences(diagnosis),
         plans=(*plans, SectionPlan("Provenance", (), (provenance_table(diagnosis.provenance),))),

@@ -22,9 +22,10 @@ from pipelines.liquid_model.results import (
 from pipelines.liquid_model.training_runs import TrainingRuns, signals_of, sloshing_run
 from pipelines.sweep.results import RigResult, RunResult
 from pipelines.sweep.shaker import sweep_signals
-from pipelines.sweep.stages import SweepOptions, analyse_sweep
+from pipelines.sweep.stages import SweepOptions, analyse_sweep, require_usable
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.resampling import resampled
+from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.maps.map_error import MapError
@@ -90,9 +91,12 @@ def validated(
     compared = [_compared("training", signals, model, domain) for signals in runs.training]
     advance("training")
     read: dict[str, list[_Read]] = {"validation": [], "test": []}
+    tested: list[ConsistencyExamination] = []
     for role, paths in (("validation", runs.files.validation), ("test", test)):
         for path in paths:
-            recording = sloshing_run(path, runs.rig)
+            recording, examination = sloshing_run(path, runs.still.reference)
+            # validation runs were examined when they were read for the training
+            tested += [examination] if role == "test" else []
             read_run = _Read(path, recording, signals_of(recording, runs.rig, runs.dry))
             read[role].append(read_run)
             at_rate = _compared(role, read_run.signals.at_rate(model.sampling_rate_hz), model, domain)
@@ -115,7 +119,8 @@ def validated(
         maps=maps,
         training=training,
         skipped=skipped,
-        flags=(*runs.flags, *_outside(compared)),
+        examinations=(*runs.examinations, *tested),
+        flags=(*runs.flags, *(flag for examination in tested for flag in examination.flags), *_outside(compared)),
     )
 
 
@@ -132,7 +137,8 @@ def _with_windows(run: ComparedRun, read: _Read, rig: Rig, dry: DryMass | None) 
 
     The simulated force is brought to the rate of the recording, the motion is the recorded one.
     """
-    signals, quality = sweep_signals(read.recording, read.path, rig, dry)
+    quality = require_usable(read.recording, read.path)
+    signals = sweep_signals(read.recording, rig, dry, quality)
     ratio = run.signals.sampling_rate_hz / read.signals.sampling_rate_hz
     positions = np.arange(signals.force_n.size) * ratio
     dynamic = resampled(run.free, positions, rate_ratio=1 / ratio)

@@ -36,7 +36,7 @@ def remembering(model: ReducedOrderModel, starts: Sequence[Path], runs: Training
         If a recording is bad or one of the others.
     """
     require_new_runs(starts, runs.files)
-    signals = [signals_of(sloshing_run(path, runs.rig), runs.rig, runs.dry) for path in starts]
+    signals = [signals_of(sloshing_run(path, runs.still.reference)[0], runs.rig, runs.dry) for path in starts]
     rested = [from_rest(signal, runs.rate_hz, rest_s=REST_S) for signal in signals]
     found = with_break_up(model, [signals.run() for signals in (*runs.training, *rested)])
     found.facts["sudden_starts"] = [path.name for path in starts]

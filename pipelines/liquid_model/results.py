@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.sweep.results import RigResult, RunResult
+from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.maps.map_error import MapError
 from sloshlab.reduced_order_model.fit_quality import FitQuality, fit_quality
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
@@ -140,6 +141,8 @@ class ValidatedModel:
     training : Training or None
     skipped : dict
         Why a part is missing, by the part.
+    examinations : tuple of ConsistencyExamination
+        Of all recordings.
     flags : tuple of str
     provenance : dict
     """
@@ -154,6 +157,7 @@ class ValidatedModel:
     maps: ComparedMaps | None
     training: Training | None
     skipped: Mapping[str, str]
+    examinations: tuple[ConsistencyExamination, ...] = ()
     flags: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
 

@@ -20,7 +20,7 @@ from pipelines.report.citations import SCIPY, SOURCE, XARRAY, Citation
 from pipelines.report.figure import ReportFigure
 from pipelines.report.page import Page
 from pipelines.report.sections import FigurePlan, SectionPlan
-from pipelines.report.tables import provenance_table
+from pipelines.report.tables import consistency_tables, provenance_table
 from sloshlab import __version__
 
 PAPERS: Final = (
@@ -116,6 +116,7 @@ def planned_sections(validated: ValidatedModel) -> tuple[SectionPlan, ...]:
             plans(training_curve=partial(figures_training.training_curve)),
             (tables.model_table(validated),),
         ),
+        SectionPlan("Recordings", (), consistency_tables(validated.examinations)),
         SectionPlan("Provenance", (), (provenance_table(validated.provenance),)),
     )
 

@@ -11,11 +11,11 @@ from typing import Any
 import xarray as xr
 
 from pipelines.report.outputs import sha256_of
-from pipelines.sweep.stages import naming, require_usable
-from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass
-from sloshlab.conditioning.combined_channels import acceleration_channels, force_channels
+from pipelines.sweep.still_runs import StillRuns, examined_run, read_still_runs
+from sloshlab.conditioning.calibration import DryMass
+from sloshlab.consistency.examination import Reference
+from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.errors import AnalysisError, InputError
-from sloshlab.recording import read_recording
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals, liquid_signals
 from sloshlab.reduced_order_model.model_rate import ModelRate, chosen_rate
 from sloshlab.reduced_order_model.tank_scaling import tank_facts
@@ -74,22 +74,35 @@ class TrainingRuns:
     ----------
     files : RunFiles
     rig : Rig
-    dry : DryMass or None
-        Identified, if there were still runs.
+    still : StillRuns
+        What they identify, and what was found in them.
     rate : ModelRate
         Chosen from the training runs, or from the validation runs where there are no others.
     rate_hz : float
         Of the signals; the chosen one unless another was wanted.
     training, validation : list of LiquidSignals
+    examined : tuple of ConsistencyExamination
+        Of the runs for training and validation.
     """
 
     files: RunFiles
     rig: Rig
-    dry: DryMass | None
+    still: StillRuns
     rate: ModelRate
     rate_hz: float
     training: list[LiquidSignals]
     validation: list[LiquidSignals]
+    examined: tuple[ConsistencyExamination, ...] = ()
+
+    @property
+    def dry(self) -> DryMass | None:
+        """Dry mass, identified if there were still runs."""
+        return self.still.dry
+
+    @property
+    def examinations(self) -> tuple[ConsistencyExamination, ...]:
+        """Of all runs, still ones first."""
+        return (*self.still.examinations, *self.examined)
 
     @cached_property
     def domain(self) -> ValidityDomain:
@@ -101,9 +114,10 @@ class TrainingRuns:
     @property
     def flags(self) -> tuple[str, ...]:
         """What a reader must know before using a model of these runs."""
+        found = tuple(flag for examination in self.examinations for flag in examination.flags)
         if self.dry is not None:
-            return ()
-        return (f"dry mass taken from {self.files.rig.name}, not identified; give --still runs",)
+            return found
+        return (f"dry mass taken from {self.files.rig.name}, not identified; give --still runs", *found)
 
     def facts(self) -> dict[str, Any]:
         """Return what a model keeps of them."""
@@ -131,9 +145,10 @@ def training_runs(files: RunFiles, rate_hz: float | None = None) -> TrainingRuns
         If a recording, the rig or their combination is bad.
     """
     rig = Rig.from_toml(files.rig)
-    dry = dry_mass(files.still, rig)
+    still = read_still_runs(files.still, rig, files.rig.name)
+    read = {path: sloshing_run(path, still.reference) for path in (*files.training, *files.validation)}
     training, validation = (
-        [signals_of(sloshing_run(path, rig), rig, dry) for path in paths]
+        [signals_of(read[path][0], rig, still.dry) for path in paths]
         for paths in (files.training, files.validation)
     )
     rate = chosen_rate(training or validation)
@@ -141,11 +156,12 @@ def training_runs(files: RunFiles, rate_hz: float | None = None) -> TrainingRuns
     return TrainingRuns(
         files,
         rig,
-        dry,
+        still,
         rate,
         wanted,
         [signals.at_rate(wanted) for signals in training],
         [signals.at_rate(wanted) for signals in validation],
+        tuple(examination for _, examination in read.values()),
     )
 
 
@@ -165,57 +181,19 @@ def require_new_runs(test: Sequence[Path], files: RunFiles) -> None:
         known[digest] = path
 
 
-def dry_mass(paths: Sequence[Path], rig: Rig) -> DryMass | None:
-    """Identify the dry mass from empty and frozen runs; None without any.
-
-    Raises
-    ------
-    InputError
-        If a run is unusable, or neither empty nor frozen.
-    """
-    if not paths:
-        return None
-    runs: dict[str, list[xr.Dataset]] = {"empty": [], "frozen": []}
-    for path in paths:
-        recording = usable_run(path, rig)
-        configuration = str(recording.attrs.get("configuration"))
-        if configuration not in runs:
-            raise AnalysisError(
-                f"{path}: configuration", got=repr(configuration), allowed="empty or frozen with --still"
-            )
-        runs[configuration].append(recording)
-    first = (runs["empty"] + runs["frozen"])[0]
-    return identify_dry_mass(
-        runs["empty"],
-        runs["frozen"],
-        liquid_mass_kg=rig.liquid_mass_kg,
-        force_names=force_channels(first),
-        acceleration_names=acceleration_channels(first),
-    )
-
-
-def usable_run(path: Path, rig: Rig) -> xr.Dataset:
-    """Read a recording with working sensors and the right signs."""
-    with naming(path):
-        recording = read_recording(path)
-        require_usable(recording, path)
-        check_signs(recording, rig)
-    return recording
-
-
-def sloshing_run(path: Path, rig: Rig) -> xr.Dataset:
-    """Read a usable recording of the moving liquid.
+def sloshing_run(path: Path, reference: Reference) -> tuple[xr.Dataset, ConsistencyExamination]:
+    """Read and examine a usable recording of the moving liquid.
 
     Raises
     ------
     AnalysisError
-        If the liquid was frozen, or there was none.
+        If the liquid was frozen, there was none, or no result may rest on the run.
     """
-    recording = usable_run(path, rig)
+    recording, examination = examined_run(path, reference)
     configuration = recording.attrs.get("configuration")
     if configuration != "sloshing":
         raise AnalysisError(f"{path}: configuration", got=repr(configuration), allowed="sloshing")
-    return recording
+    return recording, examination
 
 
 def signals_of(recording: xr.Dataset, rig: Rig, dry: DryMass | None) -> LiquidSignals:

@@ -7,13 +7,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pipelines.sweep.stages import naming
+import xarray as xr
+
+from pipelines.sweep.stages import examined_recording, naming
 from sloshlab.conditioning.calibration import check_signs
 from sloshlab.conditioning.quality import ChannelQuality, RunQuality, quality_of
 from sloshlab.conditioning.redundancy import PairAgreement
+from sloshlab.consistency.examination import Reference
+from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.errors import InputError, RecordingError
 from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import read_recording
+from sloshlab.rig import Rig
 
 
 def check_runs(paths: Sequence[Path]) -> dict[str, Any]:
@@ -35,13 +40,17 @@ def check_runs(paths: Sequence[Path]) -> dict[str, Any]:
     refused: list[InputError] = []
     for path in paths:
         try:
-            quality = _usable_quality(path)
+            quality, examination = _examined(path)
         except InputError as error:
             refused.append(error)
             continue
-        lines += _table(path, quality)
-        flags += [f"{quality.run_id}: {remark}" for remark in quality.remarks]
-        summaries.append({"path": str(path), **asdict(quality), "n_lost": quality.n_lost})
+        lines += _table(path, quality) + _consistency_lines(examination)
+        flags += [f"{quality.run_id}: {remark}" for remark in quality.remarks] + list(examination.flags)
+        findings = [finding.to_dict() for finding in examination.findings]
+        summaries.append(
+            {"path": str(path), **asdict(quality), "n_lost": quality.n_lost, "findings": findings,
+             "not_checked": list(examination.not_checked)}
+        )  # fmt: skip
     if refused:
         more = (
             f" (and {len(refused) - 1} more of {len(paths)} recordings cannot be used)" if len(refused) > 1 else ""
@@ -51,8 +60,8 @@ def check_runs(paths: Sequence[Path]) -> dict[str, Any]:
     return {"lines": lines, "flags": flags, "runs": summaries}
 
 
-def _usable_quality(path: Path) -> RunQuality:
-    """Quality of a recording that keeps the format, has working sensors and right signs."""
+def _examined(path: Path) -> tuple[RunQuality, ConsistencyExamination]:
+    """Quality of a recording that keeps the format, has working sensors and right signs, and its examination."""
     recording = read_recording(path)
     quality = quality_of(recording)
     if not quality.usable:
@@ -65,7 +74,20 @@ def _usable_quality(path: Path) -> RunQuality:
     if "signs" in EXPERIMENTS[recording.attrs["experiment"]].stages:
         with naming(path):
             check_signs(recording)
-    return quality
+    _, examination = examined_recording(recording, path, Reference(_rig_beside(path, recording)))
+    return quality, examination
+
+
+def _rig_beside(path: Path, recording: xr.Dataset) -> Rig | None:
+    """The rig that a recording names, if it lies beside it."""
+    name = str(recording.attrs.get("rig", ""))
+    file = path.parent / name
+    return Rig.from_toml(file) if name and name == Path(name).name and file.is_file() else None
+
+
+def _consistency_lines(examination: ConsistencyExamination) -> list[str]:
+    found = [f"{finding.check}: {finding.text} ({finding.action.value})" for finding in examination.findings]
+    return [*(found or ["consistency: no contradiction"]), *(f"not checked: {p}" for p in examination.not_checked)]
 
 
 def _table(path: Path, quality: RunQuality) -> list[str]:

@@ -10,6 +10,7 @@ from pipelines.report.numbers import interval
 
 if TYPE_CHECKING:
     from sloshlab.conditioning.quality import RunQuality
+    from sloshlab.consistency.finding import ConsistencyExamination
     from sloshlab.recording import RunAttributes
 
 
@@ -105,3 +106,25 @@ def remark_table(runs: Sequence[CheckedRun]) -> Table:
     ]
     note = "" if rows else "The check of the recordings had nothing to remark."
     return Table("Remarks on the recordings", ("run", "remark"), tuple(rows), note)
+
+
+def consistency_tables(examinations: Sequence[ConsistencyExamination]) -> tuple[Table, Table]:
+    """What contradicts itself, other runs or physics, and what could not be examined."""
+    found = [(examination.run_id, finding) for examination in examinations for finding in examination.findings]
+    rows = tuple((run, finding.check, finding.text, finding.action.value) for run, finding in found)
+    note = (
+        "Errors are the largest that the finding makes where it holds."
+        if rows
+        else "Every check agreed: samples, like sensors, force against acceleration, statements about the motion."
+    )
+    # what is the same for many runs is said once
+    open_points: dict[str, list[str]] = {}
+    for examination in examinations:
+        for point in examination.not_checked:
+            open_points.setdefault(point, []).append(examination.run_id)
+    points = tuple((", ".join(runs), point) for point, runs in open_points.items())
+    return (
+        Table("Contradictions", ("run", "check", "what was found", "what follows"), rows, note),
+        Table("Not checked", ("runs", "what these recordings cannot tell"), points,
+              "" if points else "Nothing was left unexamined."),
+    )  # fmt: skip

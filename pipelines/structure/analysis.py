@@ -71,7 +71,7 @@ def analyse_beam(paths: Sequence[Path], rig_path: Path, settings: BeamSettings) 
     """
     rig = Rig.from_toml(rig_path)
     structure, modes = structure_of(rig), stated_modes(rig, settings.n_modes)
-    runs = _loaded(paths, structure.kind)
+    runs = _loaded(paths, rig)
     settings = dataclasses.replace(settings, segment_s=settings.segment_s or _segment_s(runs))
     results = []
     with progress("beam", len(runs)) as advance:
@@ -99,10 +99,10 @@ def analyse_beam(paths: Sequence[Path], rig_path: Path, settings: BeamSettings) 
     )
 
 
-def _loaded(paths: Sequence[Path], kind: str) -> list[Loaded]:
+def _loaded(paths: Sequence[Path], rig: Rig) -> list[Loaded]:
     runs: list[Loaded] = []
     for path in paths:
-        run = loaded(path, read_recording(path), kind)
+        run = loaded(path, read_recording(path), rig)
         own = run.attributes.run_id, group_of(run.attributes)
         same = next((run for run in runs if (run.attributes.run_id, group_of(run.attributes)) == own), None)
         if same is not None:

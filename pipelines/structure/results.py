@@ -12,6 +12,7 @@ import numpy.typing as npt
 from sloshlab.conditioning.calibration import ApparentMass
 from sloshlab.conditioning.quality import RunQuality
 from sloshlab.configurations import EMPTY, FROZEN, SLOSHING
+from sloshlab.consistency.finding import NOT_EXAMINED, ConsistencyExamination
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.modal.free_decay import FreeDecay
 from sloshlab.modal.modal_filter import ModalFilter, ModalResponse
@@ -135,6 +136,8 @@ class BeamRun:
         Of a random run.
     flags : tuple of str
         What a reader must know before using the numbers.
+    examination : ConsistencyExamination
+        Whether the run agrees with itself, with the rig and with physics.
     """
 
     path: Path
@@ -151,6 +154,7 @@ class BeamRun:
     decays: tuple[ModeDecay, ...] = ()
     random: RandomResponse | None = None
     flags: tuple[str, ...] = ()
+    examination: ConsistencyExamination = NOT_EXAMINED
 
     @property
     def is_simulated(self) -> bool:

@@ -10,7 +10,7 @@ from pipelines.report.citations import SCIPY, SOURCE, XARRAY, Citation
 from pipelines.report.page import Page, write_page
 from pipelines.report.progress import progress
 from pipelines.report.sections import FigurePlan, SectionPlan
-from pipelines.report.tables import Table, channel_table, provenance_table, remark_table
+from pipelines.report.tables import Table, channel_table, consistency_tables, provenance_table, remark_table
 from pipelines.structure import (
     figures_decay,
     figures_signals,
@@ -80,6 +80,7 @@ def planned_sections(experiment: BeamExperiment) -> tuple[SectionPlan, ...]:
         tables.run_table(experiment.runs),
         tables.reason_table(experiment),
         remark_table(experiment.runs),
+        *consistency_tables([run.examination for run in experiment.runs if not run.is_simulated]),
     )
     return (
         *sections,

@@ -13,7 +13,7 @@ import xarray as xr
 from pipelines.report.outputs import sha256_of
 from pipelines.structure.random_runs import random_response, rms
 from pipelines.structure.results import BeamRun, BeamSettings, ModeDecay, RandomResponse, group_of
-from pipelines.sweep.stages import require_usable
+from pipelines.sweep.stages import examined_recording, require_usable
 from pipelines.twin.simulated_tank_model import departures_of
 from sloshlab.channel_names import ACCELERATION_ROOT, FORCE_INTERFACE
 from sloshlab.conditioning.combined_channels import (
@@ -24,6 +24,8 @@ from sloshlab.conditioning.combined_channels import (
 )
 from sloshlab.conditioning.gaps import longest_whole_stretch
 from sloshlab.conditioning.quality import RunQuality, quality_of
+from sloshlab.consistency.examination import Reference
+from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.errors import AnalysisError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
 from sloshlab.modal.free_decay import analyse_free_decay
@@ -58,6 +60,7 @@ class Loaded:
     recording: xr.Dataset
     attributes: RunAttributes
     quality: RunQuality
+    examination: ConsistencyExamination
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,8 @@ def has_spectra(attributes: RunAttributes) -> bool:
     return "spectra" in EXPERIMENTS[attributes.experiment].stages
 
 
-def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
-    """A recording whose experiment suits the structure, with working sensors.
+def loaded(path: Path, recording: xr.Dataset, rig: Rig) -> Loaded:
+    """A recording whose experiment suits the structure of a rig, with working sensors, examined.
 
     Raises
     ------
@@ -87,6 +90,7 @@ def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
         If it is no run of this structure, or unusable.
     """
     attributes = run_attributes(recording, name=str(path))
+    kind = structure_of(rig).kind
     allowed = experiment_names(lambda experiment: experiment.structure == kind)
     if attributes.experiment not in allowed:
         raise AnalysisError(
@@ -98,9 +102,13 @@ def loaded(path: Path, recording: xr.Dataset, kind: str) -> Loaded:
     if EXPERIMENTS[attributes.experiment].moves == "release":
         recording = _without_still_root(recording)
     # a frozen liquid has no force: constant channels are no dead sensors in a simulation
-    simulated = "simulated_from" in recording.attrs
-    quality = quality_of(recording) if simulated else require_usable(recording, path)
-    return Loaded(path, recording, attributes, quality)
+    if "simulated_from" in recording.attrs:
+        return Loaded(
+            path, recording, attributes, quality_of(recording), ConsistencyExamination(attributes.run_id)
+        )
+    quality = require_usable(recording, path)
+    recording, examination = examined_recording(recording, path, Reference(rig))
+    return Loaded(path, recording, attributes, quality, examination)
 
 
 def _without_still_root(recording: xr.Dataset) -> xr.Dataset:
@@ -137,7 +145,8 @@ def analysed(run: Loaded, rig: Rig, settings: BeamSettings) -> BeamRun:
         response=response,
         decays=_decays(response, modes, settings, rate_hz) if "decays" in stages else (),
         random=_random(motion, response, modes, settings, rate_hz) if is_random else None,
-        flags=tuple(flags),
+        flags=(*flags, *run.examination.flags),
+        examination=run.examination,
     )
 
 

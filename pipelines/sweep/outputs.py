@@ -52,7 +52,13 @@ def write_experiment(
     lines = [f"windows: {folder / 'windows.nc'} ({n_windows} windows{left_out})", f"maps: {folder / 'maps.nc'}"]
     return {
         "lines": lines + report_lines(folder, written=report),
-        "flags": list(experiment.flags),
+        "flags": list(experiment.all_flags),
+        "findings": [
+            {"run": examination.run_id, **finding.to_dict()}
+            for examination in experiment.examinations
+            for finding in examination.findings
+        ],
+        "not_checked": {e.run_id: list(e.not_checked) for e in experiment.examinations if e.not_checked},
         "runs": len(experiment.runs),
         "windows": n_windows,
         "unsteady_windows": n_unsteady,

@@ -37,7 +37,7 @@ def _page(experiment: SweepExperiment) -> Page:
     return Page(
         title=experiment.title,
         subtitle=_subtitle(experiment),
-        flags=experiment.flags,
+        flags=experiment.all_flags,
         summary=sentences(experiment),
         plans=planned_sections(experiment),
         papers=citation(experiment.kind),

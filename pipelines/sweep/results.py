@@ -12,6 +12,7 @@ import xarray as xr
 
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.quality import RunQuality
+from sloshlab.consistency.finding import NOT_EXAMINED, ConsistencyExamination
 from sloshlab.maps.energy_maps import EnergyMaps
 from sloshlab.recording import RunAttributes
 from sloshlab.rig import Rig
@@ -67,7 +68,9 @@ class RunResult:
     excerpts : tuple of Excerpt
         At the windows nearest 9, 13 and 17 Hz, or a quarter, half and three quarters of the sweep.
     flags : tuple of str
-        What a reader must know before using the numbers; empty is good.
+        What losses a reader must know before using the numbers; empty is good.
+    examination : ConsistencyExamination
+        Whether the run agrees with itself, with other runs and with physics.
     """
 
     path: Path
@@ -83,6 +86,7 @@ class RunResult:
     n_cycles_lost: int
     excerpts: tuple[Excerpt, ...] = ()
     flags: tuple[str, ...] = ()
+    examination: ConsistencyExamination = NOT_EXAMINED
 
 
 @dataclass(frozen=True)
@@ -122,8 +126,10 @@ class SweepExperiment:
         For ``"work"``: the map without a tank.
     provenance : dict
         Input hashes, versions and the command.
+    still_runs : tuple of ConsistencyExamination
+        Of the empty and frozen runs, and of what they identify together.
     flags : tuple of str
-        Of all runs and of the experiment; if not empty the exit code is 3.
+        Losses of all runs and of the experiment.
     """
 
     title: str
@@ -136,4 +142,15 @@ class SweepExperiment:
     inputs: tuple[Path, ...] = ()
     work_maps: EnergyMaps | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
+    still_runs: tuple[ConsistencyExamination, ...] = ()
     flags: tuple[str, ...] = ()
+
+    @property
+    def examinations(self) -> tuple[ConsistencyExamination, ...]:
+        """Of all runs, still ones first."""
+        return (*self.still_runs, *(run.examination for run in self.runs))
+
+    @property
+    def all_flags(self) -> tuple[str, ...]:
+        """Losses and contradictions; if there is one the exit code is 3."""
+        return (*self.flags, *(flag for examination in self.examinations for flag in examination.flags))

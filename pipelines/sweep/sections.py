@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.report.sections import FigurePlan, SectionPlan
 from pipelines.report.style import file_stem
-from pipelines.report.tables import channel_table, provenance_table, remark_table
+from pipelines.report.tables import channel_table, consistency_tables, provenance_table, remark_table
 from pipelines.sweep import (
     figures_maps,
     figures_quality,
@@ -151,7 +151,7 @@ def _quality_section(experiment: SweepExperiment) -> SectionPlan:
     shown = [tables.dry_mass_table(experiment.rigs)] if experiment.rigs else []
     shown += [tables.identity_table(experiment), tables.validation_table(experiment), channel_table(runs)]
     shown += [agreement] if agreement is not None else []
-    shown += [tables.run_table(runs), remark_table(runs)]
+    shown += [tables.run_table(runs), remark_table(runs), *consistency_tables(experiment.examinations)]
     return SectionPlan("Quality", tuple(FigurePlan(name, draw) for name, draw in plans.items()), tuple(shown))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +12,17 @@ import xarray as xr
 
 from pipelines.report.progress import progress
 from pipelines.sweep.results import RigResult, RunResult, SweepExperiment
-from pipelines.sweep.stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
-from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass, w_bar_bias_of_delay
+from pipelines.sweep.stages import (
+    SweepOptions,
+    SweepSignals,
+    analyse_sweep,
+    examined_recording,
+    naming,
+    not_measured,
+    require_usable,
+)
+from pipelines.sweep.still_runs import HIGHEST_SWEEP_HZ, StillRuns, read_still_runs
+from sloshlab.conditioning.calibration import DryMass, check_signs
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
     dynamic_force_noise_power,
@@ -22,6 +32,10 @@ from sloshlab.conditioning.combined_channels import (
 )
 from sloshlab.conditioning.quality import RunQuality
 from sloshlab.configurations import SLOSHING, STILL_CONFIGURATIONS
+from sloshlab.consistency.between_runs import sibling_findings
+from sloshlab.consistency.bounds import window_findings
+from sloshlab.consistency.effect import Inertia
+from sloshlab.consistency.examination import Reference
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.experiments import experiment_names
 from sloshlab.maps.energy_maps import energy_maps
@@ -29,13 +43,6 @@ from sloshlab.quantities import described
 from sloshlab.recording import RunAttributes, channels, read_attributes, read_recording
 from sloshlab.rig import Rig
 from sloshlab.sweep.windows import WindowSettings
-
-_LARGEST_PLAUSIBLE_GAIN_ERROR = 0.05
-"""Of force over acceleration; beyond it the calibration is flagged."""
-_LARGEST_BIAS_OF_W_BAR = 0.02
-"""W̄ that a delay may feign before it is flagged; a delay is not taken out."""
-_FREQUENCY_OF_BIAS_HZ = 20.0
-"""Where sweeps end; the bias grows with frequency."""
 
 
 @dataclass(frozen=True)
@@ -89,18 +96,20 @@ def analyse_shaker(paths: Sequence[Path], rig_paths: Sequence[Path], settings: S
     rigs = _rigs(rig_paths)
     runs = _assigned(paths, rigs)
     results: dict[str, list[RunResult]] = {name: [] for name in rigs}
-    dry: dict[str, DryMass | None] = {}
+    still: dict[str, StillRuns] = {}
     with progress("shaker", len(runs)) as advance:
         for name, rig in rigs.items():
             own = [run for run in runs if run.rig_name == name]
-            dry[name] = _dry_mass(own, rig)
+            quiet = [run.path for run in own if run.attributes.configuration in STILL_CONFIGURATIONS]
+            still[name] = read_still_runs(quiet, rig, name)
             for run in own:
                 if run.attributes.configuration == SLOSHING:
                     with naming(run.path):
-                        results[name].append(_analysed(run, rig, dry[name], settings))
+                        results[name].append(_analysed(run, rig, still[name].reference, settings))
                 advance(run.path.name)
+            results[name] = compared_with_siblings(results[name], rig)
         inputs = [*(run.path for run in runs), *rig_paths]
-        return _experiment(results, rigs, dry, settings, inputs)
+        return _experiment(results, rigs, still, settings, inputs)
 
 
 def _rigs(paths: Sequence[Path]) -> dict[str, Rig]:
@@ -167,49 +176,37 @@ def _another_rig_lies_beside(described: Sequence[tuple[Path, RunAttributes]], ri
     return any(file.is_file() and Rig.from_toml(file) != rig for file in own)
 
 
-def _dry_mass(runs: Sequence[_Run], rig: Rig) -> DryMass | None:
-    dry = {
-        configuration: [_dry_recording(run, rig) for run in runs if run.attributes.configuration == configuration]
-        for configuration in STILL_CONFIGURATIONS
-    }
-    recordings = dry["empty"] + dry["frozen"]
-    if not recordings:
-        return None
-    return identify_dry_mass(
-        dry["empty"],
-        dry["frozen"],
-        liquid_mass_kg=rig.liquid_mass_kg,
-        force_names=force_channels(recordings[0]),
-        acceleration_names=acceleration_channels(recordings[0]),
-    )
-
-
-def _dry_recording(run: _Run, rig: Rig) -> xr.Dataset:
-    with naming(run.path):
-        recording = read_recording(run.path)
-        # a dead force cell in an empty run would halve the dry mass unnoticed
-        require_usable(recording, run.path)
-        check_signs(recording, rig)
-    return recording
-
-
-def _analysed(run: _Run, rig: Rig, dry: DryMass | None, settings: ShakerSettings) -> RunResult:
+def _analysed(run: _Run, rig: Rig, reference: Reference, settings: ShakerSettings) -> RunResult:
     recording = read_recording(run.path)
-    signals, quality = sweep_signals(recording, run.path, rig, dry)
-    return analyse_sweep(recording, run.path, signals, settings, quality=quality, rig=rig, rig_name=run.rig_name)
+    quality = require_usable(recording, run.path)
+    recording, examination = examined_recording(recording, run.path, reference)
+    signals = sweep_signals(recording, rig, reference.dry, quality)
+    result = analyse_sweep(recording, run.path, signals, settings, quality=quality, rig=rig, rig_name=run.rig_name)
+    examination = examination.with_findings(window_findings(result.windows))
+    return dataclasses.replace(result, examination=examination)
 
 
-def sweep_signals(
-    recording: xr.Dataset, path: Path, rig: Rig, dry: DryMass | None
-) -> tuple[SweepSignals, RunQuality]:
-    """Force and motion of a run of a tank on the shaker, ready to be evaluated, and how good they are.
+def compared_with_siblings(results: Sequence[RunResult], rig: Rig) -> list[RunResult]:
+    """The runs of one rig with what their quiet starts say of each other."""
+    starts = {run.attributes.run_id: run.examination.start for run in results}
+    known = {run_id: start for run_id, start in starts.items() if start is not None}
+    found = sibling_findings(known, rig, Inertia.of(rig, HIGHEST_SWEEP_HZ))
+    return [
+        dataclasses.replace(run, examination=run.examination.with_findings([found[run.attributes.run_id]]))
+        if run.attributes.run_id in found
+        else run
+        for run in results
+    ]
+
+
+def sweep_signals(recording: xr.Dataset, rig: Rig, dry: DryMass | None, quality: RunQuality) -> SweepSignals:
+    """Force and motion of a run of a tank on the shaker, ready to be evaluated.
 
     Raises
     ------
     AnalysisError
-        If the recording is unusable or has wrong signs.
+        If the recording has wrong signs.
     """
-    quality = require_usable(recording, path)
     check_signs(_enough_for_signs(recording), rig)
     forces, accelerations = force_channels(recording), acceleration_channels(recording)
     gain = 1.0 if dry is None else dry.gain_ratio
@@ -218,14 +215,13 @@ def sweep_signals(
     # by g before anything else, so that force and acceleration are on one scale; in place and in its own type,
     # because long recordings cost memory traffic
     force /= gain
-    signals = SweepSignals(
+    return SweepSignals(
         force_n=force,
         motion=mean_acceleration(recording).values,
         not_measured=not_measured(recording, forces + accelerations, quality),
         inertia_kg=mass,
         noise_power=dynamic_force_noise_power(recording, forces, accelerations, mass),
     )
-    return signals, quality
 
 
 def _enough_for_signs(recording: xr.Dataset) -> xr.Dataset:
@@ -250,14 +246,14 @@ def _windows_of(name: str, results: Sequence[RunResult]) -> xr.Dataset:
 def _experiment(
     results: Mapping[str, Sequence[RunResult]],
     rigs: Mapping[str, Rig],
-    dry: Mapping[str, DryMass | None],
+    still: Mapping[str, StillRuns],
     settings: ShakerSettings,
     inputs: Sequence[Path],
 ) -> SweepExperiment:
     windows = {name: _windows_of(name, results[name]) for name in rigs}
     everything = xr.concat(list(windows.values()), dim="window", combine_attrs="drop")
     rig_results = [
-        RigResult(name, rig, dry[name], windows[name], energy_maps(windows[name], rig, extent=everything))
+        RigResult(name, rig, still[name].dry, windows[name], energy_maps(windows[name], rig, extent=everything))
         for name, rig in rigs.items()
     ]
     runs = [result for name in rigs for result in results[name]]
@@ -270,26 +266,9 @@ def _experiment(
         windows=everything,
         maps=_joined(rig_results),
         settings=settings.windows,
-        flags=tuple([flag for run in runs for flag in run.flags] + _calibration_flags(dry, rigs)),
+        still_runs=tuple(examination for name in rigs for examination in still[name].examinations),
+        flags=tuple(flag for run in runs for flag in run.flags),
     )
-
-
-def _calibration_flags(dry: Mapping[str, DryMass | None], rigs: Mapping[str, Rig]) -> list[str]:
-    flags = []
-    for name, mass in dry.items():
-        if mass is None:
-            continue
-        if abs(mass.gain_ratio - 1) > _LARGEST_PLAUSIBLE_GAIN_ERROR:
-            flags.append(
-                f"{name}: the gain of force over acceleration is {mass.gain_ratio:.3f}; check the calibration"
-            )
-        bias = w_bar_bias_of_delay(mass, rigs[name], frequency_hz=_FREQUENCY_OF_BIAS_HZ)
-        if abs(mass.delay_s) > 3 * mass.delay_std_s and abs(bias) > _LARGEST_BIAS_OF_W_BAR:
-            flags.append(
-                f"{name}: force lags acceleration by {1e6 * mass.delay_s:.0f} µs, which shifts W̄ at 20 Hz by "
-                f"{bias:+.3f}; compensate it with delay_s in the channel map"
-            )
-    return flags
 
 
 def _joined(rigs: Sequence[RigResult]) -> xr.Dataset:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,8 @@ from pipelines.sweep.results import Excerpt, RunResult
 from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import displacement_of_part
 from sloshlab.conditioning.quality import RunQuality, quality_of
+from sloshlab.consistency.examination import Reference, examined
+from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import CLIPPED, CRC_REPAIRED, LOST, STUCK, RunAttributes, run_attributes
@@ -101,6 +103,27 @@ def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
     if not quality.usable:
         raise AnalysisError(f"recording {path}", got="; ".join(quality.reasons), allowed="working sensors")
     return quality
+
+
+def examined_recording(
+    recording: xr.Dataset, path: Path, reference: Reference | None = None, names: Sequence[str] | None = None
+) -> tuple[xr.Dataset, ConsistencyExamination]:
+    """The recording with NaN where nothing was measured, and everything that was found in it.
+
+    Raises
+    ------
+    AnalysisError
+        If no result may rest on the run.
+    """
+    examination = examined(recording, reference, names)
+    if examination.refusals:
+        raise AnalysisError(
+            f"recording {path}",
+            got="; ".join(examination.refusals),
+            allowed="a run that an analysis may rest on",
+            remedy="record again; `sloshlab check` lists everything that was found",
+        )
+    return examination.measured_only(recording), examination
 
 
 def not_measured(recording: xr.Dataset, names: list[str], quality: RunQuality) -> BoolArray | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,15 @@ import xarray as xr
 
 from pipelines.report.progress import progress
 from pipelines.sweep.results import RunResult, SweepExperiment
-from pipelines.sweep.stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
+from pipelines.sweep.stages import (
+    SweepOptions,
+    SweepSignals,
+    analyse_sweep,
+    examined_recording,
+    naming,
+    not_measured,
+    require_usable,
+)
 from sloshlab.conditioning.differentiation import differentiated
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
@@ -99,6 +108,8 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
 def _analysed(path: Path, settings: WorkSettings) -> RunResult:
     recording = read_recording(path)
     quality = require_usable(recording, path)
+    used = [name for name in (settings.force, settings.motion, settings.phase_reference) if name in recording]
+    recording, examination = examined_recording(recording, path, names=used)
     force = _channel(recording, path, settings.force, "force")
     motion = _channel(recording, path, settings.motion, settings.motion_quantity)
     reference = None
@@ -113,7 +124,8 @@ def _analysed(path: Path, settings: WorkSettings) -> RunResult:
         phase_motion=reference,
         not_measured=not_measured(recording, [settings.force, settings.motion], quality),
     )
-    return analyse_sweep(recording, path, signals, settings, quality=quality)
+    result = analyse_sweep(recording, path, signals, settings, quality=quality)
+    return dataclasses.replace(result, examination=examination)
 
 
 def _channel(recording: xr.Dataset, path: Path, name: str, quantity: str | None) -> FloatArray:

@@ -38,6 +38,8 @@ class BlockSpectra:
     ----------
     names : tuple of str
         The channels y.
+    middle_s : ndarray, shape (n_blocks,)
+        Middles of the blocks, from the first sample.
     omega_rad_per_s : ndarray, shape (n_blocks,)
         Power-weighted mean frequency of the lines used.
     power : ndarray, shape (n_blocks,)
@@ -49,6 +51,7 @@ class BlockSpectra:
     """
 
     names: tuple[str, ...]
+    middle_s: FloatArray
     omega_rad_per_s: FloatArray
     power: FloatArray
     cross: ComplexArray
@@ -117,7 +120,8 @@ def block_spectra(
     signals = [reference, *(recording[name].values for name in names)]
     spectra = np.stack([_spectra(signal, factor, per_block) for signal in signals])
     # a block with a lost sample in any channel is left out for all, so that ratios compare the same motion
-    spectra = spectra[:, np.isfinite(spectra).all(axis=(0, 2))]
+    whole = np.isfinite(spectra).all(axis=(0, 2))
+    spectra = spectra[:, whole]
     if spectra.shape[1] == 0:
         raise AnalysisError(
             f"channels {', '.join(names)}",
@@ -135,6 +139,7 @@ def block_spectra(
     omega = 2 * np.pi * line_hz * np.divide(weighted, power, out=np.zeros_like(power), where=power > 0)
     return BlockSpectra(
         names=tuple(names),
+        middle_s=np.asarray((np.flatnonzero(whole) + 0.5) / line_hz, dtype=np.float64),
         omega_rad_per_s=omega,
         power=power,
         cross=np.array([(y * x.conj()).sum(axis=1) for y in others], dtype=np.complex128),

@@ -1,0 +1,192 @@
+"""Force against acceleration where the liquid moves with the tank: apparent mass, delay, linearity.
+
+With the liquid at rest in the tank F = M ü(t − τ). That holds for a whole run that is empty or frozen, and for the
+start of any other: a liquid lies on the floor as long as the tank's acceleration stays above −g, and surface waves
+need several cycles to grow. Only a run that begins at rest has such a start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy.signal import hilbert
+
+from sloshlab.conditioning.combined_channels import mean_acceleration, total_force
+from sloshlab.conditioning.gaps import sampling_step_s
+from sloshlab.constants import GRAVITY_M_PER_S2
+
+FloatArray = npt.NDArray[np.float64]
+
+_LIFT_OFF: Final = 0.9
+"""Share of g at which the start counts as over: just before the liquid leaves the floor."""
+_LONGEST_START_CYCLES: Final = 12
+"""Surface waves under vertical motion grow by a factor e in some cycles, from the ripple of a liquid at rest."""
+_FEWEST_SAMPLES: Final = 64
+_AT_REST: Final = 0.25
+"""A run begins at rest if its first tenth of the start has less than this part of its largest acceleration."""
+_LONGEST_RUN_SAMPLES: Final = 60_000
+"""Of a still run; more tells nothing more."""
+
+
+@dataclass(frozen=True)
+class ForceResponse:
+    """F = M ü(t − τ)(1 + c (ü/a)²) over a stretch in which the liquid moves with the tank.
+
+    Attributes
+    ----------
+    mass_kg, mass_std_kg : float
+        M, with the standard deviation from the correlated residuals.
+    delay_s, delay_std_s : float
+        τ, positive: force comes later.
+    bend, bend_std : float
+        c a², the part of the force that is missing (negative) at the largest acceleration a of the stretch.
+    largest_acceleration_m_per_s2 : float
+        a.
+    stop_s : float
+        Where the stretch ends.
+    """
+
+    mass_kg: float
+    mass_std_kg: float
+    delay_s: float
+    delay_std_s: float
+    bend: float
+    bend_std: float
+    largest_acceleration_m_per_s2: float
+    stop_s: float
+
+
+def start_response(recording: xr.Dataset) -> ForceResponse | None:
+    """Response in the quiet start of a run; None if the run does not begin at rest or is quiet for too short."""
+    acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
+    stretch = quiet_start(acceleration, sampling_step_s(recording))
+    return None if stretch is None else _response(recording, acceleration, stretch)
+
+
+def still_response(recording: xr.Dataset) -> ForceResponse | None:
+    """Response of a run without liquid motion, all of it."""
+    acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
+    return _response(recording, acceleration, slice(0, min(acceleration.size, _LONGEST_RUN_SAMPLES)))
+
+
+def quiet_start(acceleration: FloatArray, step_s: float) -> slice | None:
+    """Samples from the beginning until the liquid may have begun to move; None where it may have moved before.
+
+    Parameters
+    ----------
+    acceleration : ndarray, shape (n_samples,)
+        Of the tank [m/s²], NaN where lost.
+    step_s : float
+        Sampling step.
+    """
+    there = np.isfinite(acceleration)
+    if there.sum() < _FEWEST_SAMPLES:
+        return None
+    moved = np.where(there, acceleration - np.nanmean(acceleration), 0.0)
+    lifted = np.flatnonzero(np.abs(moved) > _LIFT_OFF * GRAVITY_M_PER_S2)
+    stop = int(lifted[0]) if lifted.size else moved.size
+    stop = min(stop, _cycles_end(moved[:stop]))
+    if stop < _FEWEST_SAMPLES:
+        return None
+    largest = float(np.abs(moved[:stop]).max())
+    beginning = float(np.abs(moved[: max(stop // 10, 4)]).max())
+    # a run that was already in motion when the recorder started has liquid that is in motion
+    if largest == 0 or beginning > _AT_REST * largest:
+        return None
+    return slice(0, stop)
+
+
+def _cycles_end(moved: FloatArray) -> int:
+    """Sample at which the motion has gone through the longest start that is allowed."""
+    if moved.size == 0:
+        return 0
+    # a hysteresis of a tenth: noise at rest does not count as cycles
+    level = 0.1 * float(np.abs(moved).max())
+    above = moved > level
+    risen = np.flatnonzero(above[1:] & ~above[:-1])
+    below = np.flatnonzero(moved < -level)
+    if risen.size == 0 or below.size == 0:
+        return moved.size
+    # rises that follow a fall below −level, one per cycle
+    at = np.searchsorted(below, risen)
+    fresh = np.concatenate([[True], np.diff(at) > 0])
+    cycles = risen[fresh]
+    return int(cycles[_LONGEST_START_CYCLES]) if cycles.size > _LONGEST_START_CYCLES else moved.size
+
+
+def _response(recording: xr.Dataset, acceleration: FloatArray, stretch: slice) -> ForceResponse | None:
+    step_s = sampling_step_s(recording)
+    force = np.asarray(total_force(recording).values[stretch], dtype=np.float64)
+    motion = acceleration[stretch]
+    jerk = np.gradient(motion, step_s)
+    waves = _wave_columns(acceleration, stretch)
+    there = np.isfinite(force + motion + jerk)
+    if there.sum() < _FEWEST_SAMPLES:
+        return None
+    force, motion, jerk = force[there], motion[there] - motion[there].mean(), jerk[there]
+    largest = float(np.abs(motion).max())
+    if largest == 0:
+        return None
+    linear = np.column_stack([motion, jerk, np.ones(motion.size), waves[there]])
+    cubic = np.column_stack([linear, largest * (motion / largest) ** 3])
+    # the bend from a fit of its own: with it, mass and delay would be known ten times worse
+    solution, std = _least_squares(linear, force, motion)
+    bent, bent_std = _least_squares(cubic, force, motion)
+    mass = float(solution[0])
+    if mass <= 0:
+        return None
+    time = recording["time"].values[stretch]
+    # τ from the part in quadrature: F = M ü − M τ u⃛
+    return ForceResponse(
+        mass_kg=mass,
+        mass_std_kg=float(std[0]),
+        delay_s=-float(solution[1]) / mass,
+        delay_std_s=float(std[1]) / mass,
+        bend=float(bent[-1]) / mass,
+        bend_std=float(bent_std[-1]) / mass,
+        largest_acceleration_m_per_s2=largest,
+        stop_s=float(time[-1]),
+    )
+
+
+def _wave_columns(acceleration: FloatArray, stretch: slice) -> FloatArray:
+    """Waves at half and three halves of the frequency of the motion, as strong as it, shape (n_samples, 4).
+
+    Faraday waves answer a vertical motion at these frequencies first. They are no part of F = M ü, and over few
+    cycles they are not orthogonal to it.
+    """
+    # twice as long as the stretch: the transform is wrong at its ends
+    longer = acceleration[stretch.start : stretch.start + 2 * (stretch.stop - stretch.start)]
+    analytic = hilbert(np.where(np.isfinite(longer), longer - np.nanmean(longer), 0.0))[
+        : stretch.stop - stretch.start
+    ]
+    phase, size = np.unwrap(np.angle(analytic)), np.abs(analytic)
+    orders = [wave(order * phase) for order in (0.5, 1.5) for wave in (np.cos, np.sin)]
+    return np.asarray(size[:, None] * np.stack(orders, axis=1))
+
+
+def _least_squares(columns: FloatArray, values: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Solution and its standard deviations, robust against correlation over a period.
+
+    Newey & West, 10.2307/1913610.
+    """
+    inverse = np.linalg.inv(columns.T @ columns)
+    solution = inverse @ (columns.T @ values)
+    scores = columns * (values - columns @ solution)[:, None]
+    spread = scores.T @ scores
+    n_lags = min(_period(motion), scores.shape[0] // 3)
+    for lag in range(1, n_lags + 1):
+        product = scores[lag:].T @ scores[:-lag]
+        spread += (1 - lag / (n_lags + 1)) * (product + product.T)
+    # few periods tell little of their own scatter
+    shortage = scores.shape[0] / max(scores.shape[0] - columns.shape[1] * n_lags / 2, 1.0)
+    return solution, np.sqrt(np.diag(inverse @ spread @ inverse) * max(shortage, 1.0))
+
+
+def _period(motion: FloatArray) -> int:
+    crossings = int(np.count_nonzero(np.diff(np.signbit(motion))))
+    return max(2, min(2 * motion.size // max(crossings, 1), 2000))

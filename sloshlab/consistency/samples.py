@@ -1,0 +1,269 @@
+"""Samples that are numbers and yet were not measured: held, filled, spiked, cut off.
+
+Each channel is compared with its own signal on both sides, so that nothing need be known of sensor or motion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from sloshlab.conditioning.clipping import clipped_samples, clipping
+from sloshlab.conditioning.gaps import runs, sampling_step_s
+from sloshlab.conditioning.quality import LARGEST_CLIPPED_FRACTION
+from sloshlab.consistency.finding import Action, BoolArray, Finding
+from sloshlab.recording import channels
+
+FloatArray = npt.NDArray[np.float64]
+
+_NEIGHBOURHOOD_S = 1.0
+"""To each side of a stretch, what its signal is compared with."""
+_HOLD_MARGIN = 3.0
+"""A sine holds one step of its converter at its crest; three times as long it cannot."""
+_SHORTEST_HOLD = 6
+_QUIETEST_STRETCH = 24
+"""Samples over which the noise of a channel must vanish before it is called made up."""
+_MADE_UP_SHARE = 0.02
+"""Of the noise of the neighbourhood; what is computed from few points has none."""
+_OFTEN = 0.1
+"""Share of a channel that may be filled before its quiet stretches pass for its habit."""
+_SPIKE_SIGMA = 12.0
+"""Of the prediction from four neighbours."""
+_REPEATED_SHARE = 0.3
+"""Every second sample would be 0.5; parts at rest or lost may be without."""
+_REPEATED_STEPS = 8
+_LARGEST_STANDARDISED = 1e6
+_FELT_SIGMA = 5.0
+"""Of the prediction error of another channel: it felt something at the same instant."""
+_SPIKE_SHAPE = 0.9
+"""Share of the error of five predictions in a row that one wrong sample explains."""
+SAMPLE_CHECKS: Final = {
+    "held samples": "the value does not change while the signal on both sides does",
+    "filled samples": "no noise, as of computed values",
+    "spikes": "single values that no neighbour and no other sensor knows of",
+    "repeated samples": "each value stands several times: sampled slower than stated",
+    "cut off": "cut off at the channel's own extreme, with no range stated",
+}
+"""What is examined, and what a finding means."""
+# The error of the cubic through four neighbours, as a filter of the samples.
+_PREDICTION_ERROR: Final = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
+WHITE_GAIN: Final = float(np.sqrt((_PREDICTION_ERROR**2).sum()))
+
+
+def prediction_error(values: FloatArray) -> FloatArray:
+    """Each sample minus the cubic through its four neighbours, shape (n,); zero at the two ends.
+
+    For white noise its standard deviation is 1.394 times that of the noise; a sine of n samples per period leaves
+    (2π/n)⁴/6 of its amplitude.
+    """
+    error = np.zeros_like(values)
+    error[2:-2] = np.convolve(values, _PREDICTION_ERROR, mode="valid")
+    return error
+
+
+def white_noise_std(values: FloatArray) -> float:
+    """Standard deviation of the white noise of a channel, robust against motion, spikes and lost samples."""
+    error = prediction_error(values)[2:-2]
+    error = error[np.isfinite(error)]
+    if error.size == 0:
+        return math.nan
+    # the median of |e| is 0.6745 σ of a normal distribution
+    return float(np.median(np.abs(error - np.median(error))) / 0.6745 / WHITE_GAIN)
+
+
+def examined_samples(
+    recording: xr.Dataset, names: Sequence[str] | None = None, *, checks: Sequence[str] = tuple(SAMPLE_CHECKS)
+) -> tuple[list[Finding], dict[str, BoolArray]]:
+    """What is wrong with single samples of the channels.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        In SI units, NaN where lost.
+    names : sequence of str, optional
+        Channels to examine, all by default.
+    checks : sequence of str
+        Which of `SAMPLE_CHECKS`, all by default.
+
+    Returns
+    -------
+    findings : list of Finding
+        Masked ones; a channel with too many samples cut off is refused.
+    wrong : dict of str to ndarray of bool, shape (n_samples,)
+        By channel, the samples they are about; only channels that have any.
+    """
+    findings: list[Finding] = []
+    wrong: dict[str, BoolArray] = {}
+    if recording.sizes["time"] < 8 * _QUIETEST_STRETCH:
+        return findings, wrong
+    rate_hz = 1.0 / sampling_step_s(recording)
+    signals = {name: np.asarray(recording[name].values, dtype=np.float64) for name in channels(recording)}
+    errors = {name: standardised_errors(values, rate_hz) for name, values in signals.items()}
+    time = recording["time"].values
+    for name in signals if names is None else names:
+        # a blow is felt by more than one sensor, a disturbed sample by one
+        spiked = spikes(errors[name]) & ~_felt_elsewhere(name, errors)
+        of_check = {
+            "held samples": held_samples(signals[name], rate_hz),
+            "filled samples": filled_samples(signals[name], rate_hz),
+            "spikes": _widened(spiked, 3),
+            "repeated samples": repeated_samples(signals[name]),
+            "cut off": _cut_off(recording[name]),
+        }
+        for check in checks:
+            # what does not change has no noise either, and a step at both ends
+            samples = of_check[check] if check == "held samples" else of_check[check] & ~of_check["held samples"]
+            if samples.any():
+                findings.append(_found(check, name, samples, time))
+                wrong[name] = wrong.get(name, np.zeros(samples.size, dtype=np.bool_)) | samples
+    return findings, wrong
+
+
+def _found(check: str, name: str, samples: BoolArray, time: FloatArray) -> Finding:
+    at = np.flatnonzero(samples)
+    text = f"{at.size} samples in {len(runs(samples, True))} places: {SAMPLE_CHECKS[check]}"
+    # as of samples at a stated limit: few cost the cycles that they touch, many cost the run
+    too_many = check == "cut off" and at.size > LARGEST_CLIPPED_FRACTION * samples.size
+    action = Action.REFUSED if too_many else Action.MASKED
+    return Finding(check, (name,), text, action, float(time[at[0]]), float(time[at[-1]]))
+
+
+def _felt_elsewhere(name: str, errors: Mapping[str, FloatArray]) -> BoolArray:
+    others = [np.abs(error) > _FELT_SIGMA for other, error in errors.items() if other != name]
+    return _widened(np.logical_or.reduce(others), 5) if others else np.zeros(errors[name].size, dtype=np.bool_)
+
+
+def _widened(mask: BoolArray, n: int) -> BoolArray:
+    return np.asarray(maximum_filter1d(mask.astype(np.uint8), n).astype(np.bool_))
+
+
+def _cut_off(channel: xr.DataArray) -> BoolArray:
+    found = clipping(channel)
+    values = channel.values
+    if not found.is_suspected:
+        return np.zeros(values.size, dtype=np.bool_)
+    # what the stated range explains is counted as clipped elsewhere
+    extreme = (values == np.nanmax(values)) | (values == np.nanmin(values))
+    return np.asarray(extreme & ~clipped_samples(channel))
+
+
+def held_samples(values: FloatArray, rate_hz: float) -> BoolArray:
+    """True in runs of equal samples that are longer than the signal on both sides can stand still.
+
+    Notes
+    -----
+    A sine of amplitude A and frequency ω stays within one step q of its converter for 2 arccos(1 − q/A)/ω at its
+    crest. A and ω are those of the second before and of the second after, whichever is slower; q is the smallest
+    change between samples that is there.
+    """
+    equal = np.concatenate([[False], values[1:] == values[:-1]])
+    held = np.zeros(values.size, dtype=np.bool_)
+    long_runs = [(start - 1, stop) for start, stop in runs(equal, True) if stop - start + 1 >= _SHORTEST_HOLD]
+    if not long_runs:
+        return held
+    changes = np.abs(np.diff(values))
+    step = float(np.min(changes[changes > 0], initial=math.inf))
+    n = round(_NEIGHBOURHOOD_S * rate_hz)
+    for start, stop in long_runs:
+        longest = max(
+            _longest_hold(values[max(0, start - n) : start], step), _longest_hold(values[stop : stop + n], step)
+        )
+        if stop - start > max(_HOLD_MARGIN * longest, _SHORTEST_HOLD - 1):
+            held[start:stop] = True
+    return held
+
+
+def repeated_samples(values: FloatArray) -> BoolArray:
+    """True at samples that repeat the one before, where a channel does so regularly although it moves.
+
+    A converter that is read faster than it converts, or a slower channel that was filled up to the common rate.
+    """
+    change = np.abs(np.diff(values))
+    repeated = np.concatenate([[False], change == 0])
+    moving = change[np.isfinite(change) & (change > 0)]
+    none = np.zeros(values.size, dtype=np.bool_)
+    if moving.size == 0 or repeated.mean() < _REPEATED_SHARE:
+        return none
+    # equal neighbours are no wonder where the signal changes by a step of the converter or two
+    return repeated if float(np.median(moving)) > _REPEATED_STEPS * float(moving.min()) else none
+
+
+def _longest_hold(values: FloatArray, step: float) -> float:
+    """Samples for which a signal like this can stay within one step; infinite if it is at rest or too short."""
+    values = values[np.isfinite(values)]
+    if values.size < 2 * _SHORTEST_HOLD:
+        return math.inf
+    low, high = np.quantile(values, (0.05, 0.95))
+    amplitude = 0.5 * float(high - low)
+    change = float(np.median(np.abs(np.diff(values))))
+    # no faster than its own noise lets it seem: a channel at rest that only flickers may well stand still
+    if amplitude < 4 * step or change <= 0:
+        return math.inf
+    omega = change / (0.7071 * amplitude)
+    return 2 * math.acos(max(-1.0, 1 - step / amplitude)) / omega
+
+
+def filled_samples(values: FloatArray, rate_hz: float) -> BoolArray:
+    """True where a channel that has noise before and after has none: a gap closed by a line or a curve."""
+    error = prediction_error(values)
+    # NaN neither hides nor makes a stretch: it counts as noise
+    power = np.where(np.isfinite(error), error**2, np.inf)
+    largest = maximum_filter1d(power, _QUIETEST_STRETCH)
+    n = round(_NEIGHBOURHOOD_S * rate_hz)
+    finite = np.where(np.isfinite(power), power, 0.0)
+    usual = uniform_filter1d(np.minimum(finite, 9 * np.median(finite)), n)
+    # the quieter side: before a motion starts and after it stops nothing is compared
+    beside = np.minimum(np.roll(usual, n), np.roll(usual, -n))
+    beside[:n] = beside[-n:] = 0.0
+    # and nowhere near as quiet as the channel often is: a modulated motion has calm moments of its own
+    often = float(np.quantile(largest, _OFTEN))
+    quiet = largest < _MADE_UP_SHARE**2 * np.minimum(beside, often)
+    # back to all samples of the stretches that were seen at their middle
+    return np.asarray(maximum_filter1d(quiet.astype(np.uint8), _QUIETEST_STRETCH).astype(np.bool_))
+
+
+def standardised_errors(values: FloatArray, rate_hz: float) -> FloatArray:
+    """Prediction errors over their usual size around, shape (n,); zero beside lost samples."""
+    there = np.isfinite(values)
+    error = prediction_error(np.where(there, values, 0.0))
+    error[_widened(~there, 9)] = 0.0
+    n = max(round(_NEIGHBOURHOOD_S * rate_hz), 5)
+    # the median of |e| is 0.6745 σ of a normal distribution
+    standardised = 0.6745 * error / np.sqrt(_local_median_power(error, n))
+    # beside a stretch without any noise everything is a spike, by any factor
+    return np.asarray(np.clip(standardised, -_LARGEST_STANDARDISED, _LARGEST_STANDARDISED))
+
+
+def spikes(standardised: FloatArray) -> BoolArray:
+    """True at single samples that their four neighbours do not predict.
+
+    One wrong sample among good ones leaves the prediction errors 1, −4, 6, −4, 1 in a row; a blow that an
+    anti-aliasing filter has let through is wider and leaves another pattern.
+
+    Parameters
+    ----------
+    standardised : ndarray, shape (n_samples,)
+        Of `standardised_errors`.
+    """
+    pattern_power = float((_PREDICTION_ERROR**2).sum())
+    size = np.convolve(standardised, _PREDICTION_ERROR[::-1], mode="same") / pattern_power
+    power = np.convolve(standardised**2, np.ones(5), mode="same")
+    found = (np.abs(size) > _SPIKE_SIGMA) & (size**2 * pattern_power > _SPIKE_SHAPE * power)
+    # the largest of its surroundings only: its tails fit the pattern less
+    return np.asarray(found & (np.abs(size) >= maximum_filter1d(np.abs(size), 5)))
+
+
+def _local_median_power(error: FloatArray, n: int) -> FloatArray:
+    """Median of e² in blocks of n, the largest of three blocks in a row, one value per sample."""
+    n_blocks = max(error.size // n, 1)
+    medians = np.median((error[: n_blocks * n].reshape(n_blocks, -1)) ** 2, axis=1)
+    wide = maximum_filter1d(medians, 3, mode="nearest")
+    at = np.minimum(np.arange(error.size) // max(error.size // n_blocks, 1), n_blocks - 1)
+    # a channel without any noise has its rounding
+    return np.asarray(np.maximum(wide[at], np.finfo(np.float64).tiny))
