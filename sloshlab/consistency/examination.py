@@ -33,14 +33,17 @@ from sloshlab.consistency.samples import examined_samples
 from sloshlab.consistency.sensor_response import PairNoise, pair_noise
 from sloshlab.consistency.series import SensorSeries, sensor_series
 from sloshlab.consistency.statement import law_finding, level_finding
-from sloshlab.consistency.step_test import largest_step
+from sloshlab.consistency.step_test import largest_step, step_sigma_near
 from sloshlab.errors import AnalysisError
 from sloshlab.experiments import EXPERIMENTS, OTHER
 from sloshlab.rig import Rig
 
 _LARGEST_NOISE_RATIO: Final = 1.5
-_COMPRESSION_SIGMA: Final = 6.0
+_COMPRESSION_SIGMA: Final = 5.0
 _WINDOW_CYCLES: Final = 12
+_SHARP: Final = 4
+"""Seconds on each side of a step of the gain: a liquid takes longer to change."""
+_NO_STEP_SIGMA: Final = 4.0
 _LARGEST_PHYSICAL_STEP_OF_W_BAR: Final = 1.0
 """What the liquid itself does within some seconds of a sweep; the largest measured W̄ is 1.65 (Table 1.2)."""
 
@@ -144,7 +147,7 @@ def _of_force(
         return [], ["force against acceleration with the liquid at rest: no rig is given"]
     if recording.attrs.get("configuration") != SLOSHING:
         return still_findings(still_response(recording), inertia), []
-    found = _lost_between_force_and_acceleration(series, inertia)
+    found = _lost_between_force_and_acceleration(series, inertia) + _common_gain_step(series, inertia)
     more, not_checked = start_findings(start, known.rig, known.dry, inertia, sampling_step_s(recording))
     if known.dry is None:
         not_checked.append("gains and masses against still runs: no empty or frozen run is given")
@@ -168,6 +171,22 @@ def _lost_between_force_and_acceleration(series: SensorSeries, inertia: Inertia)
     return [
         contradiction("lost samples", what, effect=(worst, beta), time_s=series.from_index(step.index)),
     ]
+
+
+def _common_gain_step(series: SensorSeries, inertia: Inertia) -> list[Finding]:
+    """A step in force over acceleration that stands alone and leaves their delay as it was.
+
+    Where waves come and go the liquid steps, too, but more than once, and mostly with a change of the delay.
+    """
+    step = largest_step(series.gain, _SHARP)
+    if step is None or step.sigma < SIGMA or abs(step.size) < 2 * step.next_size:
+        return []
+    if step_sigma_near(series.delay_s, _SHARP, step.index) > _NO_STEP_SIGMA:
+        return []
+    relative = step.size / series.mean_gain.value
+    what = f"force over acceleration steps by {100 * relative:+.3g} % while their delay stays"
+    effect = inertia.of_gain(relative)
+    return [contradiction("gain over time", what, effect=effect, time_s=series.from_index(step.index))]
 
 
 def _noise_findings(recording: xr.Dataset, inertia: Inertia, series: SensorSeries) -> list[Finding]:
