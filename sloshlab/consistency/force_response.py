@@ -7,6 +7,7 @@ need several cycles to grow. Only a run that begins at rest has such a start.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -136,15 +137,16 @@ def _response(recording: xr.Dataset, acceleration: FloatArray, stretch: slice) -
     # the bend from a fit of its own: with it, mass and delay would be known ten times worse
     solution, std = _least_squares(linear, force, motion)
     bent, bent_std = _least_squares(cubic, force, motion)
-    mass = float(solution[0])
-    if mass <= 0:
+    if solution[0] <= 0:
         return None
+    # F = M cos ωτ ü − M sin(ωτ)/ω u⃛ at the frequency of the stretch
+    omega = float(np.std(jerk) / np.std(motion))
+    mass = float(math.hypot(solution[0], solution[1] * omega))
     time = recording["time"].values[stretch]
-    # τ from the part in quadrature: F = M ü − M τ u⃛
     return ForceResponse(
         mass_kg=mass,
         mass_std_kg=float(std[0]),
-        delay_s=-float(solution[1]) / mass,
+        delay_s=math.atan2(-float(solution[1]) * omega, float(solution[0])) / omega,
         delay_std_s=float(std[1]) / mass,
         bend=float(bent[-1]) / mass,
         bend_std=float(bent_std[-1]) / mass,

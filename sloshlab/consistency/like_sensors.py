@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -130,15 +129,11 @@ def _gain_step(series: SensorSeries, share: float, inertia: Inertia) -> Finding 
 
 
 def _gain_drift(series: SensorSeries, share: float, inertia: Inertia) -> Finding | None:
-    """The two halves of a run against each other, by their batch means."""
-    half = series.gain.size // 2
-    if half < 2 * N_EACH_SIDE:
+    trend = series.gain_trend
+    if trend is None or abs(trend.value) < SIGMA * trend.std:
         return None
-    first, second = (series.part(part).mean_gain for part in (slice(0, half), slice(half, None)))
-    relative = (second.value - first.value) / series.mean_gain.value
-    if abs(relative) < SIGMA * math.hypot(first.std, second.std) / abs(series.mean_gain.value):
-        return None
-    what = f"their ratio differs by {100 * relative:+.3g} % between the halves of the run"
+    relative = trend.value / series.mean_gain.value
+    what = f"their ratio drifts by {100 * relative:+.3g} % over the run"
     return contradiction("gain over time", what, _both(series), effect=inertia.of_gain(share * relative))
 
 

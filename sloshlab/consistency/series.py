@@ -18,6 +18,9 @@ _WEAK_BLOCK = 0.01
 _BATCH = 10
 """Blocks per batch: slow changes of the load on two cells, of some seconds, are within one."""
 
+_FEWEST_BATCHES = 6
+"""For a line: two parameters, and four that tell their scatter."""
+
 
 @dataclass(frozen=True)
 class Mean:
@@ -56,10 +59,18 @@ class SensorSeries:
         """τ of the whole run."""
         return _batch_mean(self.delay_s)
 
-    def part(self, part: slice) -> SensorSeries:
-        """Some of the blocks."""
-        arrays = (self.time_s, self.omega_rad_per_s, self.gain, self.delay_s)
-        return SensorSeries(self.name, self.reference, *(values[part] for values in arrays))
+    @property
+    def gain_trend(self) -> Mean | None:
+        """Change of G from the beginning to the end of the run along a straight line; None for a short run."""
+        n_batches = self.gain.size // _BATCH
+        if n_batches < _FEWEST_BATCHES:
+            return None
+        means = np.array([batch.mean() for batch in np.array_split(self.gain, n_batches)])
+        along = (np.arange(n_batches) + 0.5) / n_batches - 0.5
+        slope = float((along * means).sum() / (along**2).sum())
+        residual = means - means.mean() - slope * along
+        variance = float((residual**2).sum()) / (n_batches - 2)
+        return Mean(slope, math.sqrt(variance / float((along**2).sum())))
 
     def from_index(self, index: int) -> tuple[float, float]:
         """Times of a block and of the last one."""
