@@ -25,6 +25,7 @@ from sloshlab.consistency.between_runs import (
     start_findings,
     still_findings,
 )
+from sloshlab.consistency.bounds import LARGEST_W_BAR
 from sloshlab.consistency.effect import Inertia
 from sloshlab.consistency.finding import ConsistencyExamination, Finding, contradiction
 from sloshlab.consistency.force_response import ForceResponse, start_response, still_response
@@ -41,6 +42,9 @@ from sloshlab.rig import Rig
 _LARGEST_NOISE_RATIO: Final = 1.5
 _COMPRESSION_SIGMA: Final = 5.0
 _WINDOW_CYCLES: Final = 12
+_FEWEST_BLOCKS: Final = 3
+_SHARE_OF_BLOCKS: Final = 0.02
+"""A block of a second may be out of phase by a start or a stop."""
 _SHARP: Final = 4
 """Seconds on each side of a step of the gain: a liquid takes longer to change."""
 _NO_STEP_SIGMA: Final = 4.0
@@ -147,7 +151,11 @@ def _of_force(
         return [], ["force against acceleration with the liquid at rest: no rig is given"]
     if recording.attrs.get("configuration") != SLOSHING:
         return still_findings(still_response(recording), inertia), []
-    found = _lost_between_force_and_acceleration(series, inertia) + _common_gain_step(series, inertia)
+    found = [
+        *_lost_between_force_and_acceleration(series, inertia),
+        *_impossible_phase(series, inertia),
+        *_common_gain_step(series, inertia),
+    ]
     more, not_checked = start_findings(start, known.rig, known.dry, inertia, sampling_step_s(recording))
     if known.dry is None:
         not_checked.append("gains and masses against still runs: no empty or frozen run is given")
@@ -171,6 +179,21 @@ def _lost_between_force_and_acceleration(series: SensorSeries, inertia: Inertia)
     return [
         contradiction("lost samples", what, effect=(worst, beta), time_s=series.from_index(step.index)),
     ]
+
+
+def _impossible_phase(series: SensorSeries, inertia: Inertia) -> list[Finding]:
+    """Blocks in which force and acceleration are further out of phase than any liquid can bring them."""
+    dry_kg = inertia.total_kg - inertia.liquid_kg
+    # W̄ is bounded, and the dry mass is always in phase: tan φ = W̄ m_l/(π M)
+    largest = math.atan2(LARGEST_W_BAR * inertia.liquid_kg, math.pi * dry_kg)
+    phase = series.delay_s * series.omega_rad_per_s
+    beyond = np.abs(phase) > largest
+    if beyond.sum() < max(_FEWEST_BLOCKS, _SHARE_OF_BLOCKS * phase.size):
+        return []
+    at = np.flatnonzero(beyond)
+    found = float(np.abs(phase).max())
+    what = f"force and acceleration are up to {found:.2g} rad out of phase, a liquid gives at most {largest:.2g}"
+    return [contradiction("phase", what, time_s=(float(series.time_s[at[0]]), float(series.time_s[at[-1]])))]
 
 
 def _common_gain_step(series: SensorSeries, inertia: Inertia) -> list[Finding]:

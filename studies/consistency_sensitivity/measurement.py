@@ -94,7 +94,7 @@ def measured(files: CaseFiles, damages: Sequence[Damage] = DAMAGES) -> Iterator[
     """Every size of every damage of one case."""
     case = files.read()
     with tempfile.TemporaryDirectory(dir="/dev/shm" if os.path.isdir("/dev/shm") else None) as folder:
-        base = {alone: _analysed(case.alone() if alone else case, Path(folder)) for alone in (False, True)}
+        base = {alone: analysed(case.alone() if alone else case, Path(folder)) for alone in (False, True)}
         for damage in damages:
             for size in damage.sizes:
                 seed = zlib.crc32(f"{files.name} {damage.name} {size}".encode())
@@ -107,7 +107,7 @@ def _outcome(
 ) -> Outcome:
     known = (files.name, damage.name, size)
     try:
-        experiment = _analysed(damaged, folder)
+        experiment = analysed(damaged, folder)
     except InputError as error:
         return Outcome(*known, np.inf, np.inf, "refused", str(error))
     w_bar, beta = (
@@ -123,7 +123,8 @@ def _change(before: xr.DataArray, after: xr.DataArray, clean: SweepExperiment, d
     return float(np.nanmedian(np.abs(there - before.values)) / np.median(np.abs(before.values)))
 
 
-def _analysed(case: Case, folder: Path) -> SweepExperiment:
+def analysed(case: Case, folder: Path, *, allow_incomplete: bool = False) -> SweepExperiment:
+    """A case through the analysis of the shaker, by way of files in a folder."""
     paths = []
     for name, recording in (("sloshing", case.sloshing), ("empty", case.empty), ("frozen", case.frozen)):
         if recording is None:
@@ -138,7 +139,7 @@ def _analysed(case: Case, folder: Path) -> SweepExperiment:
         f"[tank]\nheight_m = 0.0272\nlength_m = 0.1172\nwidth_m = 0.0780\ndry_mass_kg = {case.dry_mass_kg!r}\n"
         f'[liquid]\nname = "water"\ndensity_kg_per_m3 = 1000.0\nfill_level = {case.fill_level!r}\n'
     )
-    return analyse_shaker(paths, [rig], ShakerSettings(WindowSettings()))
+    return analyse_shaker(paths, [rig], ShakerSettings(WindowSettings(), allow_incomplete=allow_incomplete))
 
 
 def write_outcomes(files: CaseFiles, path: Path) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from shaken_tank import DRY_KG, LIQUID_KG, RATE_HZ, motion, tank_run, with_channel
+
 from sloshlab.consistency.force_response import quiet_start, start_response, still_response
 
 MASS = DRY_KG + LIQUID_KG
@@ -34,7 +34,7 @@ def test_standard_deviations_are_those_of_repeats():
 
 def test_waves_at_half_the_frequency_do_not_pass_for_mass():
     recording = tank_run(seed=3)
-    time, acceleration = motion()
+    time, _ = motion()
     phase = 2 * np.pi * 5.0 * 2.0 ** (time / 30) / (np.log(2) / 30)
     size = 9.80665 * 3 * np.clip(time / 4.0, 0, 1)
     waves = 0.1 * LIQUID_KG * size * np.cos(phase / 2 + 0.3)
@@ -68,7 +68,7 @@ def test_the_start_ends_before_the_liquid_lifts_off():
     stretch = quiet_start(acceleration, 1 / RATE_HZ)
     assert stretch is not None
     assert np.abs(acceleration[stretch]).max() < 0.9 * 9.80665
-    assert np.abs(acceleration[stretch.stop + 60]) > 0 and stretch.stop / RATE_HZ < 1.5
+    assert 0.5 < stretch.stop / RATE_HZ < 1.5
 
 
 def test_a_weak_motion_is_quiet_for_twelve_cycles_only():

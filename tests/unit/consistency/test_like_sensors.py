@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-
 from shaken_tank import RATE_HZ, shifted, tank_run, with_channel
+
 from sloshlab.consistency.effect import Inertia
 from sloshlab.consistency.like_sensors import compared_series, examined_pair
 from sloshlab.consistency.series import sensor_series

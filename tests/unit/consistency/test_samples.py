@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from shaken_tank import RATE_HZ, tank_run, with_channel
+
 from sloshlab.consistency.finding import Action
 from sloshlab.consistency.samples import (
     SAMPLE_CHECKS,
