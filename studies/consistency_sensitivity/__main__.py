@@ -1,4 +1,7 @@
-"""``python -m studies.consistency_sensitivity FOLDER``: damage every case, draw what is found (an hour on two cores)."""
+"""``python -m studies.consistency_sensitivity FOLDER``: damage every case and draw what is found.
+
+About an hour on two cores.
+"""
 
 from __future__ import annotations
 

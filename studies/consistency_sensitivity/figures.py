@@ -27,7 +27,7 @@ def read_outcomes(path: Path) -> list[dict[str, Any]]:
 
 def moves(outcome: dict[str, Any]) -> bool:
     """Whether a damage changed W̄ or β by more than counts; a refused one did."""
-    return max(outcome["w_bar_change"], outcome["beta_change"]) > MOVED
+    return bool(max(outcome["w_bar_change"], outcome["beta_change"]) > MOVED)
 
 
 def draw_matrix(outcomes: Sequence[dict[str, Any]], path: Path) -> None:
@@ -92,7 +92,6 @@ def summary(outcomes: Sequence[dict[str, Any]]) -> str:
         if own:
             sizes = sorted({outcome["size"] for outcome in own})
             worst = max(max(outcome["w_bar_change"], outcome["beta_change"]) for outcome in own)
-            lines.append(
-                f"| {damage.name} | {', '.join(f'{s:g}' for s in sizes)} {damage.unit} | {len(own)} | {worst:.2g} |"
-            )
+            at = ", ".join(f"{size:g}" for size in sizes)
+            lines.append(f"| {damage.name} | {at} {damage.unit} | {len(own)} | {worst:.2g} |")
     return "\n".join(lines)
