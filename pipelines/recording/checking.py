@@ -49,7 +49,7 @@ def check_runs(paths: Sequence[Path]) -> dict[str, Any]:
         findings = [finding.to_dict() for finding in examination.findings]
         summaries.append(
             {"path": str(path), **asdict(quality), "n_lost": quality.n_lost, "findings": findings,
-             "not_checked": list(examination.not_checked)}
+             "not_checked": [point.text for point in examination.not_checked]}
         )  # fmt: skip
     if refused:
         more = (
@@ -87,7 +87,10 @@ def _rig_beside(path: Path, recording: xr.Dataset) -> Rig | None:
 
 def _consistency_lines(examination: ConsistencyExamination) -> list[str]:
     found = [f"{finding.check}: {finding.text} ({finding.action.value})" for finding in examination.findings]
-    return [*(found or ["consistency: no contradiction"]), *(f"not checked: {p}" for p in examination.not_checked)]
+    return [
+        *(found or ["consistency: no contradiction"]),
+        *(f"not checked: {point.text}" for point in examination.not_checked),
+    ]
 
 
 def _table(path: Path, quality: RunQuality) -> list[str]:

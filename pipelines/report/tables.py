@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -10,7 +11,7 @@ from pipelines.report.numbers import interval
 
 if TYPE_CHECKING:
     from sloshlab.conditioning.quality import RunQuality
-    from sloshlab.consistency.finding import ConsistencyExamination
+    from sloshlab.consistency.finding import ConsistencyExamination, OpenPoint
     from sloshlab.recording import RunAttributes
 
 
@@ -117,14 +118,28 @@ def consistency_tables(examinations: Sequence[ConsistencyExamination]) -> tuple[
         if rows
         else "Every check agreed: samples, like sensors, force against acceleration, statements about the motion."
     )
-    # what is the same for many runs is said once
-    open_points: dict[str, list[str]] = {}
+    # what many runs cannot tell is said once, with the worst of them
+    open_points: dict[tuple[str, str], list[tuple[str, OpenPoint]]] = {}
     for examination in examinations:
         for point in examination.not_checked:
-            open_points.setdefault(point, []).append(examination.run_id)
-    points = tuple((", ".join(runs), point) for point, runs in open_points.items())
+            open_points.setdefault((point.what, point.why), []).append((examination.run_id, point))
+    points = tuple(
+        (
+            runs[0][0] if len(runs) == 1 else f"{len(runs)} runs",
+            f"{what}: {why}",
+            _largest(point.w_bar_error for _, point in runs),
+            _largest(point.beta_error for _, point in runs),
+        )
+        for (what, why), runs in open_points.items()
+    )
+    header = ("runs", "what may be wrong unseen", "W̄ by up to", "β by up to")
+    left = "Largest of the runs; – is not known." if points else "Nothing was left unexamined."
     return (
         Table("Contradictions", ("run", "check", "what was found", "what follows"), rows, note),
-        Table("Not checked", ("runs", "what these recordings cannot tell"), points,
-              "" if points else "Nothing was left unexamined."),
-    )  # fmt: skip
+        Table("Not checked", header, points, left),
+    )
+
+
+def _largest(errors: Iterable[float]) -> str:
+    known = [error for error in errors if math.isfinite(error)]
+    return f"{max(known):.2g}" if known else "–"

@@ -58,7 +58,9 @@ def write_experiment(
             for examination in experiment.examinations
             for finding in examination.findings
         ],
-        "not_checked": {e.run_id: list(e.not_checked) for e in experiment.examinations if e.not_checked},
+        "not_checked": {
+            e.run_id: [point.text for point in e.not_checked] for e in experiment.examinations if e.not_checked
+        },
         "runs": len(experiment.runs),
         "windows": n_windows,
         "unsteady_windows": n_unsteady,

@@ -14,9 +14,9 @@ import xarray as xr
 
 from sloshlab.conditioning.calibration import DryMass, w_bar_bias_of_delay
 from sloshlab.consistency.effect import Inertia
-from sloshlab.consistency.finding import SMALLEST_EFFECT, Finding, contradiction
+from sloshlab.consistency.finding import SMALLEST_EFFECT, Finding, OpenPoint, contradiction
 from sloshlab.consistency.force_response import ForceResponse
-from sloshlab.consistency.like_sensors import NORMAL_GAIN_ERROR
+from sloshlab.consistency.like_sensors import NORMAL_GAIN_ERROR, delay_text
 from sloshlab.consistency.series import SensorSeries
 from sloshlab.rig import Rig
 
@@ -57,19 +57,17 @@ def sensor_findings(
 
 def start_findings(
     response: ForceResponse | None, rig: Rig, dry: DryMass | None, inertia: Inertia, sample_s: float
-) -> tuple[list[Finding], list[str]]:
+) -> tuple[list[Finding], list[OpenPoint]]:
     """Mass, delay and linearity at the quiet start of a sloshing run.
 
     Returns
     -------
     findings : list of Finding
-    not_checked : list of str
+    not_checked : list of OpenPoint
     """
     if response is None:
-        return [], [
-            "force against acceleration with the liquid at rest (common gain, delay, linearity of the forces): "
-            "the run does not begin at rest"
-        ]
+        why = "the run does not begin at rest"
+        return [], [OpenPoint("common gain, delay and linearity of the forces with the liquid at rest", why)]
     findings = [
         *_mass(response, rig, dry, inertia),
         *_delay(response, dry, inertia, sample_s),
@@ -80,11 +78,14 @@ def start_findings(
     open_range = (high - low) * liquid / inertia.total_kg + (0.0 if dry is not None else 2 * _belief())
     delay_range = 2 * _SIGMA * response.delay_std_s
     told = [
-        f"a gain common to all force cells, or to all accelerometers, within a range of {100 * open_range:.2g} % "
-        f"(β by {inertia.of_gain(open_range)[1]:.2g}): the share of its mass that a quiet liquid carries is not "
-        "known better",
-        f"a delay between force and acceleration within a range of {1e6 * delay_range:.2g} µs (W̄ by "
-        f"{inertia.of_delay(delay_range)[0]:.2g} at {inertia.highest_hz:.3g} Hz): the quiet start is short",
+        OpenPoint(
+            "a gain common to all force cells, or to all accelerometers",
+            "how much of its mass a quiet liquid carries is not known better",
+            *inertia.of_gain(open_range),
+        ),
+        OpenPoint(
+            "a delay between force and acceleration", "the quiet start is short", *inertia.of_delay(delay_range)
+        ),
     ]
     return findings, told
 
@@ -126,11 +127,10 @@ def _delay(response: ForceResponse, dry: DryMass | None, inertia: Inertia, sampl
     if abs(delay) <= _SIGMA * response.delay_std_s + _LARGEST_COMMON_DELAY_SAMPLES * sample_s:
         return []
     effect = inertia.of_delay(delay)
+    compared = "against the still runs" if dry is not None else "against the acceleration"
     what = (
-        f"with the liquid at rest (until {response.stop_s:.3g} s) the force comes {1e6 * abs(delay):.3g} ± "
-        f"{1e6 * response.delay_std_s:.2g} µs ({abs(delay) / sample_s:.2g} samples) "
-        f"{'later' if delay > 0 else 'earlier'} than "
-        f"{'in the still runs' if dry is not None else 'the acceleration'}"
+        f"with the liquid at rest (until {response.stop_s:.3g} s) the force comes {delay_text(delay, sample_s)} "
+        f"{compared}, ± {1e6 * response.delay_std_s:.2g} µs"
     )
     return [contradiction("delay at the quiet start", what, effect=effect)]
 

@@ -27,7 +27,7 @@ from sloshlab.consistency.between_runs import (
 )
 from sloshlab.consistency.bounds import LARGEST_W_BAR
 from sloshlab.consistency.effect import Inertia
-from sloshlab.consistency.finding import ConsistencyExamination, Finding, contradiction
+from sloshlab.consistency.finding import ConsistencyExamination, Finding, OpenPoint, contradiction
 from sloshlab.consistency.force_response import ForceResponse, start_response, still_response
 from sloshlab.consistency.like_sensors import N_EACH_SIDE, SIGMA, compared_series, examined_pair
 from sloshlab.consistency.samples import examined_samples
@@ -100,7 +100,7 @@ def examined(
     return result.with_findings(found + more, missing + not_checked)
 
 
-def _of_carried_tank(recording: xr.Dataset, rig: Rig | None) -> tuple[list[Finding], list[str]]:
+def _of_carried_tank(recording: xr.Dataset, rig: Rig | None) -> tuple[list[Finding], list[OpenPoint]]:
     """Force on a tank that a structure carries, against its acceleration, where the liquid is still."""
     try:
         total_force(recording)
@@ -108,7 +108,9 @@ def _of_carried_tank(recording: xr.Dataset, rig: Rig | None) -> tuple[list[Findi
     except AnalysisError:
         return [], []
     if rig is None or recording.attrs.get("configuration") == SLOSHING:
-        return [], ["force against acceleration: only a run without liquid motion, and its rig, can tell"]
+        return [], [
+            OpenPoint("force against acceleration", "only a run without liquid motion, with its rig, can tell")
+        ]
     frozen = recording.attrs.get("configuration") == FROZEN
     believed_kg = rig.tank.dry_mass_kg + (rig.liquid_mass_kg if frozen else 0.0)
     return carried_mass_findings(still_response(recording), believed_kg, Inertia.of(rig, math.nan)), []
@@ -120,7 +122,7 @@ def _examined_on_shaker(
     try:
         reference_series = _against_acceleration(recording)
     except AnalysisError as error:
-        return result.with_findings((), (f"sensors against each other and against physics: {error}",))
+        return result.with_findings((), (OpenPoint("sensors against each other and against physics", str(error)),))
     inertia = Inertia.of(known.rig, _highest_hz(reference_series))
     series, missing = compared_series(recording)
     found: list[Finding] = []
@@ -137,7 +139,7 @@ def _examined_on_shaker(
     return replace(result.with_findings(found + more, missing + not_checked), start=start)
 
 
-def _of_like_sensors(recording: xr.Dataset, inertia: Inertia) -> tuple[list[Finding], list[str]]:
+def _of_like_sensors(recording: xr.Dataset, inertia: Inertia) -> tuple[list[Finding], list[OpenPoint]]:
     series, missing = compared_series(recording)
     step_s = sampling_step_s(recording)
     return [finding for one, share in series for finding in examined_pair(one, share, inertia, step_s)], missing
@@ -145,10 +147,10 @@ def _of_like_sensors(recording: xr.Dataset, inertia: Inertia) -> tuple[list[Find
 
 def _of_force(
     recording: xr.Dataset, known: Reference, inertia: Inertia, series: SensorSeries, start: ForceResponse | None
-) -> tuple[list[Finding], list[str]]:
+) -> tuple[list[Finding], list[OpenPoint]]:
     """Force against acceleration: over time, and where the liquid cannot move."""
     if known.rig is None:
-        return [], ["force against acceleration with the liquid at rest: no rig is given"]
+        return [], [OpenPoint("force against acceleration with the liquid at rest", "no rig is given")]
     if recording.attrs.get("configuration") != SLOSHING:
         return still_findings(still_response(recording), inertia), []
     found = [
@@ -158,7 +160,7 @@ def _of_force(
     ]
     more, not_checked = start_findings(start, known.rig, known.dry, inertia, sampling_step_s(recording))
     if known.dry is None:
-        not_checked.append("gains and masses against still runs: no empty or frozen run is given")
+        not_checked.append(OpenPoint("gains and masses against still runs", "no empty or frozen run is given"))
     return found + more, not_checked
 
 

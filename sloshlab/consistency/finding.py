@@ -111,6 +111,32 @@ def contradiction(
 
 
 @dataclass(frozen=True)
+class OpenPoint:
+    """What a run cannot tell.
+
+    Attributes
+    ----------
+    what, why : str
+        What may be wrong unseen, and why it is not seen.
+    w_bar_error, beta_error : float
+        How much it may change W̄ and β unseen; NaN where that is not known.
+    """
+
+    what: str
+    why: str
+    w_bar_error: float = math.nan
+    beta_error: float = math.nan
+
+    @property
+    def text(self) -> str:
+        """One line for a person."""
+        errors = (("W̄", self.w_bar_error), ("β", self.beta_error))
+        known = [f"{symbol} by up to {error:.2g}" for symbol, error in errors if math.isfinite(error)]
+        effect = f" (it may change {' and '.join(known)})" if known else ""
+        return f"{self.what}: {self.why}{effect}"
+
+
+@dataclass(frozen=True)
 class ConsistencyExamination:
     """Everything found in one run.
 
@@ -119,7 +145,7 @@ class ConsistencyExamination:
     run_id : str
     findings : tuple of Finding
         In the order of the checks.
-    not_checked : tuple of str
+    not_checked : tuple of OpenPoint
         What this run cannot tell, and why.
     wrong_samples : mapping of str to ndarray of bool, shape (n_samples,)
         By channel: samples that were not measured although they are numbers.
@@ -129,7 +155,7 @@ class ConsistencyExamination:
 
     run_id: str
     findings: tuple[Finding, ...] = ()
-    not_checked: tuple[str, ...] = ()
+    not_checked: tuple[OpenPoint, ...] = ()
     wrong_samples: Mapping[str, BoolArray] = field(default_factory=dict)
     start: ForceResponse | None = None
 
@@ -146,7 +172,7 @@ class ConsistencyExamination:
         return tuple(finding.text for finding in self.findings if finding.action is Action.REFUSED)
 
     def with_findings(
-        self, findings: Sequence[Finding], not_checked: Sequence[str] = ()
+        self, findings: Sequence[Finding], not_checked: Sequence[OpenPoint] = ()
     ) -> ConsistencyExamination:
         """The same with what another check found."""
         return replace(self, findings=(*self.findings, *findings), not_checked=(*self.not_checked, *not_checked))
@@ -161,5 +187,7 @@ class ConsistencyExamination:
         return masked
 
 
-NOT_EXAMINED: Final = ConsistencyExamination("", not_checked=("consistency: the run was not examined",))
+NOT_EXAMINED: Final = ConsistencyExamination(
+    "", not_checked=(OpenPoint("consistency", "the run was not examined"),)
+)
 """Of a run that no examination has seen."""

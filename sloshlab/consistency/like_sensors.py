@@ -10,7 +10,7 @@ import xarray as xr
 from sloshlab.conditioning.combined_channels import acceleration_channels, force_channels, mean_acceleration
 from sloshlab.conditioning.redundancy import redundant_accelerometers
 from sloshlab.consistency.effect import Inertia
-from sloshlab.consistency.finding import Finding, contradiction
+from sloshlab.consistency.finding import Finding, OpenPoint, contradiction
 from sloshlab.consistency.series import SensorSeries, sensor_series
 from sloshlab.consistency.step_test import largest_step
 from sloshlab.errors import AnalysisError
@@ -30,7 +30,7 @@ _SMALLEST_STEP_SAMPLES: Final = 0.1
 """A smaller step of a delay cannot be samples that were lost."""
 
 
-def compared_series(recording: xr.Dataset) -> tuple[list[tuple[SensorSeries, float]], list[str]]:
+def compared_series(recording: xr.Dataset) -> tuple[list[tuple[SensorSeries, float]], list[OpenPoint]]:
     """Every series of like sensors with the share that the second has in what is analysed.
 
     Returns
@@ -38,10 +38,10 @@ def compared_series(recording: xr.Dataset) -> tuple[list[tuple[SensorSeries, flo
     series : list of (SensorSeries, float)
         An error ε of the second sensor alone changes force or acceleration by share·ε; the control accelerometer
         has the share of what it is compared with.
-    not_checked : list of str
+    not_checked : list of OpenPoint
     """
     series: list[tuple[SensorSeries, float]] = []
-    missing: list[str] = []
+    missing: list[OpenPoint] = []
     groups: list[tuple[str, Sequence[str]]] = []
     for what, chosen in (("force cells", force_channels), ("accelerometers of the tank", acceleration_channels)):
         try:
@@ -50,14 +50,14 @@ def compared_series(recording: xr.Dataset) -> tuple[list[tuple[SensorSeries, flo
             continue
         groups.append((what, together))
         if len(together) < 2:
-            missing.append(f"{what} against each other: there is one only")
+            missing.append(OpenPoint(f"{what} against each other", "there is one only"))
     try:
         for _, names in groups:
             share = 1.0 / len(names)
             series += [(sensor_series(recording, name, recording[names[0]]), share) for name in names[1:]]
         series += _spare_accelerometers(recording)
     except AnalysisError as error:
-        missing.append(f"like sensors against each other: {error}")
+        missing.append(OpenPoint("like sensors against each other", str(error)))
     return series, missing
 
 
@@ -147,8 +147,7 @@ def delay_text(delay_s: float, sample_s: float) -> str:
     Examples
     --------
     >>> delay_text(-0.001, 0.002)
-    '1e+03 µs (0.5 samples) early'
+    '1 ms (0.5 samples) early'
     """
-    return (
-        f"{1e6 * abs(delay_s):.3g} µs ({abs(delay_s) / sample_s:.2g} samples) {'late' if delay_s > 0 else 'early'}"
-    )
+    size = f"{1e6 * abs(delay_s):.3g} µs" if abs(delay_s) < 999.5e-6 else f"{1e3 * abs(delay_s):.3g} ms"
+    return f"{size} ({abs(delay_s) / sample_s:.2g} samples) {'late' if delay_s > 0 else 'early'}"
