@@ -88,6 +88,15 @@ def test_attributes_that_the_motion_contradicts(attribute, factor, check):
     assert flagged(wrong, Reference(RIG)) == {check}
 
 
+def test_a_sweep_rate_that_is_right_on_the_mean_frequency_only():
+    recording = tank_run()
+    # 3 % too slow, started as much higher that both laws meet in the middle of the run
+    rate = recording.attrs["sweep_rate_octave_per_s"]
+    start = recording.attrs["sweep_start_hz"] * 2 ** (0.03 * rate * 30.0)
+    wrong = recording.assign_attrs(sweep_rate_octave_per_s=0.97 * rate, sweep_start_hz=start)
+    assert flagged(wrong, Reference(RIG)) == {"stated sweep and clock"}
+
+
 def test_a_sampling_rate_that_is_one_percent_wrong():
     recording = tank_run()
     slow = recording.assign_coords(time=("time", recording["time"].values / 1.01, {"units": "s"}))
