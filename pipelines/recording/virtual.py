@@ -18,6 +18,7 @@ from acquisition.virtual_laboratory.numerical_campaign import (
 )
 from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
+from pipelines.report.free_place import require_free_file
 from pipelines.report.progress import amounts, progress
 from sloshlab.errors import InputError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
@@ -94,9 +95,7 @@ def make_virtual_run(
     if rig is None:
         raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
     saved = checkpoint or output.with_suffix(".checkpoint")
-    for option, path in (("--output", output), ("--checkpoint", saved)):
-        if path.is_dir() or not path.parent.is_dir():
-            raise InputError(f"{option} {path}", got="no file", allowed="a file in a folder that exists")
+    require_free_file(saved, f"--checkpoint {saved}")
     with amounts(run.experiment) as advance:
         numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
         recording = _recorded(run, rig, numerical)

@@ -19,6 +19,7 @@ from short_runs import (
     USAGE,
     assert_one_line,
     contents,
+    edited,
     leftovers,
     refusal,
     shaker_arguments,
@@ -83,6 +84,30 @@ def test_output_that_is_a_file(laboratory: Path, tmp_path: Path, capsys: Any) ->
     assert_one_line(capsys.readouterr().err, str(out))
     assert out.read_text() == "a letter"
     assert leftovers(tmp_path) == []
+
+
+HOSTILE = "sweep\x1b[2J\x1b]0;all is well\x07\n0 lost\u202e"
+
+
+@pytest.mark.parametrize("command", ["check", "shaker", "import --describe", "refusal"])
+def test_text_of_a_file_moves_no_cursor(command: str, laboratory: Path, tmp_path: Path, capsys: Any) -> None:
+    recording = edited(
+        laboratory / "sweep_3g.nc", tmp_path / "bad.nc", lambda source: source.setncattr("run_id", HOSTILE)
+    )
+    if command == "refusal":
+        edited(recording, tmp_path / "worse.nc", lambda source: source.setncattr("experiment", HOSTILE))
+        recording = tmp_path / "worse.nc"
+    arguments = shaker_arguments([recording], [laboratory / "rig.toml"], tmp_path / "out")
+    if command == "import --describe":
+        (tmp_path / "bad.csv").write_text("t;F \x1b[2J;x\u202e\n[s];[N];[m]\n0,0;1,0;2,0\n0,1;1,0;2,0\n" * 3)
+        arguments = ["import", str(tmp_path / "bad.csv"), "--describe"]
+    run(["check", str(recording)] if command == "check" else arguments)
+    captured = capsys.readouterr()
+    assert captured.out + captured.err
+    for character in "\x1b\x07\u202e":
+        assert character not in captured.out + captured.err
+    if command == "check":
+        assert "sweep\\x1b[2J\\x1b]0;all is well\\x07\\n0 lost\\u202e, " in captured.out
 
 
 @pytest.fixture(scope="module")
