@@ -28,6 +28,7 @@ from short_runs import (
 
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from pipelines.command_line import run
+from sloshlab.recording import write_recording
 
 LOST_FROM_S, N_LOST = 20.0, 45
 
@@ -84,6 +85,27 @@ def test_output_that_is_a_file(laboratory: Path, tmp_path: Path, capsys: Any) ->
     assert_one_line(capsys.readouterr().err, str(out))
     assert out.read_text() == "a letter"
     assert leftovers(tmp_path) == []
+
+
+def test_scatter_about_the_mean_is_called_by_its_name(laboratory: Path, tmp_path: Path, capsys: Any) -> None:
+    """With a static weight of 50 N in the force, its RMS would be at least 50 N."""
+    heavy = short_run()
+    heavy["force_cell_1"] = heavy["force_cell_1"].copy(data=heavy["force_cell_1"].values + 50.0)
+    for limit in ("range_min", "range_max"):
+        heavy["force_cell_1"].attrs.pop(limit, None)
+    write_recording(heavy, tmp_path / "heavy.nc")
+    run(["check", str(tmp_path / "heavy.nc"), "--json"])
+    lines = capsys.readouterr().out.splitlines()
+    titles = lines[1].split()
+    row = next(line for line in lines if line.startswith("force_cell_1"))
+    values = dict(zip(titles, row.split(), strict=True))
+    expected = float(np.std(heavy["force_cell_1"].values))
+    assert expected < 50.0
+    assert "rms" not in titles
+    assert float(values["std"]) == pytest.approx(expected, rel=1e-3)
+    channels = {channel["name"]: channel for channel in json.loads(lines[-1])["runs"][0]["channels"]}
+    assert channels["force_cell_1"]["standard_deviation"] == pytest.approx(expected, rel=1e-3)
+    assert "rms" not in channels["force_cell_1"]
 
 
 HOSTILE = "sweep\x1b[2J\x1b]0;all is well\x07\n0 lost\u202e"
