@@ -96,6 +96,10 @@ def make_virtual_run(
         raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
     saved = checkpoint or output.with_suffix(".checkpoint")
     require_free_file(saved, f"--checkpoint {saved}")
+    # it may be there to go on from: beside a mistyped one, hours would be computed once more
+    if checkpoint is not None and not checkpoint.absolute().parent.is_dir():
+        got, allowed = f"{checkpoint.parent}, which is not there", "a file in a folder that exists"
+        raise InputError(f"--checkpoint {checkpoint}", got=got, allowed=allowed)
     with amounts(run.experiment) as advance:
         numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
         recording = _recorded(run, rig, numerical)

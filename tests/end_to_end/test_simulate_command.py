@@ -280,7 +280,7 @@ def test_twins_that_cannot_run_are_refused_in_one_line(
         (["--block", "beam"], ("block", "'beam'", "all, tank, structure")),
         (["--configuration", "full"], ("--configuration", "'full'")),
         (["--twin", "rig.toml"], ("sloshlab_twin",)),
-        (["-o", "nowhere/sim.nc"], ("--output", "folder that exists")),
+        (["-o", "."], ("--output .", "a folder in the way")),
         (["-o", "run.nc"], ("--output", "a file that is read")),
         (["--input", "shaken.nc"], ("neither acceleration_root nor an initial displacement",)),
         (["--input", "missing.nc"], ("missing.nc", "no such file")),
