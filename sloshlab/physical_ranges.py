@@ -83,6 +83,9 @@ FILL_LEVEL: Final = PhysicalRange(1e-4, 0.9999, "", "from a film on the bottom t
 BEAM_DIMENSION_M: Final = PhysicalRange(
     1e-6, 1e4, "m", "from the thickness of a film to several times the longest span of a bridge, 2 km"
 )
+AMPLITUDE_OVER_HEIGHT: Final = PhysicalRange(
+    1e-6, 1e4, "", "from what no sensor sees to a metre of stroke in the lowest of tanks"
+)
 FREQUENCY_HZ: Final = PhysicalRange(
     1e-3, 1e5, "Hz", "from far below the longest bridges, 0.04 Hz, to the resonances of accelerometers"
 )

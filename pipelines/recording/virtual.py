@@ -98,8 +98,8 @@ def make_virtual_run(
     require_free_file(saved, f"--checkpoint {saved}")
     # it may be there to go on from: beside a mistyped one, hours would be computed once more
     if checkpoint is not None and not checkpoint.absolute().parent.is_dir():
-        got, allowed = f"{checkpoint.parent}, which is not there", "a file in a folder that exists"
-        raise InputError(f"--checkpoint {checkpoint}", got=got, allowed=allowed)
+        got = f"{checkpoint.parent}, which is not there"
+        raise InputError(f"--checkpoint {checkpoint}", got=got, allowed="a file in a folder that exists")
     with amounts(run.experiment) as advance:
         numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
         recording = _recorded(run, rig, numerical)
