@@ -1,8 +1,14 @@
 # Everything runs on .venv in this checkout. `make help` lists the targets.
 PYTHON ?= python3
 VENV := .venv
+# what setup installs, with hashes; `make setup LOCK=` takes the newest that pyproject.toml allows instead
+LOCK := requirements.lock
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+EXTRAS := formats,dev,docs,trial
+comma := ,
+PIP = $(BIN)/python -m pip --quiet --disable-pip-version-check
+UPGRADE := --upgrade
 RESULTS := results
 TRIAL_SEED ?= 1
 TRIAL_KEY ?= $(HOME)/.config/sloshlab/trial_$(TRIAL_SEED).key
@@ -11,20 +17,32 @@ ROM := $(RESULTS)/rom/ROM.nc
 BALLS :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial test test-all lint format type bench soak docs clean
+.PHONY: help setup lock shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial test test-newest test-all lint format type bench soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
 
 setup: $(STAMP)  ## create .venv with everything for normal use
 
-$(STAMP): pyproject.toml
+$(STAMP): pyproject.toml $(LOCK)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 	  || { echo "sloshlab needs Python 3.11 or newer; remedy: make PYTHON=/path/to/python3.11 setup" >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade pip
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[formats,dev,docs,trial]'
+ifneq ($(LOCK),)
+	$(PIP) install --require-hashes --requirement $(LOCK)
+	$(PIP) install --no-deps --no-build-isolation --editable .
+else
+	$(PIP) install --upgrade pip
+	$(PIP) install --editable '.[$(EXTRAS)]'
+endif
 	@touch $@
+
+lock:  ## requirements.lock anew, with the newest versions; UPGRADE= keeps those that may stay
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/python -m pip install --quiet --disable-pip-version-check uv
+	echo 'setuptools>=77' | build/lock/bin/uv pip compile --quiet --universal --python-version 3.11 $(UPGRADE) \
+	  $(addprefix --extra ,$(subst $(comma), ,$(EXTRAS))) --generate-hashes --no-annotate \
+	  --custom-compile-command 'make lock' --output-file requirements.lock pyproject.toml -
 
 shaker: setup  ## the shaker experiment on the numerical tank (or RECORDINGS=folder): maps and report
 	$(BIN)/python -m pipelines.experiments shaker $(RECORDINGS) $(RESULTS)/shaker
@@ -71,6 +89,10 @@ trial: setup  ## a blind trial, sealed, diagnosed and scored (hours; goes on whe
 test: setup  ## the tests, at most 10 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
+test-newest:  ## the tests with the newest dependencies, in an environment of their own
+	rm -rf .venv-newest
+	$(MAKE) test VENV=.venv-newest LOCK=
+
 test-all: setup  ## all tests
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
@@ -96,5 +118,5 @@ docs: setup  ## the documentation as a web site in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 clean:  ## remove everything that make made, the environment included
-	rm -rf $(VENV) $(RESULTS) site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-newest $(RESULTS) site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

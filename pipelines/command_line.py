@@ -33,6 +33,7 @@ from pipelines.commands import laboratory
 
 # isort: split
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, app
+from pipelines.report.terminal import say
 from sloshlab import interrupt
 from sloshlab.errors import RecordingInterruptedError, SloshlabError
 
@@ -65,21 +66,21 @@ def run(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         return code
     except RecordingInterruptedError as error:
-        print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
+        say(f"sloshlab: {error}", error=True)
         return INTERRUPTED
     except SloshlabError as error:
-        print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
+        say(f"sloshlab: {error}", error=True)
         return INPUT_IS_BAD
     except _UsageError as error:
         error.show()
         return USAGE
     except (KeyboardInterrupt, typer.Abort):
-        print("sloshlab: interrupted; nothing half-written", file=sys.stderr)  # noqa: T201
+        say("sloshlab: interrupted; nothing half-written", error=True)
         return INTERRUPTED
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
         remedy = "check that the path can be written, and that a folder or file of this name is not in the way"
-        print(f"sloshlab: {what}got {error.strerror or error}; remedy: {remedy}", file=sys.stderr)  # noqa: T201
+        say(f"sloshlab: {what}got {error.strerror or error}; remedy: {remedy}", error=True)
         return INPUT_IS_BAD
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 from pipelines.command_line import run
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD
+from pipelines.report.terminal import say
 from pipelines.sweep.folder import recordings_and_rigs
 from sloshlab.errors import InputError, SloshlabError
 from sloshlab.experiments import experiment_names
@@ -29,12 +30,12 @@ def main() -> int:
     analysed = experiment_names(lambda known: bool(known.pipeline))
     if experiment not in (*_FOLDERS, *analysed):
         allowed = ", ".join((*_FOLDERS, *analysed))
-        print(f"unknown experiment {experiment!r}; allowed: {allowed}", file=sys.stderr)  # noqa: T201
+        say(f"unknown experiment {experiment!r}; allowed: {allowed}", error=True)
         return 2
     try:
         return _FOLDERS.get(experiment, _any)(folder, output)
     except SloshlabError as error:
-        print(f"sloshlab: {error}", file=sys.stderr)  # noqa: T201
+        say(f"sloshlab: {error}", error=True)
         return INPUT_IS_BAD
 
 
@@ -42,7 +43,7 @@ def _shaker(folder: Path, output: Path) -> int:
     """Maps and report; a flagged result is a result."""
     code = run(shaker_arguments(folder, output))
     if code in (0, DONE_BUT_FLAGGED):
-        print(f"The report is {(output / 'report.html').resolve()}")  # noqa: T201
+        say(f"The report is {(output / 'report.html').resolve()}")
         return 0
     return code
 
@@ -79,7 +80,7 @@ def _beam(folder: Path, output: Path) -> int:
     twins = simulated_twins(folder, rig, output / "twins")
     code = run([arguments[0], *map(str, twins), *arguments[1:]])
     if code in (0, DONE_BUT_FLAGGED):
-        print(f"The report is {(output / 'report.html').resolve()}")  # noqa: T201
+        say(f"The report is {(output / 'report.html').resolve()}")
         return 0
     return code
 
@@ -98,19 +99,19 @@ def _ball(folder: Path, output: Path) -> int:
     if not any(runs for runs, _ in found.values()):
         raise InputError(f"{folder}", got="no recordings", remedy="make them with `make campaign`")
     tasks = [(name, damper) for name in found for damper in ("contact", "always")]
-    print(f"{len(tasks)} balls, about {_MINUTES_PER_BALL:g} minutes each on one core", flush=True)  # noqa: T201
+    say(f"{len(tasks)} balls, about {_MINUTES_PER_BALL:g} minutes each on one core")
     for number, (name, damper) in enumerate(tasks, 1):
         runs, rig = found[name]
         if not runs:
-            print(f"{name}: no recordings; make them with `make tank-campaign`")  # noqa: T201
+            say(f"{name}: no recordings; make them with `make tank-campaign`")
             continue
         begin, place = time.monotonic(), output / f"{name}_{damper}"
-        print(f"{number} of {len(tasks)}: {name}, the damper acts {damper}", flush=True)  # noqa: T201
+        say(f"{number} of {len(tasks)}: {name}, the damper acts {damper}")
         code = run(["ball", *map(str, runs), "--rig", str(rig), "--damper", damper, "-o", str(place)])
         if code not in (0, DONE_BUT_FLAGGED):
             return code
         minutes = (time.monotonic() - begin) / 60
-        print(f"The report is {(place / 'report.html').resolve()}; {minutes:.1f} minutes", flush=True)  # noqa: T201
+        say(f"The report is {(place / 'report.html').resolve()}; {minutes:.1f} minutes")
     return 0
 
 
@@ -168,7 +169,7 @@ def _replay(folder: Path, output: Path) -> int:
 
     summary = replayed_campaign(folder, output)
     for line in [*summary["lines"], *(f"differs: {flag}" for flag in summary["flags"])]:
-        print(line)  # noqa: T201
+        say(line)
     return 1 if summary["flags"] else 0
 
 

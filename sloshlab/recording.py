@@ -420,14 +420,36 @@ def _time_error(time: np.ndarray, step: float, worst: float, name: str) -> Recor
             allowed="the rate of the time coordinate",
             remedy="correct the attribute or the time coordinate",
         )
-    deviation = np.abs(time - (time[0] + step * np.arange(time.size)))
-    first = int(np.argmax(deviation >= 0.999 * worst))
+    jitter_s, first = largest_jitter(time - (time[0] + step * np.arange(time.size)))
     return RecordingError(
         f"{name}: time is not uniform",
-        got=f"jitter of {worst / step:.3g} steps ({worst:.3g} s) at sample {first}",
+        got=f"jitter of {jitter_s / step:.3g} steps ({jitter_s:.3g} s) at sample {first}",
         allowed=f"≤ {JITTER_ALLOWED_STEPS:g} steps",
         remedy="resample on the device's sample counter, or mark the gap in `quality`",
     )
+
+
+def largest_jitter(deviation_s: np.ndarray) -> tuple[float, int]:
+    """How far time stamps lie off the grid that begins at the first of them, and which sample shows it.
+
+    Parameters
+    ----------
+    deviation_s : ndarray, shape (n,)
+        Time stamps minus grid points [s].
+
+    Returns
+    -------
+    tuple
+        Largest distance [s], and the first sample, counted from 0, that has it within a thousandth.
+
+    Examples
+    --------
+    >>> largest_jitter(np.array([0.0, 0.1, -0.3, 0.3]))
+    (0.3, 2)
+    """
+    distance = np.abs(deviation_s)
+    worst = float(distance.max())
+    return worst, int(np.argmax(distance >= 0.999 * worst))
 
 
 def _is_channel(name: str, dimensions: tuple[Any, ...], attributes: Mapping[str, Any]) -> bool:

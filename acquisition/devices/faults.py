@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
@@ -18,12 +17,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from acquisition.samples.channel import Channel
 from sloshlab.errors import FaultsError
 from sloshlab.recording import CLIPPED, STUCK
+from sloshlab.toml_file import parse_toml, read_toml
 
 SENSOR_FAULTS: Final[Mapping[str, int | None]] = {"swapped": None, "clipped": CLIPPED, "stuck": STUCK}
 """Tables of sensors' faults in the order in which they act on a reading, and the flag of a recording that has the
 same word. Recordings have no flag for an exchange."""
 
-_LARGEST_FILE_BYTES: Final = 1 << 20
 _LATEST_S = 1e7
 
 # Every number has limits and every list a length: the file is a person's, and a slip must end in one line.
@@ -171,15 +170,7 @@ class Faults(_Table):
         FaultsError
             If it cannot be read, or has a key or a value that is not allowed.
         """
-        try:
-            if path.stat().st_size > _LARGEST_FILE_BYTES:
-                allowed = f"≤ {_LARGEST_FILE_BYTES} bytes"
-                raise FaultsError(f"faults {path}", got=f"{path.stat().st_size} bytes", allowed=allowed)
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeError) as error:
-            got = getattr(error, "strerror", None) or str(error)
-            raise FaultsError(f"faults {path}", got=got, allowed="a TOML file in UTF-8") from error
-        return cls.from_toml_text(text, name=str(path))
+        return cls._from_document(read_toml(path, f"faults {path}", error=FaultsError), str(path))
 
     @classmethod
     def from_toml_text(cls, text: str, *, name: str = "faults") -> Faults:
@@ -191,10 +182,12 @@ class Faults(_Table):
         >>> faults.drop.probability, faults.disconnect[0].restart
         (0.01, False)
         """
+        return cls._from_document(parse_toml(text, name, error=FaultsError), name)
+
+    @classmethod
+    def _from_document(cls, document: Mapping[str, Any], name: str) -> Faults:
         try:
-            return cls.model_validate(tomllib.loads(text))
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
-            raise FaultsError(f"{name}: TOML", got=str(error)[:200], remedy="correct the syntax") from error
+            return cls.model_validate(document)
         except ValidationError as error:
             raise _first_of(error, name) from None
 

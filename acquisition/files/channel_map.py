@@ -5,9 +5,7 @@ Unknown keys are refused with the nearest known one; nothing has a default that 
 
 from __future__ import annotations
 
-import difflib
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,10 +14,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from acquisition.files.file_format import FormatName
 from sloshlab.errors import ChannelMapError
+from sloshlab.key_spelling import nearest_key
 from sloshlab.recording import Configuration, RecordedExperiment
+from sloshlab.toml_file import parse_toml, read_toml
 from sloshlab.units import SI_UNITS, ChannelQuantity
 
-_LARGEST_MAP_BYTES = 1_000_000
 _CHANNEL_NAME = re.compile(rf"({'|'.join(SI_UNITS)})_[A-Za-z0-9_]{{1,100}}")
 # keys with a meaning of their own in a recording: a free attribute would change what the numbers mean
 _RECORDING_KEYS = frozenset(
@@ -185,23 +184,8 @@ def read_channel_map(path: Path) -> ChannelMap:
     ChannelMapError
         If it is missing, not TOML, or not a map.
     """
-    try:
-        if path.stat().st_size > _LARGEST_MAP_BYTES:
-            raise ChannelMapError(
-                f"map {path}", got=f"{path.stat().st_size} bytes", allowed=f"≤ {_LARGEST_MAP_BYTES}"
-            )
-        # editors on Windows write a mark at the beginning, which TOML does not know
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ChannelMapError(f"map {path}", got="bytes that are not UTF-8 text", allowed="a TOML file") from error
-    except (OSError, ValueError) as error:
-        raise ChannelMapError(
-            f"map {path}",
-            got=getattr(error, "strerror", None) or str(error),
-            allowed="a readable TOML file",
-            remedy="check the path given to --map",
-        ) from error
-    return channel_map_from_text(text, name=str(path))
+    document = read_toml(path, f"map {path}", error=ChannelMapError, remedy="check the path given to --map")
+    return channel_map_from_document(document, name=str(path))
 
 
 def channel_map_from_text(text: str, *, name: str = "text") -> ChannelMap:
@@ -228,11 +212,7 @@ def channel_map_from_text(text: str, *, name: str = "text") -> ChannelMap:
 attributes, block_from, block_to, calibration, column, delay, delay_s, noise_std, quantity, range_max, range_min, \
 sign, source, units, units_override, x_m; remedy: did you mean 'units'?
     """
-    try:
-        document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise ChannelMapError(f"map {name}", got=f"text that is not TOML ({error})", allowed="TOML") from error
-    return channel_map_from_document(document, name=name)
+    return channel_map_from_document(parse_toml(text, f"map {name}", error=ChannelMapError), name=name)
 
 
 def channel_map_from_document(document: Mapping[str, Any], *, name: str = "document") -> ChannelMap:
@@ -260,8 +240,8 @@ def _explained(error: ValidationError, name: str) -> ChannelMapError:
     place = ".".join(keys) or "map"
     if first["type"] == "extra_forbidden":
         allowed = _keys_beside(keys)
-        near = difflib.get_close_matches(keys[-1], allowed, n=1, cutoff=0.6)
-        remedy = f"did you mean '{near[0]}'?" if near else "remove it"
+        near = nearest_key(keys[-1], allowed)
+        remedy = f"did you mean '{near}'?" if near else "remove it"
         return ChannelMapError(
             f"map {name}: {place}", got="an unknown key", allowed=", ".join(allowed), remedy=remedy
         )

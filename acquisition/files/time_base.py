@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition.files.table import FloatArray, simplest_decimal_between
 from sloshlab.errors import RecordingError
+from sloshlab.recording import largest_jitter
 
 LARGEST_LOST_FRACTION: Final = 0.5
 """A grid of which a larger part than this would be gaps is refused."""
@@ -38,7 +39,7 @@ class Grid:
     index : ndarray of int64, shape (n,)
         Grid point of each sample, increasing.
     worst_deviation_steps : float
-        Largest distance of a time stamp from its grid point [steps].
+        Largest distance of a time stamp from its grid point, the first stamp being on the grid [steps].
     resolution_s : float
         Coarseness of the time stamps [s].
     """
@@ -102,7 +103,7 @@ def uniform_grid(
     resolution_s : float
         Coarseness of the stamps [s]; 0 finds it from the numbers.
     jitter_allowed_steps : float
-        Deviation that is accepted beyond the coarseness [steps].
+        Deviation from the best-placed grid that is accepted beyond the coarseness [steps].
 
     Returns
     -------
@@ -126,12 +127,14 @@ def uniform_grid(
         offset, rate_hz, resolution, jitter_allowed_steps
     )
     rate, index = found or _with_gaps(offset, rate_hz, resolution, name)
+    # what is said of the stamps is their distance from the grid on which the recording will have them; if they
+    # are accepted is asked of the best-placed grid, as the first stamp may be the one that jitters
+    jitter_s, at = largest_jitter(offset - index / rate)
     worst = _half_range(offset, index, rate)
     if worst > _HALF * resolution + jitter_allowed_steps / rate:
-        at = int(np.abs(offset - index / rate).argmax())
         raise RecordingError(
             f"{name}: time is not uniform",
-            got=f"jitter of {worst * rate:.3g} steps ({worst:.3g} s) near sample {at + 1} for {rate:.9g} Hz",
+            got=f"jitter of {jitter_s * rate:.3g} steps ({jitter_s:.3g} s) at sample {at} for {rate:.9g} Hz",
             allowed=f"≤ {jitter_allowed_steps:g} steps beyond the {resolution:.1g} s to which time is written",
             remedy="state sampling_rate_hz if it is known, or jitter_allowed_steps, or resample",
         )
@@ -143,7 +146,7 @@ def uniform_grid(
             allowed=f"at most {LARGEST_LOST_FRACTION:.0%}",
             remedy="import the parts as separate runs, or state sampling_rate_hz",
         )
-    return Grid(float(time_s[0]), rate, index, worst * rate, resolution)
+    return Grid(float(time_s[0]), rate, index, jitter_s * rate, resolution)
 
 
 def _check_stamps(time_s: FloatArray, name: str) -> None:
@@ -153,7 +156,7 @@ def _check_stamps(time_s: FloatArray, name: str) -> None:
         at = int(np.argmin(np.isfinite(time_s)))
         raise RecordingError(
             f"{name}: time",
-            got=f"no number at sample {at + 1}",
+            got=f"no number at sample {at}",
             allowed="a time for every sample",
             remedy="use sampling_rate_hz in [source] if the samples are uniform",
         )
@@ -162,7 +165,7 @@ def _check_stamps(time_s: FloatArray, name: str) -> None:
         at = int(np.argmax(steps < 0))
         raise RecordingError(
             f"{name}: time",
-            got=f"a step back from {time_s[at]:.9g} s to {time_s[at + 1]:.9g} s after sample {at + 1}",
+            got=f"a step back from {time_s[at]:.9g} s to {time_s[at + 1]:.9g} s after sample {at}",
             allowed="increasing time",
             remedy="two records may follow each other in one file: import them as separate runs",
         )

@@ -1,9 +1,4 @@
-"""Multicast that stays on this computer.
-
-python-can's ``udp_multicast`` joins its group on the default network interface and takes datagrams from
-anywhere on its port. Here such a bus is confined to the loopback interface, by which it neither sends to
-the network nor hears it, and gets a receive buffer that holds what arrives while nobody reads.
-"""
+"""CAN buses over multicast: on this computer, or, if somebody asks for it, on the network."""
 
 from __future__ import annotations
 
@@ -21,12 +16,9 @@ DEFAULT_GROUP: Final = "239.74.163.2"
 RECEIVE_BUFFER_BYTES: Final = 8 << 20
 """Asked for; the system may give less (on Linux net.core.rmem_max)."""
 
-_LOOPBACK_INTERFACE: Final = b"lo\0"
-_LOOPBACK_ADDRESS: Final = "127.0.0.1"
-
 
 def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool, name: str | None = None) -> Any:
-    """A bus of python-can over multicast.
+    """A bus over multicast.
 
     Parameters
     ----------
@@ -34,7 +26,7 @@ def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool, name: 
         IPv4 multicast address; IPv6 only if `exposed`, since loopback interfaces have no route for it.
     port : int
     fd : bool
-        Whether CAN FD frames are taken.
+        Whether CAN FD frames are taken on the network; on this computer they always are.
     exposed : bool
         Speak and listen on the network, one hop far, instead of on this computer only.
     name : str, optional
@@ -51,25 +43,27 @@ def open_multicast_bus(group: str, port: int, *, fd: bool, exposed: bool, name: 
     """
     import can
 
+    from acquisition.sources.loopback_bus import LoopbackMulticastBus
+
     name = name or f"can:udp_multicast?channel={group}&port={port}"
     _check_group(name, group, exposed)
+    if exposed:
+        try:
+            bus = can.Bus(
+                interface="udp_multicast", channel=group, port=port, hop_limit=1, fd=fd, ignore_config=True
+            )
+        except (can.CanError, OSError, ImportError) as error:
+            raise SourceError(name, got=str(error)) from error
+        _widen(bus.fileno())
+        return bus
     try:
-        # 0 hops: what is sent goes no further than this computer
-        bus = can.Bus(
-            interface="udp_multicast", channel=group, port=port, hop_limit=int(exposed), fd=fd, ignore_config=True
-        )
-    except (can.CanError, OSError, ImportError) as error:
-        raise SourceError(name, got=str(error)) from error
-    try:
-        _prepare_socket(bus.fileno(), group, exposed)
+        return LoopbackMulticastBus(group, port, RECEIVE_BUFFER_BYTES)
     except (OSError, AttributeError) as error:
-        bus.shutdown()
         raise SourceError(
             name,
             got=f"a socket that cannot be confined to this computer ({error})",
             remedy="use another interface, or expose=yes, by which all of the network can listen and send frames",
         ) from error
-    return bus
 
 
 def _check_group(name: str, group: str, exposed: bool) -> None:
@@ -82,16 +76,7 @@ def _check_group(name: str, group: str, exposed: bool) -> None:
         raise SourceError(name, got=repr(group), allowed="a multicast address, for example " + DEFAULT_GROUP)
 
 
-def _prepare_socket(fileno: int, group: str, exposed: bool) -> None:
+def _widen(fileno: int) -> None:
     # a copy of the descriptor, as python-can offers no way to its socket's options and this object closes its own
     with socket.socket(fileno=os.dup(fileno)) as same:
         same.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
-        if exposed:
-            return
-        # sent by this interface and joined there, or nothing of what is sent would come back
-        interface = socket.inet_aton(_LOOPBACK_ADDRESS)
-        same.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
-        same.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + interface)
-        # python-can has joined the group on the default interface, too, and takes datagrams from anywhere on its
-        # port
-        same.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, _LOOPBACK_INTERFACE)

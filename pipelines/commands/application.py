@@ -10,6 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
+from pipelines.report.free_place import require_free_file, require_free_folder
+from pipelines.report.terminal import say
 from sloshlab import __version__
 
 INPUT_IS_BAD, USAGE, DONE_BUT_FLAGGED, INTERRUPTED = 1, 2, 3, 130
@@ -28,11 +30,31 @@ RigOption = Annotated[
     list[Path],
     typer.Option("--rig", metavar="RIG.toml", help="Rig description; once per fill level.", show_default=False),
 ]
+
+
+def free_folder(option: typer.CallbackParam, folder: Path | None) -> Path | None:
+    """The folder of an option, of which is known before any work that it can be filled."""
+    if folder is not None:
+        require_free_folder(folder, f"{option.opts[-1]} {folder}")
+    return folder
+
+
+def free_file(option: typer.CallbackParam, file: Path | None) -> Path | None:
+    """The file of an option, of which is known before any work that it can be written."""
+    if file is not None:
+        require_free_file(file, f"{option.opts[-1]} {file}")
+    return file
+
+
 OutputFolder = Annotated[
-    Path, typer.Option("-o", "--output", metavar="OUT", help="Folder for results.", show_default=False)
+    Path,
+    typer.Option(
+        "-o", "--output", metavar="OUT", help="Folder for results.", show_default=False, callback=free_folder
+    ),
 ]
 OutputFile = Annotated[
-    Path, typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False)
+    Path,
+    typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False, callback=free_file),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print a machine-readable summary as the last line.")]
 HalfWidth = Annotated[int, typer.Option("--p", min=1, help="P: a window averages 2P cycles.")]
@@ -51,19 +73,19 @@ def _root(
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
     if version:
-        typer.echo(__version__)
+        say(__version__)
         raise typer.Exit
 
 
 def finish(summary: dict[str, Any], as_json: bool) -> None:
     """Say what a command has to say: ``lines`` for people; ``flags`` make the exit code 3."""
     for line in summary.pop("lines", []):
-        typer.echo(line)
+        say(line)
     flags = summary.get("flags", [])
     for flag in flags:
-        typer.echo(f"flagged: {flag}", err=True)
+        say(f"flagged: {flag}", error=True)
     if as_json:
-        typer.echo(json.dumps(summary, sort_keys=True, default=str))
+        say(json.dumps(summary, sort_keys=True, default=str))
     if flags:
         raise typer.Exit(DONE_BUT_FLAGGED)
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import Json, app, command_as_given, finish
+from pipelines.commands.application import Json, app, command_as_given, finish, free_folder
 
 
 @app.command()
@@ -19,7 +19,12 @@ def diagnose(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="DIR", help="Folder for results; CASE/diagnosis.", show_default=False
+            "-o",
+            "--output",
+            metavar="DIR",
+            help="Folder for results; CASE/diagnosis.",
+            show_default=False,
+            callback=free_folder,
         ),
     ] = None,
     twin: Annotated[

@@ -13,7 +13,11 @@ from pipelines.commands.application import (
     Redundant,
     app,
     finish,
+    free_file,
+    free_folder,
 )
+from pipelines.report.free_place import require_free_file, require_free_folder
+from pipelines.report.terminal import say
 from sloshlab.configurations import CONFIGURATIONS, SLOSHING
 from sloshlab.experiments import experiment_names
 
@@ -27,7 +31,9 @@ def virtual(
             + ", or campaign for a whole folder of raw_data."
         ),
     ],
-    output: OutputFile,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False)
+    ],
     *,
     rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig of the experiment.")] = None,
     configuration: Annotated[str, typer.Option(help=f"One of {', '.join(CONFIGURATIONS)}.")] = SLOSHING,
@@ -51,7 +57,10 @@ def virtual(
     layers: Annotated[int, typer.Option(help="Layers of particles over the height of the tank.")] = 16,
     checkpoint: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Where a computation is saved; by default beside the recording."),
+        typer.Option(
+            metavar="FILE",
+            help="Where a computation is saved; by default beside the recording.",
+        ),
     ] = None,
     workers: Annotated[int, typer.Option(help="Processes of a computed campaign.")] = 2,
     only: Annotated[
@@ -59,7 +68,11 @@ def virtual(
     ] = "*",
     checkpoints: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Where a computed campaign is saved; by default within the output."),
+        typer.Option(
+            metavar="FOLDER",
+            help="Where a computed campaign is saved; by default within the output.",
+            callback=free_folder,
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -68,9 +81,11 @@ def virtual(
     from pipelines.recording import virtual as laboratory
 
     if experiment == "campaign":
+        require_free_folder(output, f"--output {output}")
         computed = CampaignSettings(seed, layers, workers, only, checkpoints)
-        finish(laboratory.make_campaign_folder(output, liquid, computed, typer.echo), as_json)
+        finish(laboratory.make_campaign_folder(output, liquid, computed, say), as_json)
         return
+    require_free_file(output, f"--output {output}")
     run = laboratory.VirtualRun(
         experiment=experiment,
         configuration=configuration,
@@ -198,7 +213,13 @@ def replay(
         float | None, typer.Option(help="Repeat the recording up to so many seconds.", show_default=False)
     ] = None,
     truth: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Write what each fault touched.", show_default=False)
+        Path | None,
+        typer.Option(
+            metavar="FILE.json",
+            help="Write what each fault touched.",
+            show_default=False,
+            callback=free_file,
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import Json, OutputFile, OutputFolder, app, command_as_given, finish
+from pipelines.commands.application import Json, OutputFile, OutputFolder, app, command_as_given, finish, free_file
 from sloshlab.configurations import SLOSHING
 
 Runs = Annotated[
@@ -153,7 +153,8 @@ def simulate(
         typer.Option(metavar="TWIN.toml", help="A saved twin instead of that of the rig.", show_default=False),
     ] = None,
     save_twin: Annotated[
-        Path | None, typer.Option(metavar="TWIN.toml", help="Save the twin that ran.", show_default=False)
+        Path | None,
+        typer.Option(metavar="TWIN.toml", help="Save the twin that ran.", show_default=False, callback=free_file),
     ] = None,
     steps: Annotated[
         int | None,

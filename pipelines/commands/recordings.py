@@ -12,6 +12,7 @@ from pipelines.commands.application import (
     Recordings,
     app,
     finish,
+    free_file,
 )
 
 
@@ -24,7 +25,14 @@ def import_(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="RUN.nc", help="Recording to write.", show_default=False),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="RUN.nc",
+            help="Recording to write.",
+            show_default=False,
+            callback=free_file,
+        ),
     ] = None,
     rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig the run belongs to.")] = None,
     describe: Annotated[

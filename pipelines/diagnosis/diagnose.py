@@ -54,7 +54,7 @@ def diagnose_case(
     target = output or folder / "diagnosis"
     case, recordings = _examined(read_case(folder, with_rig=twin is None))
     # Before the search, which takes minutes: a folder that is in the way has to be said at once.
-    require_free_folder(target, "diagnosis")
+    require_free_folder(target, f"diagnosis {target}")
     own = [effect for file in effects for effect in load_user_effects(file)]
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pipelines.liquid_model.extensions import remembering, trained_ensemble
 from pipelines.liquid_model.training_runs import RunFiles, TrainingRuns, require_new_runs, training_runs
+from pipelines.report.free_place import require_free_folder
 from pipelines.report.outputs import sha256_of
 from pipelines.report.progress import amounts
 from sloshlab.errors import InputError
@@ -237,13 +238,8 @@ def train_and_report(
     folder = report_folder(output)
     # what can be refused is refused before hours of training
     require_new_runs(test, files)
-    if command is not None and folder.exists() and not folder.is_dir():
-        raise InputError(
-            f"report folder {folder}",
-            got="a file",
-            allowed="a folder or nothing",
-            remedy="name the model otherwise",
-        )
+    if command is not None:
+        require_free_folder(folder, f"report folder {folder}")
     for path in test if command is not None else ():
         read_attributes(path)  # before hours of training, not after them
     trained = trained_model(files, wanted, settings)

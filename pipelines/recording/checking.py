@@ -94,7 +94,7 @@ def _consistency_lines(examination: ConsistencyExamination) -> list[str]:
 
 
 def _table(path: Path, quality: RunQuality) -> list[str]:
-    header = f"{'channel':<24}{'quantity':<14}{'minimum':>12}{'maximum':>12}{'rms':>12}"
+    header = f"{'channel':<24}{'quantity':<14}{'minimum':>12}{'maximum':>12}{'std':>12}"
     header += f" {'units':<8}{'lost':>8}{'clipped':>9}"
     lines = [
         f"{path}: {quality.run_id}, {quality.n_samples} samples at {quality.sampling_rate_hz:g} Hz, "
@@ -120,5 +120,5 @@ def _agreement(pair: PairAgreement) -> str:
 def _row(channel: ChannelQuality) -> str:
     return (
         f"{channel.name:<24}{channel.quantity:<14}{channel.minimum:>12.5g}{channel.maximum:>12.5g}"
-        f"{channel.rms:>12.5g} {channel.units:<8}{channel.n_lost:>8}{channel.clipping.n_clipped:>9}"
+        f"{channel.standard_deviation:>12.5g} {channel.units:<8}{channel.n_lost:>8}{channel.clipping.n_clipped:>9}"
     )

@@ -1,7 +1,7 @@
 """What a person at the rig sees while it records: levels, clipping, losses, drift, time and space left.
 
 On a terminal only, a few times per second; in a pipe only failures are said, one line each. Text that
-comes from devices is shown without its control characters.
+comes from devices is shown with its control characters written out.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Final, Self
 from acquisition.recorder.statistics import ChannelLevel
 from acquisition.recorder.status import Event, RecorderStatus, SourceState, SourceStatus
 from acquisition.samples.delivery import TroubleKind
+from pipelines.report.terminal import printable
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -116,7 +117,7 @@ class LiveView:
             return
         style = "bold red" if event.is_failure else "yellow"
         with self._terminal_may_go():
-            self._console.print(Text(plain(event.message), style=style), soft_wrap=True)
+            self._console.print(Text(printable(event.message), style=style), soft_wrap=True)
 
     def status(self, status: RecorderStatus) -> None:
         """Show the state, at most five times per second."""
@@ -180,7 +181,7 @@ def _source_line(source: SourceStatus) -> Text:
     from rich.text import Text
 
     line = Text("\n")
-    line.append(plain(source.device), style="bold")
+    line.append(printable(source.device), style="bold")
     line.append(f"  {source.state.value}", style=_STATE_STYLES[source.state])
     line.append(f"  {_grouped(source.n_samples)} samples")
     measured = "" if source.measured_rate_hz is None else f"{source.measured_rate_hz:.1f} of "
@@ -200,7 +201,7 @@ def _remarks(source: SourceStatus) -> Iterator[Text]:
     if counts:
         yield Text("  " + ", ".join(counts), style="red")
     if source.error:
-        yield Text("  " + plain(source.error), style="bold red")
+        yield Text("  " + printable(source.error), style="bold red")
 
 
 def _levels(source: SourceStatus, n_shown: int, n_letters: int) -> Table:
@@ -218,7 +219,8 @@ def _levels(source: SourceStatus, n_shown: int, n_letters: int) -> Table:
         clipped = _grouped(level.n_clipped)
         missing = f" + {_grouped(level.n_missing)} missing" if level.n_missing else ""
         style = "bold red" if level.clipped_in_window else "red" if level.n_clipped else "dim"
-        name, units = plain(level.name), plain(level.units)
+        # not as text with markup, in which a bracket of a channel's name would be an instruction or an error
+        name, units = Text(printable(level.name)), Text(printable(level.units))
         row = (name, _number(level.rms), _number(level.peak), units, _bar(level), Text(clipped + missing, style))
         table.add_row(*row)
     if len(source.levels) > n_shown:
@@ -278,14 +280,3 @@ def bytes_text(n_bytes: int) -> str:
         if n_bytes >= size:
             return f"{n_bytes / size:.1f} {unit}"
     return f"{n_bytes} B"
-
-
-def plain(text: str) -> str:
-    """`text` without anything that a terminal would obey.
-
-    Examples
-    --------
-    >>> plain("daq" + chr(27) + "[2J")
-    'daq\ufffd[2J'
-    """
-    return "".join(character if character.isprintable() else "\ufffd" for character in text)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import math
 import signal as signals
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -24,6 +24,7 @@ from acquisition.devices.player import Player
 from acquisition.devices.signal import LoopedSignal
 from acquisition.devices.simulated_device import simulated_device
 from acquisition.sources.urls import parse_url
+from pipelines.report.terminal import say
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
 
@@ -108,7 +109,7 @@ def replay(
     SloshlabError
         If an argument is wrong or a device cannot appear.
     """
-    say = announce or _said
+    told = announce or say
     places = _places(settings)
     laboratory = LaboratoryTime(len(places), speed=_speed(settings.speed))
     players = _players(settings, places, laboratory)
@@ -116,20 +117,10 @@ def replay(
         for place, player in zip(places, players, strict=True):
             cleaning.callback(player.endpoint.close)
             if settings.expose and place.listens:
-                say(place.exposure())
-            say(f"ready {player.endpoint.open()}")
-        _run(players, _Reminder([place.device for place in places], remind or _reminded))
+                told(place.exposure())
+            told(f"ready {player.endpoint.open()}")
+        _run(players, _Reminder([place.device for place in places], remind or functools.partial(say, error=True)))
     return _summary(settings, places, players)
-
-
-def _said(line: str) -> None:
-    sys.stdout.write(f"{line}\n")
-    sys.stdout.flush()
-
-
-def _reminded(line: str) -> None:
-    sys.stderr.write(f"{line}\n")
-    sys.stderr.flush()
 
 
 def _speed(text: str) -> float:

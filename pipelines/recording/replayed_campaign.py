@@ -28,7 +28,6 @@ from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 from sloshlab import interrupt
 from sloshlab.errors import RecordingError, SourceError
 from sloshlab.netcdf_lock import NETCDF_LOCK
-from sloshlab.sweep.windows import WindowSettings
 
 CHANNELS_OF_A_DEVICE: Final = {"force": "serial", "acceleration": "can"}
 _LONGEST_RECORDING_S = 600.0
@@ -283,7 +282,7 @@ def _last_lines(text: str) -> str:
 
 
 def _analysed(recordings: Path, rigs: Path, output: Path) -> xr.Dataset:
-    settings = ShakerSettings(WindowSettings())
+    settings = ShakerSettings()
     experiment = analyse_shaker(*recordings_and_rigs(recordings, rigs), settings)
     write_experiment(experiment, output, command=f"sloshlab shaker {recordings.name}", report=False)
     # the netCDF library is not made for threads; an interrupt within xarray would leave its lock taken for ever

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,9 @@ import xarray as xr
 
 from sloshlab.errors import InputError
 from sloshlab.recording import FORMAT, run_attributes
+from sloshlab.toml_file import read_toml
 
 _TEXTS = ("run_id", "experiment", "configuration", "rig")
-_LARGEST_FILE_BYTES = 1_000_000
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 
 
@@ -87,16 +86,7 @@ def require_rate(attributes: Mapping[str, Any], sampling_rate_hz: float) -> None
 
 def _from_table(path: Path) -> Mapping[str, Any]:
     what = f"run attributes {path}"
-    try:
-        if path.stat().st_size > _LARGEST_FILE_BYTES:
-            raise InputError(what, got=f"{path.stat().st_size} bytes", allowed=f"≤ {_LARGEST_FILE_BYTES}")
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(what, got=error.strerror or str(error), allowed="a readable TOML file") from error
-    except InputError:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise InputError(what, got=f"text that is not TOML ({error})", allowed="TOML") from error
+    document = read_toml(path, what)
     table = document.get("run", document)
     if not isinstance(table, dict):
         raise InputError(what, got="run that is no table", allowed="a table [run] of attributes")

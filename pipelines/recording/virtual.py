@@ -18,6 +18,7 @@ from acquisition.virtual_laboratory.numerical_campaign import (
 )
 from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
+from pipelines.report.free_place import require_free_file
 from pipelines.report.progress import amounts, progress
 from sloshlab.errors import InputError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
@@ -94,9 +95,11 @@ def make_virtual_run(
     if rig is None:
         raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
     saved = checkpoint or output.with_suffix(".checkpoint")
-    for option, path in (("--output", output), ("--checkpoint", saved)):
-        if path.is_dir() or not path.parent.is_dir():
-            raise InputError(f"{option} {path}", got="no file", allowed="a file in a folder that exists")
+    require_free_file(saved, f"--checkpoint {saved}")
+    # it may be there to go on from: beside a mistyped one, hours would be computed once more
+    if checkpoint is not None and not checkpoint.absolute().parent.is_dir():
+        got = f"{checkpoint.parent}, which is not there"
+        raise InputError(f"--checkpoint {checkpoint}", got=got, allowed="a file in a folder that exists")
     with amounts(run.experiment) as advance:
         numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
         recording = _recorded(run, rig, numerical)

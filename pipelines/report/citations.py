@@ -15,6 +15,11 @@ class Citation:
     doi: str = ""
 
 
+THESIS_REMARK: Final = (
+    "After the number of a figure stands its counterpart in the thesis that experiment and methods are from, if "
+    "it has one; numbers of equations, tables and figures in parentheses are those of the thesis, too: "
+    "Experimental data-driven reduced-order modeling of nonlinear vertical sloshing for aeroelastic analyses."
+)
 SOURCE: Final = Citation(
     "experiment, work per cycle, maps, effective mass (1.7–1.30)",
     "F. Saltari, M. Pizzoli, G. Coppotelli, F. Gambioli, J. E. Cooper, F. Mastroddi: Experimental "

@@ -16,7 +16,7 @@ class ReportFigure:
     caption : str
         Full sentences: what is seen, how it was made.
     counterpart : str
-        Figure of the source that it corresponds to, empty if none.
+        Figure of the thesis that it corresponds to, empty if none.
     png : bytes
         The image.
     """

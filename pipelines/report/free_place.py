@@ -9,7 +9,7 @@ from sloshlab.errors import InputError
 
 
 def require_free_place(output: Path, *, overwrite: bool) -> None:
-    """Refuse a place that is taken or cannot be written.
+    """Refuse a place for a recording that is taken or cannot be written.
 
     Parameters
     ----------
@@ -24,13 +24,29 @@ def require_free_place(output: Path, *, overwrite: bool) -> None:
         If a folder or, unless it may go, a file is there, or the folder of it cannot be written.
     """
     what = f"recording {output}"
-    if output.is_dir():
-        raise InputError(what, got="a folder in the way", remedy="choose another name")
+    require_free_file(output, what)
     if output.exists() and not overwrite:
         raise InputError(what, got="a file that is there already", remedy="another name, or --overwrite")
-    folder = next(folder for folder in output.absolute().parents if folder.exists())
-    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(what, got=f"{folder}, which cannot be written", allowed="a writable folder")
+
+
+def require_free_file(output: Path, what: str) -> None:
+    """Refuse a place that no file can be written to; one that is there will be replaced.
+
+    Parameters
+    ----------
+    output : Path
+        Folders that are not there yet will be made.
+    what : str
+        What messages call it.
+
+    Raises
+    ------
+    InputError
+        If a folder is there, or the folder of it cannot be written.
+    """
+    if output.is_dir():
+        raise InputError(what, got="a folder in the way", allowed="a file", remedy="choose another name")
+    _require_writable(output.absolute().parent, what)
 
 
 def require_free_folder(output: Path, what: str) -> None:
@@ -41,7 +57,7 @@ def require_free_folder(output: Path, what: str) -> None:
     output : Path
         Folders that are not there yet will be made.
     what : str
-        The folder is of, for messages.
+        What messages call it.
 
     Raises
     ------
@@ -49,7 +65,13 @@ def require_free_folder(output: Path, what: str) -> None:
         If a file is there, or the folder cannot be written.
     """
     if output.exists() and not output.is_dir():
-        raise InputError(f"{what} {output}", got="a file in the way", remedy="choose another folder")
-    there = next(folder for folder in (output.absolute(), *output.absolute().parents) if folder.exists())
-    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
-        raise InputError(f"{what} {output}", got=f"{there}, which cannot be written", allowed="a writable folder")
+        raise InputError(what, got="a file in the way", allowed="a folder", remedy="choose another folder")
+    _require_writable(output.absolute(), what)
+
+
+def _require_writable(folder: Path, what: str) -> None:
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    if not there.is_dir():
+        raise InputError(what, got=f"{there}, which is a file", allowed="a folder", remedy="choose another place")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(what, got=f"{there}, which cannot be written", allowed="a writable folder")

@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pipelines.report.citations import Citation
+from pipelines.report.citations import THESIS_REMARK, Citation
 from pipelines.report.figure import NothingToDrawError, ReportFigure, SkippedFigure
 from pipelines.report.sections import SectionPlan
 from pipelines.report.style import drawing_style, file_stem
@@ -107,6 +107,8 @@ def page_html(page: Page, sections: Sequence[Section]) -> str:
         flags=page.flags,
         summary=page.summary,
         remark=GRAVITY_REMARK,
+        has_counterparts=any(figure.counterpart for figure in _figures(sections)),
+        thesis=THESIS_REMARK,
         sections=_numbered(sections),
         papers=page.papers,
     )

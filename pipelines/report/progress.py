@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Final, Protocol
 
+from pipelines.report.terminal import printable
+
 _REMEMBERED_S: Final = 3600.0
 """Steps that take minutes still tell how long the rest takes."""
 
@@ -29,11 +31,13 @@ def amounts(description: str) -> Iterator[Advance]:
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(),
-               TextColumn("{task.fields[note]}"))  # fmt: skip
+               TextColumn("{task.fields[note]}", markup=False))  # fmt: skip
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, speed_estimate_period=_REMEMBERED_S) as bar:
         task = bar.add_task(description, total=None, note="")
-        yield lambda done, everything, note="": bar.update(task, completed=done, total=everything, note=note)
+        yield lambda done, everything, note="": bar.update(
+            task, completed=done, total=everything, note=printable(note)
+        )
 
 
 @contextlib.contextmanager
@@ -46,7 +50,7 @@ def progress(description: str, total: int) -> Iterator[Callable[[str], None]]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"),
-               TimeRemainingColumn(), TextColumn("{task.fields[step]}"))  # fmt: skip
+               TimeRemainingColumn(), TextColumn("{task.fields[step]}", markup=False))  # fmt: skip
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(description, total=total, step="")
-        yield lambda step: bar.update(task, advance=1, step=step)
+        yield lambda step: bar.update(task, advance=1, step=printable(step))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -12,9 +11,10 @@ from typing import Any, Final
 from pipelines.report.progress import progress
 from pipelines.twin.simulate import SimulationSettings, simulate_run
 from sloshlab import atomic_file
-from sloshlab.errors import InputError
+from sloshlab.errors import InputError, RigError
 from sloshlab.recording import read_attributes
 from sloshlab.reduced_order_model.storage import LARGEST_BYTES, load_model
+from sloshlab.toml_file import read_toml, read_toml_text
 
 TWINS: Final[Mapping[str, Mapping[str, str]]] = {
     "beam_free": {
@@ -36,7 +36,6 @@ TWINS: Final[Mapping[str, Mapping[str, str]]] = {
 """Tables [twin] by experiment: the dampers of Appendix E, and the bouncing ball of Table 2.2."""
 
 _TWIN_TABLES: Final = re.compile(r"^\[twin(\.[^\]]*)?\].*?(?=^\[(?!twin)|\Z)", re.MULTILINE | re.DOTALL)
-_LARGEST_TABLE_BYTES: Final = 100_000
 
 
 def simulated_twins(folder: Path, rig: Path, output: Path) -> list[Path]:
@@ -78,7 +77,7 @@ def twins_of_runs(runs: Sequence[Path], rig: Path, output: Path, more: Mapping[s
     list of Path
         The simulated recordings.
     """
-    text = rig.read_text(encoding="utf-8")
+    text = read_toml_text(rig, f"rig {rig}", error=RigError)
     planned = []
     for path in runs:
         attributes = read_attributes(path)
@@ -133,15 +132,13 @@ def _rom_table(path: Path, output: Path) -> str:
 
 
 def _ball_table(path: Path) -> str:
+    document: Any = read_toml(path, f"ball {path}")
     try:
-        with path.open("rb") as file:
-            table: Any = tomllib.loads(file.read(_LARGEST_TABLE_BYTES).decode("utf-8"))["twin"]
+        table = document["twin"]
         if table["tank_model"] != "bouncing_ball":
             raise ValueError(repr(table["tank_model"]))
         numbers = ", ".join(f"{name} = {float(value)!r}" for name, value in table["parameters"].items())
-    except OSError as error:
-        raise InputError(f"ball {path}", got=error.strerror or str(error), allowed="a readable file") from error
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             f"ball {path}", got=f"no table of a ball ({error})"[:120], allowed="a ball.toml of `sloshlab ball`"
         ) from error

@@ -144,10 +144,10 @@ def error_text(maps: EnergyMaps, name: str, symbol: str, unit: str = "") -> str:
     result = maps.validation.get(name)
     if result is None:
         return ""
-    factor, unit = (1e3, "g") if unit == "kg" and result.left_out_windows_rms < 0.5 else (1.0, unit)
-    lines = [f"window left out: {text(factor * result.left_out_windows_rms, 2)} {unit}".rstrip()]
+    # kilograms however small: a "g" beside contours in multiples of gravity would be read as one of them
+    lines = [f"window left out: {text(result.left_out_windows_rms, 2)} {unit}".rstrip()]
     if np.isfinite(result.left_out_runs_rms):
-        lines.append(f"run left out: {text(factor * result.left_out_runs_rms, 2)} {unit}".rstrip())
+        lines.append(f"run left out: {text(result.left_out_runs_rms, 2)} {unit}".rstrip())
     return f"RMS error of {symbol}, cross-validated\n" + "\n".join(lines)
 
 

@@ -61,8 +61,10 @@ def regime_map(name: str, rig: RigResult, runs: Sequence[RunResult]) -> ReportFi
         f"Regime of the liquid in every window for {rig_text(rig)}. Apart from the fundamental, the label "
         "names what "
         "has the largest share of the power of the liquid's dynamic force: repeating every second cycle (Faraday "
-        "waves), repeating at multiples of the frequency (impacts), not repeating (chaotic); quiet means that "
-        "there is next to nothing. The table below gives the numbers that decide."
+        "waves), repeating at multiples of the frequency (impacts), not repeating (chaotic). What is smooth, with "
+        "next to nothing beside the fundamental, is counted with the waves, which answer at the frequency of the "
+        "tank, too; quiet means that there is next to nothing at all. The table below gives the numbers that "
+        "decide."
     )
     return ReportFigure(name, caption, "regimes of Fig. 1.6", png_bytes(figure))
 

@@ -11,7 +11,6 @@ from pipelines.report.outputs import provenance_of, report_lines, stamp_of, writ
 from pipelines.sweep.results import SweepExperiment
 from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 from sloshlab import atomic_file
-from sloshlab.sweep.windows import WindowSettings
 
 
 def write_experiment(
@@ -84,5 +83,5 @@ def analyse_and_write(
     recordings: Sequence[Path], rigs: Sequence[Path], output: Path, command: str
 ) -> dict[str, Any]:
     """The pipeline of sweeps on the shaker with its usual settings."""
-    experiment = analyse_shaker(recordings, rigs, ShakerSettings(WindowSettings()))
+    experiment = analyse_shaker(recordings, rigs, ShakerSettings())
     return write_experiment(experiment, output, command=command)

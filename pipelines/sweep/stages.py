@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +73,7 @@ class SweepSignals:
 class SweepOptions:
     """Choices of the analysis: windows, boundaries, what to do with a sweep that stops early."""
 
-    windows: WindowSettings
+    windows: WindowSettings = field(default_factory=WindowSettings)
     boundaries: str = "measured"
     allow_incomplete: bool = False
 

@@ -20,7 +20,7 @@ from sloshlab import viscous_equivalent
 from sloshlab.errors import SloshlabError
 from sloshlab.free_surface_modes import mode_table
 from sloshlab.sweep.frequency_response import force_amplitude_n
-from sloshlab.sweep.regime import QUIET_FORCE_RATIO, REGIMES
+from sloshlab.sweep.regime import FARADAY, QUIET_FORCE_RATIO, REGIMES
 
 if TYPE_CHECKING:
     from pipelines.sweep.results import RigResult, RunResult, SweepExperiment
@@ -148,10 +148,26 @@ def regime_table(windows: xr.Dataset) -> Table:
         ("regime", "windows", "acceleration [g]", "force ratio", "repeats every 2nd cycle", "repeats at 2Ω … 5Ω",
          "does not repeat", "crest factor"),
         tuple(rows),
-        f"A window is quiet if the force ratio (RMS of Δf without its fundamental over that of m_l ü) is below "
-        f"{QUIET_FORCE_RATIO:g}; otherwise the largest of the three shares names it. The crest factor is shown "
-        "for information.",
+        f"A window is quiet if the force ratio (RMS of Δf without its part in phase with the acceleration over "
+        f"that of m_l ü) is below {QUIET_FORCE_RATIO:g}. It is counted with the Faraday waves if it dissipates "
+        f"smoothly, with less than {QUIET_FORCE_RATIO:g} of m_l ü beside the fundamental, where the shares are "
+        f"those of next to nothing{_n_smooth_text(windows)}. Otherwise the largest of the three shares names it. "
+        "The crest factor is shown for information.",
     )  # fmt: skip
+
+
+def _n_smooth_text(windows: xr.Dataset) -> str:
+    n_smooth, n_waves = counted_with_the_waves(windows)
+    if not n_smooth:
+        return ""
+    return f" ({n_smooth} of the {n_waves} windows called {FARADAY}, whatever their largest share)"
+
+
+def counted_with_the_waves(windows: xr.Dataset) -> tuple[int, int]:
+    """Windows called Faraday whose largest share is not what repeats every second cycle, and all so called."""
+    is_wave = windows["regime"].values.astype(str) == FARADAY
+    others = np.maximum(windows["harmonic_share"].values, windows["unrepeated_share"].values)
+    return int((is_wave & (windows["subharmonic_share"].values < others)).sum()), int(is_wave.sum())
 
 
 def viscous_table(rig: RigResult) -> Table:

@@ -137,8 +137,6 @@ def _check(settings: SimulationSettings) -> None:
     for option, path in (("--output", settings.output), ("--save-twin", settings.save_twin)):
         if path is None:
             continue
-        if path.is_dir() or not path.absolute().parent.is_dir():
-            raise InputError(f"{option} {path}", got="no file", allowed="a file in a folder that exists")
         for given in (settings.run, settings.rig, settings.twin):
             if given is not None and path.exists() and given.exists() and path.samefile(given):
                 raise InputError(f"{option} {path}", got="a file that is read", remedy="choose another name")

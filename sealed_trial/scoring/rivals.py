@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from sealed_trial.scoring.statistics import Rate, rate
+from sloshlab.toml_file import read_toml
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,7 +27,7 @@ def commonest(classes: Sequence[str]) -> Rate:
 def metadata_features(case: Path) -> dict[str, float]:
     """Everything about a case that is not a sample: numbers of the rig, attributes, sizes of files, ranges."""
     features: dict[str, float] = {}
-    rig = tomllib.loads((case / "rig.toml").read_text(encoding="utf-8"))
+    rig = read_toml(case / "rig.toml", f"rig {case / 'rig.toml'}")
     _collect(rig, "rig", features)
     recordings = sorted((case / "recordings").glob("*.nc"))
     features["n_recordings"] = len(recordings)

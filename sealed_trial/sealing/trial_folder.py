@@ -149,9 +149,8 @@ def read_commitments(folder: Path) -> Commitments:
     try:
         return Commitments.model_validate_json((folder / COMMITMENTS).read_bytes())
     except OSError as error:
-        raise InputError(
-            f"trial {folder}", got=f"no {COMMITMENTS}", allowed="a folder made by `sloshlab trial seal`"
-        ) from error
+        got = f"no {COMMITMENTS}" if folder.is_dir() else "a file" if folder.exists() else "no such folder"
+        raise InputError(f"trial {folder}", got=got, allowed="a folder made by `sloshlab trial seal`") from error
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(

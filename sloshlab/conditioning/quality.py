@@ -36,8 +36,8 @@ class ChannelQuality:
     ----------
     name, quantity, units : str
         What it is.
-    minimum, maximum, mean, rms : float
-        Of the samples that are not lost, in `units`; `rms` about the mean. NaN if all are lost.
+    minimum, maximum, mean, standard_deviation : float
+        Of the samples that are not lost, in `units`. NaN if all are lost.
     n_samples, n_lost : int
         All samples, and those that are NaN.
     clipping : Clipping
@@ -50,7 +50,7 @@ class ChannelQuality:
     minimum: float
     maximum: float
     mean: float
-    rms: float
+    standard_deviation: float
     n_samples: int
     n_lost: int
     clipping: Clipping
@@ -157,7 +157,7 @@ def quality_of(recording: xr.Dataset) -> RunQuality:
 
 def channel_quality(channel: xr.DataArray) -> ChannelQuality:
     """Range, mean, RMS, lost and clipped samples of one channel."""
-    n, minimum, maximum, mean, rms = _statistics(channel.values)
+    n, minimum, maximum, mean, deviation = _statistics(channel.values)
     return ChannelQuality(
         name=str(channel.name),
         quantity=str(channel.attrs.get("quantity", "")),
@@ -165,7 +165,7 @@ def channel_quality(channel: xr.DataArray) -> ChannelQuality:
         minimum=float(minimum),
         maximum=float(maximum),
         mean=float(mean),
-        rms=float(rms),
+        standard_deviation=float(deviation),
         n_samples=int(channel.size),
         n_lost=int(channel.size - n),
         clipping=clipping(channel),
@@ -263,7 +263,7 @@ def _gain_remarks(agreed: SensorAgreement | None) -> list[str]:
 
 
 def _statistics(values: npt.NDArray[Any]) -> tuple[int, float, float, float, float]:
-    """n, minimum, maximum, mean and RMS about the mean of the values that are not NaN."""
+    """n, minimum, maximum, mean and standard deviation of the values that are not NaN."""
     n, minimum, maximum, origin, total, squares = _sums(values)
     if n == 0:
         return 0, math.nan, math.nan, math.nan, math.nan

@@ -112,10 +112,14 @@ def read_case(folder: str | Path, *, with_rig: bool = True) -> Case:
     """
     path = Path(folder)
     rig_file = path / "rig.toml"
-    if with_rig and not rig_file.is_file():
-        raise InputError(
-            f"case {path}", got="no rig.toml", allowed="rig.toml and recordings/*.nc", remedy="name a case folder"
-        )
+    wrong = ""
+    if not path.is_dir():
+        wrong = "a file" if path.exists() else "no such folder"
+    elif with_rig and not rig_file.is_file():
+        wrong = "no rig.toml"
+    if wrong:
+        allowed = "a folder with rig.toml and recordings/*.nc"
+        raise InputError(f"case {path}", got=wrong, allowed=allowed, remedy="name a case folder")
     files = sorted((path / "recordings").glob("*.nc"))
     if not 1 <= len(files) <= MOST_RUNS:
         raise InputError(f"case {path}", got=f"{len(files)} recordings", allowed=f"1 … {MOST_RUNS}")

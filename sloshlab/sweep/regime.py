@@ -3,9 +3,11 @@
 The dynamic force d of a window is split by power into what repeats every cycle at Ω, what repeats
 at the harmonics 2Ω … 5Ω, what repeats every second cycle (Ω/2 and 3Ω/2), and the rest, which does
 not repeat. The label is the largest of the last three shares; no threshold is needed between them.
+Two rules come before it.
 A window is quiet if everything in d but its inertial part, which is in phase with the acceleration,
 is small against the inertia of the liquid. A window that dissipates smoothly, with nothing but the
-fundamental, is counted with the waves: nothing hits and nothing breaks.
+fundamental, is counted with the waves, whatever its largest share: nothing hits and nothing breaks, and
+Faraday waves answer synchronously with the tank as well as at a half and three halves of its frequency (1.4.1).
 """
 
 from __future__ import annotations

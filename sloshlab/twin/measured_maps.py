@@ -25,6 +25,7 @@ from scipy.ndimage import distance_transform_edt
 from sloshlab import interrupt, viscous_equivalent
 from sloshlab.errors import InputError
 from sloshlab.netcdf_lock import NETCDF_LOCK
+from sloshlab.physical_ranges import AMPLITUDE_OVER_HEIGHT, FREQUENCY_HZ, PhysicalRange
 from sloshlab.rig import Rig
 from sloshlab.twin.structure import structure_of_rig
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING
@@ -124,11 +125,8 @@ def filled(grid: xr.DataArray) -> xr.DataArray:
 
 
 def _frequency_hz(rig: Rig, parameters: Mapping[str, Any]) -> float:
-    given = parameters.get("frequency_hz")
-    if given is not None:
-        if isinstance(given, bool) or not isinstance(given, (int, float)) or not 0 < given < np.inf:
-            raise InputError("viscous: frequency_hz", got=repr(given)[:80], allowed="> 0")
-        return float(given)
+    if parameters.get("frequency_hz") is not None:
+        return _in_range(parameters, "frequency_hz", FREQUENCY_HZ)
     return _DEFAULT_FREQUENCY_HZ if rig.structure is None else float(structure_of_rig(rig).frequencies_hz[0])
 
 
@@ -143,7 +141,15 @@ def _damping_kg_per_s(
         return viscous_equivalent.damping_at_maximum_kg_per_s(w_bar, **tank)
     if metric == "c_3":
         return viscous_equivalent.damping_of_maximum_kg_per_s(w_bar, omega_bar, **tank)
-    u_bar = parameters.get("u_bar")
-    if isinstance(u_bar, bool) or not isinstance(u_bar, (int, float)) or not 0 < u_bar < np.inf:
-        raise InputError("viscous: u_bar", got=repr(u_bar)[:80], allowed="> 0, the mean amplitude over h")
-    return viscous_equivalent.damping_at_amplitude_kg_per_s(w_bar, omega_bar, float(u_bar), **tank)
+    u_bar = _in_range(parameters, "u_bar", AMPLITUDE_OVER_HEIGHT)
+    return viscous_equivalent.damping_at_amplitude_kg_per_s(w_bar, omega_bar, u_bar, **tank)
+
+
+def _in_range(parameters: Mapping[str, Any], name: str, possible: PhysicalRange) -> float:
+    value = parameters.get(name)
+    try:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(str(possible))
+        return float(possible.checked(value))
+    except ValueError as error:
+        raise InputError(f"viscous: {name}", got=repr(value)[:80], allowed=str(error)) from error

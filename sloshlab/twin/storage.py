@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import tomllib
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +18,7 @@ from scipy.io import netcdf_file
 
 from sloshlab.atomic_file import replaced, write_bytes
 from sloshlab.errors import InputError
+from sloshlab.toml_file import read_toml
 from sloshlab.twin import (  # noqa: F401  they register forces
     liquid_effects,
     rate_independent_forces,
@@ -34,7 +34,7 @@ from sloshlab.twin.twin import Twin
 FloatArray = npt.NDArray[np.float64]
 FORMAT: Final = 1
 # Checked before anything is read: a file may hold anything.
-_LARGEST_TEXT_BYTES, _LARGEST_ARRAYS_BYTES = 1_000_000, 200_000_000
+_LARGEST_ARRAYS_BYTES = 200_000_000
 _MOST_TERMS = 1000
 _STRUCTURE_ARRAYS = (
     "masses_kg",
@@ -129,18 +129,7 @@ def _text(twin: Twin) -> str:
 
 
 def _document(file: Path) -> dict[str, Any]:
-    try:
-        if file.stat().st_size > _LARGEST_TEXT_BYTES:
-            raise InputError(
-                f"twin {file}", got=f"{file.stat().st_size} bytes", allowed=f"≤ {_LARGEST_TEXT_BYTES}"
-            )
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"twin {file}", got=error.strerror or str(error), allowed="a readable file") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(
-            f"twin {file}", got=f"text that is not TOML ({error})"[:200], allowed="a saved twin"
-        ) from error
+    document = read_toml(file, f"twin {file}")
     if document.get("sloshlab_twin") != FORMAT:
         raise InputError(
             f"twin {file}: sloshlab_twin", got=repr(document.get("sloshlab_twin"))[:80], allowed=str(FORMAT)

@@ -130,6 +130,33 @@ def test_bad_recording_is_refused_in_one_line(name: str, laboratory: Path, tmp_p
     refusal(capsys, arguments, tmp_path / "out", "bad.nc", *fragments)
 
 
+def noisy_times(source: netCDF4.Dataset) -> None:
+    rng = np.random.default_rng(1)
+    source["time"][:] += 0.02 / RATE_HZ * rng.uniform(-1, 1, source["time"].size)
+
+
+@pytest.mark.parametrize("edit", [jitter, noisy_times])
+def test_import_and_check_name_one_jitter_of_one_file(
+    edit: Edit, laboratory: Path, tmp_path: Path, capsys: Any
+) -> None:
+    """The size is by hand: the largest distance from the grid that begins at the first sample."""
+    bad = edited(laboratory / "sweep_3g.nc", tmp_path / "bad.nc", edit)
+    with netCDF4.Dataset(bad) as source:
+        time_s = np.asarray(source["time"][:])
+    off_steps = np.abs((time_s - time_s[0]) * RATE_HZ - np.arange(time_s.size))
+    said = f"jitter of {off_steps.max():.3g} steps ({off_steps.max() / RATE_HZ:.3g} s) at sample"
+    (tmp_path / "map.toml").write_text(
+        '[run]\nexperiment = "other"\nconfiguration = "frozen"\n[channels.force_cell_1]\ncolumn = "force_cell_1"\n'
+    )
+    importing = ["import", str(bad), "--map", str(tmp_path / "map.toml"), "-o", str(tmp_path / "out.nc")]
+    samples = set()
+    for arguments in (["check", str(bad)], importing):
+        line = refusal(capsys, arguments, tmp_path / "out", "time is not uniform", said)
+        samples.add(int(line.split(" at sample ")[1].split()[0].rstrip(";")))
+    (sample,) = samples
+    assert off_steps[sample] == pytest.approx(off_steps.max(), rel=1e-3)
+
+
 def test_results_of_an_earlier_run_stay_as_they_were(laboratory: Path, tmp_path: Path, capsys: Any) -> None:
     bad = edited(laboratory / "sweep_3g.nc", tmp_path / "bad.nc", jitter)
     out = tmp_path / "out"

@@ -203,7 +203,7 @@ def cut(folder: Path) -> None:
 
 
 BAD: dict[str, tuple[Spoil, tuple[str, ...]]] = {
-    "no such folder": (shutil.rmtree, ("no rig.toml", "name a case folder")),
+    "no such folder": (shutil.rmtree, ("no such folder", "rig.toml and recordings", "name a case folder")),
     "no rig": (lambda folder: (folder / "rig.toml").unlink(), ("no rig.toml", "recordings/*.nc")),
     "no recordings": (lambda folder: shutil.rmtree(folder / "recordings"), ("got 0 recordings", "allowed: 1")),
     "damaged recording": (cut, ("run_0.nc",)),

@@ -19,6 +19,7 @@ from short_runs import (
     USAGE,
     assert_one_line,
     contents,
+    edited,
     leftovers,
     refusal,
     shaker_arguments,
@@ -27,6 +28,7 @@ from short_runs import (
 
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from pipelines.command_line import run
+from sloshlab.recording import write_recording
 
 LOST_FROM_S, N_LOST = 20.0, 45
 
@@ -83,6 +85,51 @@ def test_output_that_is_a_file(laboratory: Path, tmp_path: Path, capsys: Any) ->
     assert_one_line(capsys.readouterr().err, str(out))
     assert out.read_text() == "a letter"
     assert leftovers(tmp_path) == []
+
+
+def test_scatter_about_the_mean_is_called_by_its_name(laboratory: Path, tmp_path: Path, capsys: Any) -> None:
+    """With a static weight of 50 N in the force, its RMS would be at least 50 N."""
+    heavy = short_run()
+    heavy["force_cell_1"] = heavy["force_cell_1"].copy(data=heavy["force_cell_1"].values + 50.0)
+    for limit in ("range_min", "range_max"):
+        heavy["force_cell_1"].attrs.pop(limit, None)
+    write_recording(heavy, tmp_path / "heavy.nc")
+    run(["check", str(tmp_path / "heavy.nc"), "--json"])
+    lines = capsys.readouterr().out.splitlines()
+    titles = lines[1].split()
+    row = next(line for line in lines if line.startswith("force_cell_1"))
+    values = dict(zip(titles, row.split(), strict=True))
+    expected = float(np.std(heavy["force_cell_1"].values))
+    assert expected < 50.0
+    assert "rms" not in titles
+    assert float(values["std"]) == pytest.approx(expected, rel=1e-3)
+    channels = {channel["name"]: channel for channel in json.loads(lines[-1])["runs"][0]["channels"]}
+    assert channels["force_cell_1"]["standard_deviation"] == pytest.approx(expected, rel=1e-3)
+    assert "rms" not in channels["force_cell_1"]
+
+
+HOSTILE = "sweep\x1b[2J\x1b]0;all is well\x07\n0 lost\u202e"
+
+
+@pytest.mark.parametrize("command", ["check", "shaker", "import --describe", "refusal"])
+def test_text_of_a_file_moves_no_cursor(command: str, laboratory: Path, tmp_path: Path, capsys: Any) -> None:
+    recording = edited(
+        laboratory / "sweep_3g.nc", tmp_path / "bad.nc", lambda source: source.setncattr("run_id", HOSTILE)
+    )
+    if command == "refusal":
+        edited(recording, tmp_path / "worse.nc", lambda source: source.setncattr("experiment", HOSTILE))
+        recording = tmp_path / "worse.nc"
+    arguments = shaker_arguments([recording], [laboratory / "rig.toml"], tmp_path / "out")
+    if command == "import --describe":
+        (tmp_path / "bad.csv").write_text("t;F \x1b[2J;x\u202e\n[s];[N];[m]\n0,0;1,0;2,0\n0,1;1,0;2,0\n" * 3)
+        arguments = ["import", str(tmp_path / "bad.csv"), "--describe"]
+    run(["check", str(recording)] if command == "check" else arguments)
+    captured = capsys.readouterr()
+    assert captured.out + captured.err
+    for character in "\x1b\x07\u202e":
+        assert character not in captured.out + captured.err
+    if command == "check":
+        assert "sweep\\x1b[2J\\x1b]0;all is well\\x07\\n0 lost\\u202e, " in captured.out
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from acquisition.virtual_laboratory.numerical_runs import BEAM_RIG, RIG_TEXTS, S
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from acquisition.virtual_laboratory.structure_run import virtual_structure_run
 from pipelines.command_line import run
+from sloshlab import physical_ranges
 from sloshlab.recording import LOST, read_recording, write_recording
 from sloshlab.rig import Rig
 
@@ -275,12 +277,40 @@ def test_twins_that_cannot_run_are_refused_in_one_line(
 
 
 @pytest.mark.parametrize(
+    ("key", "possible"),
+    [
+        ("height_m", physical_ranges.TANK_DIMENSION_M),
+        ("dry_mass_kg", physical_ranges.MASS_KG),
+        ("density_kg_per_m3", physical_ranges.LIQUID_DENSITY_KG_PER_M3),
+        ("fill_level", physical_ranges.FILL_LEVEL),
+        ("mass_kg", physical_ranges.MASS_KG),
+        ("stiffness_n_per_m", physical_ranges.STIFFNESS_N_PER_M),
+        ("coulomb_force_n", physical_ranges.FRICTION_N),
+        ("damping_kg_per_s", physical_ranges.DAMPING_KG_PER_S),
+    ],
+)
+def test_both_ends_of_every_range_run_or_are_refused(
+    folder: Path, tmp_path: Path, capsys: Any, key: str, possible: physical_ranges.PhysicalRange
+) -> None:
+    """Nothing that a rig may say ends in a traceback."""
+    for value in (possible.low, possible.high):
+        text, n = re.subn(rf"(?m)^{key} = .*$", f"{key} = {value!r}", RIGS["sdof"])
+        assert n == 1
+        (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+        given = ["--rig", str(tmp_path / "rig.toml"), "--input", str(folder / "sdof_free.nc")]
+        code = run(["simulate", *given, "-o", str(tmp_path / "sim.nc")])
+        assert code in (0, 1, 3)
+        stderr = capsys.readouterr().err
+        assert stderr.count("\n") == 1 if code == 1 else "sloshlab:" not in stderr
+
+
+@pytest.mark.parametrize(
     ("arguments", "fragments"),
     [
         (["--block", "beam"], ("block", "'beam'", "all, tank, structure")),
         (["--configuration", "full"], ("--configuration", "'full'")),
         (["--twin", "rig.toml"], ("sloshlab_twin",)),
-        (["-o", "nowhere/sim.nc"], ("--output", "folder that exists")),
+        (["-o", "."], ("--output .", "a folder in the way")),
         (["-o", "run.nc"], ("--output", "a file that is read")),
         (["--input", "shaken.nc"], ("neither acceleration_root nor an initial displacement",)),
         (["--input", "missing.nc"], ("missing.nc", "no such file")),

@@ -43,10 +43,10 @@ def test_a_trial_is_sealed_run_and_scored_and_remembers_what_it_did(tmp_path, ca
         (["seal", "-o", "T", "--development", "--key", "k"], "a key for a development trial"),
         (["seal", "-o", "T", "--key", "T/k"], "outside the trial"),
         (["seal", "-o", "T", "--development", "--cases", "3"], "--cases: got 3"),
-        (["run", "T"], "no commitments.json"),
+        (["run", "T"], "trial T: got no such folder"),
         (["run", "T", "--workers", "0"], "--workers: got 0"),
         (["run", "T", "--time-limit", "0"], "--time-limit: got 0"),
-        (["score", "T", "-o", "S"], "no commitments.json"),
+        (["score", "T", "-o", "S"], "trial T: got no such folder"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(tmp_path, monkeypatch, capsys, options, said) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -12,10 +11,10 @@ from typing import Any, Final
 from sloshlab import atomic_file
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.errors import InputError
+from sloshlab.toml_file import read_toml
 from sloshlab.twin.terms import Term, kind_named
 
 FORMAT: Final = 1
-_LARGEST_BYTES: Final = 1_000_000
 _MOST_TERMS: Final = 100
 
 
@@ -65,14 +64,7 @@ def load_extended(path: str | Path) -> tuple[dict[str, float], Extension]:
 
 
 def _document(file: Path) -> dict[str, Any]:
-    try:
-        if file.stat().st_size > _LARGEST_BYTES:
-            raise InputError(f"twin {file}", got=f"{file.stat().st_size} bytes", allowed=f"≤ {_LARGEST_BYTES}")
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"twin {file}", got=error.strerror or str(error), allowed="a readable file") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"twin {file}", got="text that is not TOML", allowed="a saved twin") from error
+    document = read_toml(file, f"twin {file}")
     if document.get("sloshlab_user_twin") != FORMAT:
         got = repr(document.get("sloshlab_user_twin"))[:80]
         raise InputError(f"twin {file}: sloshlab_user_twin", got=got, allowed=str(FORMAT))

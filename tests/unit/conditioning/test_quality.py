@@ -30,7 +30,7 @@ def test_numbers_of_one_channel():
     quality = by_name(quality_of(run), "force_cell_1")
     assert (quality.minimum, quality.maximum) == (np.nanmin(values), np.nanmax(values))
     assert quality.mean == pytest.approx(np.nanmean(values), rel=1e-12)
-    assert quality.rms == pytest.approx(np.nanstd(values), rel=1e-9)
+    assert quality.standard_deviation == pytest.approx(np.nanstd(values), rel=1e-9)
     assert (quality.n_samples, quality.n_lost, quality.units) == (60000, 2, "N")
 
 
@@ -97,7 +97,7 @@ def test_everything_lost_is_said_not_raised():
     quality = quality_of(run)
     assert len(quality.reasons) == 5
     assert quality.accelerometers is None
-    assert math.isnan(quality.channels[0].rms)
+    assert math.isnan(quality.channels[0].standard_deviation)
 
 
 def test_numbers_whose_squares_cannot_be_held_are_told_not_raised():
@@ -105,7 +105,7 @@ def test_numbers_whose_squares_cannot_be_held_are_told_not_raised():
     run["force_cell_1"] = run["force_cell_1"].astype(np.float64)
     run["force_cell_1"][100] = 1e200
     quality = by_name(quality_of(run), "force_cell_1")
-    assert (quality.maximum, quality.rms) == (1e200, math.inf)
+    assert (quality.maximum, quality.standard_deviation) == (1e200, math.inf)
 
 
 def test_a_short_run_is_not_compared_and_says_so():

@@ -196,6 +196,18 @@ def test_a_damper_that_follows_the_motion_does_so_from_the_release_on() -> None:
         ('maps = "rig.toml"', "cannot be read"),
         ('maps = "maps.nc"\nmetric = "c_9"', "metric"),
         ('maps = "maps.nc"\nmetric = "c_rand"', "u_bar"),
+        (
+            'maps = "maps.nc"\nmetric = "c_rand"\nu_bar = 1e308',
+            "viscous: u_bar: got 1e+308; allowed: 1e-06 … 10000, from",
+        ),
+        (
+            'maps = "maps.nc"\nmetric = "c_1"\nfrequency_hz = 1e308',
+            "frequency_hz: got 1e+308; allowed: 0.001 … 100000 Hz",
+        ),
+        (
+            'maps = "maps.nc"\nmetric = "c_1"\nfrequency_hz = 5e-324',
+            "frequency_hz: got 5e-324; allowed: 0.001 … 100000 Hz",
+        ),
         ('maps = "maps.nc"\nmetric = "c_1"\nfrequency_hz = 99.0', "no measured value"),
         ('maps = "maps.nc"\nmetric = "c_1"\nfrequency_hz = "fast"', "frequency_hz"),
         ('maps = "maps.nc"\nspeed = 1.0', "speed"),

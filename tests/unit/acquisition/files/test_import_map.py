@@ -163,7 +163,7 @@ class TestTime:
     def test_time_running_back_is_refused(self, tmp_path: Path) -> None:
         columns = signal()
         columns["t"] = np.r_[TIME_S[:100], TIME_S[:100]]
-        with pytest.raises(RecordingError, match=r"a step back from 0\.99 s to 0 s after sample 100"):
+        with pytest.raises(RecordingError, match=r"a step back from 0\.99 s to 0 s after sample 99"):
             imported(tmp_path, columns, force())
 
     def test_no_rate_is_refused(self, tmp_path: Path) -> None:

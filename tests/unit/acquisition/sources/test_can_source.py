@@ -490,6 +490,74 @@ def test_multicast_stays_on_this_computer_unless_exposed(exposed, expected):
     assert n_bytes >= min(1_000_000, limit)
 
 
+def joined_on(group: str) -> set[str]:
+    """Interfaces on which somebody has joined an IPv4 group, as the kernel lists them."""
+    little_endian = socket.inet_aton(group)[::-1].hex().upper()
+    found, interface = set(), ""
+    for line in Path("/proc/net/igmp").read_text().splitlines()[1:]:
+        words = line.split()
+        if words[0].isdigit():
+            interface = words[1]
+        elif words[0] == little_endian:
+            found.add(interface)
+    return found
+
+
+@pytest.mark.parametrize("exposed", [False, True])
+def test_a_group_is_joined_on_the_loopback_interface_alone_unless_exposed(exposed):
+    """A membership elsewhere is told to the network, whatever the socket is confined to afterwards."""
+    group = "239.74.163.77"
+    assert joined_on(group) == set()
+    try:
+        bus = open_multicast_bus(group, 43198, fd=True, exposed=exposed)
+    except SourceError:
+        pytest.skip("no network interface to be exposed on")
+    try:
+        assert ("lo" in joined_on(group)) is not exposed
+        assert bool(joined_on(group) - {"lo"}) is exposed
+    finally:
+        bus.shutdown()
+    assert joined_on(group) == set()
+
+
+def test_buses_on_this_computer_hear_each_other_and_their_group_alone():
+    """Frames of both kinds, with the time at which the kernel got them; not what was sent to another group."""
+    buses = [open_multicast_bus(group, 43197, fd=True, exposed=False) for group in ("239.74.163.78",) * 2]
+    other = open_multicast_bus("239.74.163.79", 43197, fd=True, exposed=False)
+    try:
+        other.send(can.Message(arbitration_id=1, data=[1], is_extended_id=False))
+        sent = can.Message(arbitration_id=0x1ABCDEF, data=bytes(range(64)), is_extended_id=True, is_fd=True)
+        before = time.time()
+        buses[0].send(sent)
+        got = buses[1].recv(2.0)
+        assert (got.arbitration_id, bytes(got.data), got.is_extended_id, got.is_fd) == (
+            0x1ABCDEF,
+            bytes(range(64)),
+            True,
+            True,
+        )
+        # the kernel's clock of time stamps may lag behind by a tick
+        assert before - 0.05 <= got.timestamp <= time.time()
+        assert buses[1].recv(0.05) is None
+    finally:
+        for bus in (*buses, other):
+            bus.shutdown()
+    with pytest.raises(can.CanOperationError):
+        buses[1].recv(0.01)
+
+
+def test_bytes_that_are_no_frame_are_an_error_of_the_bus():
+    bus = open_multicast_bus("239.74.163.80", 43196, fd=True, exposed=False)
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
+            stranger.sendto(b"\xc1 no frame", ("239.74.163.80", 43196))
+        with pytest.raises(can.CanOperationError, match="unpack"):
+            bus.recv(2.0)
+    finally:
+        bus.shutdown()
+
+
 def test_silence_is_quiet_and_frames_of_nobody_are_nothing(dbc, tmp_path):
     name = f"silent_{tmp_path.name}"
     with (

@@ -312,7 +312,7 @@ def test_what_is_there_stays_unless_it_may_go(place: Path, name: str) -> None:
 
 def test_a_file_where_a_folder_should_be_is_refused(place: Path) -> None:
     place.write_bytes(b"")
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="which is a file; allowed: a folder"):
         record(settings_for(place), open_source=never)
 
 

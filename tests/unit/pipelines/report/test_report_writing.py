@@ -130,6 +130,17 @@ def test_links_lead_to_sections_that_are_there(drawn: Drawn) -> None:
     assert links <= {f"#{identifier}" for identifier in identifiers}
 
 
+@pytest.mark.parametrize("name", sorted(EXPECTED))
+def test_what_stands_after_the_number_of_a_figure_is_explained_once(drawn: Drawn, name: str) -> None:
+    _, folder = drawn(name)
+    text = " ".join(page_of(folder).text.split())
+    assert re.search(r"Figure \d+ \(thesis: (like )?Fig\. 1\.\d+", text)
+    assert not re.search(r"Figure \d+ \((?!thesis: )", text)
+    before_the_figures = text[: text.index("(thesis: ")]
+    assert before_the_figures.count("After the number of a figure stands its counterpart in the thesis") == 1
+    assert "Experimental data-driven reduced-order modeling of nonlinear vertical sloshing" in before_the_figures
+
+
 def test_hostile_names_are_text_and_not_markup(drawn: Drawn) -> None:
     experiment, folder = drawn("two fills")
     assert experiment.runs[0].attributes.run_id.startswith("<script>")

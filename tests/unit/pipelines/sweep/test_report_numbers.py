@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -112,6 +113,35 @@ def test_viscous_table_states_c2_of_the_maximum() -> None:
     # E.4 by hand: c = m_l/π √(g/h) ω̄ W̄
     expected = 0.124323 / math.pi * 18.991 * PEAK_OMEGA_BAR * PEAK_W_BAR
     assert [float(row[3]) for row in table.rows] == pytest.approx([expected] * 3, rel=0.05)
+
+
+def test_the_rule_that_names_smooth_windows_is_told_and_counted() -> None:
+    """By hand: three of six windows are called Faraday; of two of these another share is larger."""
+    windows = shaker_experiment((0.5,), (2.0,)).windows.isel(window=slice(6)).copy(deep=True)
+    labels = ["Faraday", "Faraday", "Faraday", "impacts", "chaotic", "quiet"]
+    shares = {
+        "subharmonic_share": [0.8, 0.026, 0.0, 0.1, 0.1, 0.0],
+        "harmonic_share": [0.1, 0.9, 0.0, 0.8, 0.2, 0.0],
+        "unrepeated_share": [0.1, 0.074, 1.0, 0.1, 0.7, 1.0],
+    }
+    windows["regime"] = ("window", np.array(labels))
+    for name, values in shares.items():
+        windows[name] = ("window", np.array(values))
+    caption = tables.regime_table(windows).caption
+    assert "2 of the 3 windows called Faraday, whatever their largest share" in caption
+    assert "dissipates smoothly, with less than 0.05 of m_l ü beside the fundamental" in caption
+    only_by_shares = tables.regime_table(windows.isel(window=[0, 3, 4, 5])).caption
+    assert "whatever their largest share" not in only_by_shares
+
+
+@pytest.mark.parametrize("rms_kg", [0.015, 0.49, 2.0])
+def test_errors_of_masses_are_not_in_a_g_beside_contours_in_g(rms_kg: float) -> None:
+    maps = shaker_experiment((0.5,), (2.0, 3.0)).rigs[0].maps
+    result = dataclasses.replace(maps.validation["work_j"], left_out_windows_rms=rms_kg, left_out_runs_rms=rms_kg)
+    shown = dataclasses.replace(maps, validation={"work_j": result})
+    text = figures_maps.error_text(shown, "work_j", "W/(u₀Ω)²", "kg")
+    assert re.findall(r"left out: (\S+) (\S+)", text) == [(f"{rms_kg:#.2g}", "kg")] * 2
+    assert " g" not in text.replace(" kg", "")
 
 
 def test_every_table_row_is_as_long_as_its_header() -> None:
