@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from pipelines.report.progress import progress
-from pipelines.sweep.results import RigResult, RunResult, SweepExperiment
-from pipelines.sweep.stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
+from pipelines.sweep.results import RigResult, RunResult, SweepExperiment, SweepOptions
+from pipelines.sweep.stages import SweepSignals, analyse_sweep, naming, not_measured, require_usable
 from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass, w_bar_bias_of_delay
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
@@ -269,7 +269,7 @@ def _experiment(
         rigs=tuple(rig_results),
         windows=everything,
         maps=_joined(rig_results),
-        settings=settings.windows,
+        settings=settings,
         flags=tuple([flag for run in runs for flag in run.flags] + _calibration_flags(dry, rigs)),
     )
 

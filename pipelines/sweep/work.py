@@ -11,8 +11,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.report.progress import progress
-from pipelines.sweep.results import RunResult, SweepExperiment
-from pipelines.sweep.stages import SweepOptions, SweepSignals, analyse_sweep, naming, not_measured, require_usable
+from pipelines.sweep.results import RunResult, SweepExperiment, SweepOptions
+from pipelines.sweep.stages import SweepSignals, analyse_sweep, naming, not_measured, require_usable
 from sloshlab.conditioning.differentiation import differentiated
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
@@ -91,7 +91,7 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
         windows=windows,
         maps=maps.dataset,
         work_maps=maps,
-        settings=settings.windows,
+        settings=settings,
         flags=tuple(flag for result in results for flag in result.flags),
     )
 
