@@ -10,6 +10,7 @@ import typer
 from pipelines.commands.application import (
     Json,
     OutputFile,
+    Overwrite,
     Redundant,
     app,
     finish,
@@ -46,7 +47,16 @@ def virtual(
     sampling_rate_hz: Annotated[
         float | None, typer.Option(help="Sampling rate in Hz; on the shaker 512.", show_default=False)
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of noise, drive and liquid.")] = 0,
+    laboratory: Annotated[
+        str,
+        typer.Option(
+            help="exact: the rig as told, or drawn: masses, gains, frequencies a little off.", show_default=False
+        ),
+    ] = "",
+    laboratory_seed: Annotated[
+        int | None, typer.Option(help="Which laboratory is drawn.", show_default=False)
+    ] = None,
     liquid: Annotated[str, typer.Option(help="law, or numerical: computed, takes long.")] = "law",
     layers: Annotated[int, typer.Option(help="Layers of particles over the height of the tank.")] = 16,
     checkpoint: Annotated[
@@ -61,17 +71,25 @@ def virtual(
         Path | None,
         typer.Option(metavar="FOLDER", help="Where a computed campaign is saved; by default within the output."),
     ] = None,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """A run of the virtual laboratory."""
     from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
-    from pipelines.recording import virtual as laboratory
+    from pipelines.recording.virtual import (
+        CAMPAIGN,
+        VirtualRun,
+        laboratory_seed_of,
+        make_campaign_folder,
+        make_virtual_run,
+    )
 
-    if experiment == "campaign":
-        computed = CampaignSettings(seed, layers, workers, only, checkpoints)
-        finish(laboratory.make_campaign_folder(output, liquid, computed, typer.echo), as_json)
+    of_laboratory = laboratory_seed_of(laboratory, laboratory_seed, is_campaign=experiment == CAMPAIGN)
+    if experiment == CAMPAIGN:
+        computed = CampaignSettings(seed, layers, workers, only, checkpoints, of_laboratory, overwrite)
+        finish(make_campaign_folder(output, liquid, computed, typer.echo), as_json)
         return
-    run = laboratory.VirtualRun(
+    run = VirtualRun(
         experiment=experiment,
         configuration=configuration,
         seed=seed,
@@ -86,8 +104,9 @@ def virtual(
         initial_displacement_m=initial_displacement_m,
         rms_g=rms_g,
         second_frequency_hz=second_frequency_hz,
+        laboratory_seed=of_laboratory,
     )
-    finish(laboratory.make_virtual_run(run, rig, output, checkpoint), as_json)
+    finish(make_virtual_run(run, rig, output, checkpoint, overwrite=overwrite), as_json)
 
 
 @app.command()
@@ -200,6 +219,7 @@ def replay(
     truth: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Write what each fault touched.", show_default=False)
     ] = None,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """A recording, the virtual rig or a test pattern, played as serial or CAN devices."""
@@ -219,5 +239,6 @@ def replay(
         seed=seed,
         loop_duration_s=loop_duration,
         truth=truth,
+        overwrite=overwrite,
     )
     finish(play(settings), as_json)
