@@ -145,6 +145,6 @@ def test_results_are_not_written_through_a_link(analyse, tmp_path: Path, capsys:
     elsewhere.mkdir()
     (out / "figures").symlink_to(elsewhere)
     assert analyse(out, report=True) == INPUT_IS_BAD
-    assert_one_line(capsys.readouterr().err, "a link in the place of a folder")
+    assert_one_line(capsys.readouterr().err, "a link in the place of a folder", "another folder")
     assert list(elsewhere.iterdir()) == []
     assert [path.name for path in out.iterdir()] == ["figures"]
