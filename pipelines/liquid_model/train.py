@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from sloshlab.reduced_order_model.stability import stability
 from sloshlab.reduced_order_model.storage import load_model, save_model
 from sloshlab.reduced_order_model.training import Epoch, TrainingRecord, TrainingSettings, fit
 from sloshlab.reduced_order_model.validity_domain import ValidityDomain
+
+REPORT_FILES: Final = ("report.html", "training_curve.nc", "maps.nc", "residual.nc")
+"""Of a validation; some are written only if the runs allow it, but nothing may be in their way after hours."""
 
 
 @dataclass(frozen=True)
@@ -252,7 +255,7 @@ def train_and_report(
     if wanted.n_members:
         require_free_place(ensemble_file(output), overwrite=overwrite, described="ensemble")
     if command is not None:
-        require_result_folder(folder, ["report.html"])
+        require_result_folder(folder, REPORT_FILES)
     ensemble = _ensemble_of(output)
     for path in test if command is not None else ():
         read_attributes(path)  # before hours of training, not after them
@@ -343,7 +346,7 @@ def validate_model(
     """
     from pipelines.liquid_model.outputs import write_validation
 
-    require_result_folder(folder, ["report.html"])
+    require_result_folder(folder, REPORT_FILES)
     model = load_model(path)
     try:
         ValidityDomain.of_facts(model.facts["domain"])
