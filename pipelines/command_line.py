@@ -1,8 +1,8 @@
 """The command line: what to read, what to write, and how it ends.
 
 Exit codes: 0 done; 1 the input is bad, one line on stderr; 2 usage; 3 done, but data were lost or a
-result is flagged; 130 interrupted, nothing half-written. Commands import what they need when they
-run, so that ``sloshlab --help`` stays quick.
+result is flagged; 130 interrupted, 129 and 143 terminated, nothing half-written. Commands import what they
+need when they run, so that ``sloshlab --help`` stays quick.
 """
 
 from __future__ import annotations
@@ -77,6 +77,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         say("sloshlab: interrupted; nothing half-written", error=True)
         return INTERRUPTED
+    except interrupt.Terminated as termination:
+        print(f"sloshlab: ended by {termination}; nothing half-written", file=sys.stderr)  # noqa: T201
+        return termination.exit_code
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
         remedy = "check that the path can be written, and that a folder or file of this name is not in the way"
@@ -87,7 +90,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def main() -> NoReturn:
     """Entry point of the ``sloshlab`` command."""
     code = run()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is done is done: nothing is left to interrupt
+    for number in (signal.SIGINT, *interrupt.TERMINATIONS):
+        signal.signal(number, signal.SIG_IGN)  # what is done is done: nothing is left to interrupt
     sys.exit(code)
 
 

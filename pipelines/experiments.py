@@ -73,12 +73,7 @@ def beam_arguments(folder: Path, output: Path) -> list[str]:
 
 def _beam(folder: Path, output: Path) -> int:
     """Damping, modes, twins of the sloshing runs, and report; a flagged result is a result."""
-    from pipelines.structure.twins import simulated_twins
-
-    arguments = beam_arguments(folder, output)
-    rig = Path(arguments[arguments.index("--rig") + 1])
-    twins = simulated_twins(folder, rig, output / "twins")
-    code = run([arguments[0], *map(str, twins), *arguments[1:]])
+    code = run([*beam_arguments(folder, output), "--twins"])
     if code in (0, DONE_BUT_FLAGGED):
         say(f"The report is {(output / 'report.html').resolve()}")
         return 0
@@ -153,7 +148,8 @@ def _rom_files(folder: Path) -> tuple[list[str], Path, list[str]]:
 
 def _rom(folder: Path, output: Path) -> int:
     """The reduced-order model and its report; a flagged result is a result."""
-    code = run(rom_arguments(folder, output))
+    # a model of an earlier `make rom`
+    code = run([*rom_arguments(folder, output), "--overwrite"])
     return 0 if code == DONE_BUT_FLAGGED else code
 
 

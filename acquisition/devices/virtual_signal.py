@@ -140,8 +140,8 @@ class _Truth:
             stop_hz=last,
             duration_s=settings["duration_s"],
         )
-        # the one laboratory of all virtual runs: gains and offsets do not depend on the seed of the run
-        self._laboratory = Laboratory.drawn(0) if settings["imperfect"] else Laboratory.perfect()
+        # gains and offsets do not depend on the seed of the run
+        self._laboratory: Laboratory = settings["laboratory"]
         self._shaker: VirtualShaker = virtual_shaker(
             rig,
             plan,

@@ -10,10 +10,12 @@ import contextlib
 import signal
 from collections.abc import Iterator
 
+from sloshlab.interrupt import TERMINATIONS
+
 
 @contextlib.contextmanager
 def stop_signals_noted() -> Iterator[list[int]]:
-    """Yield a list that stays empty until SIGINT (Ctrl-C) or SIGTERM; nothing is broken off by them.
+    """Yield a list that stays empty until Ctrl-C or a termination; nothing is broken off by them.
 
     A signal that is ignored, as SIGINT by jobs in the background, stays ignored. In other threads than
     the main one no signals arrive, and the list stays empty.
@@ -23,7 +25,8 @@ def stop_signals_noted() -> Iterator[list[int]]:
     def note(number: int, _: object) -> None:
         stopping.append(number)
 
-    heeded = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
+    numbers = (signal.SIGINT, *TERMINATIONS)
+    heeded = [number for number in numbers if signal.getsignal(number) != signal.SIG_IGN]
     try:
         before = {number: signal.signal(number, note) for number in heeded}
     except ValueError:  # not in the main thread

@@ -18,7 +18,7 @@ from acquisition.samples.delivery import CountArray
 from acquisition.sources.interface import SourceInfo, SourceURL
 from acquisition.sources.playback import PlayedSource
 from acquisition.sources.urls import URLOptions
-from acquisition.virtual_laboratory.sensors import CHANNELS, LOST_COUNT
+from acquisition.virtual_laboratory.sensors import CHANNELS, LOST_COUNT, Laboratory
 from acquisition.virtual_laboratory.shaker_run import SWEEP_LAWS, virtual_shaker_run
 from sloshlab.configurations import CONFIGURATIONS, SLOSHING
 from sloshlab.errors import InputError, SourceError
@@ -39,7 +39,8 @@ class SimulatedSource(PlayedSource):
 
     Options beside those of `PlayedSource`: ``rig=RIG.toml`` (needed), ``acceleration_g``, ``duration_s``,
     ``sampling_rate_hz``, ``seed``, ``start_hz``, ``stop_hz``, ``n_steps``, ``direction=up|down``,
-    ``law=octave|linear|stepped``, ``configuration=sloshing|frozen|empty``, ``imperfect=yes|no``.
+    ``law=octave|linear|stepped``, ``configuration=sloshing|frozen|empty``, ``imperfect=yes|no``,
+    ``laboratory_seed`` (without it the rig is as told).
 
     Parameters
     ----------
@@ -122,7 +123,15 @@ def run_settings(options: URLOptions) -> dict[str, Any]:
         "law": options.choice("law", SWEEP_LAWS[0], SWEEP_LAWS),
         "configuration": options.choice("configuration", SLOSHING, CONFIGURATIONS),
         "imperfect": options.yes("imperfect", True),
+        "laboratory": _laboratory(options),
     }
+
+
+def _laboratory(options: URLOptions) -> Laboratory:
+    """The laboratory that is asked for; the rig as it is told if none is."""
+    if options.text("laboratory_seed") is None:
+        return Laboratory.perfect()
+    return Laboratory.drawn(options.integer("laboratory_seed", 0, lowest=0, highest=2**31 - 1))
 
 
 def counts_of(channel: xr.DataArray) -> CountArray:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -21,6 +22,8 @@ from sloshlab.rig import Rig
 FILL_LEVELS: Final = (0.25, 0.50, 0.75)
 ACCELERATIONS_G: Final = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)
 MANIFEST_NAME: Final = "manifest.json"
+CAMPAIGN_LABORATORY: Final = 0
+"""Seed of the laboratory of every campaign that asks for no other."""
 COMMAND: Final = "sloshlab virtual campaign -o raw_data/shaker --seed {seed}"
 
 _RIG_TEXT = """\
@@ -79,6 +82,8 @@ def make_campaign(
     folder: str | os.PathLike[str],
     *,
     seed: int = 0,
+    laboratory_seed: int | None = CAMPAIGN_LABORATORY,
+    overwrite: bool = False,
     progress: Progress | None = None,
     only: Callable[[CampaignRun], bool] | None = None,
 ) -> Path:
@@ -87,9 +92,13 @@ def make_campaign(
     Parameters
     ----------
     folder : path-like
-        Made if missing; files of the same names are replaced, each atomically.
+        Made if missing; files of an earlier campaign are replaced, all together.
     seed : int
-        Of everything random. Same seed, same library versions: same bytes.
+        Of noise, motion and liquid. Same seeds, same library versions: same bytes.
+    laboratory_seed : int, optional
+        Of the laboratory that serves all runs; None for one that is as the rigs tell.
+    overwrite : bool
+        Whether files may be replaced that the manifest does not vouch for.
     progress : callable, optional
         Called with (runs done, runs in all, name) after each run.
     only : callable, optional
@@ -103,39 +112,44 @@ def make_campaign(
     Raises
     ------
     InputError
-        If the seed is negative.
+        If a seed is negative, or somebody's own file is in the place of one of the campaign.
 
     Notes
     -----
     One laboratory, with one set of sensor gains and one true dry mass, serves all runs: see
     `campaign_laboratory`. Nothing of that truth is written.
     """
-    if seed < 0:
-        raise InputError("seed of the campaign", got=str(seed), allowed="≥ 0")
+    for name, number in (("seed", seed), ("laboratory seed", laboratory_seed or 0)):
+        if number < 0:
+            raise InputError(f"{name} of the campaign", got=str(number), allowed="≥ 0")
     target = Path(folder)
     numbered = [(index, run) for index, run in enumerate(campaign_runs()) if only is None or only(run)]
-    written = []
-    for fill_level in FILL_LEVELS:
-        written.append(target / rig_name(fill_level))
-        atomic_file.write_bytes(written[-1], rig_text(fill_level).encode())
-    for n_done, (index, run) in enumerate(numbered, start=1):
-        written.append(target / f"{run.name}.nc")
-        record_campaign_run(run, written[-1], index=index, seed=seed)
-        if progress is not None:
-            progress(n_done, len(numbered), run.name)
-    manifest = target / MANIFEST_NAME
-    content = {
-        "format": 1,
-        "command": COMMAND.format(seed=seed),
-        "seed": seed,
-        "sloshlab_version": __version__,
-        "files": {path.name: file_record(path) for path in sorted(written)},
-    }
-    atomic_file.write_bytes(manifest, (json.dumps(content, indent=1, sort_keys=True) + "\n").encode())
-    return manifest
+    names = [*map(rig_name, FILL_LEVELS), *(f"{run.name}.nc" for _, run in numbered), MANIFEST_NAME]
+    require_own_files(target, names, overwrite=overwrite)
+    laboratory = campaign_laboratory(laboratory_seed)
+    with atomic_file.filled_folder(target) as complete:
+        for fill_level in FILL_LEVELS:
+            (complete / rig_name(fill_level)).write_bytes(rig_text(fill_level).encode())
+        for n_done, (index, run) in enumerate(numbered, start=1):
+            path = complete / f"{run.name}.nc"
+            record_campaign_run(run, path, index=index, seed=seed, laboratory=laboratory)
+            if progress is not None:
+                progress(n_done, len(numbered), run.name)
+        content = {
+            "format": 1,
+            "command": COMMAND.format(seed=seed) + laboratory_option(laboratory_seed),
+            "seed": seed,
+            "sloshlab_version": __version__,
+            "files": {path.name: file_record(path) for path in sorted(complete.iterdir())},
+        }
+        manifest = (json.dumps(content, indent=1, sort_keys=True) + "\n").encode()
+        (complete / MANIFEST_NAME).write_bytes(manifest)
+    return target / MANIFEST_NAME
 
 
-def record_campaign_run(run: CampaignRun, path: str | os.PathLike[str], *, index: int, seed: int) -> None:
+def record_campaign_run(
+    run: CampaignRun, path: str | os.PathLike[str], *, index: int, seed: int, laboratory: Laboratory
+) -> None:
     """Record one run of the campaign; `index` is its place in `campaign_runs`."""
     start = datetime.fromisoformat(START_TIME_UTC) + timedelta(minutes=10 * index)
     rig = Rig.from_toml_text(rig_text(run.fill_level))
@@ -144,7 +158,7 @@ def record_campaign_run(run: CampaignRun, path: str | os.PathLike[str], *, index
         # by the place in the list: the same run has the same bytes, whichever others are made
         seed=1000 * seed + index,
         # one laboratory: gains and dry mass are those of the sensors, not of a run
-        laboratory=campaign_laboratory(seed),
+        laboratory=laboratory,
         run_id=run.name,
         rig_name=rig_name(run.fill_level),
         start_time_utc=start.strftime("%Y-%m-%dT%H:%M:%SZ"),
@@ -153,9 +167,48 @@ def record_campaign_run(run: CampaignRun, path: str | os.PathLike[str], *, index
     write_virtual_run(recording, path)
 
 
-def campaign_laboratory(seed: int = 0) -> Laboratory:
-    """The truth about the campaign's sensors and dry mass, for tests."""
-    return Laboratory.drawn(seed)
+def campaign_laboratory(seed: int | None = CAMPAIGN_LABORATORY) -> Laboratory:
+    """The truth about the campaign's sensors and dry mass; without a seed the rig is as told."""
+    return Laboratory.perfect() if seed is None else Laboratory.drawn(seed)
+
+
+def laboratory_option(seed: int | None) -> str:
+    """What the command of a campaign says of its laboratory; nothing of the one that is usual."""
+    if seed == CAMPAIGN_LABORATORY:
+        return ""
+    return " --laboratory exact" if seed is None else f" --laboratory-seed {seed}"
+
+
+def require_own_files(folder: Path, names: Iterable[str], *, overwrite: bool) -> None:
+    """Refuse to replace what no earlier campaign wrote: it may be a measurement.
+
+    Parameters
+    ----------
+    folder : Path
+    names : iterable of str
+        Of the files that will be written.
+    overwrite : bool
+        Refuse nothing.
+
+    Raises
+    ------
+    InputError
+        If a file is there and not, as it is, in the manifest of the folder.
+    """
+    known: dict[str, Any] = {}
+    # a manifest that is not there, or none, vouches for nothing
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        known = {MANIFEST_NAME: None, **json.loads((folder / MANIFEST_NAME).read_text(encoding="utf-8"))["files"]}
+    for name in names if not overwrite else ():
+        path = folder / name
+        if not os.path.lexists(path) or (name == MANIFEST_NAME and name in known):
+            continue
+        if path.is_symlink() or not path.is_file() or known.get(name) != file_record(path):
+            raise InputError(
+                f"recording {path}",
+                got="a file that no campaign wrote, or that was changed since",
+                remedy="another folder, or --overwrite",
+            )
 
 
 def file_record(path: str | os.PathLike[str]) -> dict[str, str | int]:

@@ -23,16 +23,23 @@ import xarray as xr
 
 from acquisition.numerical_tank import checkpoint as checkpoints
 from acquisition.numerical_tank.tank import TankSetup
-from acquisition.virtual_laboratory.campaign import MANIFEST_NAME, campaign_laboratory, file_record
+from acquisition.virtual_laboratory.campaign import (
+    CAMPAIGN_LABORATORY,
+    MANIFEST_NAME,
+    campaign_laboratory,
+    file_record,
+    laboratory_option,
+)
 from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid, numerical_setup
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
 from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC, virtual_shaker_run, write_virtual_run
-from acquisition.virtual_laboratory.structure_rig import StructureLaboratory
+from acquisition.virtual_laboratory.structure_rig import structure_laboratory
 from acquisition.virtual_laboratory.structure_run import virtual_structure_run
 from acquisition.virtual_laboratory.worker_processes import Outcome, work_through
 from sloshlab import atomic_file
 from sloshlab._version import __version__
-from sloshlab.errors import InputError, RecordingInterruptedError
+from sloshlab.errors import InputError, RecordingInterruptedError, SloshlabError
+from sloshlab.recording import read_attributes
 from sloshlab.rig import Rig
 
 CHECKPOINTS_NAME: Final = ".checkpoints"
@@ -51,7 +58,7 @@ class CampaignSettings:
     Attributes
     ----------
     seed : int
-        Of everything random.
+        Of noise, motion and liquid.
     layers_per_height : int
         Resolution: height of the tank over the distance of the particles; half as fine again at α = 0.25.
     n_workers : int
@@ -60,6 +67,10 @@ class CampaignSettings:
         Pattern of the names of the runs to be made, as of files.
     checkpoints : path-like, optional
         Folder of the checkpoints; by default one within the campaign's.
+    laboratory_seed : int, optional
+        Of the laboratory that serves all runs; None for one that is as the rigs tell.
+    overwrite : bool
+        Whether recordings may be replaced that the manifest does not name.
     """
 
     seed: int = 0
@@ -67,6 +78,8 @@ class CampaignSettings:
     n_workers: int = 2
     only: str = "*"
     checkpoints: str | os.PathLike[str] | None = None
+    laboratory_seed: int | None = CAMPAIGN_LABORATORY
+    overwrite: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,7 +130,7 @@ class _Task:
     checkpoint: Path
     seed: int
     layers_per_height: int
-    laboratory_seed: int
+    laboratory_seed: int | None
 
 
 def make_numerical_campaign(
@@ -153,9 +166,11 @@ def make_numerical_campaign(
     target = Path(folder)
     tasks = _tasks(target, settings, numerical_runs() if runs is None else runs)
     with _alone(tasks[0].checkpoint.parent):
+        manifest = _Manifest(target, settings)
+        if not settings.overwrite:
+            manifest.require_own(tasks)
         for name, text in RIG_TEXTS.items():
             atomic_file.write_bytes(target / name, text.encode())
-        manifest = _Manifest(target, settings)
         missing = [task for task in tasks if not manifest.vouches_for(task)]
         # the longest first, or one process would work at it alone at the end
         missing.sort(key=_cost, reverse=True)
@@ -219,7 +234,7 @@ def _recording(task: _Task, liquid: NumericalLiquid) -> xr.Dataset:
     if run.is_on_shaker:
         laboratory = campaign_laboratory(task.laboratory_seed)
         return virtual_shaker_run(rig, numerical=liquid, laboratory=laboratory, **run.settings, **common)
-    rest = StructureLaboratory.drawn(task.laboratory_seed, rig)
+    rest = structure_laboratory(rig, task.laboratory_seed)
     return virtual_structure_run(rig, numerical=liquid, laboratory=rest, **run.settings, **common)
 
 
@@ -278,6 +293,25 @@ class _Manifest:
         # by its content: a recording may have been replaced or cut since
         return bool(self._files.get(self._relative(task.recording)) == file_record(task.recording))
 
+    def require_own(self, tasks: Sequence[_Task]) -> None:
+        """Refuse to replace files of no campaign; a recording that was damaged since is made again.
+
+        Raises
+        ------
+        InputError
+        """
+        rigs = {self._folder / name: text.encode() for name, text in RIG_TEXTS.items()}
+        others = [path for path, text in rigs.items() if path.exists() and path.read_bytes() != text]
+        # a campaign that was killed leaves recordings that its manifest does not name yet
+        others += [t.recording for t in tasks if os.path.lexists(t.recording) and not _is_of(t)]
+        for path in others:
+            if self._relative(path) not in self._files:
+                raise InputError(
+                    f"recording {path}",
+                    got="a file that no campaign wrote",
+                    remedy="another folder, or --overwrite",
+                )
+
     def add(self, task: _Task, result: Mapping[str, Any]) -> None:
         self._files[self._relative(task.recording)] = file_record(task.recording)
         self._runs[task.run.name] = {
@@ -295,7 +329,8 @@ class _Manifest:
         self._files.update({name: file_record(self._folder / name) for name in RIG_TEXTS})
         content = {
             "format": 1,
-            "command": COMMAND.format(self._settings.layers_per_height, self._settings.seed),
+            "command": COMMAND.format(self._settings.layers_per_height, self._settings.seed)
+            + laboratory_option(self._settings.laboratory_seed),
             "seed": self._settings.seed,
             "layers_per_height": self._settings.layers_per_height,
             "sloshlab_version": __version__,
@@ -308,9 +343,20 @@ class _Manifest:
         return path.relative_to(self._folder).as_posix()
 
 
+def _is_of(task: _Task) -> bool:
+    """Whether the recording of a task says of itself that it is one."""
+    try:
+        attributes = read_attributes(task.recording)
+    except SloshlabError:
+        return False
+    more = attributes.model_extra or {}
+    return attributes.run_id == Path(task.run.name).name and "liquid" in more and more.get("seed") == task.seed
+
+
 def _tasks(folder: Path, settings: CampaignSettings, runs: Sequence[NumericalRun]) -> list[_Task]:
-    if settings.seed < 0:
-        raise InputError("seed of the campaign", got=str(settings.seed), allowed="≥ 0")
+    for name, number in (("seed", settings.seed), ("laboratory seed", settings.laboratory_seed or 0)):
+        if number < 0:
+            raise InputError(f"{name} of the campaign", got=str(number), allowed="≥ 0")
     chosen = [run for run in runs if fnmatch.fnmatchcase(run.name, settings.only)]
     if not chosen:
         names = ", ".join(run.name for run in runs[:2])
@@ -326,7 +372,7 @@ def _task(folder: Path, settings: CampaignSettings, run: NumericalRun) -> _Task:
         Path(),
         1000 * settings.seed + _FIRST_SEED + run.number,
         _layers_per_height(settings, run),
-        settings.seed,
+        settings.laboratory_seed,
     )
     kept_in = Path(settings.checkpoints or folder / CHECKPOINTS_NAME)
     # the hash in the name, so that a checkpoint of other settings is not taken up, nor lost

@@ -7,10 +7,9 @@ has its gain error, noise and offset. What is unknown to the analysis is drawn o
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,9 +74,9 @@ class Laboratory:
         """No errors at all: believed mass, unit gains, equal shares."""
         return cls(1.0, dict.fromkeys(channels, 1.0), 0.5, 0.0, dict.fromkeys(channels, 0.0))
 
-    def to_json(self) -> str:
-        """The truth as JSON text, for tests; never written beside recordings."""
-        return json.dumps(asdict(self), indent=2, sort_keys=True)
+    def deviations(self) -> dict[str, Any]:
+        """In what this laboratory differs from what its rig tells, as JSON can hold it."""
+        return asdict(self)
 
 
 @dataclass(frozen=True)

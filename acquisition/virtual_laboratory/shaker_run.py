@@ -86,7 +86,7 @@ def virtual_shaker(
     laboratory: Laboratory | None = None,
 ) -> VirtualShaker:
     """The truth of the run that `virtual_shaker_run` records for the same arguments."""
-    truth = laboratory or (Laboratory.drawn(0) if imperfect else Laboratory.perfect())
+    truth = laboratory or Laboratory.perfect()
     # numbered streams of one seed: motion 1, sensors 2, so that noise does not change with what the motion draws
     generator = np.random.default_rng([seed, 1])
     motion = shaken(plan, Imperfections.drawn(generator) if imperfect else None)
@@ -147,9 +147,9 @@ def virtual_shaker_run(
     seed : int
         Of everything that differs between repeats.
     laboratory : Laboratory, optional
-        Gains and true dry mass; by default those of laboratory 0, or perfect ones.
+        Gains and true dry mass; by default the rig is as told.
     imperfect : bool
-        If false the shaker keeps its law and the sensors are exact; the liquid still scatters.
+        If false the shaker keeps its law and the sensors have no noise; the liquid still scatters.
     lost : (float, int), optional
         Time in s and number of samples lost on all channels.
     n_clipped : int
@@ -205,7 +205,7 @@ def virtual_shaker_run(
     )
     time_s = _sample_times(duration_s, sampling_rate_hz, max(start_hz, stop_hz))
     flags = _lost_samples(time_s, lost)
-    laboratory = laboratory or (Laboratory.drawn(0) if imperfect else Laboratory.perfect())
+    laboratory = laboratory or Laboratory.perfect()
     if numerical is None:
         shaker = virtual_shaker(
             rig, plan, configuration=configuration, seed=seed, imperfect=imperfect, laboratory=laboratory

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,12 +77,22 @@ class StructureLaboratory:
             around_one(0.07, 0.2, n_modes),
         )
 
+    def deviations(self) -> dict[str, Any]:
+        """In what this laboratory differs from what its rig tells, as JSON can hold it."""
+        structure = {"frequency_factors": self.frequency_factors, "damping_factors": self.damping_factors}
+        return {**self.sensors.deviations(), **{name: list(factors) for name, factors in structure.items()}}
+
     @classmethod
     def perfect(cls, rig: Rig) -> StructureLaboratory:
         """Everything is as believed."""
         described = described_structure(rig)
         ones = (1.0,) * max(len(described.frequencies_hz), 1)
         return cls(Laboratory.perfect(channels_of(described)), ones, ones)
+
+
+def structure_laboratory(rig: Rig, seed: int | None) -> StructureLaboratory:
+    """The laboratory of a seed; without one the rig is as told."""
+    return StructureLaboratory.perfect(rig) if seed is None else StructureLaboratory.drawn(seed, rig)
 
 
 @dataclass(frozen=True)

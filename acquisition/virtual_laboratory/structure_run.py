@@ -120,9 +120,9 @@ def virtual_structure_run(
     seed : int
         Of everything that differs between repeats.
     laboratory : StructureLaboratory, optional
-        Gains and true values; by default those of laboratory 0, or perfect ones.
+        Gains and true values; by default the rig is as told.
     imperfect : bool
-        If false the structure is as believed and the sensors are exact.
+        If false the sensors have no noise.
     run_id, rig_name, repeat, start_time_utc
         Global attributes.
 
@@ -164,7 +164,7 @@ def virtual_structure_run(
     _check(experiment, configuration, seed, rig)
     duration_s = EXPERIMENTS[experiment].virtual_defaults["duration_s"] if duration_s is None else duration_s
     numerical = numerical or NumericalLiquid()
-    truth = laboratory or (StructureLaboratory.drawn(0, rig) if imperfect else StructureLaboratory.perfect(rig))
+    truth = laboratory or StructureLaboratory.perfect(rig)
     n_samples = _n_samples(duration_s, sampling_rate_hz)
     setup = numerical_setup(
         rig, layers_per_height=numerical.layers_per_height, seed=seed, sampling_rate_hz=sampling_rate_hz

@@ -17,6 +17,7 @@ from typing import Any, Final, NoReturn
 
 from acquisition.numerical_tank.interruption import stop_signals_noted
 from sloshlab.errors import InputError, RecordingInterruptedError, SloshlabError
+from sloshlab.interrupt import TERMINATIONS
 
 MOST_WORKERS: Final = 256
 Work = Callable[[Any, Callable[[float], None]], Any]
@@ -72,7 +73,7 @@ def work_through(
     InputError
         If there are no workers, or too many.
     KeyboardInterrupt
-        At Ctrl-C or SIGTERM, after every process has been stopped and has saved what it can.
+        At Ctrl-C or a termination, after every process has been stopped and has saved what it can.
     """
     if not 1 <= n_workers <= MOST_WORKERS:
         raise InputError("--workers", got=str(n_workers), allowed=f"1 … {MOST_WORKERS}")
@@ -158,9 +159,10 @@ def _interrupt(*_: object) -> NoReturn:
 
 
 def _child(connection: Connection, work: Work, task: Any) -> None:
-    """What runs in a process of its own. Ctrl-C is for the parent, which then terminates this one."""
-    # a terminal sends Ctrl-C to all processes at once
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """What runs in a process of its own. Signals are for the parent, which then terminates this one."""
+    # a terminal sends Ctrl-C, and its end, to all processes at once
+    for number in (signal.SIGINT, *TERMINATIONS):
+        signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _interrupt)
 
     def report_share(share: float) -> None:

@@ -93,7 +93,7 @@ def ball_from_decays(
     omega_bar = 2 * np.pi * measured.frequency_hz / rig.frequency_scale_rad_per_s
     inputs = (*(path for path, _ in described), rig_path)
     flags = (*found.flags, *_guide_flags(frozen, rig_as_believed))
-    return BallExperiment(rig, rig_path.name, inputs, found, float(omega_bar), result, flags)
+    return BallExperiment(rig, rig_path.name, inputs, found, float(omega_bar), result, settings, flags)
 
 
 def _frozen(runs: Sequence[tuple[Path, RunAttributes]], rig: Rig, settings: BallSettings) -> FrozenDecay | None:

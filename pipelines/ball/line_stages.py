@@ -43,7 +43,7 @@ def ball_from_shaker(paths: Sequence[Path], rig: Rig, rig_path: Path, settings: 
         )
     result = _compared(found.ball, rig, line, maps=maps, windows=experiment.windows, settings=settings)
     flags = (*found.flags, *_outside_flags(result), *experiment.flags)
-    return BallExperiment(rig, rig_path.name, experiment.inputs, found, line.omega_bar, result, flags)
+    return BallExperiment(rig, rig_path.name, experiment.inputs, found, line.omega_bar, result, settings, flags)
 
 
 def _outside_flags(result: LineResult) -> tuple[str, ...]:

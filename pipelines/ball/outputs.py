@@ -10,10 +10,16 @@ import numpy as np
 import xarray as xr
 
 from pipelines.ball.results import BallExperiment, DecayResult
-from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
+from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines, stamp_of, write_dataset
+from pipelines.report.result_folder import result_folder
 from sloshlab import atomic_file
 from sloshlab.bouncing_ball.frequency_error import summary
 from sloshlab.quantities import described
+
+
+def files_of(*, report: bool) -> tuple[str, ...]:
+    """Names of the files that are written for certain."""
+    return ("ball.toml", "ball.nc", *(["report.html"] if report else []))
 
 
 def write_ball(experiment: BallExperiment, folder: Path, *, command: str, report: bool = True) -> dict[str, Any]:
@@ -21,21 +27,23 @@ def write_ball(experiment: BallExperiment, folder: Path, *, command: str, report
 
     All files appear together, complete, or none does.
     """
-    provenance = provenance_of(command, experiment.inputs)
-    with atomic_file.filled_folder(folder) as complete:
-        atomic_file.write_bytes(complete / "ball.toml", _twin_table(experiment).encode())
+    provenance = provenance_of(command, experiment.inputs, settings=experiment.settings)
+    with result_folder(folder, provenance) as complete:
+        atomic_file.write_bytes(complete / "ball.toml", _twin_table(experiment, provenance[RESULT_ID]).encode())
         write_dataset(_dataset(experiment, provenance), complete / "ball.nc")
         if report:
             from pipelines.ball.sections import page_of
             from pipelines.report.page import write_page
 
-            write_page(page_of(dataclasses.replace(experiment, provenance=provenance)), complete)
+            page = page_of(dataclasses.replace(experiment, provenance=provenance))
+            write_page(page, complete, result_id=provenance[RESULT_ID])
     return _summary(experiment, folder, report)
 
 
-def _twin_table(experiment: BallExperiment) -> str:
+def _twin_table(experiment: BallExperiment, result_id: str) -> str:
     """The table to put into the rig file, with what is known of each number."""
     lines = [f"# bouncing ball identified at omega_bar = {experiment.omega_bar:.4g} for {experiment.rig_name}"]
+    lines.append(f"# {RESULT_ID} {result_id}")
     for interval in experiment.identified.intervals:
         at = f", at the {interval.at_bound} bound of its search" if interval.at_bound else ""
         lines.append(f"# {interval.name}: 90 % interval {interval.low:.4g} ... {interval.high:.4g}{at}")

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pipelines.ball.settings import BallSettings
 from sloshlab.bouncing_ball.free_decay import DampingCurve
 from sloshlab.bouncing_ball.frequency_error import FrequencyBand
 from sloshlab.bouncing_ball.from_work_line import WorkLine
@@ -109,5 +110,6 @@ class BallExperiment:
     identified: IdentifiedBall
     omega_bar: float
     result: DecayResult | LineResult
+    settings: BallSettings
     flags: tuple[str, ...] = ()
     provenance: dict[str, object] = field(default_factory=dict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +20,7 @@ from pipelines.commands.application import (
     command_as_given,
     finish,
 )
+from pipelines.report.result_folder import require_result_folder
 
 
 @app.command()
@@ -47,11 +49,12 @@ def shaker(
     as_json: Json = False,
 ) -> None:
     """Sweeps or VFA runs of a tank on the shaker: windows, maps and a report."""
-    from pipelines.sweep.outputs import write_experiment
+    from pipelines.sweep.outputs import files_of, write_experiment
     from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 
     if boundaries not in ("measured", "law"):
         raise typer.BadParameter(f"{boundaries!r} is neither 'measured' nor 'law'", param_hint="--boundaries")
+    require_result_folder(output, files_of(report=not no_report))
     settings = ShakerSettings.checked(p=p, m=m, boundaries=boundaries, allow_incomplete=allow_incomplete)
     experiment = analyse_shaker(runs, rig, settings)
     finish(write_experiment(experiment, output, command=command_as_given(), report=not no_report), as_json)
@@ -75,12 +78,13 @@ def work(
     as_json: Json = False,
 ) -> None:
     """Any sweep with one force and one motion channel, no tank needed."""
-    from pipelines.sweep.outputs import write_experiment
+    from pipelines.sweep.outputs import files_of, write_experiment
     from pipelines.sweep.work import WorkSettings, analyse_work
 
     motions = {"acceleration": acceleration, "velocity": velocity, "displacement": displacement}
     if sum(map(bool, motions.values())) != 1:
         raise typer.BadParameter("name exactly one of --acceleration, --velocity, --displacement")
+    require_result_folder(output, files_of(report=not no_report))
     settings = WorkSettings.checked(p=p, m=m, force=force, motions=motions, phase_reference=phase_reference)
     experiment = analyse_work(runs, settings)
     finish(write_experiment(experiment, output, command=command_as_given(), report=not no_report), as_json)
@@ -110,21 +114,29 @@ def beam(
         list[Path] | None,
         typer.Option("--ball", metavar="ball.toml", help="Ball to simulate the runs with.", show_default=False),
     ] = None,
+    twins: Annotated[
+        bool, typer.Option("--twins", help="Simulate the sloshing runs with frozen liquid and dampers, too.")
+    ] = False,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write modal.nc and spectra.nc only.")] = False,
     as_json: Json = False,
 ) -> None:
     """Beam or guided tank, frozen and sloshing: modal accelerations, damping, spectra and a report."""
     from pipelines.structure.analysis import analyse_beam, checked_settings
-    from pipelines.structure.outputs import write_beam
+    from pipelines.structure.outputs import files_of, write_beam
+    from pipelines.structure.twins import tank_models, twins_of_runs
 
     settings = checked_settings(modes=modes, n_cycles=cycles, segment_s=segment_s)
-    if rom or ball_table:
-        from pipelines.structure.twins import tank_models, twins_of_runs
-
-        twins = output / "twins"
-        runs = [*twins_of_runs(runs, rig, twins, tank_models(rom or [], ball_table or [], twins)), *runs]
-    experiment = analyse_beam(runs, rig, settings)
-    finish(write_beam(experiment, output, command=command_as_given(), report=not no_report), as_json)
+    require_result_folder(output, files_of(report=not no_report))
+    command, simulated = command_as_given(), None
+    # apart until everything is there: twins beside results of another run would be taken for theirs
+    with tempfile.TemporaryDirectory(prefix="sloshlab-twins-") as place:
+        if twins or rom or ball_table:
+            simulated = Path(place)
+            models = tank_models(rom or [], ball_table or [], simulated)
+            runs = [*twins_of_runs(runs, rig, simulated, models), *runs]
+        experiment = analyse_beam(runs, rig, settings)
+        summary = write_beam(experiment, output, command=command, report=not no_report, twins=simulated)
+    finish(summary, as_json)
 
 
 @app.command()
@@ -146,7 +158,7 @@ def ball(
     as_json: Json = False,
 ) -> None:
     """A bouncing ball in place of the liquid, from free decays or from runs on the shaker."""
-    from pipelines.ball.outputs import write_ball
+    from pipelines.ball.outputs import files_of, write_ball
     from pipelines.ball.settings import BallSettings
     from pipelines.ball.stages import analyse_ball
     from sloshlab.bouncing_ball.identification import SearchSettings
@@ -155,5 +167,6 @@ def ball(
         raise typer.BadParameter(f"{damper!r} is neither 'contact' nor 'always'", param_hint="--damper")
     search = SearchSettings(n_generations=generations, seed=seed)
     settings = BallSettings(omega_bar, 1.0 if damper == "always" else 0.0, lowest_acceleration_g, search)
+    require_result_folder(output, files_of(report=not no_report))
     experiment = analyse_ball(runs, rig, settings)
     finish(write_ball(experiment, output, command=command_as_given(), report=not no_report), as_json)

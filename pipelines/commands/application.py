@@ -65,6 +65,7 @@ Redundant = Annotated[
         "--redundant", metavar="A:B", help="Channels of two devices that show the same motion.", show_default=False
     ),
 ]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Write windows.nc and maps.nc only.")]
 
 

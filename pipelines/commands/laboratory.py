@@ -10,13 +10,14 @@ import typer
 from pipelines.commands.application import (
     Json,
     OutputFile,
+    Overwrite,
     Redundant,
     app,
     finish,
     free_file,
     free_folder,
 )
-from pipelines.report.free_place import require_free_file, require_free_folder
+from pipelines.report.free_place import require_free_folder, require_free_place
 from pipelines.report.terminal import say
 from sloshlab.configurations import CONFIGURATIONS, SLOSHING
 from sloshlab.experiments import experiment_names
@@ -52,7 +53,16 @@ def virtual(
     sampling_rate_hz: Annotated[
         float | None, typer.Option(help="Sampling rate in Hz; on the shaker 512.", show_default=False)
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of noise, drive and liquid.")] = 0,
+    laboratory: Annotated[
+        str,
+        typer.Option(
+            help="exact: the rig as told, or drawn: masses, gains, frequencies a little off.", show_default=False
+        ),
+    ] = "",
+    laboratory_seed: Annotated[
+        int | None, typer.Option(help="Which laboratory is drawn.", show_default=False)
+    ] = None,
     liquid: Annotated[str, typer.Option(help="law, or numerical: computed, takes long.")] = "law",
     layers: Annotated[int, typer.Option(help="Layers of particles over the height of the tank.")] = 16,
     checkpoint: Annotated[
@@ -74,19 +84,27 @@ def virtual(
             callback=free_folder,
         ),
     ] = None,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """A run of the virtual laboratory."""
     from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
-    from pipelines.recording import virtual as laboratory
+    from pipelines.recording.virtual import (
+        CAMPAIGN,
+        VirtualRun,
+        laboratory_seed_of,
+        make_campaign_folder,
+        make_virtual_run,
+    )
 
-    if experiment == "campaign":
+    of_laboratory = laboratory_seed_of(laboratory, laboratory_seed, is_campaign=experiment == CAMPAIGN)
+    if experiment == CAMPAIGN:
         require_free_folder(output, f"--output {output}")
-        computed = CampaignSettings(seed, layers, workers, only, checkpoints)
-        finish(laboratory.make_campaign_folder(output, liquid, computed, say), as_json)
+        computed = CampaignSettings(seed, layers, workers, only, checkpoints, of_laboratory, overwrite)
+        finish(make_campaign_folder(output, liquid, computed, say), as_json)
         return
-    require_free_file(output, f"--output {output}")
-    run = laboratory.VirtualRun(
+    require_free_place(output, overwrite=overwrite, described="--output")
+    run = VirtualRun(
         experiment=experiment,
         configuration=configuration,
         seed=seed,
@@ -101,8 +119,9 @@ def virtual(
         initial_displacement_m=initial_displacement_m,
         rms_g=rms_g,
         second_frequency_hz=second_frequency_hz,
+        laboratory_seed=of_laboratory,
     )
-    finish(laboratory.make_virtual_run(run, rig, output, checkpoint), as_json)
+    finish(make_virtual_run(run, rig, output, checkpoint, overwrite=overwrite), as_json)
 
 
 @app.command()
@@ -221,6 +240,7 @@ def replay(
             callback=free_file,
         ),
     ] = None,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """A recording, the virtual rig or a test pattern, played as serial or CAN devices."""
@@ -240,5 +260,6 @@ def replay(
         seed=seed,
         loop_duration_s=loop_duration,
         truth=truth,
+        overwrite=overwrite,
     )
     finish(play(settings), as_json)

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import Json, OutputFile, OutputFolder, app, command_as_given, finish, free_file
+from pipelines.commands.application import (
+    Json,
+    OutputFile,
+    OutputFolder,
+    Overwrite,
+    app,
+    command_as_given,
+    finish,
+    free_file,
+)
 from sloshlab.configurations import SLOSHING
 
 Runs = Annotated[
@@ -69,6 +78,7 @@ def train(
     ] = None,
     ensemble: Annotated[int, typer.Option(min=0, help="Members of an ensemble for intervals.")] = 0,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write the model only.")] = False,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """Reduced-order model of the liquid from runs on the shaker, and its validation report."""
@@ -82,7 +92,8 @@ def train(
     )
     settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed)
     command = None if no_report else command_as_given()
-    finish(train_and_report(files, test or [], wanted, settings, output, command=command), as_json)
+    summary = train_and_report(files, test or [], wanted, settings, output, command=command, overwrite=overwrite)
+    finish(summary, as_json)
 
 
 @app.command()
@@ -161,10 +172,13 @@ def simulate(
         typer.Option(min=1, max=1000, help="Integration steps per sample.", show_default=False),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise of the twin's sensors.")] = 0,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """The twin of a rig file, driven by the motion, the base motion or the release of a recorded run."""
     from pipelines.twin.simulate import SimulationSettings, simulate_run
 
-    settings = SimulationSettings(rig, run_file, output, block, configuration, twin, save_twin, steps, seed)
+    settings = SimulationSettings(
+        rig, run_file, output, block, configuration, twin, save_twin, steps, seed, overwrite
+    )
     finish(simulate_run(settings), as_json)

@@ -9,6 +9,7 @@ import typer
 
 from pipelines.commands.application import (
     Json,
+    Overwrite,
     Recordings,
     app,
     finish,
@@ -38,6 +39,7 @@ def import_(
     describe: Annotated[
         bool, typer.Option("--describe", help="List columns, units, rates and traps; no map needed.")
     ] = False,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """CSV, MAT, UFF-58, TDMS, LVM, MF4, CAN logs or netCDF to one recording."""
@@ -48,7 +50,7 @@ def import_(
         return
     if channel_map is None or output is None:
         raise typer.BadParameter("--map and -o are needed, unless --describe is given")
-    finish(import_run(sources, channel_map, output, rig), as_json)
+    finish(import_run(sources, channel_map, output, rig, overwrite=overwrite), as_json)
 
 
 @app.command()

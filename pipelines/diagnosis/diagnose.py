@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.diagnosis.results import Diagnosis
-from pipelines.report.free_place import require_free_folder
-from pipelines.report.outputs import provenance_of, report_lines
+from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines
 from pipelines.report.progress import amounts
+from pipelines.report.result_folder import require_result_folder, result_folder
 from sloshlab import atomic_file
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.consistency.samples import examined_samples
@@ -24,6 +24,11 @@ from sloshlab.diagnosis.search import findings_of
 from sloshlab.diagnosis.user_effects import load_user_effects
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
 from sloshlab.diagnosis.verdict import verdict_facts, with_place
+
+
+def files_of(*, report: bool) -> tuple[str, ...]:
+    """Names of the files that are written for certain."""
+    return ("verdict.json", "extended_twin.toml", "retuned_twin.toml", *(["report.html"] if report else []))
 
 
 def diagnose_case(
@@ -54,7 +59,7 @@ def diagnose_case(
     target = output or folder / "diagnosis"
     case, recordings = _examined(read_case(folder, with_rig=twin is None))
     # Before the search, which takes minutes: a folder that is in the way has to be said at once.
-    require_free_folder(target, f"diagnosis {target}")
+    require_result_folder(target, files_of(report=report))
     own = [effect for file in effects for effect in load_user_effects(file)]
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
@@ -63,9 +68,11 @@ def diagnose_case(
         found, verdict = answered(found, lambda what, done, of: advance(done, max(of, 1)))
     examination = examined(found)
     verdict = with_place(found, verdict, seen_at(examination, verdict.best), owning_block(examination))
-    facts = {**verdict_facts(found, verdict), **examination_facts(examination, found)}
-    diagnosis = Diagnosis(found, verdict, examination, _provenance(case, command, twin, effects), recordings)
-    with atomic_file.filled_folder(target) as complete:
+    provenance = _provenance(case, command, twin, effects)
+    facts = {RESULT_ID: provenance[RESULT_ID], **verdict_facts(found, verdict)}
+    facts |= examination_facts(examination, found)
+    diagnosis = Diagnosis(found, verdict, examination, provenance, recordings)
+    with result_folder(target, provenance) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned
         found.model.save_extended(best.fit.values, explained_extension(best), complete / "extended_twin.toml")
@@ -75,7 +82,7 @@ def diagnose_case(
             from pipelines.diagnosis.sections import page_of
             from pipelines.report.page import write_page
 
-            write_page(page_of(diagnosis), complete)
+            write_page(page_of(diagnosis), complete, result_id=provenance[RESULT_ID])
     lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
     if own:
         lines.append("effects of your own: " + ", ".join(f"{effect.block}.{effect.name}" for effect in own))
@@ -98,4 +105,4 @@ def _examined(case: Case) -> tuple[Case, tuple[ConsistencyExamination, ...]]:
 
 def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:
     files = [twin or case.folder / "rig.toml", *effects, *sorted((case.folder / "recordings").glob("*.nc"))]
-    return provenance_of(command, files)
+    return provenance_of(command, files, settings="diagnosis")

@@ -8,14 +8,24 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from pipelines.diagnosis.trial_report import write_report
+from pipelines.diagnosis.trial_report import FILES, write_report
+from pipelines.report.outputs import provenance_of, sha256_of
 from pipelines.report.progress import progress
+from pipelines.report.result_folder import require_result_folder
 from sealed_trial.running import DIAGNOSE, DIAGNOSES, OUTCOME, Outcome, require_no_key, run_trial
 from sealed_trial.scoring.answer import read_answer
 from sealed_trial.scoring.rivals import commonest, metadata_classifier, metadata_features
 from sealed_trial.scoring.score import Score, scored
 from sealed_trial.sealing.key import made_or_read_key, read_key
-from sealed_trial.sealing.trial_folder import check_data, opened_truths, read_commitments, seal
+from sealed_trial.sealing.trial_folder import (
+    COMMITMENTS,
+    LOCKED,
+    READABLE,
+    check_data,
+    opened_truths,
+    read_commitments,
+    seal,
+)
 from sloshlab.errors import InputError
 
 MOST_WORKERS = 64
@@ -83,8 +93,12 @@ def score_trial(folder: Path, output: Path, *, key: Path | None) -> dict[str, An
     InputError
         If a truth, a commitment or a recording is not what was sealed, or cases have not been run.
     """
+    require_result_folder(output, FILES)
     score = score_of(folder, key)
-    write_report(score, output)
+    cases = sorted((folder / DIAGNOSES).glob("*/*.json"))
+    diagnosed = {path.relative_to(folder).as_posix(): sha256_of(path) for path in cases}
+    truths = [path for path in (folder / name for name in (READABLE, LOCKED)) if path.is_file()]
+    write_report(score, output, provenance_of("", [folder / COMMITMENTS, *truths], settings=diagnosed))
     lines = [f"{name}: {rate.successes} of {rate.n}" for name, rate in score.rates.items()]
     lines.append(f"written: {output / 'blind_trial.md'}")
     rates = {name: rate.value for name, rate in score.rates.items() if rate.n}

@@ -20,9 +20,9 @@ from pipelines.liquid_model.results import (
     ValidatedModel,
 )
 from pipelines.liquid_model.training_runs import TrainingRuns, signals_of, sloshing_run
-from pipelines.sweep.results import RigResult, RunResult
+from pipelines.sweep.results import RigResult, RunResult, SweepOptions
 from pipelines.sweep.shaker import sweep_signals
-from pipelines.sweep.stages import SweepOptions, analyse_sweep, require_usable
+from pipelines.sweep.stages import analyse_sweep, require_usable
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.resampling import resampled
 from sloshlab.consistency.finding import ConsistencyExamination

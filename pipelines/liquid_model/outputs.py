@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,10 @@ from pipelines.liquid_model.comparison import validated
 from pipelines.liquid_model.results import Training, ValidatedModel
 from pipelines.liquid_model.sections import page_of
 from pipelines.liquid_model.training_runs import TrainingRuns
-from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
+from pipelines.report.outputs import RESULT_ID, report_lines, stamp_of, write_dataset
 from pipelines.report.page import write_page
 from pipelines.report.progress import progress
-from sloshlab import atomic_file
+from pipelines.report.result_folder import result_folder
 from sloshlab.quantities import described
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 
@@ -31,9 +31,8 @@ def write_validation(
     test: Sequence[Path],
     folder: Path,
     *,
-    command: str,
+    provenance: Mapping[str, Any],
     training: Training | None = None,
-    model_file: Path | None = None,
 ) -> dict[str, Any]:
     """Compare a model with recordings and write the report; return the summary of the command.
 
@@ -45,23 +44,24 @@ def write_validation(
         Further runs.
     folder : Path
         All files appear in it together, complete, or none does.
-    command : str
-        What the user typed, for the report.
+    provenance : mapping
+        What the model and the report rest on.
     training : Training, optional
-    model_file : Path, optional
-        Where the model was read from.
     """
     files = runs.files
     n_steps = 3 + len(files.validation) + len(test) + _N_FIGURES
     with progress("validation", n_steps) as advance:
         found = validated(model, runs, test, training=training, advance=advance)
-        read = () if model_file is None else (model_file,)
-        inputs = (*read, *files.training, *files.validation, *test, *files.still, files.rig)
-        found = dataclasses.replace(found, provenance=provenance_of(command, inputs))
-        with atomic_file.filled_folder(folder) as complete:
+        found = dataclasses.replace(found, provenance=provenance)
+        with result_folder(folder, provenance) as complete:
             for name, dataset in datasets(found).items():
                 write_dataset(dataset, complete / name)
-            write_page(page_of(found), complete, progress=lambda _done, _total, name: advance(name))
+            write_page(
+                page_of(found),
+                complete,
+                result_id=provenance[RESULT_ID],
+                progress=lambda _done, _total, name: advance(name),
+            )
     return _summary(found, folder)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,9 +20,10 @@ from pipelines.liquid_model.sensitivity_study import (
 )
 from pipelines.liquid_model.study_page import StudiedModels, page_of
 from pipelines.liquid_model.training_runs import RunFiles, training_runs
-from pipelines.report.outputs import provenance_of, report_lines, write_dataset
+from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.report.page import write_page
 from pipelines.report.progress import amounts
+from pipelines.report.result_folder import require_result_folder, result_folder
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
 from sloshlab.quantities import described
@@ -71,6 +72,7 @@ def study(
     """
     if wanted.cases not in CASES:
         raise InputError("--cases", got=repr(wanted.cases), allowed=", ".join(CASES))
+    require_result_folder(folder, ["study.nc", BEST_NAME, "report.html"])
     runs = training_runs(files, wanted.rate_hz)
     with amounts("study") as advance:
         last = ""
@@ -94,13 +96,13 @@ def study(
     pick = picked(results)
     best = folder / pick.best.case.name / MODEL_NAME
     inputs = (*files.training, *files.validation, *files.still, files.rig)
-    provenance = provenance_of(command, inputs)
+    provenance = provenance_of(command, inputs, settings=(replace(wanted, n_workers=1), settings))
     flags = (*runs.flags, *(f"{result.case.name}: {result.ended}" for result in results if not result.is_trained))
     found = StudiedModels(tuple(results), pick, settings, runs.rate.reason, flags, provenance)
-    with atomic_file.filled_folder(folder) as complete:
-        write_dataset(dataset_of(results), complete / "study.nc")
+    with result_folder(folder, provenance) as complete:
+        write_dataset(dataset_of(results).assign_attrs(stamp_of(provenance)), complete / "study.nc")
         atomic_file.write_bytes(complete / BEST_NAME, best.read_bytes())
-        write_page(page_of(found), complete)
+        write_page(page_of(found), complete, result_id=provenance[RESULT_ID])
     return {
         "lines": [f"picked: {pick.reason}", f"model: {folder / BEST_NAME}", *report_lines(folder)],
         "flags": list(flags),

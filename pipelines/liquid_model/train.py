@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from pipelines.liquid_model.extensions import remembering, trained_ensemble
 from pipelines.liquid_model.training_runs import RunFiles, TrainingRuns, require_new_runs, training_runs
-from pipelines.report.free_place import require_free_folder
-from pipelines.report.outputs import sha256_of
+from pipelines.report.free_place import require_free_place
+from pipelines.report.outputs import RESULT_ID, provenance_of, sha256_of
 from pipelines.report.progress import amounts
+from pipelines.report.result_folder import require_result_folder, withdraw_result
+from sloshlab import atomic_file
 from sloshlab.errors import InputError
 from sloshlab.recording import read_attributes
 from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.ensemble import Ensemble
-from sloshlab.reduced_order_model.ensemble_storage import save_ensemble
+from sloshlab.reduced_order_model.ensemble_storage import load_ensemble, save_ensemble
 from sloshlab.reduced_order_model.fit_quality import FitQuality, fit_quality
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.model import ReducedOrderModel
@@ -28,6 +30,9 @@ from sloshlab.reduced_order_model.stability import stability
 from sloshlab.reduced_order_model.storage import load_model, save_model
 from sloshlab.reduced_order_model.training import Epoch, TrainingRecord, TrainingSettings, fit
 from sloshlab.reduced_order_model.validity_domain import ValidityDomain
+
+REPORT_FILES: Final = ("report.html", "training_curve.nc", "maps.nc", "residual.nc")
+"""Of a validation; some are written only if the runs allow it, but nothing may be in their way after hours."""
 
 
 @dataclass(frozen=True)
@@ -171,15 +176,20 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
     return TrainedModel(model, record, runs, settings, _quality(model, runs.validation), ensemble)
 
 
-def write_model(trained: TrainedModel, output: Path) -> dict[str, Any]:
-    """Write the model; return the summary of the command.
+def write_model(trained: TrainedModel, output: Path, place: Path) -> dict[str, Any]:
+    """Write the model, and its ensemble beside it; return the summary of the command.
 
     Parameters
     ----------
     trained : TrainedModel
     output : Path
+        What the summary calls it.
+    place : Path
+        Where it is written.
     """
-    save_model(trained.model, output)
+    save_model(trained.model, place)
+    if trained.ensemble is not None:
+        save_ensemble(trained.ensemble, ensemble_file(place))
     best, quality = trained.record.best, trained.quality
     forgetting = stability(trained.model, [signals.velocity_m_per_s for signals in trained.runs.training])
     lines = [
@@ -215,6 +225,7 @@ def train_and_report(
     output: Path,
     *,
     command: str | None,
+    overwrite: bool = False,
 ) -> dict[str, Any]:
     """Train, write the model, and write the report into a folder of its name beside it.
 
@@ -229,6 +240,8 @@ def train_and_report(
         The model; the report goes to the folder of that name without its suffix.
     command : str, optional
         What the user typed, for the report; without it there is no report.
+    overwrite : bool
+        Whether a model that is there may be replaced.
 
     Raises
     ------
@@ -238,19 +251,36 @@ def train_and_report(
     folder = report_folder(output)
     # what can be refused is refused before hours of training
     require_new_runs(test, files)
+    require_free_place(output, overwrite=overwrite, described="model")
+    if wanted.n_members:
+        require_free_place(ensemble_file(output), overwrite=overwrite, described="ensemble")
     if command is not None:
-        require_free_folder(folder, f"report folder {folder}")
+        require_result_folder(folder, REPORT_FILES)
+    ensemble = _ensemble_of(output)
     for path in test if command is not None else ():
         read_attributes(path)  # before hours of training, not after them
     trained = trained_model(files, wanted, settings)
-    summary = write_model(trained, output)
+    inputs = (*files.training, *files.validation, *test, *files.still, files.rig, *wanted.sudden_starts)
+    provenance = provenance_of(command or "", inputs, settings=(wanted, settings))
+    # model, ensemble and report of one training belong together
+    for facts in (trained.model.facts, *([trained.ensemble.facts] if trained.ensemble is not None else [])):
+        facts[RESULT_ID] = provenance[RESULT_ID]
+    with atomic_file.together() as stagings:
+        summary = write_model(trained, output, stagings.file(output, overwrite=overwrite))
+        # what an earlier training left beside its model would be taken for that of the new one
+        withdraw_result(folder, stagings)
+        if ensemble is not None and not wanted.n_members:
+            stagings.folder(ensemble.parent).removed.append(ensemble)
     if command is None:
         return summary
+    # after the model, which took hours: whatever happens to the report, `sloshlab validate` makes another
     from pipelines.liquid_model.outputs import write_validation
     from pipelines.liquid_model.results import Training
 
     training = Training(trained.record, settings, trained.runs.rate.reason)
-    of_report = write_validation(trained.model, trained.runs, test, folder, command=command, training=training)
+    of_report = write_validation(
+        trained.model, trained.runs, test, folder, provenance=provenance, training=training
+    )
     lines, flags = (
         summary["lines"] + of_report.pop("lines"),
         dict.fromkeys([*summary["flags"], *of_report.pop("flags")]),
@@ -259,7 +289,7 @@ def train_and_report(
 
 
 def _extension_lines(trained: TrainedModel, output: Path) -> list[str]:
-    """Write the ensemble beside the model; say what there is beyond the model without memory."""
+    """What there is beyond the model without memory."""
     lines = []
     if (break_up := trained.model.break_up) is not None:
         lines.append(
@@ -267,14 +297,30 @@ def _extension_lines(trained: TrainedModel, output: Path) -> list[str]:
             f"calming {break_up.calming_s:.3g} s, {100 * break_up.at_rest:.2g} % broken up at rest"
         )
     if trained.ensemble is not None:
-        path = output.with_name(f"{output.stem}_ensemble.nc")
-        save_ensemble(trained.ensemble, path)
         residual = trained.ensemble.residual
         lines.append(
-            f"ensemble: {path}, {len(trained.ensemble.members)} members; residual on the validation runs "
-            f"{residual.constant:.3g} N and {residual.slope:.2g} of the force"
+            f"ensemble: {ensemble_file(output)}, {len(trained.ensemble.members)} members; "
+            f"residual on the validation runs {residual.constant:.3g} N and {residual.slope:.2g} of the force"
         )
     return lines
+
+
+def ensemble_file(model: Path) -> Path:
+    """Return where the ensemble of a model goes."""
+    return model.with_name(f"{model.stem}_ensemble.nc")
+
+
+def _ensemble_of(model: Path) -> Path | None:
+    """The ensemble that was trained with a model that is there."""
+    ensemble = ensemble_file(model).absolute()
+    if not (model.is_file() and ensemble.is_file()):
+        return None
+    try:
+        of_model, of_ensemble = load_model(model).facts, load_ensemble(ensemble).facts
+    except InputError:
+        return None
+    belongs = RESULT_ID in of_model and of_model[RESULT_ID] == of_ensemble.get(RESULT_ID)
+    return ensemble if belongs else None
 
 
 def report_folder(model: Path) -> Path:
@@ -300,6 +346,7 @@ def validate_model(
     """
     from pipelines.liquid_model.outputs import write_validation
 
+    require_result_folder(folder, REPORT_FILES)
     model = load_model(path)
     try:
         ValidityDomain.of_facts(model.facts["domain"])
@@ -315,7 +362,9 @@ def validate_model(
             raise InputError(f"run {run}", got="one that the model was trained on", allowed="other runs")
     require_new_runs(test, files)
     runs = training_runs(files, model.sampling_rate_hz)
-    return write_validation(model, runs, test, folder, command=command, model_file=path)
+    inputs = (path, *files.validation, *test, *files.still, files.rig)
+    provenance = provenance_of(command, inputs, settings="validation")
+    return write_validation(model, runs, test, folder, provenance=provenance)
 
 
 def _quality(model: ReducedOrderModel, runs: Sequence[LiquidSignals]) -> FitQuality:

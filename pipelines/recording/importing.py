@@ -8,13 +8,19 @@ from typing import Any
 
 from acquisition.files.description import describe_source
 from acquisition.files.importing import import_recording
+from pipelines.report.free_place import require_free_place
+from sloshlab import atomic_file
 from sloshlab.recording import write_recording
 
 
-def import_run(sources: Sequence[Path], channel_map: Path, output: Path, rig: Path | None) -> dict[str, Any]:
+def import_run(
+    sources: Sequence[Path], channel_map: Path, output: Path, rig: Path | None, *, overwrite: bool = False
+) -> dict[str, Any]:
     """Import one run and write it; flagged if samples were lost or clipped."""
+    require_free_place(output, overwrite=overwrite)
     result = import_recording(sources, channel_map, rig=rig)
-    write_recording(result.recording, output, encoding=result.encoding)
+    with atomic_file.replaced(output, overwrite=overwrite) as place:
+        write_recording(result.recording, place, encoding=result.encoding)
     report = result.report
     flags = [f"{report.n_lost} samples lost"] if report.n_lost else []
     flags += [f"{report.n_clipped} samples clipped"] if report.n_clipped else []

@@ -24,6 +24,7 @@ from acquisition.devices.player import Player
 from acquisition.devices.signal import LoopedSignal
 from acquisition.devices.simulated_device import simulated_device
 from acquisition.sources.urls import parse_url
+from pipelines.report.free_place import require_free_place
 from pipelines.report.terminal import say
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
@@ -64,6 +65,8 @@ class ReplaySettings:
         Repeat the recording until it is so long.
     truth : Path or None
         JSON file for what each device did.
+    overwrite : bool
+        Whether a truth that is there may be replaced.
     """
 
     source: str
@@ -78,6 +81,7 @@ class ReplaySettings:
     seed: int = 0
     loop_duration_s: float | None = None
     truth: Path | None = None
+    overwrite: bool = False
 
 
 def replay(
@@ -109,6 +113,8 @@ def replay(
     SloshlabError
         If an argument is wrong or a device cannot appear.
     """
+    if settings.truth is not None:
+        require_free_place(settings.truth, overwrite=settings.overwrite, described="truth")
     told = announce or say
     places = _places(settings)
     laboratory = LaboratoryTime(len(places), speed=_speed(settings.speed))
@@ -260,7 +266,8 @@ def _summary(settings: ReplaySettings, places: Sequence[Appearance], players: Se
     truths = {place.device: player.truth for place, player in zip(places, players, strict=True)}
     if settings.truth is not None:
         told = {device: truth.to_json() for device, truth in truths.items()}
-        atomic_file.write_bytes(settings.truth, (json.dumps(told, indent=1, sort_keys=True) + "\n").encode())
+        with atomic_file.replaced(settings.truth, overwrite=settings.overwrite) as temporary:
+            temporary.write_text(json.dumps(told, indent=1, sort_keys=True) + "\n")
     lines = []
     for place, player in zip(places, players, strict=True):
         numbers = ", ".join(f"{key.replace('_', ' ')} {n}" for key, n in player.truth.summary().items())

@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
+import inspect
+import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import xarray as xr
 
-from acquisition.virtual_laboratory.campaign import make_campaign
+from acquisition.virtual_laboratory.campaign import CAMPAIGN_LABORATORY, campaign_laboratory, make_campaign
 from acquisition.virtual_laboratory.numerical_campaign import (
     CampaignSettings,
     FinishedRun,
     make_numerical_campaign,
 )
 from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
+from acquisition.virtual_laboratory.sensors import Laboratory
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
-from pipelines.report.free_place import require_free_file
+from acquisition.virtual_laboratory.structure_rig import StructureLaboratory, structure_laboratory
+from pipelines.report.free_place import require_free_file, require_free_place
 from pipelines.report.progress import amounts, progress
+from sloshlab import atomic_file
 from sloshlab.errors import InputError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
 from sloshlab.registry import loaded
 from sloshlab.rig import Rig
 
+DEVIATIONS: Final = "laboratory_deviations"
+"""Attribute of a recording: in what the laboratory differs from what the rig tells, as JSON."""
+LABORATORIES: Final = ("exact", "drawn")
 LIQUIDS: Final = ("law", "numerical")
 CAMPAIGN: Final = "campaign"
 """In place of an experiment: a whole folder of raw_data."""
@@ -37,7 +45,10 @@ def virtual_experiments() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class VirtualRun:
-    """What the virtual laboratory is asked to do; of the options it takes those that the experiment has."""
+    """What the virtual laboratory is asked to do; of the options it takes those that the experiment has.
+
+    Without `laboratory_seed` the rig is as told.
+    """
 
     experiment: str
     configuration: str
@@ -53,6 +64,7 @@ class VirtualRun:
     initial_displacement_m: float | None
     rms_g: float
     second_frequency_hz: float = 14.7
+    laboratory_seed: int | None = None
 
     def settings(self) -> dict[str, Any]:
         """Arguments of the laboratory's own function."""
@@ -68,8 +80,33 @@ class VirtualRun:
         return {name: value for name, value in chosen.items() if value is not None}
 
 
+def laboratory_seed_of(how: str, seed: int | None, *, is_campaign: bool) -> int | None:
+    """The seed of the laboratory that the options ask for; None for the rig as told.
+
+    Parameters
+    ----------
+    how : str
+        ``exact`` or ``drawn``; empty for what is usual: drawn for a campaign or where there is a seed.
+    seed : int, optional
+    is_campaign : bool
+
+    Raises
+    ------
+    InputError
+        If the options contradict each other.
+    """
+    if how not in ("", *LABORATORIES):
+        raise InputError("--laboratory", got=repr(how), allowed=", ".join(LABORATORIES))
+    if seed is not None and seed < 0:
+        raise InputError("--laboratory-seed", got=str(seed), allowed="≥ 0")
+    if how == "exact" and seed is not None:
+        raise InputError("--laboratory", got="exact, and a seed", allowed="one of them")
+    is_drawn = how == "drawn" or seed is not None or (not how and is_campaign)
+    return (seed or CAMPAIGN_LABORATORY) if is_drawn else None
+
+
 def make_virtual_run(
-    run: VirtualRun, rig: Path | None, output: Path, checkpoint: Path | None = None
+    run: VirtualRun, rig: Path | None, output: Path, checkpoint: Path | None = None, *, overwrite: bool = False
 ) -> dict[str, Any]:
     """Make one run and write it.
 
@@ -82,6 +119,8 @@ def make_virtual_run(
         The recording.
     checkpoint : Path, optional
         Where a computed liquid is saved meanwhile; by default beside the recording. Removed at the end.
+    overwrite : bool
+        Whether a recording that is there may be replaced.
 
     Raises
     ------
@@ -100,15 +139,25 @@ def make_virtual_run(
     if checkpoint is not None and not checkpoint.absolute().parent.is_dir():
         got = f"{checkpoint.parent}, which is not there"
         raise InputError(f"--checkpoint {checkpoint}", got=got, allowed="a file in a folder that exists")
+    require_free_place(output, overwrite=overwrite)
     with amounts(run.experiment) as advance:
         numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
         recording = _recorded(run, rig, numerical)
-    write_virtual_run(recording, output)
+    with atomic_file.replaced(output, overwrite=overwrite) as place:
+        write_virtual_run(recording, place)
     saved.unlink(missing_ok=True)
     rate_hz = recording.attrs["sampling_rate_hz"]
     lines = [f"recording: {output} ({recording.sizes['time']} samples at {rate_hz:g} Hz)"]
+    deviations = json.loads(recording.attrs[DEVIATIONS])
+    lines += [f"laboratory: {line}" for line in deviation_lines(run.laboratory_seed, deviations)]
     stopped = recording.attrs.get(STOPPED)
-    return {"lines": lines, "flags": [str(stopped)] if stopped else [], "output": str(output)}
+    return {
+        "lines": lines,
+        "flags": [str(stopped)] if stopped else [],
+        "output": str(output),
+        "laboratory_seed": run.laboratory_seed,
+        "laboratory_deviations": deviations,
+    }
 
 
 def _recorded(run: VirtualRun, rig: Path, numerical: NumericalLiquid) -> xr.Dataset:
@@ -117,13 +166,65 @@ def _recorded(run: VirtualRun, rig: Path, numerical: NumericalLiquid) -> xr.Data
     # no law is known for the liquid in a tank that moves with a structure
     computed = numerical if run.liquid == "numerical" or experiment.structure else None
     make: Callable[..., xr.Dataset] = loaded(experiment.virtual_run)
-    return make(described, numerical=computed, rig_name=rig.name, **run.settings())
+    drawn: dict[str, Any] = {}
+    if run.laboratory_seed is not None:
+        if "laboratory" not in inspect.signature(make).parameters:
+            allowed = "experiments whose function takes a laboratory"
+            raise InputError("--laboratory-seed", got=run.experiment, allowed=allowed)
+        drawn = {"laboratory": _laboratory(run, described)}
+    recording = make(described, numerical=computed, rig_name=rig.name, **drawn, **run.settings())
+    if run.laboratory_seed is not None:
+        # runs of one rig in two laboratories are not the same run
+        recording.attrs["run_id"] += f"_laboratory{run.laboratory_seed}"
+    # a function of one's own may have its own word
+    recording.attrs = {**_laboratory_attributes(run, described), **recording.attrs}
+    return recording
+
+
+def _laboratory(run: VirtualRun, rig: Rig) -> Laboratory | StructureLaboratory:
+    seed = run.laboratory_seed
+    if EXPERIMENTS[run.experiment].structure:
+        return structure_laboratory(rig, seed)
+    return Laboratory.perfect() if seed is None else Laboratory.drawn(seed)
+
+
+def _laboratory_attributes(run: VirtualRun, rig: Rig) -> dict[str, Any]:
+    """What a recording says of the laboratory."""
+    deviations = {} if run.laboratory_seed is None else _laboratory(run, rig).deviations()
+    told = {"laboratory": "exact", DEVIATIONS: json.dumps(deviations, sort_keys=True)}
+    if run.laboratory_seed is None:
+        return told
+    return told | {"laboratory": "drawn", "laboratory_seed": run.laboratory_seed}
+
+
+def deviation_lines(seed: int | None, deviations: Mapping[str, Any]) -> list[str]:
+    """What a person is told of a laboratory.
+
+    Examples
+    --------
+    >>> deviation_lines(3, {"dry_mass_factor": 1.004, "frequency_factors": [0.99, 1.0]})
+    ['3, drawn', 'dry mass factor: +0.40 %', 'frequency factors: -1.00, +0.00 %']
+    """
+    if seed is None:
+        return ["exact, the rig as told"]
+    lines = [f"{seed}, drawn"]
+    for name, value in deviations.items():
+        # shares are no factors about one
+        around = 0.0 if "share" in name or name == "rocking" else 1.0
+        if isinstance(value, Mapping):
+            of_channels = (f"{channel} {100 * (part - around):+.2f} %" for channel, part in value.items())
+            lines.append(f"{name.replace('_', ' ')}: {', '.join(of_channels)}")
+        else:
+            parts = value if isinstance(value, list) else [value]
+            numbers = ", ".join(f"{100 * (part - around):+.2f}" for part in parts)
+            lines.append(f"{name.replace('_', ' ')}: {numbers} %")
+    return lines
 
 
 def make_campaign_folder(
     folder: Path, liquid: str, settings: CampaignSettings, say: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Make the campaign whose liquid follows its law, of which only the seed can be chosen, or is computed.
+    """Make the campaign whose liquid follows its law, of which only the seeds can be chosen, or is computed.
 
     Parameters
     ----------
@@ -137,8 +238,22 @@ def make_campaign_folder(
     if liquid == "numerical":
         return _make_numerical_campaign_folder(folder, settings, say)
     with progress("campaign", 40) as advance:
-        manifest = make_campaign(folder, seed=settings.seed, progress=lambda done, of, name: advance(name))
-    return {"lines": [f"manifest: {manifest}"], "flags": [], "output": str(folder)}
+        manifest = make_campaign(
+            folder,
+            seed=settings.seed,
+            laboratory_seed=settings.laboratory_seed,
+            overwrite=settings.overwrite,
+            progress=lambda done, of, name: advance(name),
+        )
+    deviations = campaign_laboratory(settings.laboratory_seed).deviations()
+    told = deviation_lines(settings.laboratory_seed, deviations)
+    return {
+        "lines": [f"manifest: {manifest}", *(f"laboratory: {line}" for line in told)],
+        "flags": [],
+        "output": str(folder),
+        "laboratory_seed": settings.laboratory_seed,
+        "laboratory_deviations": deviations,
+    }
 
 
 def _check_liquid(liquid: str) -> None:
@@ -173,6 +288,8 @@ def _make_numerical_campaign_folder(
         "output": str(folder),
         "made": summary.n_made,
         "kept": summary.n_kept,
+        "laboratory_seed": settings.laboratory_seed,
+        "laboratory_deviations": campaign_laboratory(settings.laboratory_seed).deviations(),
     }
 
 

@@ -1,4 +1,4 @@
-"""Is there room for a new recording, or for results, under its name? Asked before any work is done for it."""
+"""Is there room for a new file under its name? Asked before any work is done for it."""
 
 from __future__ import annotations
 
@@ -8,25 +8,30 @@ from pathlib import Path
 from sloshlab.errors import InputError
 
 
-def require_free_place(output: Path, *, overwrite: bool) -> None:
-    """Refuse a place for a recording that is taken or cannot be written.
+def require_free_place(output: Path, *, overwrite: bool, described: str = "recording") -> None:
+    """Refuse a place that is taken or cannot be written.
 
     Parameters
     ----------
     output : Path
-        The recording; folders that are not there yet will be made.
+        The file; folders that are not there yet will be made.
     overwrite : bool
-        Whether a file that is there may be replaced.
+        Whether a file, or a link, that is there may be replaced.
+    described : str
+        What it is, for messages.
 
     Raises
     ------
     InputError
         If a folder or, unless it may go, a file is there, or the folder of it cannot be written.
     """
-    what = f"recording {output}"
-    require_free_file(output, what)
-    if output.exists() and not overwrite:
+    what = f"{described} {output}"
+    if output.is_dir() and not output.is_symlink():
+        raise InputError(what, got="a folder in the way", allowed="a file", remedy="choose another name")
+    # a link is taken, too, even one that leads nowhere: it is replaced itself
+    if os.path.lexists(output) and not overwrite:
         raise InputError(what, got="a file that is there already", remedy="another name, or --overwrite")
+    _require_writable(output.absolute().parent, what)
 
 
 def require_free_file(output: Path, what: str) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import xarray as xr
@@ -16,6 +17,9 @@ from sloshlab.netcdf_lock import NETCDF_LOCK
 
 _HASH_BLOCK = 1 << 20
 _SMALLEST_COMPRESSED_SIZE = 1000
+_IDENTIFIER_DIGITS = 16
+RESULT_ID: Final = "result_id"
+"""Name of the identifier in every file of a result."""
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
@@ -53,9 +57,13 @@ def versions() -> dict[str, str]:
 
 
 def provenance_of(
-    command: str, inputs: Iterable[Path], known_sha256: Mapping[Path, str] | None = None
+    command: str,
+    inputs: Iterable[Path],
+    known_sha256: Mapping[Path, str] | None = None,
+    *,
+    settings: object,
 ) -> dict[str, Any]:
-    """What a result rests on: the command, hashes of the input files and versions.
+    """What a result rests on: the command, hashes of the input files, settings and versions.
 
     Parameters
     ----------
@@ -65,21 +73,49 @@ def provenance_of(
         Every file that the results depend on.
     known_sha256 : mapping of Path to str, optional
         Hashes that need not be computed again.
+    settings : object
+        Everything that was chosen: data classes, mappings, sequences and plain values.
+
+    Returns
+    -------
+    dict
+        Also `result_id`, one identifier of all that is made of the same inputs by the same settings and versions.
     """
     known = known_sha256 or {}
+    hashed = [(path.name, known.get(path) or sha256_of(path)) for path in inputs]
+    chosen, used = _plain(settings), versions()
+    # no clock, and no place: the same run again has the same identifier
+    whole = json.dumps([sorted(hashed), chosen, used], sort_keys=True)
     return {
+        RESULT_ID: hashlib.sha256(whole.encode()).hexdigest()[:_IDENTIFIER_DIGITS],
         "command": command,
-        "inputs": {path.name: known.get(path) or sha256_of(path) for path in inputs},
-        "versions": versions(),
+        "inputs": dict(hashed),
+        "settings": json.dumps(chosen, sort_keys=True),
+        "versions": used,
     }
 
 
+def _plain(value: object) -> Any:
+    """A value as JSON has it; files by their names, as their contents are hashed."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        return {type(value).__name__: fields}
+    if isinstance(value, Mapping):
+        return {str(name): _plain(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    if isinstance(value, Path):
+        return value.name
+    return value if value is None or isinstance(value, bool | int | float | str) else repr(value)
+
+
 def stamp_of(provenance: Mapping[str, Any]) -> dict[str, str]:
-    """Attributes of a result that say what it rests on; the command stands in the report only.
+    """Attributes of a result: what it rests on, and which run made it; the command stands in the report only.
 
     Files of the same inputs then have the same bytes, wherever they are written.
     """
-    return {name: json.dumps(provenance.get(name, {}), sort_keys=True) for name in ("inputs", "versions")}
+    rests_on = {name: json.dumps(provenance.get(name, {}), sort_keys=True) for name in ("inputs", "versions")}
+    return {RESULT_ID: str(provenance.get(RESULT_ID, "")), **rests_on}
 
 
 def report_lines(folder: Path, *, written: bool = True) -> list[str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import struct
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -11,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.report.citations import THESIS_REMARK, Citation
 from pipelines.report.figure import NothingToDrawError, ReportFigure, SkippedFigure
+from pipelines.report.outputs import RESULT_ID
 from pipelines.report.sections import SectionPlan
 from pipelines.report.style import drawing_style, file_stem
 from sloshlab import atomic_file
@@ -20,6 +23,9 @@ if TYPE_CHECKING:
     from pipelines.report.tables import Table
 
 Progress = Callable[[int, int, str], None]
+
+_PNG_HEADER_BYTES: Final = 33
+"""Signature and header chunk."""
 
 GRAVITY_REMARK: Final = f"Accelerations in g are multiples of {GRAVITY_M_PER_S2} m/s²."
 
@@ -61,13 +67,17 @@ class Section:
     tables: tuple[Table, ...]
 
 
-def write_page(page: Page, folder: Path, *, progress: Progress | None = None) -> Path:
-    """Write `figures/*.png` and `report.html`; nothing is written before every figure is drawn."""
+def write_page(page: Page, folder: Path, *, result_id: str = "", progress: Progress | None = None) -> Path:
+    """Write `figures/*.png` and `report.html`; nothing is written before every figure is drawn.
+
+    Both say which result they belong to, if `result_id` does.
+    """
     sections = drawn_sections(page.plans, progress)
     # a file name need not be Unicode; it must not stop the report
-    html = page_html(page, sections).encode("utf-8", errors="replace")
+    html = page_html(page, sections, result_id=result_id).encode("utf-8", errors="replace")
     for figure in _figures(sections):
-        atomic_file.write_bytes(folder / "figures" / f"{figure.name}.png", figure.png)
+        png = with_png_text(figure.png, RESULT_ID, result_id) if result_id else figure.png
+        atomic_file.write_bytes(folder / "figures" / f"{figure.name}.png", png)
     report = folder / "report.html"
     atomic_file.write_bytes(report, html)
     return report
@@ -91,7 +101,14 @@ def drawn_sections(plans: Sequence[SectionPlan], progress: Progress | None = Non
     return tuple(sections)
 
 
-def page_html(page: Page, sections: Sequence[Section]) -> str:
+def with_png_text(png: bytes, keyword: str, text: str) -> bytes:
+    """A PNG with one more textual chunk behind its header (PNG specification, 11.3.3.2 tEXt)."""
+    content = b"tEXt" + keyword.encode("latin-1") + b"\0" + text.encode("latin-1")
+    chunk = struct.pack(">I", len(content) - 4) + content + struct.pack(">I", zlib.crc32(content))
+    return png[:_PNG_HEADER_BYTES] + chunk + png[_PNG_HEADER_BYTES:]
+
+
+def page_html(page: Page, sections: Sequence[Section], *, result_id: str = "") -> str:
     """The page as text: styles and images inside, nothing fetched from elsewhere."""
     from jinja2 import Environment, StrictUndefined
 
@@ -101,6 +118,7 @@ def page_html(page: Page, sections: Sequence[Section]) -> str:
     template = environment.from_string(files.joinpath("page.html.j2").read_text(encoding="utf-8"))
     return template.render(
         title=page.title,
+        result_id=result_id,
         subtitle=page.subtitle,
         lead=page.lead,
         css=_safe_css(files.joinpath("page.css").read_text(encoding="utf-8")),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -11,12 +12,14 @@ import numpy as np
 import xarray as xr
 
 from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
+from pipelines.report.result_folder import require_result_folder, result_folder
 from pipelines.structure.analysis import analyse_beam
 from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, ModeDecay
-from sloshlab import atomic_file
 from sloshlab.errors import InputError
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping
 from sloshlab.quantities import described
+
+TWINS_FOLDER: Final = "twins"
 
 _POINTS: Final = ("peak", "envelope", "sine_fit")
 """Dimensions of the three methods, in the order of `METHODS`."""
@@ -209,7 +212,14 @@ def _first(values: Any) -> float:
     return float("nan") if values is None else float(np.ravel(values)[0])
 
 
-def write_beam(experiment: BeamExperiment, folder: Path, *, command: str, report: bool = True) -> dict[str, Any]:
+def files_of(*, report: bool) -> tuple[str, ...]:
+    """Names of the files that are written for certain."""
+    return ("modal.nc", "spectra.nc", *(["report.html"] if report else []))
+
+
+def write_beam(
+    experiment: BeamExperiment, folder: Path, *, command: str, report: bool = True, twins: Path | None = None
+) -> dict[str, Any]:
     """Write `modal.nc`, `spectra.nc` and the report; return the summary of the command.
 
     Parameters
@@ -222,6 +232,8 @@ def write_beam(experiment: BeamExperiment, folder: Path, *, command: str, report
         What the user typed, for the report.
     report : bool
         False leaves the report and its figures out.
+    twins : Path, optional
+        Folder of what the twins are and simulated, which is kept with the results.
 
     Returns
     -------
@@ -229,9 +241,11 @@ def write_beam(experiment: BeamExperiment, folder: Path, *, command: str, report
         ``lines`` for people, ``flags``, and numbers for machines.
     """
     known = {run.path: run.sha256 for run in experiment.runs}
-    provenance = provenance_of(command, experiment.inputs, known)
+    provenance = provenance_of(command, experiment.inputs, known, settings=experiment.settings)
     stamp = {"title": experiment.title, **stamp_of(provenance)}
-    with atomic_file.filled_folder(folder) as complete:
+    with result_folder(folder, provenance) as complete:
+        if twins is not None:
+            shutil.copytree(twins, complete / TWINS_FOLDER)
         for name, dataset in (
             ("modal.nc", modal_dataset(experiment)),
             ("spectra.nc", spectra_dataset(experiment)),
@@ -286,5 +300,6 @@ def analyse_and_write(
     """The pipeline of a tank on a structure with its usual settings."""
     if len(rigs) != 1:
         raise InputError("--rig", got=f"{len(rigs)} rigs", allowed="the one rig that the runs belong to")
+    require_result_folder(output, files_of(report=True))
     experiment = analyse_beam(recordings, rigs[0], BeamSettings())
     return write_beam(experiment, output, command=command)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from pipelines.report.citations import SCIPY, SOURCE, XARRAY, Citation
+from pipelines.report.outputs import RESULT_ID
 from pipelines.report.page import Page, write_page
 from pipelines.report.progress import progress
 from pipelines.report.sections import FigurePlan, SectionPlan
@@ -63,8 +64,9 @@ def write_beam_report(experiment: BeamExperiment, folder: Path) -> Path:
         plans=plans,
         papers=_PAPERS,
     )
+    result_id = str(experiment.provenance.get(RESULT_ID, ""))
     with progress("figures", sum(len(plan.figures) for plan in plans)) as advance:
-        return write_page(page, folder, progress=lambda _done, _total, name: advance(name))
+        return write_page(page, folder, result_id=result_id, progress=lambda _done, _total, name: advance(name))
 
 
 def planned_sections(experiment: BeamExperiment) -> tuple[SectionPlan, ...]:

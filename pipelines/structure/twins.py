@@ -38,26 +38,6 @@ TWINS: Final[Mapping[str, Mapping[str, str]]] = {
 _TWIN_TABLES: Final = re.compile(r"^\[twin(\.[^\]]*)?\].*?(?=^\[(?!twin)|\Z)", re.MULTILINE | re.DOTALL)
 
 
-def simulated_twins(folder: Path, rig: Path, output: Path) -> list[Path]:
-    """Simulate every sloshing recording of a folder with the twins of its experiment.
-
-    Parameters
-    ----------
-    folder : Path
-        With the recordings.
-    rig : Path
-        Their rig.
-    output : Path
-        Folder for the rig files of the twins and the simulated recordings.
-
-    Returns
-    -------
-    list of Path
-        The simulated recordings.
-    """
-    return twins_of_runs(sorted(folder.glob("*.nc")), rig, output, {})
-
-
 def twins_of_runs(runs: Sequence[Path], rig: Path, output: Path, more: Mapping[str, str]) -> list[Path]:
     """Simulate sloshing recordings with the twins of their experiment, and with more.
 

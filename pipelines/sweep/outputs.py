@@ -8,9 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
+from pipelines.report.result_folder import require_result_folder, result_folder
 from pipelines.sweep.results import SweepExperiment
 from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
-from sloshlab import atomic_file
+
+
+def files_of(*, report: bool) -> tuple[str, ...]:
+    """Names of the files that are written for certain."""
+    return ("windows.nc", "maps.nc", *(["report.html"] if report else []))
 
 
 def write_experiment(
@@ -23,7 +28,7 @@ def write_experiment(
     experiment : SweepExperiment
         What was analysed.
     folder : Path
-        Made if it is not there. All files appear together, complete, or none does.
+        Made if it is not there. All files appear together, complete, or none does; those of an earlier result go.
     command : str
         What the user typed, for the report.
     report : bool
@@ -36,10 +41,10 @@ def write_experiment(
     """
     known = {run.path: run.sha256 for run in experiment.runs}
     provenance = {
-        **provenance_of(command, experiment.inputs, known),
+        **provenance_of(command, experiment.inputs, known, settings=experiment.settings),
         "n_unsteady_windows": sum(int(run.windows.attrs["n_unsteady_windows"]) for run in experiment.runs),
     }
-    with atomic_file.filled_folder(folder) as complete:
+    with result_folder(folder, provenance) as complete:
         _write_results(experiment, complete, provenance)
         if report:
             from pipelines.sweep.report import write_report
@@ -72,8 +77,8 @@ def _write_results(experiment: SweepExperiment, folder: Path, provenance: dict[s
         stamped = dataset.assign_attrs(
             title=experiment.title,
             **stamp_of(provenance),
-            half_width_cycles=experiment.settings.half_width_cycles,
-            spacing_cycles=experiment.settings.spacing_cycles,
+            half_width_cycles=experiment.settings.windows.half_width_cycles,
+            spacing_cycles=experiment.settings.windows.spacing_cycles,
             n_unsteady_windows=provenance["n_unsteady_windows"],
         )
         write_dataset(stamped, folder / name)
@@ -83,5 +88,6 @@ def analyse_and_write(
     recordings: Sequence[Path], rigs: Sequence[Path], output: Path, command: str
 ) -> dict[str, Any]:
     """The pipeline of sweeps on the shaker with its usual settings."""
+    require_result_folder(output, files_of(report=True))
     experiment = analyse_shaker(recordings, rigs, ShakerSettings())
     return write_experiment(experiment, output, command=command)

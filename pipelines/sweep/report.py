@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipelines.report.citations import citation
+from pipelines.report.outputs import RESULT_ID
 from pipelines.report.page import Page, Progress, Section, page_html, write_page
 from pipelines.sweep.results import SweepExperiment
 from pipelines.sweep.sections import planned_sections
@@ -30,7 +31,8 @@ def write_report(experiment: SweepExperiment, folder: Path, *, progress: Progres
     Path
         The report. The same experiment gives the same bytes.
     """
-    return write_page(_page(experiment), folder, progress=progress)
+    result_id = str(experiment.provenance.get(RESULT_ID, ""))
+    return write_page(_page(experiment), folder, result_id=result_id, progress=progress)
 
 
 def _page(experiment: SweepExperiment) -> Page:

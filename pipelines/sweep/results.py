@@ -23,6 +23,15 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class SweepOptions:
+    """Choices of the analysis: windows, boundaries, what to do with a sweep that stops early."""
+
+    windows: WindowSettings = field(default_factory=WindowSettings)
+    boundaries: str = "measured"
+    allow_incomplete: bool = False
+
+
+@dataclass(frozen=True)
 class Excerpt:
     """Signals of one window, for the time histories and hysteresis loops.
 
@@ -118,8 +127,8 @@ class SweepExperiment:
         All windows of all runs.
     maps : xarray.Dataset
         The contents of `maps.nc`.
-    settings : WindowSettings
-        P and M.
+    settings : SweepOptions
+        P and M among them.
     inputs : tuple of Path
         Every file that the results depend on: recordings, dry runs among them, and rigs.
     work_maps : EnergyMaps, optional
@@ -138,7 +147,7 @@ class SweepExperiment:
     rigs: tuple[RigResult, ...]
     windows: xr.Dataset
     maps: xr.Dataset
-    settings: WindowSettings
+    settings: SweepOptions
     inputs: tuple[Path, ...] = ()
     work_maps: EnergyMaps | None = None
     provenance: dict[str, Any] = field(default_factory=dict)

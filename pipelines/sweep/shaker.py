@@ -11,9 +11,8 @@ import numpy as np
 import xarray as xr
 
 from pipelines.report.progress import progress
-from pipelines.sweep.results import RigResult, RunResult, SweepExperiment
+from pipelines.sweep.results import RigResult, RunResult, SweepExperiment, SweepOptions
 from pipelines.sweep.stages import (
-    SweepOptions,
     SweepSignals,
     analyse_sweep,
     examined_recording,
@@ -265,7 +264,7 @@ def _experiment(
         rigs=tuple(rig_results),
         windows=everything,
         maps=_joined(rig_results),
-        settings=settings.windows,
+        settings=settings,
         still_runs=tuple(examination for name in rigs for examination in still[name].examinations),
         flags=tuple(flag for run in runs for flag in run.flags),
     )

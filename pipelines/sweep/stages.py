@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.report.outputs import sha256_of
-from pipelines.sweep.results import Excerpt, RunResult
+from pipelines.sweep.results import Excerpt, RunResult, SweepOptions
 from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import displacement_of_part
 from sloshlab.conditioning.quality import RunQuality, quality_of
@@ -25,7 +25,7 @@ from sloshlab.rig import Rig
 from sloshlab.sweep.cycles import evaluate_cycles
 from sloshlab.sweep.law import SweepLaw, identify_law, stated_law
 from sloshlab.sweep.motion_phase import MotionPhase, measured_phase
-from sloshlab.sweep.windows import WindowSettings, evaluate_windows
+from sloshlab.sweep.windows import evaluate_windows
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -67,15 +67,6 @@ class SweepSignals:
     not_measured: BoolArray | None = None
     inertia_kg: float = 0.0
     noise_power: float = 0.0
-
-
-@dataclass(frozen=True)
-class SweepOptions:
-    """Choices of the analysis: windows, boundaries, what to do with a sweep that stops early."""
-
-    windows: WindowSettings = field(default_factory=WindowSettings)
-    boundaries: str = "measured"
-    allow_incomplete: bool = False
 
 
 @contextlib.contextmanager

@@ -201,7 +201,7 @@ def viscous_table(rig: RigResult) -> Table:
 
 def settings_table(experiment: SweepExperiment) -> Table:
     """Rig, liquid and settings."""
-    settings = experiment.settings
+    settings = experiment.settings.windows
     rows: list[tuple[str, ...]] = [
         ("P, half width of a window", str(settings.half_width_cycles), "cycles"),
         ("M, distance of windows", str(settings.spacing_cycles), "cycles"),

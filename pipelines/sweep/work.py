@@ -12,9 +12,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.report.progress import progress
-from pipelines.sweep.results import RunResult, SweepExperiment
+from pipelines.sweep.results import RunResult, SweepExperiment, SweepOptions
 from pipelines.sweep.stages import (
-    SweepOptions,
     SweepSignals,
     analyse_sweep,
     examined_recording,
@@ -100,7 +99,7 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
         windows=windows,
         maps=maps.dataset,
         work_maps=maps,
-        settings=settings.windows,
+        settings=settings,
         flags=tuple(flag for result in results for flag in result.flags),
     )
 

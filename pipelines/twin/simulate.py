@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, cast
@@ -11,9 +12,11 @@ from typing import Any, Final, cast
 import numpy as np
 import xarray as xr
 
-from pipelines.report.outputs import sha256_of, versions
+from pipelines.report.free_place import require_free_place
+from pipelines.report.outputs import RESULT_ID, provenance_of, sha256_of, versions
 from pipelines.report.progress import amounts
 from pipelines.twin.simulated_tank_model import departure_attributes, with_tank_model
+from sloshlab import atomic_file
 from sloshlab.configurations import CONFIGURATIONS
 from sloshlab.errors import InputError
 from sloshlab.modal.rig_beam import scale_remarks
@@ -56,6 +59,8 @@ class SimulationSettings:
         Integration steps per sample.
     seed : int
         Of the noise of the twin's sensors.
+    overwrite : bool
+        Whether files that are there may be replaced.
     """
 
     rig: Path
@@ -67,6 +72,7 @@ class SimulationSettings:
     save_twin: Path | None = None
     steps: int | None = None
     seed: int = 0
+    overwrite: bool = False
 
 
 def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
@@ -85,6 +91,7 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
     _check(settings)
     rig = Rig.from_toml(settings.rig)
     twin = _chosen_twin(settings, rig)
+    _require_free_places(settings, twin)
     recording = read_recording(settings.run)
     drive = drive_of(recording, twin, block=cast("Block", settings.block))
     n_steps = settings.steps or steps_per_sample(twin, drive.excitation.sampling_rate_hz)
@@ -97,10 +104,13 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
         ).require_done()
     left = departures(simulation)
     attributes = _attributes(settings, recording, drive, n_steps) | departure_attributes(left)
+    attributes[RESULT_ID] = _result_id(settings, twin)
     simulated = simulated_run(simulation, recording, rig, attributes=attributes, seed=settings.seed)
-    write_recording(simulated.recording, settings.output, encoding=_encoding(simulated.recording))
-    if settings.save_twin is not None:
-        save_twin(twin, settings.save_twin)
+    with atomic_file.together() as stagings:
+        place = stagings.file(settings.output, overwrite=settings.overwrite)
+        write_recording(simulated.recording, place, encoding=_encoding(simulated.recording))
+        if settings.save_twin is not None:
+            save_twin(twin, stagings.file(settings.save_twin, overwrite=settings.overwrite))
     summary = _summary(
         settings, rig, recording, drive, simulation=simulation, simulated=simulated, n_steps=n_steps
     )
@@ -142,6 +152,18 @@ def _check(settings: SimulationSettings) -> None:
                 raise InputError(f"{option} {path}", got="a file that is read", remedy="choose another name")
 
 
+def _require_free_places(settings: SimulationSettings, twin: Twin) -> None:
+    """Of the recording, and of the twin that is saved, whose arrays lie beside its text."""
+    require_free_place(settings.output, overwrite=settings.overwrite)
+    if settings.save_twin is None:
+        return
+    has_tables = any(term.table.size for term in twin.terms)
+    for path in (settings.save_twin, settings.save_twin.with_suffix(".nc"))[: 1 + has_tables]:
+        if path.absolute() == settings.output.absolute():
+            raise InputError(f"--save-twin {path}", got="the name of --output", remedy="choose another name")
+        require_free_place(path, overwrite=settings.overwrite, described="twin")
+
+
 def _chosen_twin(settings: SimulationSettings, rig: Rig) -> Twin:
     twin = (
         Twin.from_rig(rig, folder=settings.rig.absolute().parent)
@@ -170,6 +192,15 @@ def _attributes(settings: SimulationSettings, recording: xr.Dataset, drive: Driv
         "simulated_with_steps_per_sample": n_steps,
         "versions": json.dumps(versions(), sort_keys=True),
     }
+
+
+def _result_id(settings: SimulationSettings, twin: Twin) -> str:
+    """One identifier of all that is simulated so; the twin counts as it is saved, with the files it is made of."""
+    with tempfile.TemporaryDirectory(prefix="sloshlab-twin-") as folder:
+        save_twin(twin, Path(folder) / "twin.toml")
+        inputs = [settings.run, settings.rig, *sorted(Path(folder).iterdir())]
+        chosen = replace(settings, output=Path(), save_twin=None, overwrite=False)
+        return str(provenance_of("", inputs, settings=chosen)[RESULT_ID])
 
 
 def _encoding(simulated: xr.Dataset) -> dict[str, dict[str, Any]]:

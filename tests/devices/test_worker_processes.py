@@ -74,7 +74,7 @@ def test_an_impossible_number_of_workers_is_refused(n_workers):
         work_through(squared, [], n_workers, progressed=print, finished=print)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_all_save_and_stop_when_the_parent_is_told_to_or_dies(tmp_path, number):
     notes = [tmp_path / "one", tmp_path / "two"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}

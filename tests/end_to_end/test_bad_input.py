@@ -14,6 +14,7 @@ from short_runs import RATE_HZ, cut_out, edited, refusal, shaker_arguments, shor
 
 from acquisition.virtual_laboratory.campaign import rig_text
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
+from pipelines.command_line import run
 
 Edit = Callable[[netCDF4.Dataset], Any]
 
@@ -160,8 +161,7 @@ def test_import_and_check_name_one_jitter_of_one_file(
 def test_results_of_an_earlier_run_stay_as_they_were(laboratory: Path, tmp_path: Path, capsys: Any) -> None:
     bad = edited(laboratory / "sweep_3g.nc", tmp_path / "bad.nc", jitter)
     out = tmp_path / "out"
-    out.mkdir()
-    (out / "windows.nc").write_bytes(b"results of yesterday")
+    assert run(shaker_arguments([laboratory / "sweep_3g.nc"], [laboratory / "rig.toml"], out)) == 0
     runs = [laboratory / "sweep_1.5g.nc", bad]
     refusal(capsys, shaker_arguments(runs, [laboratory / "rig.toml"], out), out, "time is not uniform")
 

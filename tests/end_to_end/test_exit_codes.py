@@ -149,7 +149,7 @@ def test_lost_samples_exit_3_and_results_are_written(laboratory: Path, tmp_path:
     arguments = shaker_arguments([tmp_path / "broken.nc"], [laboratory / "rig.toml"], tmp_path / "out")
     assert run([*arguments, "--json"]) == DONE_BUT_FLAGGED
     captured = capsys.readouterr()
-    assert set(contents(tmp_path / "out") or {}) == {"windows.nc", "maps.nc"}
+    assert set(contents(tmp_path / "out") or {}) == {"windows.nc", "maps.nc", "result.json"}
     assert captured.err.startswith("flagged: ")
     assert "lost or clipped samples cost" in captured.err
     summary = json.loads(captured.out.splitlines()[-1])
@@ -182,7 +182,7 @@ def test_same_input_same_bytes_in_two_processes(laboratory: Path, tmp_path: Path
         ended = sloshlab(arguments, env={"PYTHONHASHSEED": seed, "PATH": "/usr/bin:/bin", "HOME": str(tmp_path)})
         assert (ended.returncode, ended.stderr) == (0, "")
     assert contents(tmp_path / "first") == contents(tmp_path / "second")
-    assert set(contents(tmp_path / "first") or {}) == {"windows.nc", "maps.nc"}
+    assert set(contents(tmp_path / "first") or {}) == {"windows.nc", "maps.nc", "result.json"}
 
 
 def test_order_of_the_runs_changes_no_number(laboratory: Path, tmp_path: Path) -> None:

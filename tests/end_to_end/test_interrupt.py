@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent to a 
 PLACES = {
     "after the first run": (pipelines.sweep.stages, "evaluate_windows"),
     "before windows.nc": (pipelines.sweep.outputs, "write_dataset"),
-    "while a file is closed": (atomic_file.os, "chmod"),
+    "while a file is put": (atomic_file.os, "replace"),
     "before the report": (pipelines.sweep.report, "write_report"),
 }
 
@@ -79,23 +79,25 @@ def test_an_interrupt_told_as_another_error_is_one(
 
 def test_interrupt_leaves_earlier_results_alone(laboratory: Path, tmp_path: Path, monkeypatch: Any) -> None:
     out = tmp_path / "out"
-    out.mkdir()
-    (out / "windows.nc").write_bytes(b"results of yesterday")
+    assert run([*arguments_for(laboratory, out), "--no-report", "--m", "12"]) == 0
+    before = contents(out)
 
     def interrupted(*arguments: Any, **options: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pipelines.sweep.report, "write_report", interrupted)
     assert run(arguments_for(laboratory, out)) == INTERRUPTED
-    assert contents(out) == {"windows.nc": b"results of yesterday"}
+    assert contents(out) == before
     assert leftovers(tmp_path) == []
 
 
-def test_signals_at_many_moments(laboratory: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("signal_name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_signals_at_many_moments(signal_name: str, laboratory: Path, tmp_path: Path) -> None:
     """Wherever the signal falls, the folder is complete or absent; no moment is assumed to be in any stage."""
     command = [str(Path(sys.executable).with_name("sloshlab"))]
     complete = {"windows.nc", "maps.nc", "report.html"}
-    codes = []
+    sent, codes = signal.Signals[signal_name], []
+    said = "interrupted" if sent == signal.SIGINT else f"ended by {signal_name}"
     for number, delay_s in enumerate((0.9, 1.4, 2.2, 3.0, 4.5)):
         folder = tmp_path / str(number)
         folder.mkdir()
@@ -106,28 +108,29 @@ def test_signals_at_many_moments(laboratory: Path, tmp_path: Path) -> None:
             text=True,
         )
         time.sleep(delay_s)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(sent)
         _, stderr = process.communicate(timeout=60)
         codes.append(process.returncode)
         written = contents(folder / "out")
         assert leftovers(folder) == []
         if process.returncode in (0, DONE_BUT_FLAGGED):
             assert complete <= set(written or {})
-        elif process.returncode == INTERRUPTED:
+        elif process.returncode == 128 + sent:
             assert written is None
-            assert stderr.strip() == "sloshlab: interrupted; nothing half-written"
+            assert stderr.strip() == f"sloshlab: {said}; nothing half-written"
         else:  # the interpreter was still loading the command
-            assert process.returncode == -signal.SIGINT
+            assert process.returncode == -sent
             assert written is None
-    assert INTERRUPTED in codes
+    assert 128 + sent in codes
 
 
-def test_a_signal_after_the_command_is_done_changes_nothing() -> None:
+@pytest.mark.parametrize("signal_name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_after_the_command_is_done_changes_nothing(signal_name: str) -> None:
     """The interpreter takes a while to end; what was done has its own exit code and says nothing more."""
     script = (
         "import atexit, os, signal, sys\n"
         "from pipelines.command_line import main\n"
-        "atexit.register(os.kill, os.getpid(), signal.SIGINT)\n"
+        f"atexit.register(os.kill, os.getpid(), signal.{signal_name})\n"
         "sys.argv = ['sloshlab', '--help']\n"
         "main()\n"
     )

@@ -74,3 +74,49 @@ def test_whoever_handles_the_interrupt_already_goes_on_doing_so() -> None:
             assert signal.getsignal(signal.SIGINT) is handler
         finally:
             signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("number", interrupt.TERMINATIONS)
+def test_a_termination_is_an_exception_with_the_exit_code_of_shells(number: int) -> None:
+    steps = []
+
+    def work() -> None:
+        with interrupt.never_lost():
+            try:
+                with interrupt.held():
+                    signal.raise_signal(number)
+                    steps.append("held")
+                steps.append("never")
+            finally:
+                signal.raise_signal(number)  # a second one does not break off the clean-up
+                steps.append("cleaned up")
+
+    with pytest.raises(interrupt.Terminated) as ended:
+        work()
+    assert steps == ["held", "cleaned up"]
+    assert ended.value.exit_code == 128 + number
+    assert signal.getsignal(number) is signal.SIG_DFL
+
+
+def test_a_hangup_that_is_ignored_stays_ignored() -> None:
+    """So does nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with interrupt.never_lost():
+            signal.raise_signal(signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_termination_in_the_clean_up_of_an_object_arrives_after_it() -> None:
+    class Dying:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGTERM)
+
+    def work() -> None:
+        Dying()
+        for _ in range(5000):
+            time.sleep(0.001)
+
+    with pytest.raises(interrupt.Terminated), interrupt.never_lost():
+        work()

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipelines.sweep.results import Excerpt, RigResult, RunResult, SweepExperiment
+from pipelines.sweep.results import Excerpt, RigResult, RunResult, SweepExperiment, SweepOptions
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.clipping import Clipping
 from sloshlab.conditioning.gaps import Gap
@@ -25,7 +25,7 @@ from sloshlab.sweep.windows import WindowSettings
 
 PEAK_W_BAR, PEAK_OMEGA_BAR, PEAK_ACCELERATION_G = 1.6, 3.8, 3.0
 STROKE_M = 0.0125
-SETTINGS = WindowSettings()
+SETTINGS = SweepOptions(WindowSettings())
 LAW = SweepLaw(LawKind.OCTAVE, 5.0, 1 / 120, stated=True)
 MASS_KG, DAMPING_KG_PER_S = 40.0, 60.0
 

@@ -99,7 +99,7 @@ def test_interrupted_it_says_how_to_go_on(tmp_path: Path, through: ComputedForce
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_within_a_block_loses_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, through: ComputedForce, number: signal.Signals
 ) -> None:
