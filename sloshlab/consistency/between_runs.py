@@ -29,6 +29,8 @@ QUIET_EFFECTIVE_MASS: Final = (0.80, 1.0)
 All of it in theory; 0.83 … 0.87 at 0.25 g in the measured maps of the source (β = −0.13 … −0.17, App. E), and
 their scatter.
 """
+_LARGEST_W_BAR_AT_THE_END: Final = 1.0
+"""Below 1 g, where a liquid takes little: at most 0.6 in the recordings of the numerical tank."""
 _CHANGE_OF_EFFECTIVE_MASS: Final = 0.1
 """Share of the liquid by which its effective mass may change up to 1 g: half of the range above."""
 _LARGEST_COMMON_DELAY_SAMPLES: Final = 0.02
@@ -73,21 +75,36 @@ def start_findings(
         *_delay(response, dry, inertia, sample_s),
         *_bend(response, inertia, is_still=False),
     ]
-    liquid = rig.liquid_mass_kg
+    return findings, _open_points(response, rig, dry, inertia)
+
+
+def _open_points(response: ForceResponse, rig: Rig, dry: DryMass | None, inertia: Inertia) -> list[OpenPoint]:
+    """What the quiet start leaves open, with its largest effect."""
     low, high = QUIET_EFFECTIVE_MASS
-    open_range = (high - low) * liquid / inertia.total_kg + (0.0 if dry is not None else 2 * _belief())
-    delay_range = 2 * _SIGMA * response.delay_std_s
-    told = [
+    scatter = 2 * _SIGMA * response.mass_std_kg / inertia.total_kg
+    gain = (high - low) * rig.liquid_mass_kg / inertia.total_kg + scatter
+    points = [
         OpenPoint(
             "a gain common to all force cells, or to all accelerometers",
             "how much of its mass a quiet liquid carries is not known better",
-            *inertia.of_gain(open_range),
+            *inertia.of_gain(gain),
         ),
         OpenPoint(
-            "a delay between force and acceleration", "the quiet start is short", *inertia.of_delay(delay_range)
+            "a delay between force and acceleration",
+            "the quiet start is short",
+            *inertia.of_delay(_SIGMA * response.delay_std_s),
         ),
     ]
-    return findings, told
+    if dry is None:
+        of_mass = gain + 2 * _belief()
+        # W̄ and β are per mass of the liquid, of which the whole mass says as much as it is known itself
+        of_filling = of_mass * inertia.total_kg / rig.liquid_mass_kg
+        points.append(
+            OpenPoint(
+                "gains and masses against still runs", "no empty or frozen run is given", of_filling, of_filling
+            )
+        )
+    return points
 
 
 def _belief() -> float:
@@ -143,6 +160,21 @@ def _bend(response: ForceResponse, inertia: Inertia, *, is_still: bool) -> list[
     effect = inertia.of_gain(0.75 * response.bend)
     what = f"force is not in proportion to acceleration: {100 * response.bend:+.2g} % at the largest acceleration"
     return [contradiction("linearity", what, effect=effect)]
+
+
+def stop_findings(response: ForceResponse | None, dry: DryMass | None, inertia: Inertia) -> list[Finding]:
+    """Delay while the motion dies away at the end, against what the liquid may still take there."""
+    if response is None or not math.isfinite(inertia.liquid_kg):
+        return []
+    delay = response.delay_s - (0.0 if dry is None else dry.delay_s)
+    per_delay = math.pi * 2 * math.pi * inertia.highest_hz * inertia.total_kg / inertia.liquid_kg
+    if per_delay * (abs(delay) - _SIGMA * response.delay_std_s) <= _LARGEST_W_BAR_AT_THE_END:
+        return []
+    what = (
+        f"while the motion dies away at the end the force comes {1e3 * abs(delay):.3g} ms "
+        f"{'late' if delay > 0 else 'early'}, ± {1e3 * response.delay_std_s:.2g} ms"
+    )
+    return [contradiction("delay at the end", what, effect=inertia.of_delay(delay))]
 
 
 def still_findings(response: ForceResponse | None, inertia: Inertia) -> list[Finding]:

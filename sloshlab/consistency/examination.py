@@ -24,11 +24,12 @@ from sloshlab.consistency.between_runs import (
     sensor_findings,
     start_findings,
     still_findings,
+    stop_findings,
 )
 from sloshlab.consistency.bounds import LARGEST_W_BAR
 from sloshlab.consistency.effect import Inertia
 from sloshlab.consistency.finding import ConsistencyExamination, Finding, OpenPoint, contradiction
-from sloshlab.consistency.force_response import ForceResponse, start_response, still_response
+from sloshlab.consistency.force_response import ForceResponse, start_response, still_response, stop_response
 from sloshlab.consistency.like_sensors import N_EACH_SIDE, SIGMA, compared_series, examined_pair
 from sloshlab.consistency.samples import examined_samples
 from sloshlab.consistency.sensor_response import PairNoise, pair_noise
@@ -159,8 +160,7 @@ def _of_force(
         *_common_gain_step(series, inertia),
     ]
     more, not_checked = start_findings(start, known.rig, known.dry, inertia, sampling_step_s(recording))
-    if known.dry is None:
-        not_checked.append(OpenPoint("gains and masses against still runs", "no empty or frozen run is given"))
+    more += stop_findings(stop_response(recording), known.dry, inertia)
     return found + more, not_checked
 
 

@@ -68,6 +68,24 @@ def start_response(recording: xr.Dataset) -> ForceResponse | None:
     return None if stretch is None else _response(recording, acceleration, stretch)
 
 
+def stop_response(recording: xr.Dataset) -> ForceResponse | None:
+    """Response while the motion dies away at the end of a run; None if it does not.
+
+    The liquid still moves then, by itself: what it gives and takes is bounded, not absent.
+    """
+    acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
+    there = np.isfinite(acceleration)
+    moved = np.where(there, acceleration - np.nanmean(acceleration), 0.0) if there.any() else acceleration
+    strong = np.flatnonzero(np.abs(moved) > _LIFT_OFF * GRAVITY_M_PER_S2)
+    if strong.size == 0:
+        return None
+    stretch = slice(int(strong[-1]) + 1, moved.size)
+    left = np.abs(moved[stretch])
+    if left.size < _FEWEST_SAMPLES or left[-max(left.size // 10, 4) :].max() > _AT_REST * left.max():
+        return None
+    return _response(recording, acceleration, stretch)
+
+
 def still_response(recording: xr.Dataset) -> ForceResponse | None:
     """Response of a run without liquid motion, all of it."""
     acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
@@ -161,11 +179,12 @@ def _wave_columns(acceleration: FloatArray, stretch: slice) -> FloatArray:
     Faraday waves answer a vertical motion at these frequencies first. They are no part of F = M ü, and over few
     cycles they are not orthogonal to it.
     """
-    # twice as long as the stretch: the transform is wrong at its ends
-    longer = acceleration[stretch.start : stretch.start + 2 * (stretch.stop - stretch.start)]
-    analytic = hilbert(np.where(np.isfinite(longer), longer - np.nanmean(longer), 0.0))[
-        : stretch.stop - stretch.start
-    ]
+    n = stretch.stop - stretch.start
+    # longer than the stretch by as much on both sides, where there is more: the transform is wrong at its ends
+    first = max(stretch.start - n, 0)
+    longer = acceleration[first : stretch.stop + n]
+    moved = np.where(np.isfinite(longer), longer - np.nanmean(longer), 0.0)
+    analytic = hilbert(moved)[stretch.start - first : stretch.stop - first]
     phase, size = np.unwrap(np.angle(analytic)), np.abs(analytic)
     orders = [wave(order * phase) for order in (0.5, 1.5) for wave in (np.cos, np.sin)]
     return np.asarray(size[:, None] * np.stack(orders, axis=1))

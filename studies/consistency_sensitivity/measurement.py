@@ -75,6 +75,8 @@ class Outcome:
     size : float
     w_bar_change, beta_change : float
         Median over windows of the change, over the median of the undamaged run; infinite for a refused run.
+    w_bar_open, beta_open : float
+        Change of W̄ and β that the open points of the run say may go unseen, in the same measure.
     answer : str
         ``"silent"``, ``"flagged"`` or ``"refused"``.
     said : str
@@ -86,6 +88,8 @@ class Outcome:
     size: float
     w_bar_change: float
     beta_change: float
+    w_bar_open: float
+    beta_open: float
     answer: str
     said: str
 
@@ -109,12 +113,18 @@ def _outcome(
     try:
         experiment = analysed(damaged, folder)
     except InputError as error:
-        return Outcome(*known, np.inf, np.inf, "refused", str(error))
+        return Outcome(*known, np.inf, np.inf, 0.0, 0.0, "refused", str(error))
     w_bar, beta = (
         _change(clean.windows[name], experiment.windows[name], clean, experiment) for name in ("w_bar", "beta")
     )
+    scale = {name: float(np.median(np.abs(clean.windows[name].values))) for name in ("w_bar", "beta")}
     said = [flag for flag in experiment.all_flags if flag not in clean.all_flags]
-    return Outcome(*known, w_bar, beta, "flagged" if said else "silent", said[0] if said else "")
+    points = [point for examination in experiment.examinations for point in examination.not_checked]
+    w_bar_open = max((point.w_bar_error for point in points), default=0.0) / scale["w_bar"]
+    beta_open = max((point.beta_error for point in points), default=0.0) / scale["beta"]
+    return Outcome(
+        *known, w_bar, beta, w_bar_open, beta_open, "flagged" if said else "silent", said[0] if said else ""
+    )
 
 
 def _change(before: xr.DataArray, after: xr.DataArray, clean: SweepExperiment, damaged: SweepExperiment) -> float:

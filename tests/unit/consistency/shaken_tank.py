@@ -10,12 +10,15 @@ DRY_KG, LIQUID_KG = 0.61, 0.12433
 STEP_FORCE, STEP_ACCELERATION = 1 / 128, 1 / 32
 
 
-def motion(duration_s=60.0, level_g=3.0, start_hz=5.0, octave_per_s=1 / 30, ramp_s=4.0, rate_hz=RATE_HZ):
-    """Time and acceleration of an octave sweep that begins at rest."""
+def motion(duration_s=60.0, level_g=3.0, start_hz=5.0, octave_per_s=1 / 30, ramp_s=4.0, stop_s=0.0):
+    """Time and acceleration of an octave sweep that begins at rest, and ends so within the time to stop."""
+    rate_hz = RATE_HZ
     time = np.arange(round(duration_s * rate_hz)) / rate_hz
     frequency = start_hz * 2.0 ** (octave_per_s * time)
     phase = 2 * np.pi * frequency / (octave_per_s * np.log(2))
     level = 9.80665 * level_g * np.clip(time / ramp_s, 0, 1)
+    if stop_s:
+        level = level * np.clip((duration_s - time) / stop_s, 0, 1)
     return time, level * np.sin(phase)
 
 
@@ -37,10 +40,11 @@ def tank_run(
     level_g=3.0,
     duration_s=60.0,
     experiment="shaker_sweep",
+    stop_s=0.0,
     **attributes,
 ):
     """A run of a rigid mass on two cells, with noise in units of the converter's step."""
-    time, acceleration = motion(duration_s=duration_s, level_g=level_g)
+    time, acceleration = motion(duration_s=duration_s, level_g=level_g, stop_s=stop_s)
     generator = np.random.default_rng(seed)
     force = shifted(mass_kg * acceleration, delay_samples)
 

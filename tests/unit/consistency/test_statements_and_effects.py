@@ -225,3 +225,17 @@ def test_results_that_no_liquid_gives(w_bar, beta, said):
     found = window_findings(windows(w_bar, beta))
     assert len(found) == (1 if said else 0)
     assert not said or said in found[0].what
+
+
+@pytest.mark.parametrize(("n_samples", "wrong"), [(0.0, False), (0.1, False), (2.0, True), (-2.0, True)])
+def test_a_delay_where_the_motion_dies_away(n_samples, wrong):
+    # the first ten seconds are missing: there is no quiet start
+    run = tank_run(stop_s=3.0, delay_samples=n_samples).isel(time=slice(5_120, None))
+    run = run.assign_attrs({k: v for k, v in run.attrs.items() if not k.startswith("sweep")})
+    result = examined(run, Reference(RIG))
+    assert any("does not begin at rest" in point.why for point in result.not_checked)
+    found = [finding for finding in result.findings if finding.check == "delay at the end"]
+    assert bool(found) == wrong
+    if wrong:
+        assert f"{1e3 * abs(n_samples) / RATE_HZ:.2g}"[:3] in found[0].what
+        assert ("late" in found[0].what) == (n_samples > 0)
