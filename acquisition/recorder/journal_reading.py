@@ -265,7 +265,7 @@ def _indexed(file: OpenFile) -> Journal:
         failures=tuple(found.failures),
         closing=found.closing,
         n_bytes=file.n_bytes,
-        n_bytes_left_out=sum(damage.n_bytes for damage in scan.damage),
+        n_bytes_left_out=scan.n_bytes_left_out,
         damage=tuple(sorted(scan.damage)),
         _file=file,
     )

@@ -34,8 +34,11 @@ from sloshlab.errors import JournalError
 SYNCHRONISATION_INTERVAL_NS: Final = 500_000_000
 """The journal is forced to the disk at most this often."""
 
-DESCRIPTION_INTERVAL_NS: Final = 30_000_000_000
-"""Metadata and sources are repeated this often, so that no single damage makes the samples unreadable."""
+LONGEST_DESCRIPTION_INTERVAL_NS: Final = 30_000_000_000
+"""Metadata and sources, without which no samples can be read, are repeated at least this often."""
+
+# a short recording has several copies, too, some of them far from the others
+_FIRST_DESCRIPTION_INTERVAL_NS: Final = 1_000_000_000
 
 # the clock fit needs the earliest arrivals of a run, not every one; each entry costs 32 bytes
 SHORTEST_ENTRY_NS: Final = 40_000_000
@@ -114,10 +117,13 @@ class JournalWriter:
         # remains of an older journal on the same disk have another one and are not taken for blocks of this
         self._identity = secrets.randbits(32)
         self._synchronised_ns = self._described_ns = monotonic_ns()
+        self._description_interval_ns = _FIRST_DESCRIPTION_INTERVAL_NS
         self._is_broken = False
         self._file: JournalFile | None = self._opened(open_file, overwrite)
         try:
             self._write(packed_file_header(self._identity))
+            # twice: one damaged block of them must not make the samples unreadable
+            self._describe()
             self._describe()
             # Before anything is recorded: the descriptions, without which no samples can be read, and the name in
             # its folder, without which the file is gone after a power cut.
@@ -172,11 +178,13 @@ class JournalWriter:
         self._append(BlockType.FAILURE, source, packed_text({"message": message[:1000]}))
 
     def close(self, closing: Mapping[str, Any] | None = None) -> None:
-        """Close cleanly with a last block that says so; may be called twice."""
+        """Describe once more and close cleanly with a last block that says so; may be called twice."""
         if self._file is None:
             return
         try:
             if not self._is_broken:
+                # far from the copies at the start, as damage often concerns neighbours
+                self._describe()
                 # only a recorder that ended properly writes it: without it a reader says that something may be
                 # missing
                 self._append(BlockType.CLOSING, 0, packed_text(closing or {}))
@@ -212,7 +220,8 @@ class JournalWriter:
             return
         now = self._monotonic_ns()
         # only after samples: a run without any does not grow
-        if now - self._described_ns >= DESCRIPTION_INTERVAL_NS:
+        if now - self._described_ns >= self._description_interval_ns:
+            self._description_interval_ns = min(2 * self._description_interval_ns, LONGEST_DESCRIPTION_INTERVAL_NS)
             self._describe()
         if now - self._synchronised_ns >= SYNCHRONISATION_INTERVAL_NS:
             self._force_to_disk()
