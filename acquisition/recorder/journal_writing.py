@@ -6,7 +6,7 @@ import contextlib
 import os
 import secrets
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol, Self
 
@@ -25,6 +25,7 @@ from acquisition.recorder.journal_format import (
     packed_file_header,
     packed_text,
 )
+from acquisition.recorder.journal_lock import is_live, live_journal, lock_new_journal, remove_dead_journal
 from acquisition.samples.delivery import Block, CountArray, Delivery, End, Trouble
 from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
@@ -70,9 +71,18 @@ class JournalFile(Protocol):
 
 
 def _new_file(path: Path, overwrite: bool) -> JournalFile:
-    # Unbuffered: each block is with the system at once, and kill -9 costs what is still being joined only. With
-    # "x" an older journal, which may be all that is left of a run, is never overwritten unasked.
-    return path.open("wb" if overwrite else "xb", buffering=0)
+    while True:
+        if overwrite:
+            remove_dead_journal(path)
+        try:
+            # Unbuffered: each block is with the system at once, and kill -9 costs what is still being joined only.
+            # With "x" an older journal, which may be all that is left of a run, is never overwritten unasked, and
+            # nothing is written through a link.
+            return path.open("xb", buffering=0)
+        except FileExistsError:
+            # made by another recorder since: live, or it has ended by now
+            if not overwrite:
+                raise
 
 
 class JournalWriter:
@@ -87,15 +97,15 @@ class JournalWriter:
     sources : sequence of SourceInfo
         Described once; blocks name them by their position.
     overwrite : bool
-        Whether an existing journal may be replaced.
+        Whether a journal whose recorder has ended may be replaced.
     monotonic_ns, synchronise, open_file : callable
         Clock, `os.fsync` and opening; given by tests.
 
     Raises
     ------
     JournalError
-        By every method, if the disk is full or refuses; the journal then ends with its last complete
-        block, and nothing more can be appended.
+        If a journal is in the way; by every method, if the disk is full or refuses; the journal then ends with
+        its last complete block, and nothing more can be appended.
     """
 
     def __init__(
@@ -131,15 +141,23 @@ class JournalWriter:
             _synchronise_folder(path.parent)
         except BaseException:
             self._release()
+            # nothing was recorded into it
+            path.unlink(missing_ok=True)
             raise
 
     def _opened(self, open_file: Callable[[Path, bool], JournalFile], overwrite: bool) -> JournalFile:
         try:
-            return open_file(self.path, overwrite)
+            file = open_file(self.path, overwrite)
         except FileExistsError:
             raise existing_journal(self.path) from None
         except OSError as error:
             raise self._refused(error) from error
+        try:
+            lock_new_journal(self.path, file.fileno())
+        except BaseException:
+            file.close()
+            raise
+        return file
 
     def update_metadata(self, more: Mapping[str, Any]) -> None:
         """Add to the metadata; later values take the place of earlier ones."""
@@ -191,6 +209,18 @@ class JournalWriter:
                 self._force_to_disk()
         finally:
             self._release()
+
+    @contextlib.contextmanager
+    def kept_locked(self) -> Iterator[None]:
+        """Within it no other recorder can take the journal, closed or not; begins before it is closed."""
+        if self._file is None:
+            raise JournalError(f"journal {self.path}", got="a lock after its end", remedy="start a new journal")
+        # the lock belongs to the opening, which this holds
+        descriptor = os.dup(self._file.fileno())
+        try:
+            yield
+        finally:
+            os.close(descriptor)
 
     def abandon(self) -> None:
         """Close without the last block, as after a crash; may be called twice."""
@@ -289,6 +319,8 @@ def _synchronise_folder(folder: Path) -> None:
 
 def existing_journal(path: Path) -> JournalError:
     """The error for a journal that is in the way."""
+    if is_live(path):
+        return live_journal(path)
     return JournalError(
         f"journal {path}",
         got="a journal that is already there, from a recording that was cut short",
