@@ -26,6 +26,8 @@ from acquisition.recorder.journal_format import (
 )
 from sloshlab.errors import JournalError
 
+# damage is mostly short, and its end is looked for again and again where there is much of it
+_FIRST_SCAN_BYTES: Final = 1 << 8
 _SCAN_BYTES: Final = 1 << 20
 # with one or two wrong bits in its fields no header implies a displacement of less than 2 MB
 _LARGEST_LONE_DISPLACEMENT_BYTES: Final = 1 << 16
@@ -67,6 +69,8 @@ class OpenFile:
         """Up to `n_bytes` from `offset`; fewer only at the end of the file."""
         if not self.close.alive:
             raise JournalError(f"journal {self.path}", got="a read after closing", remedy="read it again")
+        # memory for no more than there is, whatever a header claims; what a recorder appends meanwhile is not read
+        n_bytes = max(0, min(n_bytes, self.n_bytes - offset))
         try:
             # at a place of its own, without a position that several readers would share
             data = os.pread(self._descriptor, n_bytes, offset)
@@ -98,7 +102,7 @@ class Scan:
         """Offset of the payload, header, payload."""
         position = self.begin
         while position < self.file.n_bytes:
-            header = self._header_at(position)
+            header = self._sound_header(position, self.file.read(position, BLOCK_HEADER.size))
             payload = None if header is None else self._payload(position, header)
             if header is not None and payload is not None:
                 start = position + BLOCK_HEADER.size
@@ -110,9 +114,9 @@ class Scan:
             self._leave_out(position, found - position, reason)
             position = found
 
-    def refuse(self, start: int, header: BlockHeader, reason: str) -> None:
-        """Leave out a block that is whole but says what cannot be."""
-        self._leave_out(start - BLOCK_HEADER.size, BLOCK_HEADER.size + header.n_bytes, reason)
+    def refuse(self, start: int, n_bytes: int, reason: str) -> None:
+        """Leave out a block that is whole, payload from `start` on, but says what cannot be."""
+        self._leave_out(start - BLOCK_HEADER.size, BLOCK_HEADER.size + n_bytes, reason)
 
     def _leave_out(self, offset: int, n_bytes: int, reason: str) -> None:
         self.n_bytes_left_out += n_bytes
@@ -133,10 +137,9 @@ class Scan:
         # a damaged file header costs nothing: blocks carry the identity themselves
         return None, 0
 
-    def _header_at(self, position: int) -> BlockHeader | None:
-        """The sound header at `position`, in its place or displaced as the block before it."""
-        data = self.file.read(position, BLOCK_HEADER.size)
-        for displacement in (self._displacement, 0):
+    def _sound_header(self, position: int, data: bytes) -> BlockHeader | None:
+        """The sound header that the bytes at `position` are, in its place or displaced as the block before it."""
+        for displacement in {self._displacement, 0}:
             header = unpacked_block_header(data, position - displacement) if position >= displacement else None
             # without a file header the first sound block says whose journal this is
             if header is not None and self.identity in (None, header.identity):
@@ -174,16 +177,16 @@ class Scan:
     def _next_header(self, position: int) -> int:
         """Place of the next sound header, or the end of the file."""
         # a header may lie across the border of two pieces
-        overlap = BLOCK_HEADER.size - 1
+        overlap, n_bytes = BLOCK_HEADER.size - 1, _FIRST_SCAN_BYTES
         while position < self.file.n_bytes:
-            data = self.file.read(position, _SCAN_BYTES + overlap)
+            data = self.file.read(position, n_bytes + overlap)
             at = data.find(BLOCK_MAGIC)
-            while 0 <= at < _SCAN_BYTES:
+            while 0 <= at < n_bytes:
                 header = data[at : at + BLOCK_HEADER.size]
-                if self._header_at(position + at) is not None or self._is_displaced(position + at, header):
+                if self._sound_header(position + at, header) or self._is_displaced(position + at, header):
                     return position + at
                 at = data.find(BLOCK_MAGIC, at + 1)
-            position += _SCAN_BYTES
+            position, n_bytes = position + n_bytes, min(2 * n_bytes, _SCAN_BYTES)
         return self.file.n_bytes
 
     def _is_displaced(self, position: int, data: bytes) -> bool:
