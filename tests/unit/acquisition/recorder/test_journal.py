@@ -362,21 +362,34 @@ def test_blocks_behind_inserted_bytes_are_found_at_their_new_places(tmp_path: Pa
         assert read_blocks(path) == {key: counts for _, key, counts in written if key not in lost}, at
 
 
-def test_a_block_with_the_wrong_source_in_its_header_is_not_taken_for_a_displaced_one(tmp_path: Path) -> None:
-    """Its payload is sound, and some place suits its checksum: only not one near by."""
+@pytest.mark.parametrize(("further", "counts"), [(60_000, True), (70_000, False), (-10, False)])
+def test_a_lone_displaced_block_counts_only_near_by(tmp_path: Path, further: int, counts: bool) -> None:
+    """Nothing vouches for it; one from before the last block's end would be a copy, or inside another."""
     path = tmp_path / "run.journal"
     made = HandMade()
-    for number in (0, 1):
-        made.add(SOURCE, number, DAQ_BY_HAND)
+    made.add(SOURCE, 0, DAQ_BY_HAND)
+    made.add(SAMPLES, 0, SOUND, offset=len(made.data) + further)
+    path.write_bytes(made.data)
+    assert read_blocks(path) == ({(0, 0, 7, 5): [[2, 2]]} if counts else {})
+
+
+@pytest.mark.parametrize("place", [6, 16, 17, 18])
+@pytest.mark.parametrize("bits", [1, 2, 3, 4, 5, 8, 16, 32, 64, 128])
+def test_a_block_with_a_wrong_header_is_not_taken_for_a_displaced_one(
+    tmp_path: Path, place: int, bits: int
+) -> None:
+    """Source or sequence number are wrong, the payload is sound: the place that suits its checksum is far away."""
+    path = tmp_path / "run.journal"
+    made = HandMade()
+    for number in range(9):
+        made.add(SOURCE, 1 << number if number < 8 else 0, DAQ_BY_HAND)
     begin = len(made.data)
     made.add(SAMPLES, 0, SOUND)
-    for sources in ((1,), (0, 1)):
-        if len(sources) > 1:
-            made.add(SAMPLES, 0, samples_payload(0, 7, 9, [(1, 0, 0, 0)], np.array([[8, 8]], np.int16)))
-        damaged = bytearray(made.data)
-        damaged[begin + 6] = 1
-        path.write_bytes(damaged)
-        assert (1, 0, 7, 5) not in read_blocks(path)
+    made.add(SAMPLES, 0, samples_payload(0, 7, 9, [(1, 0, 0, 0)], np.array([[8, 8]], np.int16)))
+    damaged = bytearray(made.data)
+    damaged[begin + place] ^= bits
+    path.write_bytes(damaged)
+    assert read_blocks(path) == {(0, 0, 7, 9): [[8, 8]]}
 
 
 @pytest.mark.parametrize(
