@@ -111,7 +111,8 @@ class Scan:
                 yield start, header, payload
                 continue
             found, reason = self._after_damage(position, header)
-            self._leave_out(position, found - position, reason)
+            if found > position:
+                self._leave_out(position, found - position, reason)
             position = found
 
     def refuse(self, start: int, n_bytes: int, reason: str) -> None:
@@ -158,7 +159,8 @@ class Scan:
     def _after_damage(self, position: int, header: BlockHeader | None) -> tuple[int, str]:
         """Where the next sound block is, and why nothing before it is one."""
         if header is None:
-            return self._next_header(position + 1), "no block"
+            # from here on: where whole blocks are missing, the next one stands right here, displaced
+            return self._next_header(position), "no block"
         end = position + BLOCK_HEADER.size + header.n_bytes
         # where the next block follows at its place, no byte is missing or too many; else its place is unknown
         if self._is_followed(end, header, self._displacement) or not self._may_look_further:

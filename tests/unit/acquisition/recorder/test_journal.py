@@ -362,6 +362,19 @@ def test_blocks_behind_inserted_bytes_are_found_at_their_new_places(tmp_path: Pa
         assert read_blocks(path) == {key: counts for _, key, counts in written if key not in lost}, at
 
 
+def test_whole_blocks_that_are_missing_cost_no_others(tmp_path: Path) -> None:
+    """Neither those behind them nor a byte that is left out: what is there is sound."""
+    path = tmp_path / "run.journal"
+    data, written = small_journal(path)
+    parts = taken_apart(data)
+    for first, last in ((5, 5), (6, 8), (0, 1), (9, 9)):
+        path.write_bytes(data[: parts[first].begin] + data[parts[last].end :])
+        gone = {part.end for part in parts[first : last + 1]}
+        assert read_blocks(path) == {key: counts for end, key, counts in written if end not in gone}, first
+        with read_journal(path) as journal:
+            assert journal.n_bytes_left_out == 0
+
+
 @pytest.mark.parametrize(("further", "counts"), [(60_000, True), (70_000, False), (-10, False)])
 def test_a_lone_displaced_block_counts_only_near_by(tmp_path: Path, further: int, counts: bool) -> None:
     """Nothing vouches for it; one from before the last block's end would be a copy, or inside another."""
