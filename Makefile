@@ -15,6 +15,7 @@ TRIAL_KEY ?= $(HOME)/.config/sloshlab/trial_$(TRIAL_SEED).key
 RECORDINGS := raw_data/numerical_tank/shaker
 ROM := $(RESULTS)/rom/ROM.nc
 BALLS :=
+PATIENCE ?= 30
 
 .DEFAULT_GOAL := help
 .PHONY: help setup lock shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial test test-newest test-all lint format type bench soak docs clean
@@ -66,8 +67,8 @@ closed-loop: setup  ## the beam with the model of `make rom` (or ROM=file) and b
 rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
 	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study
 
-replay: setup  ## every recording of raw_data/shaker through simulated serial and CAN devices
-	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay
+replay: setup  ## every recording of raw_data/shaker through simulated serial and CAN devices (PATIENCE=s for an answer)
+	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay --patience $(PATIENCE)
 
 campaign: setup  ## make the recordings of raw_data/shaker again
 	$(BIN)/sloshlab virtual campaign -o raw_data/shaker

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from pathlib import Path
@@ -25,14 +26,24 @@ def shaker_arguments(folder: Path, output: Path, rigs_folder: Path | None = None
 
 
 def main() -> int:
-    """Run ``EXPERIMENT FOLDER OUTPUT``."""
-    experiment, folder, output = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
+    """Run ``EXPERIMENT FOLDER OUTPUT``; ``replay`` takes ``--patience S``, too."""
+    parser = argparse.ArgumentParser(prog="python -m pipelines.experiments", description=__doc__)
+    parser.add_argument("experiment")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("output", type=Path)
+    parser.add_argument("--patience", type=float, metavar="S", help="of replay: how long a device may be silent")
+    given = parser.parse_args()
+    experiment, folder, output = given.experiment, given.folder, given.output
+    if given.patience is not None and experiment != "replay":
+        parser.error("--patience is an option of replay only")
     analysed = experiment_names(lambda known: bool(known.pipeline))
     if experiment not in (*_FOLDERS, *analysed):
         allowed = ", ".join((*_FOLDERS, *analysed))
         say(f"unknown experiment {experiment!r}; allowed: {allowed}", error=True)
         return 2
     try:
+        if given.patience is not None:
+            return _replay(folder, output, given.patience)
         return _FOLDERS.get(experiment, _any)(folder, output)
     except SloshlabError as error:
         say(f"sloshlab: {error}", error=True)
@@ -159,11 +170,12 @@ def _study(folder: Path, output: Path) -> int:
     return 0 if code == DONE_BUT_FLAGGED else code
 
 
-def _replay(folder: Path, output: Path) -> int:
+def _replay(folder: Path, output: Path, patience_s: float | None = None) -> int:
     """Every recording through simulated devices; any difference is a failure."""
-    from pipelines.recording.replayed_campaign import replayed_campaign
+    from pipelines.recording.replayed_campaign import LEAST_PATIENCE_S, replayed_campaign
 
-    summary = replayed_campaign(folder, output)
+    least_s = LEAST_PATIENCE_S if patience_s is None else patience_s
+    summary = replayed_campaign(folder, output, least_patience_s=least_s)
     for line in [*summary["lines"], *(f"differs: {flag}" for flag in summary["flags"])]:
         say(line)
     return 1 if summary["flags"] else 0

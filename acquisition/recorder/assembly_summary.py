@@ -22,7 +22,8 @@ _MOST_MESSAGES_NAMED: Final = 8
 _GRAVE = frozenset(
     kind.name
     for kind in TroubleKind
-    if kind not in (TroubleKind.RECONNECTED, TroubleKind.GARBAGE, TroubleKind.CORRUPT_FRAME)
+    if kind
+    not in (TroubleKind.RECONNECTED, TroubleKind.GARBAGE, TroubleKind.CORRUPT_FRAME, TroubleKind.LINE_ERROR)
 )
 """Troubles that flag a recording by themselves; the others do so if samples are missing for it."""
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from acquisition.recorder.journal_lock import is_live
 from acquisition.recorder.journal_reading import Entries, Entry, Journal, read_journal
 from acquisition.recorder.journal_scanning import Damage
 from acquisition.recorder.journal_writing import JournalWriter, existing_journal
@@ -16,5 +17,6 @@ __all__ = [
     "Journal",
     "JournalWriter",
     "existing_journal",
+    "is_live",
     "read_journal",
 ]

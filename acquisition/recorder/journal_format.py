@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import functools
 import json
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -56,6 +57,8 @@ LARGEST_TEXT_BYTES: Final = 1 << 20
 MOST_SOURCES: Final = 256
 _LARGEST = 2**63 - 1
 _CRC_OF_HEADER = struct.Struct("<Q")
+# far less than the 32 bits of an offset that a checksum of 32 bits can tell
+_REACH_BYTES: Final = 1 << 30
 
 
 class BlockType(enum.IntEnum):
@@ -102,19 +105,71 @@ def packed_block(
 
 
 def unpacked_block_header(header: bytes, offset: int) -> BlockHeader | None:
-    """The header that stands at `offset`; None if that is none, or a damaged one."""
+    """The header that was written for `offset`; None if that is none, or a damaged one."""
+    found = _possible_header(header)
+    # the header has a checksum of its own: the length must be right before the payload can be read at all
+    return found if found is not None and _checksum_of(header) == _header_crc(header[:-4], offset) else None
+
+
+def displaced_block_header(header: bytes, near: int) -> Iterator[tuple[BlockHeader, int]]:
+    """What looks like a header, and each offset within 1 GiB of `near` for which its checksum is right.
+
+    Nearly any bytes have such an offset: only what stands around the block can vouch for it.
+    """
+    found = _possible_header(header)
+    if found is None:
+        return
+    for half in sorted({max(0, near - _REACH_BYTES) >> 32, near + _REACH_BYTES >> 32}):
+        offset = half << 32 | _lower_half(header, half << 32)
+        if abs(offset - near) <= _REACH_BYTES:
+            yield found, offset
+
+
+def _possible_header(header: bytes) -> BlockHeader | None:
     if len(header) < BLOCK_HEADER.size or header[:4] != BLOCK_MAGIC:
         return None
-    _, kind, zero, source, n_bytes, identity, sequence, payload_crc, crc = BLOCK_HEADER.unpack(header)
-    # the header has a checksum of its own: the length must be right before the payload can be read at all
-    if crc != _header_crc(header[:-4], offset) or zero or n_bytes > LARGEST_PAYLOAD_BYTES:
+    _, kind, zero, source, n_bytes, identity, sequence, payload_crc, _ = BLOCK_HEADER.unpack(header)
+    if zero or n_bytes > LARGEST_PAYLOAD_BYTES:
         return None
     return BlockHeader(kind, source, n_bytes, identity, sequence, payload_crc)
+
+
+def _checksum_of(header: bytes) -> int:
+    return int.from_bytes(header[-4:], "little")
 
 
 def _header_crc(start: bytes, offset: int) -> int:
     # the offset is part of the checksum, so that a block inside another block's samples is none
     return zlib.crc32(start, zlib.crc32(_CRC_OF_HEADER.pack(offset)))
+
+
+def _lower_half(header: bytes, offset: int) -> int:
+    """Lower 32 bits of the offset, whose upper half is that of `offset`, for which the checksum is right."""
+    change = _checksum_of(header) ^ _header_crc(header[:-4], offset)
+    lower = 0
+    for pivot, bits in _bits_by_change():
+        if change ^ pivot < change:
+            change, lower = change ^ pivot, lower ^ bits
+    return lower
+
+
+@functools.cache
+def _bits_by_change() -> tuple[tuple[int, int], ...]:
+    """Changes of a header's checksum, each with its own leading bit, and the changes of the offset behind them.
+
+    A CRC is linear: bits of the offset change it whatever the header holds. Gaussian elimination over its 32
+    lowest bits.
+    """
+    nothing = bytes(BLOCK_HEADER.size - 4)
+    pivots: list[tuple[int, int]] = []
+    for number in range(32):
+        bits = 1 << number
+        change = _header_crc(nothing, bits) ^ _header_crc(nothing, 0)
+        for pivot, others in pivots:
+            if change ^ pivot < change:
+                change, bits = change ^ pivot, bits ^ others
+        pivots.append((change, bits))
+    return tuple(pivots)
 
 
 def packed_text(content: Mapping[str, Any]) -> bytes:

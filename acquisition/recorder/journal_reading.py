@@ -11,7 +11,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from acquisition.recorder.journal_format import (
     unpacked_text,
 )
 from acquisition.recorder.journal_scanning import Damage, OpenFile, Scan
+from acquisition.recorder.samples_index import IndexedBlocks, SamplesIndex, SamplesPlace
 from acquisition.samples.channel import MOST_CHANNELS
 from acquisition.samples.delivery import CountArray, End, Trouble
 from acquisition.sources.interface import SourceInfo
@@ -37,8 +38,13 @@ from sloshlab.errors import JournalError
 
 # at about 60 bytes each; one every 40 ms is nine days
 MOST_ENTRIES: Final = 20_000_000
-MOST_TROUBLES_KEPT: Final = 10_000
-"""Further troubles are counted, not kept one by one."""
+MOST_KEPT: Final = 10_000
+"""Further troubles are counted, further ends and failures left out: a device has a few."""
+
+MOST_METADATA_BYTES: Final = 4 << 20
+"""Of all descriptions of the run that say something new; one is at most 1 MiB."""
+
+T = TypeVar("T")
 
 
 class Entry(NamedTuple):
@@ -124,7 +130,7 @@ class Journal:
     entries : dict
         `Entries` by (source, group); every group of every source is there, maybe with none.
     troubles : tuple of (int, Trouble)
-        Source and trouble, in the order of writing; the first `MOST_TROUBLES_KEPT`.
+        Source and trouble, in the order of writing; the first `MOST_KEPT`.
     trouble_counts : dict
         Total of `Trouble.count` by (source, kind).
     ends : tuple of (int, End)
@@ -218,24 +224,14 @@ def read_journal(path: str | os.PathLike[str]) -> Journal:
 class _Collected:
     metadata: dict[str, Any] = field(default_factory=dict)
     sources: dict[int, SourceInfo] = field(default_factory=dict)
-    samples: dict[tuple[int, int], list[_SamplesBlock]] = field(default_factory=lambda: defaultdict(list))
+    samples: SamplesIndex = field(default_factory=SamplesIndex)
     troubles: list[tuple[int, Trouble]] = field(default_factory=list)
     trouble_counts: dict[tuple[int, str], int] = field(default_factory=lambda: defaultdict(int))
     ends: list[tuple[int, End]] = field(default_factory=list)
     failures: list[tuple[int, str]] = field(default_factory=list)
     closing: dict[str, Any] | None = None
     n_blocks: int = 0
-    n_entries: int = 0
-
-
-class _SamplesBlock(NamedTuple):
-    start: int
-    header: BlockHeader
-    n_channels: int
-    bytes_per_count: int
-    stream: int
-    counter: int
-    rows: NDArray[np.void]
+    n_metadata_bytes: int = 0
 
 
 def _indexed(file: OpenFile) -> Journal:
@@ -245,7 +241,7 @@ def _indexed(file: OpenFile) -> Journal:
         try:
             _collect(found, start, header, payload)
         except MalformedBlockError as error:
-            scan.refuse(start, header, str(error))
+            scan.refuse(start, header.n_bytes, str(error))
     if scan.begin == 0 and not found.n_blocks:
         raise JournalError(
             f"journal {file.path}",
@@ -265,7 +261,7 @@ def _indexed(file: OpenFile) -> Journal:
         failures=tuple(found.failures),
         closing=found.closing,
         n_bytes=file.n_bytes,
-        n_bytes_left_out=sum(damage.n_bytes for damage in scan.damage),
+        n_bytes_left_out=scan.n_bytes_left_out,
         damage=tuple(sorted(scan.damage)),
         _file=file,
     )
@@ -279,17 +275,16 @@ def _collect(found: _Collected, start: int, header: BlockHeader, payload: bytes)
         return
     content = unpacked_text(payload)
     if header.block_type == BlockType.METADATA:
-        # unlike a source, metadata may change while recording; the latest word counts
-        found.metadata.update(content)
+        _collect_metadata(found, content, len(payload))
     elif header.block_type == BlockType.SOURCE:
         # repeated on purpose; the first is what the samples were taken with
         found.sources.setdefault(header.source, source_from(content))
     elif header.block_type == BlockType.TROUBLE:
         _collect_trouble(found, header.source, trouble_from(content))
     elif header.block_type == BlockType.END:
-        found.ends.append((header.source, end_from(content)))
+        _keep(found.ends, (header.source, end_from(content)))
     elif header.block_type == BlockType.FAILURE:
-        found.failures.append((header.source, str(content.get("message", ""))[:1000]))
+        _keep(found.failures, (header.source, str(content.get("message", ""))[:1000]))
     elif header.block_type == BlockType.CLOSING:
         found.closing = content
     else:
@@ -298,8 +293,24 @@ def _collect(found: _Collected, start: int, header: BlockHeader, payload: bytes)
 
 def _collect_trouble(found: _Collected, source: int, trouble: Trouble) -> None:
     found.trouble_counts[source, trouble.kind.name] += trouble.count
-    if len(found.troubles) < MOST_TROUBLES_KEPT:
-        found.troubles.append((source, trouble))
+    _keep(found.troubles, (source, trouble))
+
+
+def _keep(kept: list[T], one: T) -> None:
+    if len(kept) < MOST_KEPT:
+        kept.append(one)
+
+
+def _collect_metadata(found: _Collected, content: dict[str, Any], n_bytes: int) -> None:
+    known = found.metadata
+    # the copies of a description add nothing
+    if all(key in known and known[key] == value for key, value in content.items()):
+        return
+    found.n_metadata_bytes += n_bytes
+    if found.n_metadata_bytes > MOST_METADATA_BYTES:
+        raise MalformedBlockError("more metadata than any recorder writes")
+    # unlike a source, metadata may change while recording; the latest word counts
+    known.update(content)
 
 
 def _collect_samples(found: _Collected, start: int, header: BlockHeader, payload: bytes) -> None:
@@ -310,69 +321,53 @@ def _collect_samples(found: _Collected, start: int, header: BlockHeader, payload
     rows_end = SAMPLES_HEAD.size + n_entries * ENTRY.itemsize
     if n_bytes not in (2, 4) or zero or not 1 <= n_channels <= MOST_CHANNELS or len(payload) < rows_end:
         raise MalformedBlockError("samples with an impossible head")
-    # a copy, so that the index does not keep every payload in memory
-    rows = np.frombuffer(payload, ENTRY, n_entries, SAMPLES_HEAD.size).copy()
+    rows = np.frombuffer(payload, ENTRY, n_entries, SAMPLES_HEAD.size)
     if not n_entries or not rows["n_samples"].all():
         raise MalformedBlockError("samples without samples")
     # in 64 bits: the sum of 32-bit numbers can come round to one that fits
     n_samples = int(rows["n_samples"].sum(dtype=np.int64))
     if len(payload) != rows_end + n_samples * n_channels * n_bytes or counter > 2**63 - 1 - n_samples:
         raise MalformedBlockError("samples whose number is wrong")
-    found.n_entries += n_entries
-    if found.n_entries > MOST_ENTRIES:
+    place = SamplesPlace(header.source, group, n_channels)
+    found.samples.add(place, (start, len(payload), n_bytes, stream, counter), rows)
+    if found.samples.n_entries > MOST_ENTRIES:
         raise JournalError("journal", got=f"more than {MOST_ENTRIES} entries", remedy="record shorter runs")
-    block = _SamplesBlock(start + rows_end, header, n_channels, n_bytes, stream, counter, rows)
-    found.samples[header.source, group].append(block)
 
 
 def _entries_of_all_groups(found: _Collected, scan: Scan) -> dict[tuple[int, int], Entries]:
     expected = {
-        (number, group): len(members)
+        SamplesPlace(number, group, len(members))
         for number, info in found.sources.items()
         for group, members in enumerate(info.groups)
     }
-    for place, blocks in found.samples.items():
-        # looked at only now: the description of a source may stand behind its samples if the first was damaged
-        unusable = [block for block in blocks if block.n_channels != expected.get(place)]
-        for block in unusable:
-            n_rows_bytes = SAMPLES_HEAD.size + block.rows.nbytes
-            scan.refuse(block.start - n_rows_bytes, block.header, "samples of an unknown group")
-    return {
-        (number, group): _entries(
-            number,
-            group,
-            n_channels,
-            [block for block in found.samples.get((number, group), []) if block.n_channels == n_channels],
-        )
-        for (number, group), n_channels in expected.items()
-    }
+    # looked at only now: the description of a source may stand behind its samples if the first was damaged
+    indexed, unknown = found.samples.at(expected)
+    for start, n_bytes in unknown.tolist():
+        scan.refuse(start, n_bytes, "samples of an unknown group")
+    return {(place.source, place.group): _entries(place, indexed[place]) for place in sorted(expected)}
 
 
-def _entries(source: int, group: int, n_channels: int, blocks: list[_SamplesBlock]) -> Entries:
-    rows = np.concatenate([block.rows for block in blocks]) if blocks else np.empty(0, ENTRY)
-    n_each = np.array([len(block.rows) for block in blocks], np.int64)
+def _entries(place: SamplesPlace, blocks: IndexedBlocks) -> Entries:
+    rows, n_each = blocks.rows, blocks.n_rows
     # sums of 32-bit numbers would come round
     n_samples = rows["n_samples"].astype(np.int64)
     # samples of a block are consecutive: those of the second entry follow those of the first
     before = _samples_before(n_samples, n_each)
-    width = np.repeat(_column(blocks, "bytes_per_count"), n_each)
+    width = np.repeat(blocks.bytes_per_count, n_each)
+    counts_start = blocks.start + SAMPLES_HEAD.size + ENTRY.itemsize * n_each
     return Entries(
-        source,
-        group,
-        n_channels,
-        stream=np.repeat(_column(blocks, "stream"), n_each),
-        counter=np.repeat(_column(blocks, "counter"), n_each) + before,
+        place.source,
+        place.group,
+        place.n_channels,
+        stream=np.repeat(blocks.stream, n_each),
+        counter=np.repeat(blocks.counter, n_each) + before,
         n_samples=n_samples,
         clock_ticks=rows["clock_ticks"].astype(np.int64),
         host_monotonic_ns=rows["host_monotonic_ns"].astype(np.int64),
         host_utc_ns=rows["host_utc_ns"].astype(np.int64),
-        offset=np.repeat(_column(blocks, "start"), n_each) + before * n_channels * width,
+        offset=np.repeat(counts_start, n_each) + before * place.n_channels * width,
         bytes_per_count=width.astype(np.uint8),
     )
-
-
-def _column(blocks: list[_SamplesBlock], name: str) -> NDArray[np.int64]:
-    return np.array([getattr(block, name) for block in blocks], np.int64)
 
 
 def _samples_before(n_samples: NDArray[np.int64], n_each: NDArray[np.int64]) -> NDArray[np.int64]:

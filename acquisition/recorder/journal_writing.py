@@ -6,7 +6,7 @@ import contextlib
 import os
 import secrets
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol, Self
 
@@ -25,6 +25,7 @@ from acquisition.recorder.journal_format import (
     packed_file_header,
     packed_text,
 )
+from acquisition.recorder.journal_lock import is_live, live_journal, lock_new_journal, remove_dead_journal
 from acquisition.samples.delivery import Block, CountArray, Delivery, End, Trouble
 from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
@@ -34,8 +35,11 @@ from sloshlab.errors import JournalError
 SYNCHRONISATION_INTERVAL_NS: Final = 500_000_000
 """The journal is forced to the disk at most this often."""
 
-DESCRIPTION_INTERVAL_NS: Final = 30_000_000_000
-"""Metadata and sources are repeated this often, so that no single damage makes the samples unreadable."""
+LONGEST_DESCRIPTION_INTERVAL_NS: Final = 30_000_000_000
+"""Metadata and sources, without which no samples can be read, are repeated at least this often."""
+
+# a short recording has several copies, too, some of them far from the others
+_FIRST_DESCRIPTION_INTERVAL_NS: Final = 1_000_000_000
 
 # the clock fit needs the earliest arrivals of a run, not every one; each entry costs 32 bytes
 SHORTEST_ENTRY_NS: Final = 40_000_000
@@ -67,9 +71,18 @@ class JournalFile(Protocol):
 
 
 def _new_file(path: Path, overwrite: bool) -> JournalFile:
-    # Unbuffered: each block is with the system at once, and kill -9 costs what is still being joined only. With
-    # "x" an older journal, which may be all that is left of a run, is never overwritten unasked.
-    return path.open("wb" if overwrite else "xb", buffering=0)
+    while True:
+        if overwrite:
+            remove_dead_journal(path)
+        try:
+            # Unbuffered: each block is with the system at once, and kill -9 costs what is still being joined only.
+            # With "x" an older journal, which may be all that is left of a run, is never overwritten unasked, and
+            # nothing is written through a link.
+            return path.open("xb", buffering=0)
+        except FileExistsError:
+            # made by another recorder since: live, or it has ended by now
+            if not overwrite:
+                raise
 
 
 class JournalWriter:
@@ -84,15 +97,15 @@ class JournalWriter:
     sources : sequence of SourceInfo
         Described once; blocks name them by their position.
     overwrite : bool
-        Whether an existing journal may be replaced.
+        Whether a journal whose recorder has ended may be replaced.
     monotonic_ns, synchronise, open_file : callable
         Clock, `os.fsync` and opening; given by tests.
 
     Raises
     ------
     JournalError
-        By every method, if the disk is full or refuses; the journal then ends with its last complete
-        block, and nothing more can be appended.
+        If a journal is in the way; by every method, if the disk is full or refuses; the journal then ends with
+        its last complete block, and nothing more can be appended.
     """
 
     def __init__(
@@ -114,10 +127,13 @@ class JournalWriter:
         # remains of an older journal on the same disk have another one and are not taken for blocks of this
         self._identity = secrets.randbits(32)
         self._synchronised_ns = self._described_ns = monotonic_ns()
+        self._description_interval_ns = _FIRST_DESCRIPTION_INTERVAL_NS
         self._is_broken = False
         self._file: JournalFile | None = self._opened(open_file, overwrite)
         try:
             self._write(packed_file_header(self._identity))
+            # twice: one damaged block of them must not make the samples unreadable
+            self._describe()
             self._describe()
             # Before anything is recorded: the descriptions, without which no samples can be read, and the name in
             # its folder, without which the file is gone after a power cut.
@@ -125,15 +141,23 @@ class JournalWriter:
             _synchronise_folder(path.parent)
         except BaseException:
             self._release()
+            # nothing was recorded into it
+            path.unlink(missing_ok=True)
             raise
 
     def _opened(self, open_file: Callable[[Path, bool], JournalFile], overwrite: bool) -> JournalFile:
         try:
-            return open_file(self.path, overwrite)
+            file = open_file(self.path, overwrite)
         except FileExistsError:
             raise existing_journal(self.path) from None
         except OSError as error:
             raise self._refused(error) from error
+        try:
+            lock_new_journal(self.path, file.fileno())
+        except BaseException:
+            file.close()
+            raise
+        return file
 
     def update_metadata(self, more: Mapping[str, Any]) -> None:
         """Add to the metadata; later values take the place of earlier ones."""
@@ -172,17 +196,31 @@ class JournalWriter:
         self._append(BlockType.FAILURE, source, packed_text({"message": message[:1000]}))
 
     def close(self, closing: Mapping[str, Any] | None = None) -> None:
-        """Close cleanly with a last block that says so; may be called twice."""
+        """Describe once more and close cleanly with a last block that says so; may be called twice."""
         if self._file is None:
             return
         try:
             if not self._is_broken:
+                # far from the copies at the start, as damage often concerns neighbours
+                self._describe()
                 # only a recorder that ended properly writes it: without it a reader says that something may be
                 # missing
                 self._append(BlockType.CLOSING, 0, packed_text(closing or {}))
                 self._force_to_disk()
         finally:
             self._release()
+
+    @contextlib.contextmanager
+    def kept_locked(self) -> Iterator[None]:
+        """Within it no other recorder can take the journal, closed or not; begins before it is closed."""
+        if self._file is None:
+            raise JournalError(f"journal {self.path}", got="a lock after its end", remedy="start a new journal")
+        # the lock belongs to the opening, which this holds
+        descriptor = os.dup(self._file.fileno())
+        try:
+            yield
+        finally:
+            os.close(descriptor)
 
     def abandon(self) -> None:
         """Close without the last block, as after a crash; may be called twice."""
@@ -212,7 +250,8 @@ class JournalWriter:
             return
         now = self._monotonic_ns()
         # only after samples: a run without any does not grow
-        if now - self._described_ns >= DESCRIPTION_INTERVAL_NS:
+        if now - self._described_ns >= self._description_interval_ns:
+            self._description_interval_ns = min(2 * self._description_interval_ns, LONGEST_DESCRIPTION_INTERVAL_NS)
             self._describe()
         if now - self._synchronised_ns >= SYNCHRONISATION_INTERVAL_NS:
             self._force_to_disk()
@@ -280,6 +319,8 @@ def _synchronise_folder(folder: Path) -> None:
 
 def existing_journal(path: Path) -> JournalError:
     """The error for a journal that is in the way."""
+    if is_live(path):
+        return live_journal(path)
     return JournalError(
         f"journal {path}",
         got="a journal that is already there, from a recording that was cut short",

@@ -54,6 +54,7 @@ class TroubleKind(enum.Enum):
     CALIBRATION_CHANGED = "the device describes its channels differently than before"
     UNCERTAIN_COUNTER = "samples whose place could not be proved were left out"
     BUS_ERROR = "the bus reported error frames"
+    LINE_ERROR = "the interface counted what it had received wrongly"
 
 
 @dataclass(frozen=True)

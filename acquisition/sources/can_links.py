@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from acquisition.sources.driver_counters import Counts, nothing_counted
 from acquisition.sources.serial_line import Line, LineLostError
 from acquisition.wire.can_batch import FrameBatch
 from sloshlab.errors import SourceError
@@ -67,6 +68,10 @@ class CanLink(ABC):
     @abstractmethod
     def send(self, arbitration_id: int, data: bytes, *, extended: bool, fd: bool) -> None:
         """Send one frame."""
+
+    def driver_counts(self) -> Counts:
+        """What drivers and system have counted of lost and wrong frames; most links have no counts."""
+        return {}
 
     @abstractmethod
     def close(self) -> None:
@@ -124,6 +129,10 @@ class TextLink(CanLink):
         """Send one frame as text."""
         self._line.write(self._encode(arbitration_id, data, extended=extended, fd=fd))
 
+    def driver_counts(self) -> Counts:
+        """What the driver of the line has counted, as of the port of an slcan adapter."""
+        return self._line.driver_counts()
+
     def close(self) -> None:
         """Say farewell and let the line go."""
         # said once, though close may be called twice
@@ -144,10 +153,19 @@ class PythonCanLink(CanLink):
     name : str
         For error messages.
     sleep : callable
+    count : callable
+        What drivers and system have counted.
     """
 
-    def __init__(self, bus: Any, name: str, *, sleep: Callable[[float], None] = time.sleep) -> None:
-        self._bus, self._name, self._sleep = bus, name, sleep
+    def __init__(
+        self,
+        bus: Any,
+        name: str,
+        *,
+        sleep: Callable[[float], None] = time.sleep,
+        count: Callable[[], Counts] = nothing_counted,
+    ) -> None:
+        self._bus, self._name, self._sleep, self._count = bus, name, sleep, count
         self._n_garbage = 0
 
     def start(self) -> None:
@@ -176,6 +194,10 @@ class PythonCanLink(CanLink):
             self._bus.send(frame, timeout=_SEND_TIMEOUT_S)
         except (can.CanError, OSError, ValueError) as error:
             raise LineLostError(self._name, got=_one_line(error)) from error
+
+    def driver_counts(self) -> Counts:
+        """What drivers and system have counted of lost and wrong frames."""
+        return self._count()
 
     def close(self) -> None:
         """Shut the bus down."""

@@ -18,6 +18,13 @@ from acquisition.files.can_database import read_layout
 from acquisition.samples.delivery import Delivery, End, Trouble, TroubleKind
 from acquisition.sources.can_links import CanLink, PythonCanLink, Received, open_bus
 from acquisition.sources.can_text_links import SLCAN_BITRATES, open_slcan, open_socketcand
+from acquisition.sources.driver_counters import (
+    Counts,
+    DriverLosses,
+    interface_counts,
+    nothing_counted,
+    socket_counts,
+)
 from acquisition.sources.interface import Source, SourceInfo, SourceURL
 from acquisition.sources.multicast_loopback import DEFAULT_GROUP, open_multicast_bus
 from acquisition.sources.serial_line import LineLostError
@@ -45,6 +52,8 @@ _SOCKETCAND_PORT: Final = 29536
 _MULTICAST_PORT: Final = 43113
 _INTERFACE: Final = re.compile(r"[a-z0-9_]{1,32}")
 _PASSED_ON: Final = "bus."
+_SOCKETS: Final = frozenset({"socketcan", "udp_multicast"})
+"""Interfaces of python-can that are sockets of the system."""
 
 
 class CanSource(Source):
@@ -88,6 +97,7 @@ class CanSource(Source):
         options.refuse_others()
         self._layout: CanLayout | None = None
         self._link: CanLink | None = None
+        self._losses = DriverLosses(nothing_counted, 0)
         self._waiting: list[Delivery] = []
         self._started = self._away = self._heard = self._complete = False
         self._asked_ns = self._retried_ns = 0
@@ -112,8 +122,12 @@ class CanSource(Source):
         self._receiver = CanReceiver(layout, self._longest_gap_s)
         # before the bus is open: multicast lost 900 frames while compiled code was loaded at the first of them
         _load_decoder(layout)
-        self._link = self._connect(self._timeout_s)
+        self._take(self._connect(self._timeout_s))
         self._layout = layout
+
+    def _take(self, link: CanLink) -> None:
+        self._link = link
+        self._losses = DriverLosses(link.driver_counts, self._monotonic_ns())
 
     @property
     def info(self) -> SourceInfo:
@@ -154,7 +168,7 @@ class CanSource(Source):
             remaining_s = max(0.0, (deadline_ns - self._monotonic_ns()) * 1e-9)
             try:
                 received = self._received(min(remaining_s, _STEP_S))
-                deliveries = self._delivered(received)
+                deliveries = [*self._delivered(received), *self._losses.grown(self._monotonic_ns())]
                 self._ask_again()
             except LineLostError as error:
                 deliveries = deliveries + self._lost(error)
@@ -183,6 +197,7 @@ class CanSource(Source):
                 deliveries += self._until_end() if layout.command is not None and layout.status is not None else []
         except LineLostError:
             pass  # what has come is decided below
+        deliveries += self._losses.grown(self._monotonic_ns(), at_once=True)
         return [*deliveries, *self._receiver.finish(self._monotonic_ns())]
 
     def _until_end(self) -> list[Delivery]:
@@ -294,7 +309,7 @@ class CanSource(Source):
             self._sleep(min(wait_s, timeout_s) if self._reconnect else timeout_s)
             return
         try:
-            self._link = self._connect(min(_RETRY_TIMEOUT_S, self._timeout_s))
+            self._take(self._connect(min(_RETRY_TIMEOUT_S, self._timeout_s)))
         except SourceError:
             return  # not back yet
         finally:
@@ -351,10 +366,16 @@ class CanSource(Source):
         for name in url.options:
             if name.startswith(_PASSED_ON):
                 configuration[name.removeprefix(_PASSED_ON)] = _typed(options.text(name) or "")
-        return lambda _: self._python_can(open_bus(f"source {self.url}", configuration))
+        # names of SocketCAN are those of network interfaces
+        interface = configuration["channel"] if self._interface == "socketcan" else None
+        return lambda _: self._python_can(open_bus(f"source {self.url}", configuration), interface)
 
-    def _python_can(self, bus: Any) -> CanLink:
-        return PythonCanLink(bus, f"source {self.url}", sleep=self._sleep)
+    def _python_can(self, bus: Any, network_interface: str | None = None) -> CanLink:
+        def count() -> Counts:
+            found = dict(socket_counts(bus.fileno())) if self._interface in _SOCKETS else {}
+            return {**found, **(interface_counts(network_interface) if network_interface else {})}
+
+        return PythonCanLink(bus, f"source {self.url}", sleep=self._sleep, count=count)
 
 
 def _load_decoder(layout: CanLayout) -> None:

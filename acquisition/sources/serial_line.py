@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Any, Final, Protocol
 from urllib.parse import urlsplit
 
+from acquisition.sources.driver_counters import Counts, nothing_counted, port_counts
 from sloshlab.errors import SourceError
 
 # bounds what one read and its frames take of memory, whatever is sent
@@ -40,6 +41,9 @@ class Line(Protocol):
     def write(self, data: bytes) -> None:
         """Send a few bytes."""
 
+    def driver_counts(self) -> Counts:
+        """What the driver has counted of lost and wrong bytes."""
+
     def close(self) -> None:
         """Let the line go; may be called twice."""
 
@@ -59,6 +63,8 @@ class DescriptorLine:
         ``send(data)``.
     let_go : callable
         Called once, by `close`.
+    count : callable
+        What the driver has counted.
     """
 
     def __init__(
@@ -68,8 +74,10 @@ class DescriptorLine:
         receive: Callable[[int], bytes],
         send: Callable[[bytes], object],
         let_go: Callable[[], None],
+        *,
+        count: Callable[[], Counts] = nothing_counted,
     ) -> None:
-        self._name, self._receive, self._send = name, receive, send
+        self._name, self._receive, self._send, self._count = name, receive, send, count
         self._let_go: Callable[[], None] | None = let_go
         self._selector = selectors.DefaultSelector()
         self._selector.register(fileno, selectors.EVENT_READ)
@@ -116,6 +124,10 @@ class DescriptorLine:
         except OSError as error:
             raise _lost(self._name, error.strerror or str(error)) from error
 
+    def driver_counts(self) -> Counts:
+        """What the driver has counted of lost and wrong bytes; nothing of a line that was let go."""
+        return self._count() if self._let_go is not None else {}
+
     def close(self) -> None:
         """Let the line go; may be called twice."""
         if self._let_go is not None:
@@ -147,6 +159,10 @@ class PolledLine:
             self._port.write(data)
         except OSError as error:
             raise _lost(self._name, str(error)) from error
+
+    def driver_counts(self) -> Counts:
+        """Nothing: these ports tell no counts."""
+        return {}
 
     def close(self) -> None:
         """Let the line go; may be called twice."""
@@ -213,7 +229,14 @@ def _port_line(target: str, baudrate: int, name: str) -> Line:
     if os.name == "posix" and type(port) is serial.Serial:
         descriptor = port.fileno()
         # by the descriptor: pyserial's read waits for a number of bytes, or until its time is over
-        return DescriptorLine(name, descriptor, lambda n: os.read(descriptor, n), port.write, port.close)
+        return DescriptorLine(
+            name,
+            descriptor,
+            lambda n: os.read(descriptor, n),
+            port.write,
+            port.close,
+            count=lambda: port_counts(descriptor),
+        )
     return PolledLine(name, port)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from acquisition.samples.delivery import Delivery, Trouble, TroubleKind
+from acquisition.sources.driver_counters import DriverLosses, nothing_counted
 from acquisition.sources.interface import Source, SourceInfo, SourceURL
 from acquisition.sources.serial_line import Line, LineLostError, open_line
 from acquisition.sources.urls import URLOptions
@@ -66,6 +67,7 @@ class SerialSource(Source):
         self._monotonic_ns, self._utc_ns, self._sleep, self._connect = monotonic_ns, utc_ns, sleep, connect
         self._decoder = SerialDecoder(self.url, longest_gap_s)
         self._line: Line | None = None
+        self._losses = DriverLosses(nothing_counted, 0)
         self._waiting: list[Delivery] = []
         self._opened = self._started = self._away = False
         self._asked_ns = self._retried_ns = 0
@@ -78,7 +80,7 @@ class SerialSource(Source):
         SourceError
             If there is no such port, another program has it, nothing answers, or the answer is impossible.
         """
-        self._line = self._connect(self._target, self._baudrate)
+        self._take(self._connect(self._target, self._baudrate))
         try:
             self._await_calibration()
         except BaseException:
@@ -86,6 +88,10 @@ class SerialSource(Source):
             raise
         # samples of a free-running device that came meanwhile wait in `_waiting` and are the first to be delivered
         self._opened = True
+
+    def _take(self, line: Line) -> None:
+        self._line = line
+        self._losses = DriverLosses(line.driver_counts, self._monotonic_ns())
 
     def _await_calibration(self) -> None:
         deadline_ns = self._monotonic_ns() + int(self._open_timeout_s * 1e9)
@@ -164,12 +170,17 @@ class SerialSource(Source):
                     self._try_again(remaining_s)
                 else:
                     deliveries = self._received(min(max(remaining_s, 0.0), _ASK_AGAIN_NS * 1e-9))
+                    deliveries = [*deliveries, *self._losses.grown(self._monotonic_ns())]
                     self._ask_what_is_due()
             except LineLostError as error:
                 deliveries = deliveries + self._lost(error)
             if remaining_s <= 0:
                 break
         return deliveries
+
+    def finish(self) -> Sequence[Delivery]:
+        """What the driver has counted since the last look."""
+        return self._losses.grown(self._monotonic_ns(), at_once=True)
 
     def close(self) -> None:
         """Ask the device to stop and let the line go; may be called twice."""
@@ -231,7 +242,7 @@ class SerialSource(Source):
                 return
         self._retried_ns = self._monotonic_ns()
         try:
-            self._line = self._connect(self._target, self._baudrate)
+            self._take(self._connect(self._target, self._baudrate))
         except SourceError:
             return  # not back yet
         self._ask_for_everything()

@@ -54,6 +54,7 @@ _TROUBLE_NAMES: Final = {
     TroubleKind.CALIBRATION_CHANGED: "changed calibrations",
     TroubleKind.UNCERTAIN_COUNTER: "samples of uncertain place",
     TroubleKind.BUS_ERROR: "bus errors",
+    TroubleKind.LINE_ERROR: "line errors",
 }
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -12,13 +14,13 @@ from typing import Any, Final
 
 from acquisition.recorder.assembly import assemble
 from acquisition.recorder.assembly_summary import AssemblySummary
-from acquisition.recorder.journal import JournalWriter, existing_journal, read_journal
+from acquisition.recorder.journal import JournalWriter, existing_journal, is_live, read_journal
 from acquisition.recorder.longest_recording import longest_duration_s
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
 from acquisition.recorder.recording_plan import require_recordable
 from acquisition.recorder.source_alignment import require_alignable
 from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus, StopReason
-from acquisition.sources.interface import Source
+from acquisition.sources.interface import Source, SourceInfo
 from acquisition.sources.urls import open_source
 from pipelines.recording.alignment_choice import channel_pairs, checked_align
 from pipelines.recording.run_attributes import checked_run_attributes, require_rate
@@ -111,17 +113,18 @@ def record(
     """
     metadata = _checked_metadata(settings)
     _require_free_places(settings)
-    with opened([open_source(url) for url in settings.sources]) as sources:
-        infos = [source.info for source in sources]
-        require_rate(metadata["attributes"], infos[0].sampling_rate_hz)
-        # whatever the assembly would refuse: found after the recording, no command could make one of its journal
-        require_recordable(infos, metadata["attributes"], f"recording {settings.output}")
-        require_alignable(infos, settings.align, metadata["redundant"])
-        longest_s = longest_duration_s(infos, settings.align)
-        _require_readable_duration(settings.duration_s, longest_s)
-        outcome = _recorded(sources, settings, metadata, longest_s, observer)
+    # until the recording is written and the journal gone, so that no other recorder takes either
+    with contextlib.ExitStack() as lock:
+        with opened([open_source(url) for url in settings.sources]) as sources:
+            recorder_settings = _checked_recorder_settings(settings, metadata, [source.info for source in sources])
+            journal_of = functools.partial(_new_journal, settings, metadata)
+            outcome = _recorded(sources, journal_of, recorder_settings, lock, observer)
+        return _made_of_journal(settings, outcome)
+
+
+def _made_of_journal(settings: RecordSettings, outcome: RecordingOutcome) -> dict[str, Any]:
     if outcome.storage_error is not None:
-        raise JournalError(f"{outcome.storage_error}; then: {_recovery(settings)}")
+        raise JournalError(f"{outcome.storage_error}; {_recovery(settings)}")
     if not any(source.n_samples for source in outcome.status.sources):
         settings.journal.unlink(missing_ok=True)
         raise SourceError(_why_nothing(outcome))
@@ -152,8 +155,21 @@ def _require_free_places(settings: RecordSettings) -> None:
     require_free_place(output, overwrite=settings.overwrite)
     if journal.is_dir():
         raise InputError(f"journal {journal}", got="a folder in the way", remedy="choose another name")
-    if journal.exists() and not settings.overwrite:
+    # a link counts, too, wherever it leads
+    if os.path.lexists(journal) and (not settings.overwrite or is_live(journal)):
         raise existing_journal(journal)
+
+
+def _checked_recorder_settings(
+    settings: RecordSettings, metadata: dict[str, Any], infos: Sequence[SourceInfo]
+) -> RecorderSettings:
+    """Refuse what the assembly would: found after the recording, no command could make one of its journal."""
+    require_rate(metadata["attributes"], infos[0].sampling_rate_hz)
+    require_recordable(infos, metadata["attributes"], f"recording {settings.output}")
+    require_alignable(infos, settings.align, metadata["redundant"])
+    longest_s = longest_duration_s(infos, settings.align)
+    _require_readable_duration(settings.duration_s, longest_s)
+    return RecorderSettings(settings.duration_s, longest_s=longest_s)
 
 
 def _require_readable_duration(duration_s: float | None, longest_s: float) -> None:
@@ -166,23 +182,26 @@ def _require_readable_duration(duration_s: float | None, longest_s: float) -> No
         )
 
 
+def _new_journal(settings: RecordSettings, metadata: dict[str, Any], infos: Sequence[SourceInfo]) -> JournalWriter:
+    settings.journal.parent.mkdir(parents=True, exist_ok=True)
+    return JournalWriter(settings.journal, metadata, infos, overwrite=settings.overwrite)
+
+
 def _recorded(
     sources: Sequence[Source],
-    settings: RecordSettings,
-    metadata: dict[str, Any],
-    longest_s: float,
+    journal_of: Callable[[Sequence[SourceInfo]], JournalWriter],
+    settings: RecorderSettings,
+    lock: contextlib.ExitStack,
     observer: Observer | None,
 ) -> RecordingOutcome:
-    journal_path = settings.journal
-    journal_path.parent.mkdir(parents=True, exist_ok=True)
+    """Record; the journal stays locked until `lock` is closed."""
     with contextlib.ExitStack() as until_started:
-        if not journal_path.exists() or settings.overwrite:
-            # an interrupt before the first sample leaves nothing behind
-            until_started.callback(journal_path.unlink, missing_ok=True)
-        infos = [source.info for source in sources]
-        journal = JournalWriter(journal_path, metadata, infos, overwrite=settings.overwrite)
+        journal = journal_of([source.info for source in sources])
+        # an interrupt before the first sample leaves nothing behind
+        until_started.callback(journal.path.unlink, missing_ok=True)
         until_started.callback(journal.abandon)
-        recorder = Recorder(sources, journal, RecorderSettings(settings.duration_s, longest_s=longest_s))
+        lock.enter_context(journal.kept_locked())
+        recorder = Recorder(sources, journal, settings)
         with _signals_stop(recorder):
             until_started.pop_all()
             return recorder.run(observer)
@@ -214,9 +233,16 @@ def _why_nothing(outcome: RecordingOutcome) -> str:
 
 
 def _recovery(settings: RecordSettings) -> str:
-    """What to type to get the recording out of its journal."""
+    """What to type to get the recording out of its journal, if it is still there."""
+    if not settings.journal.exists():
+        return f"{settings.journal} was removed by somebody else meanwhile: its samples are lost"
     overwrite = " --overwrite" if settings.output.exists() else ""
-    return f"sloshlab recover {settings.journal} -o {settings.output}{overwrite}"
+    return f"then: sloshlab recover {settings.journal} -o {settings.output}{overwrite}"
+
+
+def _what_is_kept(settings: RecordSettings) -> str:
+    every = f"every sample is in {settings.journal}; " if settings.journal.exists() else ""
+    return every + _recovery(settings)
 
 
 def _assembled_or_kept(settings: RecordSettings) -> AssemblySummary:
@@ -225,12 +251,10 @@ def _assembled_or_kept(settings: RecordSettings) -> AssemblySummary:
         return _assembled(settings)
     except KeyboardInterrupt as error:
         raise RecordingInterruptedError(
-            f"interrupted before {settings.output} was complete; every sample is in {settings.journal}; "
-            f"remedy: {_recovery(settings)}"
+            f"interrupted before {settings.output} was complete; {_what_is_kept(settings)}"
         ) from error
     except SloshlabError as error:
-        kept = f"every sample is in {settings.journal}; then: {_recovery(settings)}"
-        raise JournalError(f"{error}; {kept}") from error
+        raise JournalError(f"{error}; {_what_is_kept(settings)}") from error
 
 
 def _assembled(settings: RecordSettings) -> AssemblySummary:

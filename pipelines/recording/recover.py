@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.recorder.assembly import assemble, options_of
-from acquisition.recorder.journal import Journal, read_journal
+from acquisition.recorder.journal import Journal, is_live, read_journal
 from acquisition.recorder.source_alignment import require_alignable
 from acquisition.sources.interface import SourceInfo
 from pipelines.recording.alignment_choice import channel_pairs, checked_align
@@ -17,6 +17,7 @@ from pipelines.report.progress import amounts
 from sloshlab.errors import InputError
 
 _MOST_DAMAGE_NAMED = 20
+_STILL_RUNS = "the recorder still runs: this is what its journal held when it was read"
 
 
 def recover(
@@ -32,7 +33,8 @@ def recover(
     Parameters
     ----------
     journal_path : Path
-        Left by a recorder that was killed, ran out of disk, or closed it properly.
+        Left by a recorder that was killed, ran out of disk, or closed it properly; or of one that still runs,
+        which is not disturbed.
     output : Path
         The recording.
     overwrite : bool
@@ -50,13 +52,22 @@ def recover(
     Raises
     ------
     InputError
-        If the recording is there already, or is the journal itself, or the devices cannot be aligned so.
+        If the recording is there already, is the journal itself or what its recorder will write, or the devices
+        cannot be aligned so.
     JournalError
         If there is nothing to recover.
     """
     require_free_place(output, overwrite=overwrite)
     if output.exists() and journal_path.exists() and output.samefile(journal_path):
         raise InputError(f"recording {output}", got="the journal itself", remedy="another name than the journal's")
+    # asked before it is read: whatever the recorder writes from now on is not in the recording
+    live = is_live(journal_path)
+    if live and output.absolute().with_suffix(journal_path.suffix) == journal_path.absolute():
+        raise InputError(
+            f"recording {output}",
+            got="the name under which the recorder, which still runs, will write it",
+            remedy="another name for what is there by now, or end the recorder",
+        )
     chosen_align = None if align is None else checked_align(align)
     pairs = channel_pairs(redundant)
     with read_journal(journal_path) as journal:
@@ -66,8 +77,9 @@ def recover(
             require_alignable(infos, options.align, pairs)
         with amounts("writing the recording") as watch:
             summary = assemble(journal, output, options, watch=watch)
-        lines = [*_journal_lines(journal), *summary.lines]
-        return {"lines": lines, "flags": list(summary.flags), "output": str(output), "report": summary.to_dict()}
+        lines = [*_journal_lines(journal, live), *summary.lines]
+        flags = [*([_STILL_RUNS] if live else []), *summary.flags]
+        return {"lines": lines, "flags": flags, "output": str(output), "report": summary.to_dict()}
 
 
 def _delivering(journal: Journal) -> list[SourceInfo]:
@@ -76,8 +88,9 @@ def _delivering(journal: Journal) -> list[SourceInfo]:
     return [info for number, info in journal.sources.items() if number in numbers]
 
 
-def _journal_lines(journal: Journal) -> Iterator[str]:
-    yield f"journal {journal.path}: {journal.n_bytes} bytes, {_closing(journal)}"
+def _journal_lines(journal: Journal, live: bool) -> Iterator[str]:
+    closing = "its recorder still runs" if live else _closing(journal)
+    yield f"journal {journal.path}: {journal.n_bytes} bytes, {closing}"
     if journal.n_bytes_left_out:
         yield f"left out: {journal.n_bytes_left_out} bytes"
     for damage in journal.damage[:_MOST_DAMAGE_NAMED]:

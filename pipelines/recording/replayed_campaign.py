@@ -12,6 +12,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -26,12 +27,21 @@ from pipelines.sweep.folder import recordings_and_rigs
 from pipelines.sweep.outputs import write_experiment
 from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 from sloshlab import interrupt
-from sloshlab.errors import RecordingError, SourceError
+from sloshlab.errors import InputError, RecordingError, SourceError
 from sloshlab.netcdf_lock import NETCDF_LOCK
 
 CHANNELS_OF_A_DEVICE: Final = {"force": "serial", "acceleration": "can"}
-_LONGEST_RECORDING_S = 600.0
+LEAST_PATIENCE_S: Final = 30.0
+"""A device that has not answered its recorder for so long is given up."""
+
+# on a loaded computer everything takes longer alike, the start of the devices included
+_PATIENCE_PER_START = 10.0
+# what a source takes
+_MOST_PATIENCE_S = 600.0
+_LONGEST_RECORDING_IN_PATIENCES = 20.0
 _LINES_OF_AN_ERROR = 3
+_REFUSAL = "sloshlab: "
+"""Begins the one line that a command says of bad input."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +70,30 @@ WAYS: Final = (
 )
 
 
-def replayed_campaign(folder: Path, output: Path, ways: Sequence[Way] = WAYS) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Playing:
+    """Devices that play in another process.
+
+    Attributes
+    ----------
+    urls : tuple of str
+        Where a recorder finds them; each source waits for an answer for `patience_s`.
+    patience_s : float
+        At least what was asked for; more where the devices were slow to start.
+    """
+
+    urls: tuple[str, ...]
+    patience_s: float
+
+    @property
+    def longest_s(self) -> float:
+        """A process that takes longer hangs [s]."""
+        return _LONGEST_RECORDING_IN_PATIENCES * self.patience_s
+
+
+def replayed_campaign(
+    folder: Path, output: Path, ways: Sequence[Way] = WAYS, *, least_patience_s: float = LEAST_PATIENCE_S
+) -> dict[str, Any]:
     """Play, record, compare counts, analyse, compare windows.
 
     Parameters
@@ -71,6 +104,9 @@ def replayed_campaign(folder: Path, output: Path, ways: Sequence[Way] = WAYS) ->
         One folder per way with its recordings and `windows.nc`, beside that of the files.
     ways : sequence of Way
         Which ways the channels take.
+    least_patience_s : float
+        Before a device that does not answer is given up [s]; ten times the time that it took to start if that is
+        longer, at most 600 s.
 
     Returns
     -------
@@ -80,7 +116,11 @@ def replayed_campaign(folder: Path, output: Path, ways: Sequence[Way] = WAYS) ->
     runs = sorted(folder.glob("*.nc"))
     if not runs:
         raise RecordingError(f"folder {folder}", got="no recordings", allowed="*.nc with their rig*.toml")
-    flags = _replayed_differences([(way, run) for way in ways for run in runs[:: way.every]], output)
+    if not 0 < least_patience_s <= _MOST_PATIENCE_S:
+        allowed = f"0 … {_MOST_PATIENCE_S:g} s"
+        raise InputError("--patience", got=f"{least_patience_s:g} s", allowed=allowed)
+    played = [(way, run) for way in ways for run in runs[:: way.every]]
+    flags = _replayed_differences(played, output, least_patience_s)
     expected = _analysed(folder, folder, output / "file")
     n_windows = int(expected.sizes["window"])
     analysed = [way for way in ways if way.every == 1]
@@ -100,11 +140,13 @@ def replayed_campaign(folder: Path, output: Path, ways: Sequence[Way] = WAYS) ->
     }
 
 
-def _replayed_differences(played: Sequence[tuple[Way, Path]], output: Path) -> list[str]:
+def _replayed_differences(
+    played: Sequence[tuple[Way, Path]], output: Path, least_patience_s: float = LEAST_PATIENCE_S
+) -> list[str]:
     """Play and record, two at a time, and compare; the first failure of any ends all."""
     flags: list[str] = []
     with progress("replaying", len(played)) as step, ThreadPoolExecutor(2) as pool:
-        jobs = [pool.submit(recorded, run, output / way.name, way) for way, run in played]
+        jobs = [pool.submit(recorded, run, output / way.name, way, least_patience_s) for way, run in played]
         try:
             for (way, run), job in zip(played, jobs, strict=True):
                 flags += [f"{way.name}: {run.name}: {text}" for text in differences(run, job.result())]
@@ -114,18 +156,27 @@ def _replayed_differences(played: Sequence[tuple[Way, Path]], output: Path) -> l
     return flags
 
 
-def recorded(run: Path, folder: Path, way: Way) -> Path:
+def recorded(run: Path, folder: Path, way: Way, least_patience_s: float = LEAST_PATIENCE_S) -> Path:
     """Play one recording as devices and record them, in two processes; return the new recording."""
+    try:
+        return _recorded(run, folder, way, least_patience_s)
+    except SourceError as error:
+        # one message, that of the process that met the trouble, and where
+        raise SourceError(f"{run.name} by {way.name}: {error}") from error
+
+
+def _recorded(run: Path, folder: Path, way: Way, least_patience_s: float) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     output = folder / run.name
     with tempfile.TemporaryDirectory(prefix="sloshlab_") as name:
         devices = _devices(run, Path(name), way)
         attributes = Path(name, "run.toml")
         attributes.write_text(_run_attributes(run), encoding="utf-8")
-        with _playing(["replay", str(run), *devices, "--speed", "max"], len(way.transports)) as urls:
-            sources = [part for url in urls for part in ("--source", url)]
+        arguments = ["replay", str(run), *devices, "--speed", "max"]
+        with _playing(arguments, len(way.transports), least_patience_s) as playing:
+            sources = [part for url in playing.urls for part in ("--source", url)]
             command = ["record", *sources, "--rig", str(_rig_of(run)), "-o", str(output), "--overwrite"]
-            _run([*command, "--run", str(attributes), "--align", "counter"])
+            _run([*command, "--run", str(attributes), "--align", "counter"], playing.longest_s)
     return output
 
 
@@ -233,24 +284,36 @@ def _run_attributes(run: Path) -> str:
 
 
 @contextlib.contextmanager
-def _playing(arguments: Sequence[str], n_devices: int) -> Iterator[list[str]]:
-    """Devices in a process of their own; yields the URLs at which the recorder finds them."""
+def _playing(arguments: Sequence[str], n_devices: int, least_patience_s: float) -> Iterator[Playing]:
+    """Devices in a process of their own."""
     command = [sys.executable, "-m", "pipelines.command_line", *arguments]
+    began_s = time.monotonic()
     with (
         tempfile.TemporaryFile("w+") as messages,
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=messages, text=True) as process,
     ):
         try:
             assert process.stdout is not None
-            yield [_ready(process.stdout, messages) for _ in range(n_devices)]
+            urls = [_ready(process.stdout, messages) for _ in range(n_devices)]
+            patience_s = _patience_s(least_patience_s, time.monotonic() - began_s)
+            playing = Playing(tuple(_waiting(url, patience_s) for url in urls), patience_s)
+            yield playing
             with _in_time("the simulated device"):
-                code = process.wait(_LONGEST_RECORDING_S)
+                code = process.wait(playing.longest_s)
             if code != 0:
                 messages.seek(0)
-                got = f"exit code {code}: {_last_lines(messages.read())}"
-                raise SourceError("the simulated device", got=got, allowed="exit code 0")
+                raise _failed("the simulated device", f"exit code {code}", messages.read())
         finally:
             process.kill()
+
+
+def _patience_s(least_s: float, start_took_s: float) -> float:
+    return min(max(least_s, _PATIENCE_PER_START * start_took_s), _MOST_PATIENCE_S)
+
+
+def _waiting(url: str, patience_s: float) -> str:
+    """The URL of a source that waits so long for the first answer."""
+    return f"{url}{'&' if '?' in url else '?'}open_timeout_s={patience_s:.1f}"
 
 
 @contextlib.contextmanager
@@ -258,7 +321,7 @@ def _in_time(what: str) -> Iterator[None]:
     try:
         yield
     except subprocess.TimeoutExpired as error:
-        raise SourceError(what, got=f"no end within {error.timeout:g} s") from error
+        raise SourceError(what, got=f"no end within {error.timeout:g} s", remedy="more patience") from error
 
 
 def _ready(lines: IO[str], messages: IO[str]) -> str:
@@ -266,19 +329,24 @@ def _ready(lines: IO[str], messages: IO[str]) -> str:
         if line.startswith("ready "):
             return line.removeprefix("ready ").strip()
     messages.seek(0)
-    raise SourceError("the simulated device", got=_last_lines(messages.read()), allowed="a line 'ready URL'")
+    raise _failed("the simulated device", "no line 'ready URL'", messages.read())
 
 
-def _run(arguments: Sequence[str]) -> None:
+def _run(arguments: Sequence[str], longest_s: float) -> None:
     command = [sys.executable, "-m", "pipelines.command_line", *arguments]
     with _in_time(f"sloshlab {arguments[0]}"):
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_RECORDING_S, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=longest_s, check=False)
     if done.returncode not in (0, 3):
-        raise SourceError(f"sloshlab {arguments[0]}", got=_last_lines(done.stderr), allowed="exit code 0 or 3")
+        raise _failed(f"sloshlab {arguments[0]}", f"exit code {done.returncode}", done.stderr)
 
 
-def _last_lines(text: str) -> str:
-    return " | ".join(text.strip().splitlines()[-_LINES_OF_AN_ERROR:]) or "no message"
+def _failed(what: str, how: str, messages: str) -> SourceError:
+    """What a process said that failed: its own line if it said one, else how it ended and its last lines."""
+    lines = messages.strip().splitlines()
+    refusals = [line.removeprefix(_REFUSAL) for line in lines if line.startswith(_REFUSAL)]
+    if refusals:
+        return SourceError(refusals[-1])
+    return SourceError(what, got=f"{how}: {' | '.join(lines[-_LINES_OF_AN_ERROR:]) or 'no message'}")
 
 
 def _analysed(recordings: Path, rigs: Path, output: Path) -> xr.Dataset:

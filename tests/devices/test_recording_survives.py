@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recorder.journal import JournalWriter, read_journal
+from acquisition.recorder.journal import JournalWriter, is_live, read_journal
 from acquisition.recorder.recorder import Recorder
 from acquisition.recorder.status import StopReason
 from acquisition.samples.channel import Channel
 from acquisition.samples.delivery import Block, Delivery
 from acquisition.sources.interface import Source, SourceInfo
+from sloshlab.errors import JournalError
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs fork and SIGKILL")
 
@@ -219,3 +220,25 @@ def test_a_file_that_may_not_grow_ends_the_recording_and_keeps_it(tmp_path: Path
     assert os.waitstatus_to_exitcode(status) == 0
     assert path.stat().st_size <= n_bytes
     assert assert_prefix_is_exact(path, path.stat().st_size) > 100
+
+
+def test_a_killed_recorder_lets_its_journal_go(tmp_path: Path) -> None:
+    """While it lives nobody takes the journal, killed in whatever way it is nobody's."""
+    path = tmp_path / "run.journal"
+    with announcements() as (reading, writing):
+        child = forked(lambda: record_until_killed(path, writing, None))
+        os.close(writing)
+        while path.exists() is False or path.stat().st_size < 5000:
+            time.sleep(0.005)
+        assert is_live(path)
+        with pytest.raises(JournalError, match="a recorder that is running"):
+            JournalWriter(path, {}, [FastSource(0).info], overwrite=True)
+        os.kill(child, signal.SIGKILL)
+        n_bytes = drained(reading)
+        os.waitpid(child, 0)
+    assert not is_live(path)
+    assert_prefix_is_exact(path, n_bytes)
+    with pytest.raises(JournalError, match="cut short"):
+        JournalWriter(path, {}, [FastSource(0).info])
+    JournalWriter(path, {}, [FastSource(0).info], overwrite=True).close()
+    assert path.stat().st_size < 5000

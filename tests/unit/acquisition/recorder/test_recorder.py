@@ -133,7 +133,8 @@ def test_an_error_overtakes_what_waits_in_the_queue(tmp_path: Path) -> None:
 
         def write(self, data: bytes | memoryview, /) -> int:
             self.n_written += 1
-            if self.n_written > 3:
+            # behind the header and two copies of the descriptions
+            if self.n_written > 5:
                 in_write.set()
                 assert release.wait(PATIENCE_S)
             return self.file.write(data)

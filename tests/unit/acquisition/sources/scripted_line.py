@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from acquisition.sources.driver_counters import Counts
 from acquisition.sources.serial_line import LineLostError
 from sloshlab.errors import SourceError
 
@@ -38,6 +39,7 @@ class Script:
         self.n_reads = self.n_connections = self.n_attempts = self.n_closed = 0
         self.arrived: list[bytes] = []
         self.unwritable = False
+        self.counts: Counts = {}
 
     def monotonic_ns(self) -> int:
         return round(self.now_s * 1e9)
@@ -91,6 +93,9 @@ class ScriptedLine:
         answer = self._script.answers(data)
         if answer:
             self._script.arrived.append(answer)
+
+    def driver_counts(self) -> Counts:
+        return {} if self.closed else self._script.counts
 
     def close(self) -> None:
         self._script.n_closed += not self.closed

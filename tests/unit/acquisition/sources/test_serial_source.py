@@ -11,6 +11,7 @@ from scripted_line import Script
 
 from acquisition.samples.channel import Channel
 from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
+from acquisition.sources.driver_counters import Counter
 from acquisition.sources.serial_line import LineLostError
 from acquisition.sources.serial_source import SerialSource
 from acquisition.sources.urls import open_source, parse_url
@@ -373,3 +374,26 @@ def test_sleeps_are_never_longer_than_asked() -> None:
         assert source.read(3.0) == []
         assert script.now_s - before_s == pytest.approx(3.05)
         assert len(script.slept_s) < 25
+
+
+def test_what_the_driver_has_lost_is_told_every_half_second_and_at_the_end() -> None:
+    overrun = Counter("overruns of the port", TroubleKind.OVERRUN, 1 << 32)
+    events = [(0.1 * k, samples(10 * k, 10)) for k in range(1, 20)]
+    script = Script([(0.0, CALIBRATION), *events])
+    # from before this program opened the port
+    script.counts = {overrun: 7}
+    source = source_of(script)
+    source.open()
+    source.start()
+    found = read_all(source, script, 0.9)
+    assert TroubleKind.OVERRUN not in kinds(found)
+    script.counts = {overrun: 12}
+    found = read_all(source, script, 1.8)
+    script.counts = {overrun: 13}
+    found += source.finish()
+    told = [(each.kind, each.count, each.detail) for each in found if isinstance(each, Trouble)]
+    assert told == [
+        (TroubleKind.OVERRUN, 5, "overruns of the port: 5 more"),
+        (TroubleKind.OVERRUN, 1, "overruns of the port: 1 more"),
+    ]
+    source.close()

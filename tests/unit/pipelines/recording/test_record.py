@@ -6,6 +6,7 @@ import contextlib
 import errno
 import functools
 import signal
+import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -24,6 +25,7 @@ from acquisition.samples.channel import Channel
 from acquisition.samples.delivery import Block, Delivery, End
 from acquisition.sources.interface import Source, SourceInfo
 from pipelines.recording.record import RecordSettings, record
+from pipelines.recording.recover import recover
 from pipelines.recording.run_attributes import checked_run_attributes
 from sloshlab.errors import (
     InputError,
@@ -477,3 +479,121 @@ def test_tables_that_cannot_be_attributes_are_refused(tmp_path: Path, text: str)
     table.write_text(text, encoding="utf-8")
     with pytest.raises(InputError):
         checked_run_attributes(Path("a.nc"), Path("rig.toml"), table, [])
+
+
+def second_recorder(place: Path, said: list[str], **options: Any) -> None:
+    """Another recorder that is to write the same recording: what it is told."""
+    try:
+        record(settings_for(place, **options), open_source=opening(FakeSource("fake:a", complete())))
+    except JournalError as error:
+        said.append(str(error))
+    else:
+        said.append("recorded")
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_second_recorder_never_takes_a_live_journal(place: Path, monkeypatch, overwrite: bool) -> None:
+    """Neither while the first records nor while it makes its recording of the journal."""
+    said: list[str] = []
+    original = pipelines.recording.record.assemble
+
+    def recording() -> Iterator[list[Delivery]]:
+        for number, deliveries in enumerate(complete()):
+            if number == 20:
+                second_recorder(place, said, overwrite=overwrite)
+            yield deliveries
+
+    def assembling(*arguments: Any, **more: Any) -> Any:
+        second_recorder(place, said, overwrite=overwrite)
+        return original(*arguments, **more)
+
+    monkeypatch.setattr(pipelines.recording.record, "assemble", assembling)
+    summary = record(settings_for(place), open_source=opening(FakeSource("fake:a", recording())))
+    assert len(said) == 2
+    assert all("got the journal of a recorder that is running" in text for text in said)
+    assert not any("cut short" in text or "--overwrite" in text for text in said)
+    assert summary["flags"] == []
+    assert np.array_equal(stored_counts(place / "run.nc"), true_counts(0, N_SAMPLES))
+    assert [path.name for path in place.iterdir()] == ["run.nc"]
+
+
+def test_of_two_recorders_that_start_at_once_one_records(place: Path) -> None:
+    for _ in range(20):
+        said: list[str] = []
+        at_once = threading.Barrier(2)
+
+        def start(said: list[str] = said, at_once: threading.Barrier = at_once) -> None:
+            source = FakeSource("fake:a", complete(), on_open=at_once.wait)
+            try:
+                record(settings_for(place, overwrite=True), open_source=opening(source))
+            except JournalError as error:
+                said.append(str(error))
+            else:
+                said.append("recorded")
+
+        threads = [threading.Thread(target=start) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        # the second may also come when the first is done
+        assert said.count("recorded") >= 1
+        assert all(text == "recorded" or "a recorder that is running" in text for text in said), said
+        assert np.array_equal(stored_counts(place / "run.nc"), true_counts(0, N_SAMPLES))
+        assert [path.name for path in place.iterdir()] == ["run.nc"]
+
+
+@pytest.mark.parametrize("name", ["run.nc", "run.journal"])
+@pytest.mark.parametrize("linked", ["symbolic", "hard", "dangling"])
+def test_overwriting_never_writes_through_a_link(place: Path, name: str, linked: str) -> None:
+    place.mkdir()
+    precious = place.parent / "precious"
+    if linked != "dangling":
+        precious.write_bytes(b"of yesterday")
+    (place / name).hardlink_to(precious) if linked == "hard" else (place / name).symlink_to(precious)
+    if linked != "dangling" or name == "run.journal":
+        with pytest.raises((InputError, JournalError), match="--overwrite"):
+            record(settings_for(place), open_source=never)
+    record(
+        settings_for(place, overwrite=True, keep_journal=True),
+        open_source=opening(FakeSource("fake:a", complete())),
+    )
+    assert precious.exists() == (linked != "dangling")
+    assert not precious.exists() or precious.read_bytes() == b"of yesterday"
+    assert not any(path.is_symlink() for path in place.iterdir())
+    assert np.array_equal(stored_counts(place / "run.nc"), true_counts(0, N_SAMPLES))
+
+
+def test_a_journal_that_somebody_removes_is_not_claimed_to_be_there(place: Path) -> None:
+    def recording() -> Iterator[list[Delivery]]:
+        yield from complete()[:20]
+        (place / "run.journal").unlink()
+
+    with pytest.raises(JournalError, match="removed by somebody else") as error:
+        record(settings_for(place, duration_s=0.2), open_source=opening(FakeSource("fake:a", recording())))
+    assert "every sample is in" not in str(error.value)
+    assert "sloshlab recover" not in str(error.value)
+
+
+def test_a_live_journal_can_be_recovered_into_another_file(place: Path) -> None:
+    """The recorder goes on undisturbed, and the summary says that it does."""
+    found: dict[str, Any] = {}
+
+    def recording() -> Iterator[list[Delivery]]:
+        for number, deliveries in enumerate(complete()):
+            if number == 40:
+                # what is joined reaches the journal after a quarter of a second
+                time.sleep(0.6)
+                yield []
+                time.sleep(0.2)
+                with pytest.raises(InputError, match="which still runs, will write it"):
+                    recover(place / "run.journal", place / "run.nc")
+                found.update(recover(place / "run.journal", place / "so_far.nc"))
+            yield deliveries
+
+    summary = record(settings_for(place), open_source=opening(FakeSource("fake:a", recording())))
+    assert "its recorder still runs" in found["lines"][0]
+    assert "the recorder still runs" in found["flags"][0]
+    assert np.array_equal(stored_counts(place / "so_far.nc"), true_counts(0, 400))
+    assert summary["flags"] == []
+    assert np.array_equal(stored_counts(place / "run.nc"), true_counts(0, N_SAMPLES))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from acquisition.sources.urls import parse_url
 from pipelines.recording import replayed_campaign as campaign
 from pipelines.recording.replayed_campaign import Way, differences, window_differences
-from sloshlab.errors import RecordingError, SourceError
+from sloshlab.errors import InputError, RecordingError, SourceError
 
 ATTRIBUTES = {"run_id": "r", "rig": "rig.toml", "sampling_rate_hz": 500.0}
 
@@ -120,26 +121,66 @@ def test_windows_are_compared_bit_by_bit(change, said):
     assert window_differences(windows(), change(windows())) == said
 
 
+def python(monkeypatch, tmp_path, script):
+    """Every process that is started runs this script instead."""
+    path = tmp_path / "python"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(path))
+
+
 def test_a_device_that_fails_after_it_was_ready_is_an_error(monkeypatch, tmp_path):
-    script = tmp_path / "python"
-    script.write_text("#!/bin/sh\necho ready serial:tty\necho it broke >&2\nexit 5\n")
-    script.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(script))
+    python(monkeypatch, tmp_path, "echo ready serial:tty\necho it broke >&2\nexit 5")
     with (
         pytest.raises(SourceError, match="exit code 5: it broke"),
-        campaign._playing(["replay"], 1) as urls,
+        campaign._playing(["replay"], 1, 600.0) as playing,
     ):
-        assert urls == ["serial:tty"]
+        assert playing.urls == ("serial:tty?open_timeout_s=600.0",)
 
 
 def test_a_process_that_does_not_end_is_an_error(monkeypatch, tmp_path):
-    script = tmp_path / "python"
-    script.write_text("#!/bin/sh\nexec sleep 60\n")
-    script.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(script))
-    monkeypatch.setattr(campaign, "_LONGEST_RECORDING_S", 0.1)
+    python(monkeypatch, tmp_path, "exec sleep 60")
     with pytest.raises(SourceError, match=r"sloshlab record: got no end within 0\.1 s"):
-        campaign._run(["record"])
+        campaign._run(["record"], 0.1)
+
+
+@pytest.mark.parametrize(
+    ("least_s", "start_took_s", "expected_s"),
+    [(30.0, 1.5, 30.0), (30.0, 20.0, 200.0), (30.0, 500.0, 600.0), (120.0, 1.5, 120.0)],
+)
+def test_patience_grows_with_the_load(least_s, start_took_s, expected_s):
+    assert campaign._patience_s(least_s, start_took_s) == expected_s
+
+
+def test_sources_wait_ten_times_as_long_as_the_devices_took_to_start(monkeypatch, tmp_path):
+    python(monkeypatch, tmp_path, "sleep 0.3\necho ready serial:tty\necho 'ready can:socketcand?port=7&dbc=a.dbc'")
+    with campaign._playing(["replay"], 2, 0.1) as playing:
+        assert playing.patience_s >= 3.0
+    patience = f"open_timeout_s={playing.patience_s:.1f}"
+    assert playing.urls == (f"serial:tty?{patience}", f"can:socketcand?port=7&dbc=a.dbc&{patience}")
+    for url in playing.urls:
+        assert parse_url(url).options["open_timeout_s"] == f"{playing.patience_s:.1f}"
+
+
+@pytest.mark.parametrize("by_device", [False, True])
+def test_a_failure_is_one_message_not_nested(monkeypatch, tmp_path, by_device):
+    """The line of the process that met the trouble, once, and where it met it."""
+    told = "source serial:tty: got no answer within 30 s; remedy: check that the device is switched on"
+    recorder = "exit 0" if by_device else f"echo 'sloshlab: {told}' >&2; exit 1"
+    device = f"echo 'sloshlab: {told}' >&2; exit 1" if by_device else "exec sleep 60"
+    lines = f'if [ "$3" = record ]; then {recorder}; fi\necho ready serial:tty\n{device}'
+    python(monkeypatch, tmp_path, lines)
+    recording().to_netcdf(tmp_path / "run.nc")
+    with pytest.raises(SourceError) as error:
+        campaign.recorded(tmp_path / "run.nc", tmp_path / "out", Way("serial", ("serial",)))
+    assert str(error.value) == f"run.nc by serial: {told}"
+
+
+@pytest.mark.parametrize("patience_s", [0.0, -1.0, 601.0, float("nan")])
+def test_patience_that_no_source_takes_is_refused(tmp_path, patience_s):
+    recording().to_netcdf(tmp_path / "run.nc")
+    with pytest.raises(InputError, match="--patience"):
+        campaign.replayed_campaign(tmp_path, tmp_path / "out", least_patience_s=patience_s)
 
 
 def test_the_first_failure_ends_all(monkeypatch, tmp_path):
@@ -150,7 +191,7 @@ def test_the_first_failure_ends_all(monkeypatch, tmp_path):
             super().shutdown(wait=False, cancel_futures=options.get("cancel_futures", False))
             is_shut.set()
 
-    def fails(run, folder, way):
+    def fails(run, folder, way, least_patience_s):
         begun.append(run)
         if run.stem != "0":
             is_shut.wait(60)
