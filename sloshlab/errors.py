@@ -81,7 +81,7 @@ class MissingExtraError(SloshlabError, ImportError):
     """
 
     def __init__(self, package: str, *, extra: str, purpose: str) -> None:
-        self.package, self.extra = package, extra
+        self.package, self.extra, self.purpose = package, extra, purpose
         super().__init__(
             f"{purpose} needs {package}, which is not installed; remedy: pip install 'sloshlab[{extra}]'"
         )

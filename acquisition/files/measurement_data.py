@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
+from acquisition.files.reading_limits import BoundedReader, DeclaredBytes, ReaderGuard, checked_size, library
 from acquisition.files.table import Column, Table, as_float64, unique_names
 from sloshlab.errors import FileFormatError
 
@@ -21,6 +21,7 @@ _NUMERIC_CONVERSIONS = frozenset({0, 1, 2, 4, 5})
 _MASTER_TYPES = (2, 3)
 _VIRTUAL_MASTER = 3
 _LAST_NUMERIC_DATA_TYPE = 5
+_HAS_INVALIDATION_BIT = 2
 _CHAINED = (b"##DG", b"##CG", b"##CN", b"##DL", b"##FH", b"##CH", b"##AT", b"##EV")
 """Blocks whose first link is the next of their kind."""
 
@@ -43,7 +44,7 @@ def read(path: Path, settings: SourceSection) -> Table:
         If asammdf is not installed.
     """
     asammdf = library("asammdf", "reading MF4 files")
-    size = checked_size(path)
+    checked_size(path)
     found: list[Column] = []
     unusable: dict[str, str] = {}
     start: str | None = None
@@ -51,14 +52,13 @@ def read(path: Path, settings: SourceSection) -> Table:
     n_data_bytes = _check_links(path)
     guard = ReaderGuard(path, "MF4", loggers=("asammdf",))
     # given a stream, asammdf neither copies nor finishes the file
-    with guard, path.open("rb") as stream, _opened(asammdf, stream) as source:
-        total = 0
+    with guard, BoundedReader(path) as stream, _opened(asammdf, stream) as source:
+        declared = DeclaredBytes(path)
         for group in source.groups:
             described = group.channel_group
-            total += described.cycles_nr * (described.samples_byte_nr + described.invalidation_bytes_nr + 8)
-            # deflate cannot make more than about a thousand bytes of one
-            check_declared(path, "channel groups", total, max(1100 * size, 1 << 20))
-            check_declared(path, "channel groups", total)
+            # each channel becomes eight bytes a sample, and so do the time stamps, however short they are stored
+            n_bytes = max(described.samples_byte_nr + described.invalidation_bytes_nr, 8 * len(group.channels))
+            declared.add("a channel group", described.cycles_nr * (n_bytes + 8))
         _check_records(path, source.groups, n_data_bytes)
         for number in range(len(source.groups)):
             found += _group(source, number, settings, unusable)
@@ -186,6 +186,12 @@ def _check_records(path: Path, groups: Any, n_data_bytes: int) -> None:
             is_number = channel.data_type <= _LAST_NUMERIC_DATA_TYPE
             if last > record_bytes or (is_number and not 0 < channel.bit_count <= 64):
                 raise _damaged(path, f"channel {str(channel.name)[:40]!r} outside its record")
+            # as far away as it is stated, asammdf reads it
+            has_bit = channel.flags & _HAS_INVALIDATION_BIT
+            if has_bit and channel.pos_invalidation_bit >= 8 * described.invalidation_bytes_nr:
+                raise _damaged(
+                    path, f"channel {str(channel.name)[:40]!r} with its invalidation bit outside the record"
+                )
     if n_needed > n_data_bytes:
         raise _damaged(path, f"records of {n_needed} bytes in data of {n_data_bytes}")
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from hostile_hdf5 import HOSTILE
 
 from sloshlab.errors import RecordingError
 from sloshlab.recording import channels, read_attributes, read_recording, validate_recording, write_recording
@@ -125,3 +127,15 @@ def test_lost_samples_are_nan_and_flagged(tmp_path: Path):
     back = read_recording(tmp_path / "run.nc")
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(back.force_cell_1)), np.arange(10, 20))
     np.testing.assert_array_equal(back.quality, flags)
+
+
+@pytest.mark.parametrize("damage", HOSTILE)
+def test_what_lies_outside_of_a_recording_is_refused(damage, tmp_path):
+    """An HDF5 file may name other files, whose bytes would become samples; or contain itself without end."""
+    put, said = HOSTILE[damage]
+    write_recording(recording(), tmp_path / "run.nc")
+    with h5py.File(tmp_path / "run.nc", "a") as file:
+        put(file, "force_cell_9", tmp_path)
+    for read in (read_recording, read_attributes):
+        with pytest.raises(RecordingError, match=rf"run\.nc: force_cell_9.*: got {said}"):
+            read(tmp_path / "run.nc")
