@@ -123,6 +123,13 @@ def decoded_bytes(dataset: Any) -> int:
     return n_numbers * max(_DECODED_BYTES, int(dataset.get_type().get_size()))
 
 
+def is_hdf5(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is HDF5, by its signature."""
+    import h5py
+
+    return bool(h5py.is_hdf5(path))
+
+
 def require_self_contained(path: str | os.PathLike[str], *, what: str) -> None:
     """Refuse a file of which anything lies outside of it, or within itself.
 

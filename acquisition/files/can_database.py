@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from acquisition.files.reading_limits import ReaderGuard
+from acquisition.files.database_text import decoded_text, loaded_database
 from acquisition.samples.channel import MOST_CHANNELS, Channel
 from acquisition.wire.can_bits import BitField
 from acquisition.wire.can_layout import STREAM_BITS, CanLayout, ControlMessage, SampleMessage, Selected
@@ -205,11 +205,7 @@ def read_layout(source: Path | str) -> CanLayout:
     name = str(source) if isinstance(source, Path) else "DBC"
     text = _text_of(source)
     try:
-        with ReaderGuard(Path(name), "DBC", loggers=("cantools",)):
-            import cantools
-
-            # strict: signals that overlap or leave their message are refused
-            database = cantools.database.load_string(text, database_format="dbc", strict=True)
+        database = loaded_database(text, name)
     except FileFormatError as error:
         raise SourceError(error.what, got=error.got, allowed=error.allowed, remedy=error.remedy) from error
     return _DatabaseReader(name, database).layout()
@@ -228,11 +224,7 @@ def _text_of(source: Path | str) -> str:
             raise SourceError(f"{source}", got=error.strerror or "no file", allowed="a DBC file") from error
     if max(size, len(content)) > LARGEST_DATABASE_BYTES:
         raise SourceError(f"{source}"[:200], got=f"{size} bytes", allowed=f"≤ {LARGEST_DATABASE_BYTES} bytes")
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError:
-        # the usual encoding of DBC files, where units and comments are beyond ASCII
-        return content.decode("cp1252", errors="replace")
+    return decoded_text(content)
 
 
 class _DatabaseReader:

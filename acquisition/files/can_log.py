@@ -6,8 +6,11 @@ Error frames, remote frames and frames without a description are counted, never 
 
 from __future__ import annotations
 
+import io
+import mmap
 import struct
 import zlib
+from array import array
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -18,7 +21,8 @@ import numpy as np
 
 from acquisition.files.can_device_log import DeviceLog
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
+from acquisition.files.database_text import decoded_text, loaded_database
+from acquisition.files.reading_limits import DeclaredBytes, ReaderGuard, checked_size, decoded_allowance
 from acquisition.files.table import Column, Table
 from sloshlab.errors import FileFormatError
 
@@ -31,6 +35,7 @@ _BLF_RESOLUTION_S = 5e-7
 """python-can gives BLF times as seconds since 1970 in float64."""
 
 _LOG_CONTAINER = 10
+_BLF_FILE_SIZE_AT = 16
 _OBJECT_HEADER = struct.Struct("<4sHHII")
 
 
@@ -50,8 +55,9 @@ class _Log:
     undecodable: Counter[str] = field(default_factory=Counter)
     first_time_s: float | None = None
     buses: dict[str, set[Any]] = field(default_factory=lambda: defaultdict(set))
-    times: dict[_Key, list[float]] = field(default_factory=lambda: defaultdict(list))
-    values: dict[_Key, list[float]] = field(default_factory=lambda: defaultdict(list))
+    # arrays of numbers: a list of objects takes four times the memory
+    times: dict[_Key, array[float]] = field(default_factory=lambda: defaultdict(lambda: array("d")))
+    values: dict[_Key, array[float]] = field(default_factory=lambda: defaultdict(lambda: array("d")))
 
 
 def read(path: Path, settings: SourceSection) -> Table:
@@ -69,8 +75,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     """
     kind = settings.format or path.suffix.lower().lstrip(".")
     checked_size(path, _LARGEST_LOG_BYTES)
-    if kind == "blf":
-        _check_blf(path)
+    missing = _check_blf(path) if kind == "blf" else _missing_end(path)
     database = _database(Path(settings.database)) if settings.database else None
     device = _device(path, settings.database, database)
     log = _Log()
@@ -92,6 +97,7 @@ def read(path: Path, settings: SourceSection) -> Table:
         (*counted, *_columns(log, database, kind)),
         traps=(*(device.traps() if device is not None else ()), *_traps(log, database, kind, guard.traps)),
         unusable={f"frame {name}": f"{n} frames, not in the database" for name, n in log.unknown.items()},
+        truncated=missing,
         jitter_allowed_steps=_JITTER_ALLOWED_STEPS,
         hint="" if database is not None else "state database = 'FILE.dbc' in [source] to decode signals",
     )
@@ -104,8 +110,30 @@ def _messages(path: Path, kind: str) -> Iterator[Any]:
         with path.open("rb") as stream:
             yield from can.BLFReader(stream)
         return
-    with path.open(encoding="utf-8", errors="replace") as stream:
+    with _WholeLines(path.open("rb"), encoding="utf-8", errors="replace") as stream:
         yield from can.ASCReader(stream) if kind == "asc" else can.TRCReader(stream)
+
+
+class _WholeLines(io.TextIOWrapper):
+    """Text without a last line that has no end: half a number is another number."""
+
+    def __next__(self) -> str:  # type: ignore[override]  # of bytes, say the stubs of its base
+        line = super().__next__()
+        if not line.endswith("\n"):
+            raise StopIteration
+        return line
+
+
+def _missing_end(path: Path) -> str:
+    """What tells that a text log was cut off; empty where nothing does."""
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        # not the whole words: programs write them with large and small letters
+        begun, ended = content.rfind(b"Begin Trigger"), content.rfind(b"End Trigger")
+        # what follows the end of the block has no frames, so that its last line may be open
+        is_open = content[-1:] not in b"\r\n" and ended <= begun
+    if is_open:
+        return "the last line has no line end: the file is cut short, and that line is left out"
+    return "'End TriggerBlock' is missing: the file is cut short" if begun > ended else ""
 
 
 def _device(path: Path, name: str | None, database: Any) -> DeviceLog | None:
@@ -168,10 +196,9 @@ def _decoded(found: Any, data: bytes, log: _Log) -> dict[str, float]:
 
 
 def _database(path: Path) -> dict[tuple[int, bool], Any]:
-    cantools = library("cantools", "decoding CAN logs")
     checked_size(path, _LARGEST_DATABASE_BYTES)
+    loaded = loaded_database(decoded_text(path.read_bytes()), str(path))
     with ReaderGuard(path, "DBC", loggers=("cantools",)):
-        loaded = cantools.database.load_file(str(path), database_format="dbc", strict=True)
         return {(message.frame_id, bool(message.is_extended_frame)): message for message in loaded.messages}
 
 
@@ -231,8 +258,11 @@ def _traps(log: _Log, database: Any, kind: str, reader_traps: list[str]) -> list
     return traps
 
 
-def _check_blf(path: Path) -> None:
-    """Walk over all objects of a BLF file, so that no declared size can stall or swamp its reader."""
+def _check_blf(path: Path) -> str:
+    """Walk over all objects of a BLF file, so that no declared size can stall or swamp its reader.
+
+    Returns what is missing of it by its header, empty for a whole file.
+    """
     content = path.read_bytes()
     if len(content) < 144 or content[:4] != b"LOGG":
         raise _damaged(path, "no BLF header")
@@ -241,16 +271,21 @@ def _check_blf(path: Path) -> None:
         raise _damaged(path, f"a header of {header_size} bytes")
     # objects may cross the borders of containers, so that all of them are put together first
     inner = bytearray()
+    declared = DeclaredBytes(path)
     position = header_size
     while position + _OBJECT_HEADER.size <= len(content):
         signature, _, _, size, kind = _OBJECT_HEADER.unpack_from(content, position)
         if signature != b"LOBJ" or size < _OBJECT_HEADER.size or position + size > len(content):
             raise _damaged(path, f"a broken object at byte {position}")
         if kind == _LOG_CONTAINER:
-            inner += _container(path, content[position + _OBJECT_HEADER.size : position + size])
-            check_declared(path, "log containers", len(inner), _LARGEST_LOG_BYTES)
+            container = _container(path, content[position + _OBJECT_HEADER.size : position + size])
+            declared.add("a log container", len(container))
+            inner += container
         position += size + size % 4
     _check_objects(path, bytes(inner))
+    (n_bytes,) = struct.unpack_from("<Q", content, _BLF_FILE_SIZE_AT)
+    is_short = n_bytes > len(content)
+    return f"the header declares {n_bytes} bytes of which {len(content)} are there" if is_short else ""
 
 
 def _container(path: Path, body: bytes) -> bytes:
@@ -263,12 +298,12 @@ def _container(path: Path, body: bytes) -> bytes:
         raise _damaged(path, f"compression method {method}")
     try:
         stream = zlib.decompressobj()
-        # bounded: a few kilobytes may declare terabytes
-        data = stream.decompress(body[16:], _LARGEST_LOG_BYTES)
+        # bounded: a few kilobytes may unpack to terabytes
+        data = stream.decompress(body[16:], decoded_allowance(path.stat().st_size))
     except zlib.error as error:
         raise _damaged(path, f"a log container that cannot be opened ({error})") from error
     if stream.unconsumed_tail:
-        check_declared(path, "log containers", _LARGEST_LOG_BYTES + 1, _LARGEST_LOG_BYTES)
+        raise _damaged(path, f"a log container of more than {len(data)} bytes")
     return data
 
 

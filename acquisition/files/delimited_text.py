@@ -51,6 +51,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     checked_size(path, LARGEST_TEXT_BYTES)
     text, traps = _decoded(path, settings.encoding)
     layout = _layout(text, settings, path)
+    text, missing = _whole_rows(text, layout, traps)
     frame = _parsed(text, layout, path)
     columns: list[Column] = []
     unusable: dict[str, str] = {}
@@ -67,7 +68,7 @@ def read(path: Path, settings: SourceSection) -> Table:
             allowed="delimited text with numbers",
             remedy="state delimiter, decimal and header_rows in [source], or the right format",
         )
-    return Table("csv", tuple(columns), traps=tuple(traps), unusable=unusable)
+    return Table("csv", tuple(columns), traps=tuple(traps), unusable=unusable, truncated=missing)
 
 
 def _decoded(path: Path, encoding: str | None) -> tuple[str, list[str]]:
@@ -225,6 +226,31 @@ def _named(
         names.append(name[:200])
         units.append(stated)
     return tuple(unique_names(names)), tuple(units)
+
+
+def _whole_rows(text: str, layout: Layout, traps: list[str]) -> tuple[str, str]:
+    """The text without a last row that is cut off, and what tells that it is; empty where nothing does."""
+    # a whole row before a line end may be the last that was written, too: of that no text can tell
+    *before, last = text.rsplit("\n", _N_LINES_LOOKED_AT)
+    rows = [_split(line, layout.delimiter) for line in before[1:] if line.strip()][layout.n_header_rows :]
+    if not last.strip() or not rows:
+        return text, ""
+    cells = _split(last, layout.delimiter)
+    widths = {len(row) for row in rows}
+    decimals = {_n_decimals(row[-1], layout.decimal) for row in rows}
+    said = ""
+    if len(widths) == 1 and len(cells) < min(widths):
+        said = f"the last line has {len(cells)} of {min(widths)} cells and no line end: the file is cut short"
+    elif len(decimals) == 1 and _n_decimals(cells[-1], layout.decimal) < min(decimals):
+        said = "the last number has fewer decimals than all before and no line end: the file is cut short"
+    if said:
+        return text[: -len(last)], f"{said}, and that line is left out"
+    traps.append("the last line has no line end: if the file is cut off there, its last number is incomplete")
+    return text, ""
+
+
+def _n_decimals(cell: str, decimal: str) -> int:
+    return len(cell.rpartition(decimal)[2]) if decimal in cell else 0
 
 
 def _parsed(text: str, layout: Layout, path: Path):  # type: ignore[no-untyped-def]

@@ -20,6 +20,8 @@ class FileFormat:
         Of file names, with the dot; a file that is called so and does not begin so is damaged.
     signatures : tuple of bytes
         What a file of the format begins with, where that alone tells it.
+    packages : tuple of str
+        What the reader imports; imported before, a forked child has it already.
     can_be_stated : bool
         Whether a map may name it; False for a version that only the content tells.
     """
@@ -27,24 +29,30 @@ class FileFormat:
     reader: str
     suffixes: tuple[str, ...] = ()
     signatures: tuple[bytes, ...] = ()
+    packages: tuple[str, ...] = ()
     can_be_stated: bool = True
 
 
 FILE_FORMATS: Final[Registry[FileFormat]] = Registry("format")
 
 for _name, _format in {
-    "csv": FileFormat("delimited_text"),
-    "mat": FileFormat("matlab5", (".mat",)),
+    "csv": FileFormat("delimited_text", packages=("pandas",)),
+    "mat": FileFormat("matlab5", (".mat",), packages=("scipy.io",)),
     # a map says "mat" for both versions; the content tells which
-    "mat73": FileFormat("matlab73", can_be_stated=False),
-    "uff": FileFormat("universal58", (".uff", ".unv")),
-    "tdms": FileFormat("labview_tdms", (".tdms",), (b"TDSm",)),
-    "lvm": FileFormat("labview_text", (".lvm",)),
-    "mf4": FileFormat("measurement_data", (".mf4",)),
-    "asc": FileFormat("can_log", (".asc",)),
-    "blf": FileFormat("can_log", (".blf",), (b"LOGG",)),
-    "trc": FileFormat("can_log", (".trc",)),
-    "netcdf": FileFormat("network_common_data", (".nc", ".nc4", ".cdf"), (b"CDF\x01", b"CDF\x02", b"CDF\x05")),
+    "mat73": FileFormat("matlab73", packages=("h5py",), can_be_stated=False),
+    "uff": FileFormat("universal58", (".uff", ".unv"), packages=("pyuff",)),
+    "tdms": FileFormat("labview_tdms", (".tdms",), (b"TDSm",), ("nptdms",)),
+    "lvm": FileFormat("labview_text", (".lvm",), packages=("lvm_read",)),
+    "mf4": FileFormat("measurement_data", (".mf4",), packages=("asammdf",)),
+    "asc": FileFormat("can_log", (".asc",), packages=("can", "cantools")),
+    "blf": FileFormat("can_log", (".blf",), (b"LOGG",), ("can", "cantools")),
+    "trc": FileFormat("can_log", (".trc",), packages=("can", "cantools")),
+    "netcdf": FileFormat(
+        "network_common_data",
+        (".nc", ".nc4", ".cdf"),
+        (b"CDF\x01", b"CDF\x02", b"CDF\x05"),
+        ("netCDF4", "h5py"),
+    ),
 }.items():
     FILE_FORMATS.add(_name, _format)
 

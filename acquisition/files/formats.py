@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import importlib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.file_format import FILE_FORMATS, format_begun, format_called, format_names
-from acquisition.files.reading_limits import checked_size
-from acquisition.files.table import Table
-from sloshlab.errors import FileFormatError
+from acquisition.files.file_format import FILE_FORMATS, FileFormat, format_begun, format_called, format_names
+from acquisition.files.reading_limits import checked_size, library, limits_for
+from acquisition.files.table import Table, plain_table, table_of_plain
+from sloshlab.errors import FileFormatError, MissingExtraError
+from sloshlab.limited_process import UntrustedFile
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 # each with its reason: what looks like a damaged file of another format would send a person the wrong way
@@ -48,15 +51,31 @@ def read_table(path: Path, settings: SourceSection) -> Table:
     MissingExtraError
         If its reader is not installed.
     """
-    checked_size(path)
+    size = checked_size(path)
     chosen = file_format(path, settings.format)
-    module = importlib.import_module(f"acquisition.files.{FILE_FORMATS[chosen].reader}")
-    table: Table = module.read(path, settings.model_copy(update={"format": chosen}))
+    _import_for(FILE_FORMATS[chosen])
+    file = UntrustedFile(f"source {path}", limits_for(size), FileFormatError)
+    table = table_of_plain(file.read(_read_here, str(path), chosen, settings.model_dump()))
     columns = tuple(
         column if column.number else replace(column, number=number)
         for number, column in enumerate(table.columns, start=1)
     )
     return replace(table, format=chosen, columns=columns)
+
+
+def _import_for(chosen: FileFormat) -> None:
+    """Import what the reader needs, so that a forked child has it; what is missing the reader tells itself."""
+    for package in chosen.packages:
+        with contextlib.suppress(MissingExtraError):
+            library(package, "reading")
+    importlib.import_module(f"acquisition.files.{chosen.reader}")
+
+
+def _read_here(path: str, chosen: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """What the reader returns, as plain values, read in this process."""
+    section = SourceSection(**settings).model_copy(update={"format": chosen})
+    module = importlib.import_module(f"acquisition.files.{FILE_FORMATS[chosen].reader}")
+    return plain_table(module.read(Path(path), section))
 
 
 def file_format(path: Path, stated: str | None = None) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
+from acquisition.files.reading_limits import DeclaredBytes, ReaderGuard, checked_size, library
 from acquisition.files.table import Column, RawCounts, Table, as_float64, unique_names
 from sloshlab.errors import FileFormatError
 
@@ -30,7 +30,7 @@ def read(path: Path, settings: SourceSection) -> Table:
         If npTDMS is not installed.
     """
     nptdms = library("nptdms", "reading TDMS files")
-    size = checked_size(path)
+    checked_size(path)
     columns: list[Column] = []
     unusable: dict[str, str] = {}
     starts: list[Any] = []
@@ -38,10 +38,9 @@ def read(path: Path, settings: SourceSection) -> Table:
     # given a stream, npTDMS looks for no index file
     with guard, path.open("rb") as stream, nptdms.TdmsFile.open(stream) as source:
         channels = [channel for group in source.groups() for channel in group.channels()]
-        total = 0
+        declared = DeclaredBytes(path)
         for channel in channels:
-            total += 8 * len(channel)
-            check_declared(path, f"channel {channel.name[:60]!r}", total, max(64 * size, 1 << 20))
+            declared.add(f"channel {channel.name[:60]!r}", 8 * len(channel))
         labels = unique_names([f"{channel.group_name}/{channel.name}" for channel in channels])
         for label, channel in zip(labels, channels, strict=True):
             if settings.group not in (None, channel.group_name):

@@ -13,7 +13,13 @@ from typing import Any
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.reading_limits import LARGEST_DECODED_BYTES, ReaderGuard, check_declared, checked_size
+from acquisition.files.reading_limits import (
+    DeclaredBytes,
+    ReaderGuard,
+    check_declared,
+    checked_size,
+    decoded_allowance,
+)
 from acquisition.files.table import Column, Table, as_float64, rows_of
 from sloshlab.errors import FileFormatError
 
@@ -131,6 +137,7 @@ def collect(name: str, value: Any, found: Found, depth: int = 0) -> None:
 class _Budget:
     """What may still be declared."""
 
+    numbers: DeclaredBytes
     n_elements: int = _MOST_ELEMENTS
 
 
@@ -140,15 +147,12 @@ def _walked(path: Path) -> Iterator[tuple[str, str]]:
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     if len(content) < 136 or order is None:
         raise _damaged(path, "no MAT v5 header")
-    total = 0
-    budget = _Budget()
+    budget = _Budget(DeclaredBytes(path))
     for kind, body in _elements(content[128:], order, path):
         if kind == _COMPRESSED:
             kind, body = _decompressed(body, order, path)
         if kind != _MATRIX:
             continue
-        total += len(body)
-        check_declared(path, "decompressed variables", total)
         name, reason = _checked_matrix(body, order, path, 0, budget)
         if name and not name.startswith("__"):
             yield name, reason
@@ -183,7 +187,7 @@ def _decompressed(body: bytes, order: str, path: Path) -> tuple[int, bytes]:
         if len(head) < 8:
             raise _damaged(path, "a compressed variable without content")
         kind, length = struct.unpack(order + "II", head)
-        check_declared(path, "a compressed variable", length, LARGEST_DECODED_BYTES)
+        check_declared(path, "a compressed variable", length, decoded_allowance(path.stat().st_size))
         # no more than is declared, which was checked before
         inner = stream.decompress(stream.unconsumed_tail, length + 16) if length else b""
     except zlib.error as error:
@@ -213,8 +217,11 @@ def _checked_matrix(body: bytes, order: str, path: Path, depth: int, budget: _Bu
     size = math.prod(shape)
     if kind in _NUMERIC:
         _check_numbers(path, name, size, parts[3:], 2 if flags & _COMPLEX_FLAG else 1)
+        # every number becomes one of eight bytes, however short it is stored
+        budget.numbers.add(f"variable {name[:40]!r}", 8 * size)
     elif kind == _CHAR:
         _check_numbers(path, name, size, parts[3:], 1, exact=False)
+        budget.numbers.add(f"text {name[:40]!r}", 8 * size)
     elif kind == _CELL:
         _check_members(path, name, size, parts[3:], order=order, depth=depth, budget=budget)
     elif kind == _STRUCT:

@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
+from acquisition.files.reading_limits import DeclaredBytes, ReaderGuard, checked_size, library
 from acquisition.files.table import Column, Table, as_float64, unique_names
 from sloshlab.errors import FileFormatError
 
@@ -43,7 +43,7 @@ def read(path: Path, settings: SourceSection) -> Table:
         If asammdf is not installed.
     """
     asammdf = library("asammdf", "reading MF4 files")
-    size = checked_size(path)
+    checked_size(path)
     found: list[Column] = []
     unusable: dict[str, str] = {}
     start: str | None = None
@@ -52,13 +52,12 @@ def read(path: Path, settings: SourceSection) -> Table:
     guard = ReaderGuard(path, "MF4", loggers=("asammdf",))
     # given a stream, asammdf neither copies nor finishes the file
     with guard, path.open("rb") as stream, _opened(asammdf, stream) as source:
-        total = 0
+        declared = DeclaredBytes(path)
         for group in source.groups:
             described = group.channel_group
-            total += described.cycles_nr * (described.samples_byte_nr + described.invalidation_bytes_nr + 8)
-            # deflate cannot make more than about a thousand bytes of one
-            check_declared(path, "channel groups", total, max(1100 * size, 1 << 20))
-            check_declared(path, "channel groups", total)
+            # each channel becomes eight bytes a sample, and so do the time stamps, however short they are stored
+            n_bytes = max(described.samples_byte_nr + described.invalidation_bytes_nr, 8 * len(group.channels))
+            declared.add("a channel group", described.cycles_nr * (n_bytes + 8))
         _check_records(path, source.groups, n_data_bytes)
         for number in range(len(source.groups)):
             found += _group(source, number, settings, unusable)

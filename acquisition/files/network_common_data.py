@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.reading_limits import ReaderGuard, check_declared, checked_size, library
+from acquisition.files.reading_limits import DeclaredBytes, ReaderGuard, checked_size, library
 from acquisition.files.table import Column, Table, as_float64, rows_of
 from sloshlab.errors import FileFormatError
 from sloshlab.file_structure import require_sound_heaps
+from sloshlab.hdf5_contents import is_hdf5, require_self_contained
 
 _TIME_UNITS = re.compile(r"^(?P<unit>[a-zA-Zµ]+)(\s+since\s+(?P<epoch>.+))?$")
 _SECONDS = {
@@ -38,17 +39,21 @@ def read(path: Path, settings: SourceSection) -> Table:
     netcdf4 = library("netCDF4", "reading netCDF files")
     checked_size(path)
     require_sound_heaps(path, what=f"source {path}")
+    with ReaderGuard(path, "netCDF"):
+        # the classic formats know neither links nor other files
+        if is_hdf5(path):
+            require_self_contained(path, what=f"source {path}")
     columns: list[Column] = []
     others = _Others()
     with ReaderGuard(path, "netCDF") as guard, netcdf4.Dataset(str(path), mode="r") as source:
         group = source[settings.group] if settings.group else source
         for name in source.groups if not settings.group else ():
             others.unusable[name] = f"a group; state group = {name!r} to read it"
-        total = 0
+        declared = DeclaredBytes(path)
         for variable in group.variables.values():
             # in Python's integers: a product of declared sizes can come round in 64 bits
-            total += 8 * int(np.prod([len(d) for d in variable.get_dims()], dtype=object))
-            check_declared(path, f"variable {variable.name!r}", total)
+            n_numbers = int(np.prod([len(d) for d in variable.get_dims()], dtype=object))
+            declared.add(f"variable {variable.name!r}", 8 * n_numbers)
         clocks = {
             name: _clock(variable) for name, variable in group.variables.items() if variable.dimensions == (name,)
         }

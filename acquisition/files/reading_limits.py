@@ -13,10 +13,28 @@ from types import ModuleType, TracebackType
 from typing import Final
 
 from sloshlab.errors import FileFormatError, MissingExtraError, SloshlabError
+from sloshlab.limited_process import ReadingLimits
 
 LARGEST_TEXT_BYTES: Final = 1 << 30
 LARGEST_BINARY_BYTES: Final = 6 << 30
 LARGEST_DECODED_BYTES: Final = 6 << 30
+
+LARGEST_EXPANSION: Final = 100
+"""Decoded bytes per byte of a file. Measured signals are compressed to a half or a tenth, and four bytes of text
+or two of a converter become eight; only signals that hardly change go beyond, and deflate ends at a thousand."""
+
+SMALLEST_DECODED_ALLOWANCE: Final = 256 << 20
+"""What a file of any size may unpack to: eight channels that never change, an hour at 1 kHz."""
+
+_COMPUTING_S = 20.0
+_COMPUTING_S_PER_MIB = 5.0
+"""A BLF log takes 1.1 s per MiB on one core of 2 GHz, text at most 0.2 s, the other formats 0.03 s or less;
+a slower machine and a database with many signals take several times as long."""
+
+_MEMORY_BYTES = 512 << 20
+_MEMORY_PER_DECODED = 4
+"""Beside the numbers, their text or packed form is in memory, and pieces of both while they are converted."""
+
 # a reader may warn at every sample
 _MOST_WARNINGS_KEPT = 5
 
@@ -68,6 +86,56 @@ def check_declared(path: Path, what: str, needed_bytes: int, largest_bytes: int 
             allowed=f"≤ {largest_bytes} bytes",
             remedy="the file is damaged, or too long to be read at once",
         )
+
+
+def decoded_allowance(size: int) -> int:
+    """What a file of a size may unpack to, both in bytes.
+
+    Examples
+    --------
+    >>> decoded_allowance(1000) >> 20, decoded_allowance(10 << 20) >> 20, decoded_allowance(1 << 30) >> 30
+    (256, 1000, 6)
+    """
+    return min(LARGEST_DECODED_BYTES, max(SMALLEST_DECODED_ALLOWANCE, LARGEST_EXPANSION * size))
+
+
+def limits_for(size: int) -> ReadingLimits:
+    """Memory and computing time for reading a file of a size [bytes].
+
+    Examples
+    --------
+    >>> limits_for(2 << 20).computing_s
+    30.0
+    """
+    return ReadingLimits(
+        memory_bytes=_MEMORY_BYTES + _MEMORY_PER_DECODED * decoded_allowance(size),
+        computing_s=_COMPUTING_S + _COMPUTING_S_PER_MIB * size / 2**20,
+    )
+
+
+class DeclaredBytes:
+    """Sum of what a file declares, refused where it becomes more than a file of its size may hold.
+
+    Parameters
+    ----------
+    path : Path
+        An existing file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._total = path, 0
+        self._allowed = decoded_allowance(path.stat().st_size)
+
+    def add(self, what: str, n_bytes: int) -> None:
+        """Add a part before anything is allocated for it.
+
+        Raises
+        ------
+        FileFormatError
+            If all parts together are too large.
+        """
+        self._total += n_bytes
+        check_declared(self._path, f"{what} and all before", self._total, self._allowed)
 
 
 def library(name: str, purpose: str) -> ModuleType:
@@ -136,7 +204,8 @@ class ReaderGuard:
         if len(distinct) > _MOST_WARNINGS_KEPT:
             self.traps.append(f"{len(distinct) - _MOST_WARNINGS_KEPT} more warnings of the reader")
         # Ctrl-C and the end of the process pass through
-        if error is None or isinstance(error, SloshlabError) or not isinstance(error, Exception):
+        # and so does the end of memory, which is no fault of the format
+        if error is None or isinstance(error, (SloshlabError, MemoryError)) or not isinstance(error, Exception):
             return
         reason = " ".join(str(error).split())[:160] or type(error).__name__
         raise FileFormatError(

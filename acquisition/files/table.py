@@ -103,6 +103,21 @@ class Table:
     hint: str = ""
 
 
+def plain_table(table: Table) -> dict[str, Any]:
+    """A table as mappings and tuples of numbers, texts and arrays, which another process can hand back."""
+    columns = [{**vars(column), "raw": vars(column.raw) if column.raw else None} for column in table.columns]
+    return {**vars(table), "columns": columns}
+
+
+def table_of_plain(plain: Mapping[str, Any]) -> Table:
+    """The table again; columns that share a clock share its array, as before."""
+    columns = [
+        Column(**{**column, "raw": RawCounts(**column["raw"]) if column["raw"] else None})
+        for column in plain["columns"]
+    ]
+    return Table(**{**plain, "columns": tuple(columns)})
+
+
 def as_float64(values: object) -> FloatArray:
     """One-dimensional float64 copy-or-view of numbers; masked ones become NaN."""
     if isinstance(values, np.ma.MaskedArray):

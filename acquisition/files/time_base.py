@@ -186,7 +186,7 @@ def _whole_steps(
     """
     steps = np.diff(offset)
     unit = float(steps.min())
-    if unit <= 0 or offset[-1] / unit > _LARGEST_INDEX:
+    if unit <= 0 or offset[-1] > _LARGEST_INDEX * unit:
         return None
     counts = np.rint(steps / unit)
     spacing = float(np.spacing(np.abs(offset).max()))
@@ -224,13 +224,14 @@ def _with_gaps(
         raise RecordingError(
             f"{name}: time is not uniform", got=f"{edges.size - 2} gaps", allowed=f"≤ {_MOST_GAPS}"
         )
-    if offset[-1] / typical > _LARGEST_INDEX:
+    if offset[-1] > _LARGEST_INDEX * typical:
         raise RecordingError(f"{name}: time", got=f"a gap of {steps.max():.3g} s", allowed="a shorter gap")
     # from the longest run without a gap: the typical step is too coarse to count across gaps
     longest = int(np.diff(edges).argmax())
     run = offset[edges[longest] : edges[longest + 1]]
     rate = rate_hz or 1 / typical
-    if rate_hz is None and run.size > 2:
+    # a run of one and the same stamp says nothing about the rate
+    if rate_hz is None and run.size > 2 and run[-1] > run[0]:
         rate = _simplest_rate(run - run[0], np.arange(run.size), resolution)
     index = np.arange(offset.size, dtype=np.int64)
     for first, last in itertools.pairwise(edges):

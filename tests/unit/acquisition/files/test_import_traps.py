@@ -217,7 +217,7 @@ class TestMat:
         header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
         path = tmp_path / "run.mat"
         path.write_bytes(header + struct.pack("<II", 15, len(body)) + body)
-        with pytest.raises(FileFormatError, match="of which"):
+        with pytest.raises(FileFormatError, match="declared size of 4294967288 bytes; allowed: ≤ 268435456 bytes"):
             describe_source(path)
 
 
