@@ -9,9 +9,10 @@ TRIAL_KEY ?= $(HOME)/.config/sloshlab/trial_$(TRIAL_SEED).key
 RECORDINGS := raw_data/numerical_tank/shaker
 ROM := $(RESULTS)/rom/ROM.nc
 BALLS :=
+FUZZ_SECONDS ?= 600
 
 .DEFAULT_GOAL := help
-.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial test test-all lint format type bench soak docs clean
+.PHONY: help setup shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial test test-all lint format type bench fuzz soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -88,6 +89,9 @@ type: setup  ## static types
 
 bench: setup  ## speed and memory as ratios in one run
 	$(BIN)/python -m tests.benchmarks
+
+fuzz: setup  ## damaged files to every reader, for FUZZ_SECONDS (600): no crash, no hang, no more than 2 GiB
+	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
 
 soak: setup  ## ten minutes of recording at full load, by serial, socketcand and slcan
 	for transport in serial socketcand slcan; do $(BIN)/python -m tests.benchmarks.sustained $$transport --duration 600 || exit 1; done

@@ -22,7 +22,13 @@ import numpy as np
 from acquisition.files.can_device_log import DeviceLog
 from acquisition.files.channel_map import SourceSection
 from acquisition.files.database_text import decoded_text, loaded_database
-from acquisition.files.reading_limits import DeclaredBytes, ReaderGuard, checked_size, decoded_allowance
+from acquisition.files.reading_limits import (
+    BoundedReader,
+    DeclaredBytes,
+    ReaderGuard,
+    checked_size,
+    decoded_allowance,
+)
 from acquisition.files.table import Column, Table
 from sloshlab.errors import FileFormatError
 
@@ -107,7 +113,7 @@ def _messages(path: Path, kind: str) -> Iterator[Any]:
     import can
 
     if kind == "blf":
-        with path.open("rb") as stream:
+        with BoundedReader(path) as stream:
             yield from can.BLFReader(stream)
         return
     with _WholeLines(path.open("rb"), encoding="utf-8", errors="replace") as stream:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.reading_limits import DeclaredBytes, ReaderGuard, checked_size, library
+from acquisition.files.reading_limits import BoundedReader, DeclaredBytes, ReaderGuard, checked_size, library
 from acquisition.files.table import Column, RawCounts, Table, as_float64, unique_names
 from sloshlab.errors import FileFormatError
 
@@ -36,7 +36,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     starts: list[Any] = []
     guard = ReaderGuard(path, "TDMS", loggers=("nptdms",))
     # given a stream, npTDMS looks for no index file
-    with guard, path.open("rb") as stream, nptdms.TdmsFile.open(stream) as source:
+    with guard, BoundedReader(path) as stream, nptdms.TdmsFile.open(stream) as source:
         channels = [channel for group in source.groups() for channel in group.channels()]
         declared = DeclaredBytes(path)
         for channel in channels:

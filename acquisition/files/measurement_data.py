@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.reading_limits import DeclaredBytes, ReaderGuard, checked_size, library
+from acquisition.files.reading_limits import BoundedReader, DeclaredBytes, ReaderGuard, checked_size, library
 from acquisition.files.table import Column, Table, as_float64, unique_names
 from sloshlab.errors import FileFormatError
 
@@ -51,7 +51,7 @@ def read(path: Path, settings: SourceSection) -> Table:
     n_data_bytes = _check_links(path)
     guard = ReaderGuard(path, "MF4", loggers=("asammdf",))
     # given a stream, asammdf neither copies nor finishes the file
-    with guard, path.open("rb") as stream, _opened(asammdf, stream) as source:
+    with guard, BoundedReader(path) as stream, _opened(asammdf, stream) as source:
         declared = DeclaredBytes(path)
         for group in source.groups:
             described = group.channel_group

@@ -138,6 +138,19 @@ class DeclaredBytes:
         check_declared(self._path, f"{what} and all before", self._total, self._allowed)
 
 
+class BoundedReader(io.BufferedReader):
+    """A file of which a reader gets no more than there is, before memory is taken for what it asks for."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path.open("rb", buffering=0))
+        self._n_bytes = path.stat().st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """At most `size` bytes; all that are left where it is negative or None."""
+        left = max(0, self._n_bytes - self.tell())
+        return super().read(left if size is None or size < 0 else min(size, left))
+
+
 def library(name: str, purpose: str) -> ModuleType:
     """Import an optional reader.
 

@@ -23,6 +23,7 @@ _FUNCTIONS = {
 }  # fmt: skip
 # of E13.5, the format of abscissa values: a step such as 1/2048 s is rounded
 _DIGITS_WRITTEN = 6
+_NEEDED = ("func_type", "data", "x", "num_pts", "abscissa_spacing", "abscissa_inc", "abscissa_min")
 _END_MARK = re.compile(rb"(?m)^ {4}-1[ \r]*$")
 
 
@@ -78,6 +79,10 @@ def read(path: Path, settings: SourceSection) -> Table:
 
 
 def _unusable(data: Mapping[str, Any]) -> str:
+    # pyuff gives back as much of a broken header as it understood
+    absent = [key for key in _NEEDED if key not in data]
+    if absent:
+        return f"a broken header, without {', '.join(absent)}"
     if data["func_type"] not in (0, _TIME_RESPONSE):
         return _FUNCTIONS.get(data["func_type"], f"function type {data['func_type']}") + ", not a time history"
     if np.iscomplexobj(data["data"]):
