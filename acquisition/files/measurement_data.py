@@ -21,6 +21,7 @@ _NUMERIC_CONVERSIONS = frozenset({0, 1, 2, 4, 5})
 _MASTER_TYPES = (2, 3)
 _VIRTUAL_MASTER = 3
 _LAST_NUMERIC_DATA_TYPE = 5
+_HAS_INVALIDATION_BIT = 2
 _CHAINED = (b"##DG", b"##CG", b"##CN", b"##DL", b"##FH", b"##CH", b"##AT", b"##EV")
 """Blocks whose first link is the next of their kind."""
 
@@ -185,6 +186,12 @@ def _check_records(path: Path, groups: Any, n_data_bytes: int) -> None:
             is_number = channel.data_type <= _LAST_NUMERIC_DATA_TYPE
             if last > record_bytes or (is_number and not 0 < channel.bit_count <= 64):
                 raise _damaged(path, f"channel {str(channel.name)[:40]!r} outside its record")
+            # as far away as it is stated, asammdf reads it
+            has_bit = channel.flags & _HAS_INVALIDATION_BIT
+            if has_bit and channel.pos_invalidation_bit >= 8 * described.invalidation_bytes_nr:
+                raise _damaged(
+                    path, f"channel {str(channel.name)[:40]!r} with its invalidation bit outside the record"
+                )
     if n_needed > n_data_bytes:
         raise _damaged(path, f"records of {n_needed} bytes in data of {n_data_bytes}")
 

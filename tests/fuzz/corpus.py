@@ -5,12 +5,38 @@ from __future__ import annotations
 import base64
 import zlib
 
-from tests.fuzz.campaign import content_of
-
 
 def _unpacked(text: str) -> bytes:
     return zlib.decompress(base64.b85decode("".join(text.split())))
 
+
+# zlib and base85
+_MF4 = r"""
+c-r%IaZ>;R6Fox%5S^Htl4hZ2p~nCOvltl&0%c_n7Z9BR<+DNQ56lpH2Qz;CD`1S-
+m6E#3uO&cCCam`Og6#=F6SwhjNzTvBP0cH@<FW~f&<BzretuqjK~a7|YEemMYB5MqAE6Fvo=X&nmPPZUO9&%_B#?H1dgLusyn-
+=Vf^`ckFH3@xqpP#G`}r2n;ALlLn5N%rYV8)&kKC2>vuo<=u=SC<^ZvH+N}K21+EV#>nr`&=yxZGqfA`5+m%qEUwfg%!+v@M{Zf~
+!*Z?;Wkcylb!!J45n_0ESw&EoR={`@$6;K-q42ag_BSI|(=QPNV=Q`A(|Rn}HtzhJ?N6-$<^S+i)-
+s#VLDty{Nn;mVaum#$sAc=77h%a^a`@2+PzVq{hpHs;orzA18);i|<XO^vhX4xT)E_VDTB{epE}UZ=EHWxbM`6?MyMSJf}JHn(GH
+%hH~SO$)nbwyn(B{%`P$dN($<E&+z##Byn*@OjLD89qWlx`744-
+#i4vXDI{2PVux3lytQNJzcqZz|$2dUjWmVU2;)sVo7R>jXsbK5iH5i&xy}Wu}dsY%mro~8-
+17nl5|;WUP^uuni8lWin5~O%=|n%Q06nTfGdLt0@E+TJy3VMd4OmOsCzN;3@qQ}H>2b$V7$76*bY!>Xf!eyz!+Q*>IcsJj$J<tB=
+A6J2_{_nLn1)50-AV9W^O7z`C_<!XFm|V0Ltfp(lc05)fcefFLx%O$uluR1RSsgAvpk-
+Kimk&XZzvzX9F9m`UqD1?x?_!X91f<YkwvZkk8dGjx)mJPY-rf^$u+K-
+I0JH&%_`ABn4>f&r$;EvVa3sy#_n!b_+qx17)fIP(W>e<YeZ-
+{NW4^PaOFh7hq(>Rda(|1NN|J#1&2!oM<}G!byOGup5NY{6&lSE=f$n8{g<af|GQ+#nH^8g+Br+OEU8F!2WQ@)_#M54FnRv1E~LC
+%_s+S|3l?)g_i*LU@Nz=yK@KkU@LctOMe4jZsJd08C;a5FCi!m0A_t=uK
+"""
+_UFF = r"""
+c-rli%}x|S5P&zv7&9>j6amGb0u}_<S-NL-b{8+sWiKAqgPu*$AR#W0$P3If`2x-(_y`<5a^%3lo$0TJ?cI%u37BZ;Y`V6-
+uIjFubXALpgf<w?l5{^7LToulQVnaXzln9+jLb6mKlrpe7>Et}Z~MI<w&9zd!!T-
+#{r1Y3;m`4Mx;U`f#EhtgjrgOmj;Ae{^5n^Y+O1Jv(=^5CHO$b!Hn)@5M!nF)-
+b%HL?f79CdB1<KE92u>Cdb7d(fA(k_V*5V24nVL`oG!3bLY!kFJCYJ7t0fsEK}j7>`^PnX6|HwTuhy;qyPNw<TCsz{QR|(>+m`Ft
+kbjS=r@r|@D+4Mwu1kX+N(c&7Cwi*uICqV$uJ)Hvc^kXb@-
+y@hrWrt17F}g&G*#hn+bN$;Ad{%Yz_VZK7+o2ehc{szKZ^X@2L4chTlNfeDA^U6PM;&Lq36Pz9+=BivL6SZR|GScj5EsYk7Hzc<`
+>^-TQiU^m)p=7yZR|ul0|;dk0&`AEK)$^~-A)N$!_D?I7!>e*2)UWHI_F*VN)4!e_8+!}S_#o9Jj+AYZ~G^b^V|hQEN%qj!-
+~U3+(4l6qxQ+k%_aE4Qqb`{k)+yPf)FuI1lKy>?O4e4Ar!NAs=w?JLuKwcRz~ny<Fa2>*uPezQ*Qw`*-
+{Z9N~^gj<cb{EmNAIKKcf5_?b
+"""
 
 FOUND: dict[str, tuple[str, bytes]] = {
     # ZeroDivisionError in the search for the simplest rate
@@ -25,6 +51,8 @@ FOUND: dict[str, tuple[str, bytes]] = {
         b'VERSION ""\nNS_ :\nBS_:\nBU_: rig\nBO_ 291 L: 8 rig\n SG_ F : 0|4000000000@1- (1,0) [0|0] "N" rig\n',
     ),
     # KeyError: 'data'
-    "UFF set with a broken header": ("uff binary", content_of("uff binary", 64)),
+    "UFF set with a broken header": ("uff binary", _unpacked(_UFF)),
+    # a segmentation fault of asammdf
+    "MF4 channel with its invalidation bit far outside the record": ("mf4", _unpacked(_MF4)),
 }
 """What it was → target and content."""

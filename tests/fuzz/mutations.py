@@ -38,6 +38,8 @@ def _damaged(content: bytearray, seeds: Sequence[bytes], rng: np.random.Generato
         content[at : at + n] = rng.bytes(n)
     elif kind == 3:
         width = int(rng.choice([1, 2, 4, 8]))
+        # in binary formats numbers stand at multiples of their size
+        at = at // width * width
         value = _INTEGERS[int(rng.integers(len(_INTEGERS)))] % (1 << 8 * width)
         content[at : at + width] = value.to_bytes(width, "little" if rng.random() < 0.8 else "big")
     elif kind == 4:

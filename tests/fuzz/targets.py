@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 import tempfile
 from collections.abc import Callable
@@ -75,8 +76,30 @@ def both(*actions: Callable[[], Any]) -> None:
         raise refusal
 
 
-def _can_scenario() -> import_scenarios.Scenario:
-    return next(scenario for scenario in import_scenarios.SCENARIOS if scenario.name == "can asc")
+def _mf4_files(folder: Path) -> list[bytes]:
+    """With and without compression, invalidation bits and a conversion, and two groups."""
+    from asammdf import MDF, Signal
+
+    n = import_scenarios.N_SAMPLES
+    counts, times = np.arange(n, dtype=np.uint8), import_scenarios.TIME_S
+    signals = [
+        Signal(import_scenarios.FORCE_KN, times, unit="kN", name="F"),
+        Signal(import_scenarios.ACCELERATION, times, unit="m/s^2", name="a"),
+        Signal(counts, times, name="u", invalidation_bits=counts % 3 == 0),
+        Signal(counts, times, name="scaled", conversion={"a": 2.0, "b": 1.0}),
+    ]
+    contents = []
+    for compression in (0, 1, 2):
+        with MDF(version="4.10") as target:
+            target.append(signals)
+            target.append(signals[2:])
+            target.save(folder / "good.mf4", overwrite=True, compression=compression)
+        contents.append((folder / "good.mf4").read_bytes())
+    return contents
+
+
+def _scenario(name: str) -> import_scenarios.Scenario:
+    return next(scenario for scenario in import_scenarios.SCENARIOS if scenario.name == name)
 
 
 def _read_database(path: Path) -> None:
@@ -140,8 +163,9 @@ def _maps(folder: Path) -> list[bytes]:
 
 TARGETS: dict[str, Target] = {
     **{scenario.name: _of_scenario(scenario) for scenario in import_scenarios.SCENARIOS},
+    "mf4": dataclasses.replace(_of_scenario(_scenario("mf4")), good=_mf4_files),
     "recording": Target("run.nc", _recordings, read_recording),
-    "database": Target("rig.dbc", _databases, _read_database, lambda folder: _can_scenario().write(folder)),
+    "database": Target("rig.dbc", _databases, _read_database, lambda folder: _scenario("can asc").write(folder)),
     "map": Target("map.toml", _maps, read_channel_map),
     "rig": Target("rig.toml", lambda folder: [_RIG.encode()], Rig.from_toml),
     "journal": Target("run.journal", _journals, _read_journal),

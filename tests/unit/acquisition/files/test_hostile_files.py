@@ -20,6 +20,7 @@ from hostile_hdf5 import HOSTILE, SECRET
 from acquisition.files import describe_source, import_recording
 from acquisition.files.can_database import read_layout
 from acquisition.files.channel_map import SourceSection
+from acquisition.files.formats import read_table
 from acquisition.files.time_base import uniform_grid
 from sloshlab.errors import FileFormatError, InputError, RecordingError, SourceError
 
@@ -247,3 +248,27 @@ def test_a_reader_that_crashes_is_one_line(tmp_path: Path, monkeypatch: pytest.M
     (tmp_path / "run.csv").write_text("F\n1.5\n2.5\n")
     with pytest.raises(InputError, match=r"run\.csv: got a file on which the reader crashed \(SIGSEGV\)"):
         describe_source(tmp_path / "run.csv")
+
+
+def test_an_invalidation_bit_outside_the_record_is_refused(tmp_path: Path) -> None:
+    """asammdf reads where the file says, 512 MB behind the record; it is refused before."""
+    from asammdf import MDF, Signal
+
+    counts = np.arange(16, dtype=np.uint8)
+    with MDF(version="4.10") as target:
+        target.append([Signal(counts, counts / 8.0, name="u", invalidation_bits=counts % 3 == 0)])
+        target.save(tmp_path / "run.mf4", overwrite=True, compression=0)
+    content = bytearray((tmp_path / "run.mf4").read_bytes())
+    np.testing.assert_array_equal(import_columns(tmp_path / "run.mf4")["u"], counts[counts % 3 != 0])
+    # of a channel block: 24 bytes of head, 8 links, type, order, place and size; then flags and the bit
+    for at in [at for at in range(len(content)) if content[at : at + 4] == b"##CN"]:
+        if struct.unpack_from("<I", content, at + 100)[0] & 2:
+            struct.pack_into("<I", content, at + 104, 2**32 - 1)
+    (tmp_path / "run.mf4").write_bytes(content)
+    with pytest.raises(FileFormatError, match="channel 'u' with its invalidation bit outside the record"):
+        describe_source(tmp_path / "run.mf4")
+
+
+def import_columns(path: Path) -> dict[str, np.ndarray]:
+    """Values by name of column."""
+    return {column.name: column.values for column in read_table(path, SourceSection()).columns}
