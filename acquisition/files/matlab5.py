@@ -145,7 +145,8 @@ def _walked(path: Path) -> Iterator[tuple[str, str]]:
     """Name and, where it is not usable, reason of every variable; declared sizes checked."""
     content = path.read_bytes()
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
-    if len(content) < 136 or order is None:
+    # by a zero among the first four bytes scipy knows version 4, whatever else the header says
+    if len(content) < 136 or order is None or 0 in content[:4]:
         raise _damaged(path, "no MAT v5 header")
     budget = _Budget(DeclaredBytes(path))
     for kind, body in _elements(content[128:], order, path):

@@ -224,8 +224,7 @@ def _with_gaps(
         raise RecordingError(
             f"{name}: time is not uniform", got=f"{edges.size - 2} gaps", allowed=f"≤ {_MOST_GAPS}"
         )
-    if offset[-1] > _LARGEST_INDEX * typical:
-        raise RecordingError(f"{name}: time", got=f"a gap of {steps.max():.3g} s", allowed="a shorter gap")
+    _require_countable(float(offset[-1]) / typical, float(steps.max()), name)
     # from the longest run without a gap: the typical step is too coarse to count across gaps
     longest = int(np.diff(edges).argmax())
     run = offset[edges[longest] : edges[longest + 1]]
@@ -233,6 +232,7 @@ def _with_gaps(
     # a run of one and the same stamp says nothing about the rate
     if rate_hz is None and run.size > 2 and run[-1] > run[0]:
         rate = _simplest_rate(run - run[0], np.arange(run.size), resolution)
+    _require_countable(float(offset[-1]) * rate, float(steps.max()), name)
     index = np.arange(offset.size, dtype=np.int64)
     for first, last in itertools.pairwise(edges):
         # the mean of a run is known more finely than its stamps are written
@@ -247,6 +247,11 @@ def _with_gaps(
             remedy="state the right sampling_rate_hz; samples out of order or sent twice must be sorted out first",
         )
     return rate_hz or _simplest_rate(offset, index, resolution), index
+
+
+def _require_countable(n_steps: float, longest_s: float, name: str) -> None:
+    if not n_steps <= _LARGEST_INDEX:
+        raise RecordingError(f"{name}: time", got=f"a gap of {longest_s:.3g} s", allowed="a shorter gap")
 
 
 def _typical_step(steps: FloatArray, resolution: float) -> float:

@@ -37,6 +37,27 @@ y@hrWrt17F}g&G*#hn+bN$;Ad{%Yz_VZK7+o2ehc{szKZ^X@2L4chTlNfeDA^U6PM;&Lq36Pz9+=BivL
 ~U3+(4l6qxQ+k%_aE4Qqb`{k)+yPf)FuI1lKy>?O4e4Ar!NAs=w?JLuKwcRz~ny<Fa2>*uPezQ*Qw`*-
 {Z9N~^gj<cb{EmNAIKKcf5_?b
 """
+_MF4_TIMES = r"""
+c-qZaOK%!i6do|a7~2@|3%{{3HhzJ5*v1KgE5&u#BuXVOylR3BRjdZEfL86MV$nqxT~t+7Sy5H>-
+Sm~dTQ_aW{Rv)X>1CvDvdp53GR$|#0UKx=Tk0%)XYM!WyXV|F=Q|f)+1PZdSIFyMR>wp-`Fz+L_A2G;woYkzxm@uLb-
+amZBgXwsZM@Oh-2M*TJo9SsS=XNq^;Uo4I#(*|T&tUp#5Z=b>2xYnh?*l?+rIK&^*NilzL(4HrE-PcR9>C*J$Vm&8(Zr5z}U>YIj
+M~+Qc?cNUTkfvqeE!V<5Ewdyd2ZUX^p5D7Hw_V-
+6EieC2e#Fg8^2r0h$!#&bf1dUXRfl8c9$XjUapj&|erI#oF6p^(LlfG{T}^noNM+0@R04mqbSg2;T-
+|gBw<9HpA*24JyvUjaAu6AABEH1`xVLR~HCx0~!J0l<e+?)w>{^g4LR^SOC2jtKDw9=;;CB`(y>eMQOF-tq*7|5C(+J2Ixcb5LQP
+eyB&ldQCxt6vbPsjAJcAta9;HF0s4gY5LN@SzaNC3($2#wEC&W)^%;FHB!E*44pMc{R|cV5IvgPUoN@y@zaoZ)VD$xM6h@O69tQL
+!<sk@ta%2RAUjcG}a9NCw!s=^4W>_h5Yz%jI0nH(!LUMc@gx>(_LddgXVggp*0vZJ2sB}6}4S<TM6lGmZPJ-||N@#4<u$Y>H6`-
+OMgdXW~VXg0BH37nqn4Z=Miv&Hcj&3)segL5xgnl_QgS7xD{UG#;*;#n_BOt4w&^;bl5#)i@s+^m{T0a3YO8PkS^YD<MVL@MeVF6
+Y@19IVet%=1&tVPgaiSlu22_F6eh$>}4dcCkBXcUA2;qzgw13-F80A+a@9ukB~DF&q9k9U3rWJg>JA`rk@1oaA1onR0i-
+owt%P+T$;g4I1z07<&IvVxi40F4O}+SOHf2&gzoJ1^GOVD&q!jwn?{IE=Lb6<r|o%Jp@4cpq;MfzU6`pNG}`YRMs^N*69*tv^8M0
+Thyv2s{L&SU~6z7cau91ZV(O!!jDhS_HYNQe-TqtM)a0qb`LYZp3ud-uGgxPqDtl`Vi|otk1B%!ukm78>~;TzQFnb(|xA%OxKx?G
+u>u7&2*XRFw<S8vrJc+jxyb3I>~gA=^)cRrgKc!n2s^sVmifiiRlp29i}r(SD214-
+C#Pwbb;vrt9w@Gtgcxdv$|z<%IcEUA*(x9XRNMR9kIG$b;9a`)d9<Umgkkc*3N$i_2<9Mc=i0Jo?pvn!01jcl_;c=5nuUUn=E9rx
+32FdqltVXT|VGOd^Ew}mr|KzHdprwCTm{H<#)50sCq~agsZP<ljU>f6Mt|f+>BTHJ^ZaN%R5vd#)F#kZ@G>ytM??hREiH!Mn|ZN#
+|_V-C)?8{P&S9{&CjyVy7|IxI@Ju%SM4udtyD0cNghOZ?fZ_d=4a|~9j@1Dkq9=|ru_G-
+Q5>5s@E5K&kJDqRGw5#ahw~V2sBoQioQW2A+LwPW&?L@Bb#Xpy5vR#=JWlJeI1Q&B=Zh`!(qXNA|IqU9*LHwUe}>;HzmvF?N><{y
+RB7W4>bqh0*ERZut^HJ_GHtX^_1At+?ejrTYafQ{_|9UVuDw#Ynax!8>GDbcpP*~Ih5kru&8ev-
+Pb=p!U=8cT_J7m6ll|PcKYjk2PBs6}F8?}CHUFCDSKRh=`DF(7H?S|5_y
+"""
 
 FOUND: dict[str, tuple[str, bytes]] = {
     # ZeroDivisionError in the search for the simplest rate
@@ -54,5 +75,7 @@ FOUND: dict[str, tuple[str, bytes]] = {
     "UFF set with a broken header": ("uff binary", _unpacked(_UFF)),
     # a segmentation fault of asammdf
     "MF4 channel with its invalidation bit far outside the record": ("mf4", _unpacked(_MF4)),
+    # OverflowError, as the times are of all sizes that a float has
+    "MF4 times of which an index does not fit into 64 bits": ("mf4", _unpacked(_MF4_TIMES)),
 }
 """What it was → target and content."""

@@ -103,6 +103,13 @@ class TestSizes:
         ):
             describe_source(path)
 
+    def test_a_mat_file_is_of_one_version_for_all_its_readers(self, tmp_path: Path) -> None:
+        """With a zero among its first bytes scipy reads version 4, past everything that was looked at."""
+        path = SCENARIOS[[scenario.name for scenario in SCENARIOS].index("mat v5")].write(tmp_path)[0]
+        path.write_bytes(b"\0" + path.read_bytes()[1:])
+        with pytest.raises(FileFormatError, match="got no MAT v5 header"):
+            describe_source(path)
+
     def test_blf_unpacks_to_no_more_than_its_size_allows(self, tmp_path: Path) -> None:
         blf_file(tmp_path / "run.blf", n_frames=6_000_000)
         assert (tmp_path / "run.blf").stat().st_size < 2 * MIB
