@@ -40,7 +40,11 @@ _SPIKE_SIGMA = 12.0
 _REPEATED_SHARE = 0.3
 """Every second sample would be 0.5; parts at rest or lost may be without."""
 _REPEATED_STEPS = 8
+_SMALLEST_SPIKE = 0.5
+"""Of the RMS of a channel: a smaller one, of n samples a cycle, changes no work by more than 1/n of reactive power."""
 _LARGEST_STANDARDISED = 1e6
+_ROUNDING = 1e-9
+_BEND: Final = np.array([1.0, -2.0, 1.0])
 _FELT_SIGMA = 5.0
 """Of the prediction error of another channel: it felt something at the same instant."""
 _SPIKE_SHAPE = 0.9
@@ -111,6 +115,7 @@ def examined_samples(
     for name in signals if names is None else names:
         # a blow is felt by more than one sensor, a disturbed sample by one
         spiked = spikes(errors[name]) & ~_felt_elsewhere(name, errors)
+        spiked &= np.abs(prediction_error(signals[name])) > _SMALLEST_SPIKE * np.nanstd(signals[name])
         of_check = {
             "cut off": _cut_off(recording[name]),
             "held samples": held_samples(signals[name], rate_hz),
@@ -225,6 +230,8 @@ def filled_samples(values: FloatArray, rate_hz: float) -> BoolArray:
     # the quieter side: before a motion starts and after it stops nothing is compared
     beside = np.minimum(np.roll(usual, n), np.roll(usual, -n))
     beside[:n] = beside[-n:] = 0.0
+    # sums that run along a signal leave their rounding where it is zero
+    beside[beside < _ROUNDING * np.max(usual)] = 0.0
     # and nowhere near as quiet as the channel often is: a modulated motion has calm moments of its own
     often = float(np.quantile(largest, _OFTEN))
     # the steps of a converter alone leave 0.4 of a step: only a channel with noise beyond them can lack it
@@ -263,7 +270,10 @@ def spikes(standardised: FloatArray) -> BoolArray:
     pattern_power = float((_PREDICTION_ERROR**2).sum())
     size = np.convolve(standardised, _PREDICTION_ERROR[::-1], mode="same") / pattern_power
     power = np.convolve(standardised**2, np.ones(5), mode="same")
-    found = (np.abs(size) > _SPIKE_SIGMA) & (size**2 * pattern_power > _SPIKE_SHAPE * power)
+    explained = size**2 * pattern_power
+    # a bend of the signal, as of a drive that changes its slope, leaves 1, −2, 1, which is nearly the same
+    bend = np.convolve(standardised, _BEND, mode="same") ** 2 / (_BEND**2).sum()
+    found = (np.abs(size) > _SPIKE_SIGMA) & (explained > _SPIKE_SHAPE * power) & (explained > bend)
     # the largest of its surroundings only: its tails fit the pattern less
     return np.asarray(found & (np.abs(size) >= maximum_filter1d(np.abs(size), 5)))
 

@@ -14,6 +14,8 @@ from sloshlab.consistency.samples import (
     held_samples,
     prediction_error,
     repeated_samples,
+    spikes,
+    standardised_errors,
     white_noise_std,
 )
 
@@ -70,7 +72,7 @@ def test_a_gap_that_was_closed_by_a_curve_is_found(clean, kind):
 
 def test_a_single_wrong_sample_is_a_spike(clean):
     def spiked(values):
-        values[12_345] += 2.0
+        values[12_345] += 8.0
         return values
 
     findings, wrong = examined_samples(with_channel(clean, CELL, spiked))
@@ -78,9 +80,19 @@ def test_a_single_wrong_sample_is_a_spike(clean):
     np.testing.assert_array_equal(np.flatnonzero(wrong[CELL]), [12_344, 12_345, 12_346])
 
 
+def test_a_spike_too_small_to_matter_is_none(clean):
+    rms = float(clean[CELL].std())
+
+    def spiked(values):
+        values[12_345] += 0.3 * rms
+        return values
+
+    assert not found(with_channel(clean, CELL, spiked))
+
+
 def test_a_blow_that_two_cells_feel_is_no_spike(clean):
     def struck(values):
-        values[12_345] += 2.0
+        values[12_345] += 8.0
         return values
 
     both = with_channel(with_channel(clean, CELL, struck), "force_cell_2", struck)
@@ -106,6 +118,27 @@ def test_a_signal_cut_off_without_a_stated_range(share, action):
     assert actions <= {action}
     if share == 0.7:
         assert actions == {Action.REFUSED}
+
+
+def test_a_recording_filled_up_with_zeros_at_its_end(clean):
+    def filled_up(values):
+        values[-1_500:] = 0.0
+        return values
+
+    padded = clean
+    for name in list(clean.data_vars):
+        padded = with_channel(padded, name, filled_up)
+    # nothing moves there, before the end nor after it: there is nothing to be wrong
+    assert not found(padded)
+
+
+def test_a_bend_is_no_spike():
+    time = np.arange(20_000) / RATE_HZ
+    generator = np.random.default_rng(6)
+    values = 1e-4 * generator.standard_normal(time.size) + np.where(time < 20.0, 0.0, 3.0 * (time - 20.0))
+    assert not spikes(standardised_errors(values, RATE_HZ)).any()
+    values[12_345] += 5e-3
+    assert np.flatnonzero(spikes(standardised_errors(values, RATE_HZ))).tolist() == [12_345]
 
 
 def test_lost_samples_are_no_finding(clean):
