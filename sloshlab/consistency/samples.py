@@ -41,7 +41,7 @@ _REPEATED_SHARE = 0.3
 """Every second sample would be 0.5; parts at rest or lost may be without."""
 _REPEATED_STEPS = 8
 _SMALLEST_SPIKE = 0.5
-"""Of the RMS of a channel: a smaller one, of n samples a cycle, changes no work by more than 1/n of reactive power."""
+"""Of the RMS of a channel: a smaller one changes the work of a cycle of n samples by 1/n of the reactive power."""
 _LARGEST_STANDARDISED = 1e6
 _ROUNDING = 1e-9
 _BEND: Final = np.array([1.0, -2.0, 1.0])

@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 
 from sloshlab.conditioning.calibration import identify_dry_mass
-from sloshlab.consistency import between_runs, bounds, examination, like_sensors, samples, statement
+from sloshlab.consistency import (
+    between_runs,
+    bounds,
+    force_over_time,
+    like_sensors,
+    noise_findings,
+    samples,
+    statement,
+)
 from sloshlab.consistency.between_runs import calibration_findings
 from sloshlab.consistency.effect import Inertia
 from sloshlab.consistency.examination import Reference, examined, like_series
@@ -26,8 +34,8 @@ FACTORS = (0.3, 0.5, 0.7, 1.0, 1.5, 2.5)
 THRESHOLDS: tuple[tuple[Any, str], ...] = (
     (between_runs, "_SIGMA"),
     (bounds, "_SIGMA"),
-    (examination, "SIGMA"),
-    (examination, "_COMPRESSION_SIGMA"),
+    (force_over_time, "SIGMA"),
+    (noise_findings, "_COMPRESSION_SIGMA"),
     (like_sensors, "SIGMA"),
     (like_sensors, "_MEAN_SIGMA"),
     (samples, "_SPIKE_SIGMA"),
