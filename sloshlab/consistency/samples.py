@@ -26,7 +26,8 @@ _NEIGHBOURHOOD_S = 1.0
 """To each side of a stretch, what its signal is compared with."""
 _HOLD_MARGIN = 3.0
 """A sine holds one step of its converter at its crest; three times as long it cannot."""
-_SHORTEST_HOLD = 6
+_SHORTEST_HOLD = 12
+"""Random motion of several modes stands still for half as long by chance, once in some minutes."""
 _QUIETEST_STRETCH = 24
 """Samples over which the noise of a channel must vanish before it is called made up."""
 _MADE_UP_SHARE = 0.02
