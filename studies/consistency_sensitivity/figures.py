@@ -76,6 +76,7 @@ def draw_operating_points(points: Sequence[dict[str, float]], path: Path) -> Non
     axis.set_xlabel("undamaged recordings flagged [%]")
     axis.set_ylabel("damages found that move W̄ or β by > 3 % [%]")
     axis.grid(alpha=0.4)
+    axis.margins(0.1)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
