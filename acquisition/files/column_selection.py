@@ -395,6 +395,12 @@ def common_time(selected: Sequence[Selected], jitter_allowed_steps: float) -> Co
     first_points, offsets, traps = [], [], []
     for column in selected:
         steps = (column.grid.start_s - start) * rate
+        if not np.isfinite(steps):
+            raise ChannelMapError(
+                f"channels.{column.channel}: time",
+                got=f"a start at {column.grid.start_s:.6g} s, of others at {start:.6g} s",
+                allowed="columns that overlap in time",
+            )
         whole = int(np.rint(steps))
         offset = (steps - whole) / rate
         allowed = jitter_allowed_steps + column.grid.resolution_s * rate

@@ -58,6 +58,15 @@ Q5>5s@E5K&kJDqRGw5#ahw~V2sBoQioQW2A+LwPW&?L@Bb#Xpy5vR#=JWlJeI1Q&B=Zh`!(qXNA|IqU9
 RB7W4>bqh0*ERZut^HJ_GHtX^_1At+?ejrTYafQ{_|9UVuDw#Ynax!8>GDbcpP*~Ih5kru&8ev-
 Pb=p!U=8cT_J7m6ll|PcKYjk2PBs6}F8?}CHUFCDSKRh=`DF(7H?S|5_y
 """
+_LVM_START = r"""
+c-n20OK;mS49CyZr`S2OQ9Ud_jzgNE1KJ+eHq9<GlvUk~`cc@<_n(|vBm*=E5}6SBBl#zN>yG;$yXP-=-c6^`cfOxNJde%n$9nI_sTq3E;-_~n
+7lsG_?nXBcBRsmJxb}aV&b2jJ6LEKH=cc|1j!pk}g8M-n>g~{;x_$!x3g3=Xc$mG|Y&N_8r5;|-cl{WiL4er)bA9jI2{eFsaNT?BC&;tqD}L2a
+eKXg$?&w>1yNB*-`mG_vzivYQ=L{di>ElNnB*;X0Bg^nFcV8uheB0U8hviwS${MBZ#re~uU?J>Xd-Cud9BhYfX_kOg>BP$A1F2TY`6PqcB>HRy
+MaFzRL0YUni@%Ikosm^0#fN*2-X(GnDJT-C3XLi{6B@G!-VAP|RS`RjnWq_*qcCQw869gUc#an<a<5`cZP18y6B@6jim@@GD$z(ymsB?8s2CgT
+QN+f&LkBFYF<Lb*Jw_#ZK~fMtMS;Q`SS)gNCN>G4Dn`fQP&pcLh(e>$oy{AA8=M1zTkJ={%8{sr<wdS^f|n!)(L<y)rk0cvvPla`S}?dpEr^|A
+I}Fo8lNOAwaTFxms@RW`{43PL@TFSm1g}U7!<Q;*K_PW?mVBvj4j4Pbb{Mu)u^skesZd|TmujU`%!0Hae5f~Sq1jfgaKp9=rLcUfq7<Z$p>B|p
+nv#_K{T7wbY^!2B@{9Ky&MV^o13#TUz5
+"""
 
 FOUND: dict[str, tuple[str, bytes]] = {
     # ZeroDivisionError in the search for the simplest rate
@@ -77,5 +86,7 @@ FOUND: dict[str, tuple[str, bytes]] = {
     "MF4 channel with its invalidation bit far outside the record": ("mf4", _unpacked(_MF4)),
     # OverflowError, as the times are of all sizes that a float has
     "MF4 times of which an index does not fit into 64 bits": ("mf4", _unpacked(_MF4_TIMES)),
+    # OverflowError, as one column begins beyond all steps of a float
+    "LVM column that begins at 1e308 s": ("lvm", _unpacked(_LVM_START)),
 }
 """What it was → target and content."""
