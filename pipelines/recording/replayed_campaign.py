@@ -22,6 +22,7 @@ from typing import IO, Any, Final
 import numpy as np
 import xarray as xr
 
+from pipelines.report.outputs import RESULT_ID
 from pipelines.report.progress import progress
 from pipelines.sweep.folder import recordings_and_rigs
 from pipelines.sweep.outputs import write_experiment
@@ -213,13 +214,13 @@ def differences(run: Path, recording: Path) -> list[str]:
 
 
 def window_differences(expected: xr.Dataset, found: xr.Dataset) -> list[str]:
-    """How two `windows.nc` differ, bit by bit; only the hashes of the input files may."""
+    """How two `windows.nc` differ, bit by bit; only the hashes of the input files, and what they make, may."""
     texts = [f"{name} is only in one of them" for name in sorted(_names(expected) ^ _names(found))]
     for name in sorted(_names(expected) & _names(found)):
         wanted, got = expected[name], found[name]
         if wanted.dtype != got.dtype or _bits(wanted) != _bits(got) or wanted.attrs != got.attrs:
             texts.append(f"{name} differs")
-    keys = {*expected.attrs, *found.attrs} - {"inputs"}
+    keys = {*expected.attrs, *found.attrs} - {"inputs", RESULT_ID}
     return texts + [
         f"attribute {key} differs"
         for key in sorted(keys)
