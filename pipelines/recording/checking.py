@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -15,7 +16,7 @@ from sloshlab.conditioning.quality import ChannelQuality, RunQuality, quality_of
 from sloshlab.conditioning.redundancy import PairAgreement
 from sloshlab.consistency.examination import Reference
 from sloshlab.consistency.finding import ConsistencyExamination
-from sloshlab.errors import InputError, RecordingError
+from sloshlab.errors import InputError, RecordingError, RigError
 from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import read_recording
 from sloshlab.rig import Rig
@@ -79,10 +80,14 @@ def _examined(path: Path) -> tuple[RunQuality, ConsistencyExamination]:
 
 
 def _rig_beside(path: Path, recording: xr.Dataset) -> Rig | None:
-    """The rig that a recording names, if it lies beside it."""
+    """The rig that a recording names, if it lies beside it and can be read: a recording may be good without."""
     name = str(recording.attrs.get("rig", ""))
     file = path.parent / name
-    return Rig.from_toml(file) if name and name == Path(name).name and file.is_file() else None
+    if not name or name != Path(name).name or not file.is_file():
+        return None
+    with contextlib.suppress(RigError):
+        return Rig.from_toml(file)
+    return None
 
 
 def _consistency_lines(examination: ConsistencyExamination) -> list[str]:

@@ -40,7 +40,7 @@ _FEWEST_SIBLINGS: Final = 3
 def sensor_findings(
     series: Sequence[tuple[SensorSeries, float]], of_still_run: Sequence[SensorSeries], inertia: Inertia
 ) -> list[Finding]:
-    """Gains and delays of like sensors against those of a run without liquid motion."""
+    """Gains of like sensors against those of a run without liquid motion."""
     findings = []
     before = {(one.name, one.reference): one for one in of_still_run}
     for one, share in series:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 import xarray as xr
@@ -34,7 +35,11 @@ from sloshlab.consistency.series import SensorSeries, sensor_series
 from sloshlab.consistency.statement import law_finding, level_finding
 from sloshlab.errors import AnalysisError
 from sloshlab.experiments import EXPERIMENTS, OTHER
+from sloshlab.recording import channels
 from sloshlab.rig import Rig
+
+_READABLE: Final = (1e-100, 1e100)
+"""Magnitudes of which squares and products are numbers; no sensor reads others."""
 
 
 @dataclass(frozen=True)
@@ -77,12 +82,24 @@ def examined(
     findings, wrong = examined_samples(recording, names)
     result = ConsistencyExamination(str(recording.attrs.get("run_id", "unnamed")), tuple(findings), (), wrong)
     measured = result.measured_only(recording)
+    if beyond := _beyond_computing(measured):
+        why = f"its readings are not within {_READABLE[0]:g} … {_READABLE[1]:g}"
+        return result.with_findings((), [OpenPoint(f"all but single samples of {beyond}", why)])
     experiment = str(recording.attrs.get("experiment", OTHER))
     if experiment in EXPERIMENTS and EXPERIMENTS[experiment].moves == "shaker":
         return _examined_on_shaker(result, measured, known, is_modulated=EXPERIMENTS[experiment].is_modulated)
     found, missing = _of_like_sensors(measured, Inertia.of(None, math.nan))
     more, not_checked = _of_carried_tank(measured, known.rig)
     return result.with_findings(found + more, missing + not_checked)
+
+
+def _beyond_computing(recording: xr.Dataset) -> str:
+    """The first channel whose largest reading is no magnitude to compute with; empty if all are."""
+    for name in channels(recording):
+        largest = float(np.nanmax(np.abs(recording[name].values), initial=0.0))
+        if largest and not _READABLE[0] <= largest <= _READABLE[1]:
+            return name
+    return ""
 
 
 def _of_carried_tank(recording: xr.Dataset, rig: Rig | None) -> tuple[list[Finding], list[OpenPoint]]:

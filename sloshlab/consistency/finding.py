@@ -94,7 +94,7 @@ def contradiction(
     check, what, channels
         As in `Finding`.
     effect : tuple of float
-        Largest errors of W̄ and β; an effect that is not known is not known to be small.
+        Largest errors of W̄ and β; where neither is known it is not known to be small.
     time_s : tuple of float
         When it begins and ends.
 

@@ -45,8 +45,6 @@ class ForceResponse:
         τ, positive: force comes later.
     bend, bend_std : float
         c a², the part of the force that is missing (negative) at the largest acceleration a of the stretch.
-    largest_acceleration_m_per_s2 : float
-        a.
     stop_s : float
         Where the stretch ends.
     """
@@ -57,7 +55,6 @@ class ForceResponse:
     delay_std_s: float
     bend: float
     bend_std: float
-    largest_acceleration_m_per_s2: float
     stop_s: float
 
 
@@ -87,7 +84,7 @@ def stop_response(recording: xr.Dataset) -> ForceResponse | None:
 
 
 def still_response(recording: xr.Dataset) -> ForceResponse | None:
-    """Response of a run without liquid motion, all of it."""
+    """Response of a run without liquid motion, of its first 60 000 samples at most."""
     acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
     return _response(recording, acceleration, slice(0, min(acceleration.size, _LONGEST_RUN_SAMPLES)))
 
@@ -142,10 +139,10 @@ def _response(recording: xr.Dataset, acceleration: FloatArray, stretch: slice) -
     force = np.asarray(total_force(recording).values[stretch], dtype=np.float64)
     motion = acceleration[stretch]
     jerk = np.gradient(motion, step_s)
-    waves = _wave_columns(acceleration, stretch)
     there = np.isfinite(force + motion + jerk)
     if there.sum() < _FEWEST_SAMPLES:
         return None
+    waves = _wave_columns(acceleration, stretch)
     force, motion, jerk = force[there], motion[there] - motion[there].mean(), jerk[there]
     largest = float(np.abs(motion).max())
     if largest == 0:
@@ -155,10 +152,10 @@ def _response(recording: xr.Dataset, acceleration: FloatArray, stretch: slice) -
     # the bend from a fit of its own: with it, mass and delay would be known ten times worse
     solution, std = _least_squares(linear, force, motion)
     bent, bent_std = _least_squares(cubic, force, motion)
-    if solution[0] <= 0:
+    omega = float(np.std(jerk) / np.std(motion))
+    if solution[0] <= 0 or omega == 0:
         return None
     # F = M cos ωτ ü − M sin(ωτ)/ω u⃛ at the frequency of the stretch
-    omega = float(np.std(jerk) / np.std(motion))
     mass = float(math.hypot(solution[0], solution[1] * omega))
     time = recording["time"].values[stretch]
     return ForceResponse(
@@ -168,7 +165,6 @@ def _response(recording: xr.Dataset, acceleration: FloatArray, stretch: slice) -
         delay_std_s=float(std[1]) / mass,
         bend=float(bent[-1]) / mass,
         bend_std=float(bent_std[-1]) / mass,
-        largest_acceleration_m_per_s2=largest,
         stop_s=float(time[-1]),
     )
 
@@ -195,7 +191,11 @@ def _least_squares(columns: FloatArray, values: FloatArray, motion: FloatArray) 
 
     Newey & West, 10.2307/1913610.
     """
-    inverse = np.linalg.inv(columns.T @ columns)
+    # each column over its length: a jerk is a hundred times a motion; what is not independent gets nothing
+    lengths = np.linalg.norm(columns, axis=0)
+    lengths[lengths == 0] = 1.0
+    columns = columns / lengths
+    inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
     solution = inverse @ (columns.T @ values)
     scores = columns * (values - columns @ solution)[:, None]
     spread = scores.T @ scores
@@ -205,7 +205,8 @@ def _least_squares(columns: FloatArray, values: FloatArray, motion: FloatArray) 
         spread += (1 - lag / (n_lags + 1)) * (product + product.T)
     # few periods tell little of their own scatter
     shortage = scores.shape[0] / max(scores.shape[0] - columns.shape[1] * n_lags / 2, 1.0)
-    return solution, np.sqrt(np.diag(inverse @ spread @ inverse) * max(shortage, 1.0))
+    variance = np.maximum(np.diag(inverse @ spread @ inverse), 0.0) * max(shortage, 1.0)
+    return solution / lengths, np.sqrt(variance) / lengths
 
 
 def _period(motion: FloatArray) -> int:

@@ -74,16 +74,6 @@ def prediction_error(values: FloatArray) -> FloatArray:
     return error
 
 
-def white_noise_std(values: FloatArray) -> float:
-    """Standard deviation of the white noise of a channel, robust against motion, spikes and lost samples."""
-    error = prediction_error(values)[2:-2]
-    error = error[np.isfinite(error)]
-    if error.size == 0:
-        return math.nan
-    # the median of |e| is 0.6745 σ of a normal distribution
-    return float(np.median(np.abs(error - np.median(error))) / 0.6745 / WHITE_GAIN)
-
-
 def examined_samples(
     recording: xr.Dataset, names: Sequence[str] | None = None, *, checks: Sequence[str] = tuple(SAMPLE_CHECKS)
 ) -> tuple[list[Finding], dict[str, BoolArray]]:
@@ -110,10 +100,11 @@ def examined_samples(
     if recording.sizes["time"] < 8 * _QUIETEST_STRETCH:
         return findings, wrong
     rate_hz = 1.0 / sampling_step_s(recording)
-    signals = {name: np.asarray(recording[name].values, dtype=np.float64) for name in channels(recording)}
+    over_largest = {name: _over_its_largest(recording[name]) for name in channels(recording)}
+    signals = {name: values for name, values in over_largest.items() if values is not None}
     errors = {name: standardised_errors(values, rate_hz) for name, values in signals.items()}
     time = recording["time"].values
-    for name in signals if names is None else names:
+    for name in signals if names is None else [name for name in names if name in signals]:
         # a blow is felt by more than one sensor, a disturbed sample by one
         spiked = spikes(errors[name]) & ~_felt_elsewhere(name, errors)
         spiked &= np.abs(prediction_error(signals[name])) > _SMALLEST_SPIKE * np.nanstd(signals[name])
@@ -133,6 +124,13 @@ def examined_samples(
                 findings.append(_found(check, name, samples, time))
                 wrong[name] = wrong.get(name, np.zeros(samples.size, dtype=np.bool_)) | samples
     return findings, wrong
+
+
+def _over_its_largest(channel: xr.DataArray) -> FloatArray | None:
+    """Values over the largest of them, as every check is one of proportions; None where nothing was measured."""
+    values = np.asarray(channel.values, dtype=np.float64)
+    largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+    return values / largest if largest > 0 else None
 
 
 def _found(check: str, name: str, samples: BoolArray, time: FloatArray) -> Finding:
@@ -223,10 +221,10 @@ def filled_samples(values: FloatArray, rate_hz: float) -> BoolArray:
     """True where a channel that has noise before and after has none: a gap closed by a line or a curve."""
     error = prediction_error(values)
     # NaN neither hides nor makes a stretch: it counts as noise
-    power = np.where(np.isfinite(error), error**2, np.inf)
+    power = np.where(np.isfinite(error), error**2, np.finfo(np.float64).max)
     largest = maximum_filter1d(power, _QUIETEST_STRETCH)
     n = round(_NEIGHBOURHOOD_S * rate_hz)
-    finite = np.where(np.isfinite(power), power, 0.0)
+    finite = np.where(np.isfinite(error), power, 0.0)
     usual = uniform_filter1d(np.minimum(finite, 9 * np.median(finite)), n)
     # the quieter side: before a motion starts and after it stops nothing is compared
     beside = np.minimum(np.roll(usual, n), np.roll(usual, -n))

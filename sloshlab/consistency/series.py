@@ -10,6 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from sloshlab.conditioning.block_spectra import block_spectra
+from sloshlab.errors import AnalysisError
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -83,13 +84,15 @@ def sensor_series(recording: xr.Dataset, name: str, reference: xr.DataArray) -> 
     Raises
     ------
     AnalysisError
-        If the run is too short or has no block without lost samples.
+        If the run is too short, has no block without lost samples, or no motion.
     """
     x = np.asarray(reference.values, dtype=np.float64)
     spectra = block_spectra(recording, [name], x)
     there = spectra.power > _WEAK_BLOCK * np.median(spectra.power)
     cross, power = spectra.cross[0][there], spectra.power[there]
     omega = spectra.omega_rad_per_s[there]
+    if power.size == 0:
+        raise AnalysisError(f"channel {reference.name}", got="no motion", allowed="a motion to compare with")
     sign = 1.0 if cross.real.sum() >= 0 else -1.0
     start_s = float(recording["time"].values[0])
     return SensorSeries(

@@ -16,7 +16,6 @@ from sloshlab.consistency.samples import (
     repeated_samples,
     spikes,
     standardised_errors,
-    white_noise_std,
 )
 
 CELL = "force_cell_1"
@@ -158,14 +157,6 @@ def test_only_the_named_channels_and_checks(clean):
     assert not examined_samples(wrong, ["force_cell_2"])[0]
     assert not examined_samples(wrong, checks=("spikes",))[0]
     assert set(SAMPLE_CHECKS) >= {"held samples", "spikes"}
-
-
-def test_white_noise_is_measured_beside_a_motion():
-    generator = np.random.default_rng(5)
-    time = np.arange(40_000) / RATE_HZ
-    values = 10 * np.sin(2 * np.pi * 7 * time) + 0.05 * generator.standard_normal(time.size)
-    values[::997] += 4.0
-    assert white_noise_std(values) == pytest.approx(0.05, rel=0.03)
 
 
 def test_the_prediction_error_of_a_cubic_is_zero():

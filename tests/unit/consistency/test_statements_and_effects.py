@@ -11,11 +11,12 @@ from scipy.integrate import quad
 from shaken_tank import DRY_KG, LIQUID_KG, RATE_HZ, shifted, tank_run, with_channel
 
 from sloshlab.conditioning.calibration import identify_dry_mass
-from sloshlab.consistency.between_runs import calibration_findings
+from sloshlab.consistency.between_runs import calibration_findings, sibling_findings
 from sloshlab.consistency.bounds import window_findings
 from sloshlab.consistency.effect import Inertia
 from sloshlab.consistency.examination import Reference, examined, like_series
 from sloshlab.consistency.finding import Action
+from sloshlab.consistency.force_response import start_response
 from sloshlab.consistency.sensor_response import pair_noise
 from sloshlab.rig import Rig
 
@@ -239,3 +240,33 @@ def test_a_delay_where_the_motion_dies_away(n_samples, wrong):
     if wrong:
         assert f"{1e3 * abs(n_samples) / RATE_HZ:.2g}"[:3] in found[0].what
         assert ("late" in found[0].what) == (n_samples > 0)
+
+
+@pytest.mark.parametrize("configuration", ["sloshing", "frozen"])
+@pytest.mark.parametrize("experiment", ["shaker_sweep", "beam_free"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda values: 1e200 * values,
+        lambda values: 1e-200 * values,
+        lambda values: np.eye(1, values.size, 5_000).ravel(),
+        lambda values: 1.0 * np.arange(values.size),
+        lambda values: np.sign(values),
+        lambda values: np.where(np.arange(values.size) % 600 < 590, np.nan, values),
+        lambda values: np.where(np.arange(values.size) < 9_000, 0.0, values),
+    ],
+    ids=["huge", "tiny", "one blow", "ramp", "square", "mostly lost", "late"],
+)
+def test_any_readings_end_in_an_examination(change, experiment, configuration):
+    base = tank_run(duration_s=20.0, experiment=experiment, configuration=configuration)
+    examined(changed(base, list(base.data_vars), change), Reference(RIG))
+
+
+@pytest.mark.parametrize(("factor", "odd"), [(1.0, set()), (1.04, {"c"}), (0.95, {"c"})])
+def test_a_run_that_starts_unlike_its_siblings(factor, odd):
+    starts = {name: start_response(tank_run(seed=seed)) for seed, name in enumerate("abd")}
+    starts["c"] = start_response(changed(tank_run(seed=9), FORCES, lambda values: factor * values))
+    found = sibling_findings(starts, RIG, Inertia.of(RIG, 20.0))
+    assert set(found) == odd
+    # two runs do not tell which of them is odd
+    assert not sibling_findings({name: starts[name] for name in "ac"}, RIG, Inertia.of(RIG, 20.0))
