@@ -8,21 +8,19 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from sealed_trial.perturbed_case import write_perturbed_case
 from sealed_trial.sealing.key import PREFIX, is_key
-from sealed_trial.sealing.trial_folder import (
-    READABLE,
-    Commitments,
-    check_data,
-    read_commitments,
-)
+from sealed_trial.sealing.selection import EVERYTHING, Selection
+from sealed_trial.sealing.trial_folder import READABLE, check_data, read_commitments
 from sloshlab.atomic_file import write_bytes
 from sloshlab.errors import InputError
 
@@ -97,9 +95,12 @@ def run_trial(
     n_workers: int,
     time_limit_s: float,
     command: Sequence[str] = DIAGNOSE,
+    chosen: Selection = EVERYTHING,
+    diagnoses: str = DIAGNOSES,
+    perturbation: int | None = None,
     finished: Callable[[Outcome], None] = lambda outcome: None,
 ) -> list[Outcome]:
-    """Diagnose all cases that have not been; what was done before stays.
+    """Diagnose all chosen cases that have not been; what was done before stays.
 
     Parameters
     ----------
@@ -110,24 +111,36 @@ def run_trial(
         Of wall time per case.
     command : sequence of str
         Is given the case and `-o FOLDER`.
+    chosen : Selection
+    diagnoses : str
+        Folder of the trial that takes the answers.
+    perturbation : int, optional
+        Seed by which the recordings are moved a little; as they are, by default.
     finished : callable
         Told every outcome.
 
     Raises
     ------
     InputError
-        If data are not what was published.
+        If data are not what was published, or a case is chosen that there is not.
     """
     commitments = read_commitments(trial)
     if commitments.purpose == "sealed" and (trial / READABLE).exists():
         raise InputError(f"{trial / READABLE}", got="readable truths", allowed="a sealed trial without them")
-    for case in commitments.cases:
-        check_data(trial, case)
-    outcomes = {name: outcome for name in _names(commitments) if (outcome := _known(trial, name)) is not None}
-    waiting = [name for name in _names(commitments) if name not in outcomes]
+    published = {case.case: case for case in commitments.cases}
+    names = chosen.of(list(published))
+    for name in names:
+        check_data(trial, published[name])
+    outputs = {name: trial / diagnoses / name for name in names}
+    outcomes = {name: outcome for name, output in outputs.items() if (outcome := _known(output)) is not None}
+    waiting = [name for name in names if name not in outcomes]
     stopping = threading.Event()
+    watched = _Watched(command, time_limit_s, stopping)
     with ThreadPoolExecutor(n_workers) as pool:
-        tasks = [pool.submit(_diagnosed, trial, name, command, time_limit_s, stopping) for name in waiting]
+        tasks = [
+            pool.submit(_answered, trial / "cases" / name, outputs[name], perturbation, watched)
+            for name in waiting
+        ]
         try:
             for task in as_completed(tasks):
                 outcome = task.result()
@@ -137,43 +150,62 @@ def run_trial(
             stopping.set()
             pool.shutdown(cancel_futures=True)
             raise
-    return [outcomes[name] for name in _names(commitments)]
+    return [outcomes[name] for name in names]
 
 
-def _names(commitments: Commitments) -> list[str]:
-    return [case.case for case in commitments.cases]
+@dataclass(frozen=True)
+class _Watched:
+    """How every case is diagnosed: by which command, how long at most, and until when at all."""
+
+    command: Sequence[str]
+    time_limit_s: float
+    stopping: threading.Event
 
 
-def _known(trial: Path, case: str) -> Outcome | None:
-    path = trial / DIAGNOSES / case / OUTCOME
+def _known(output: Path) -> Outcome | None:
+    path = output / OUTCOME
     if not path.exists():
         return None
     stored: dict[str, Any] = json.loads(path.read_bytes())
     return Outcome(**stored)
 
 
-def _diagnosed(
-    trial: Path, case: str, command: Sequence[str], time_limit_s: float, stopping: threading.Event
-) -> Outcome:
-    """One case in a process of its own, watched."""
-    if stopping.is_set():
+def _answered(case: Path, output: Path, perturbation: int | None, watched: _Watched) -> Outcome:
+    """One case, or the same a little moved, in a process of its own."""
+    if watched.stopping.is_set():
         raise KeyboardInterrupt
-    output = trial / DIAGNOSES / case
+    with _as_given_or_moved(case, perturbation) as folder:
+        return _diagnosed(folder, output, watched)
+
+
+@contextlib.contextmanager
+def _as_given_or_moved(case: Path, perturbation: int | None) -> Iterator[Path]:
+    if perturbation is None:
+        yield case
+        return
+    with tempfile.TemporaryDirectory(prefix="sloshlab-trial-") as temporary:
+        moved = Path(temporary) / case.name
+        write_perturbed_case(case, moved, perturbation)
+        yield moved
+
+
+def _diagnosed(case: Path, output: Path, watched: _Watched) -> Outcome:
+    """One case in a process of its own, watched."""
     output.mkdir(parents=True, exist_ok=True)
-    words = [*command, str(trial / "cases" / case), "-o", str(output)]
+    words = [*watched.command, str(case), "-o", str(output)]
     with (output / "stderr.txt").open("w+b") as errors:
         started = time.monotonic()
         process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True
         )
-        status, code, usage = _waited(process.pid, started + time_limit_s, stopping)
+        status, code, usage = _waited(process.pid, started + watched.time_limit_s, watched.stopping)
         wall = time.monotonic() - started
         errors.seek(max(0, errors.tell() - 2000))
         last = (errors.read().decode(errors="replace").strip().splitlines() or [""])[-1][-500:]
     process.returncode = code  # was waited for by its number, for its use of processor and memory
     if status == "done" and (code not in (0, 3) or not (output / "verdict.json").is_file()):
         status = "crashed"
-    outcome = Outcome(case, status, code, round(wall, 2), round(usage[0], 2), round(usage[1], 1), last)
+    outcome = Outcome(case.name, status, code, round(wall, 2), round(usage[0], 2), round(usage[1], 1), last)
     write_bytes(output / OUTCOME, json.dumps(asdict(outcome), indent=1, sort_keys=True).encode() + b"\n")
     return outcome
 

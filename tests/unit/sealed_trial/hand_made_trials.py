@@ -6,6 +6,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import xarray as xr
+
 from sealed_trial.case_drawing import HiddenTruth
 from sealed_trial.sealing.trial_folder import Commitments, _written
 
@@ -24,15 +27,24 @@ def truth(case: str, kind: str, *effects: dict[str, Any], accepted: list[list[st
 
 
 def written_trial(folder: Path, truths: list[HiddenTruth], key: bytes | None) -> Commitments:
-    """A sealed (or, without a key, a development) trial whose recordings are text."""
+    """A sealed (or, without a key, a development) trial whose recordings are noise of a few samples."""
     for its_truth in truths:
         place = folder / "cases" / its_truth.case
         (place / "recordings").mkdir(parents=True)
         (place / "rig.toml").write_text("[tank]\n")
-        (place / "recordings" / "run_01.nc").write_text(f"samples of {its_truth.case}")
+        counts = np.random.default_rng([int(its_truth.case[-3:])]).integers(-3000, 3000, 40).astype(np.int16)
+        written_recording(place / "recordings" / "run_01.nc", counts)
     purpose = "development" if key is None else "sealed"
     by_case = {its_truth.case: its_truth for its_truth in truths}
     return _written(folder, by_case, purpose=purpose, seed=1, key=key, secret=b"secret")
+
+
+def written_recording(path: Path, counts: np.ndarray) -> None:
+    """A recording of one channel as a laboratory stores it."""
+    time = ("time", np.arange(counts.size) / 100.0, {"units": "s"})
+    described = {"units": "N", "quantity": "force", "scale_factor": 0.002}
+    dataset = xr.Dataset({"force_tank": ("time", counts, described)}, coords={"time": time}, attrs={"run_id": "r"})
+    dataset.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding={"force_tank": {"_FillValue": None}})
 
 
 DIAGNOSIS = """

@@ -6,11 +6,14 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 from hand_made_trials import KEY, stand_in, truth, written_trial
 
 from sealed_trial.running import DIAGNOSES, OUTCOME, require_no_key, run_trial
 from sealed_trial.sealing.key import made_or_read_key
+from sealed_trial.sealing.selection import Selection
 from sealed_trial.sealing.trial_folder import READABLE
 from sloshlab.errors import InputError
 
@@ -97,3 +100,37 @@ def test_memory_is_that_of_a_process_and_its_copy_with_what_they_share_once(tmp_
     [outcome] = run_trial(trial, n_workers=1, time_limit_s=60.0, command=(sys.executable, str(script)))
     assert outcome.status == "done"
     assert 250.0 < outcome.memory_mib < 330.0
+
+
+def test_a_half_is_run_and_moved_recordings_are_answered_elsewhere(tmp_path) -> None:
+    """The stand-in copies what it is given: odd cases as they are, the third a millionth away."""
+    trial, script = tmp_path / "trial", tmp_path / "copies.py"
+    written_trial(trial, FOUR, None)
+    script.write_text(
+        "import pathlib, shutil, sys\n"
+        "case, output = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[3])\n"
+        "shutil.copytree(case, output / 'seen')\n"
+        "(output / 'verdict.json').write_text('{}')\n"
+    )
+    command = (sys.executable, str(script))
+    outcomes = run_trial(trial, n_workers=2, time_limit_s=60.0, command=command, chosen=Selection("odd"))
+    assert [outcome.case for outcome in outcomes] == ["case_001", "case_003"]
+    assert sorted(path.name for path in (trial / DIAGNOSES).iterdir()) == ["case_001", "case_003"]
+    run_trial(
+        trial,
+        n_workers=1,
+        time_limit_s=60.0,
+        command=command,
+        chosen=Selection("odd", ("case_003",)),
+        diagnoses="diagnoses_again",
+        perturbation=7,
+    )
+    assert [path.name for path in (trial / "diagnoses_again").iterdir()] == ["case_003"]
+    recording = Path("case_003", "seen", "recordings", "run_01.nc")
+    plain, moved = (
+        xr.open_dataset(trial / place / recording).load().force_tank for place in (DIAGNOSES, "diagnoses_again")
+    )
+    distance = np.sqrt(np.mean((moved - plain) ** 2) / np.mean(plain**2))
+    assert 5e-7 < distance < 2e-6
+    # the published recordings are what they were
+    run_trial(trial, n_workers=1, time_limit_s=60.0, command=("false",), chosen=Selection("odd"))
