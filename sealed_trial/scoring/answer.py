@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -39,6 +40,7 @@ class Answer:
     alternatives : frozenset of frozenset of str
         Every explanation that is said to be as good.
     probabilities : dict
+        By label: names in alphabetical order joined by '+', 'none' or 'unknown'.
     fit : dict
         Finite numbers of `fit`.
     """
@@ -88,9 +90,28 @@ def answer_of(verdict: dict[str, Any]) -> Answer:
         blocks={effect["name"]: effect["block"] for effect in effects},
         intervals=intervals,
         alternatives=frozenset(frozenset(names) for names in verdict.get("alternatives") or []),
-        probabilities=_numbers(verdict.get("probabilities") or {}),
+        probabilities=_by_label(_numbers(verdict.get("probabilities") or {})),
         fit=_numbers(verdict.get("fit") or {}),
     )
+
+
+def label(names: Iterable[str]) -> str:
+    """Names as one label.
+
+    Examples
+    --------
+    >>> label(["mains_hum", "coulomb_friction"])
+    'coulomb_friction+mains_hum'
+    """
+    return "+".join(sorted(names)) or "none"
+
+
+def _by_label(given: dict[str, float]) -> dict[str, float]:
+    probabilities: dict[str, float] = {}
+    for text, value in given.items():
+        its_label = label(name.strip() for name in text.split("+"))
+        probabilities[its_label] = probabilities.get(its_label, 0.0) + value
+    return probabilities
 
 
 def _interval(given: Any) -> Interval | None:

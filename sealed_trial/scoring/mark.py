@@ -2,6 +2,7 @@
 
 Right is
 - nothing missing: `nothing_missing`, or the effect that was put into the sensors as a nuisance, named;
+- wrong baseline that retuning mends: as nothing missing;
 - one effect: `named` with this name alone, in its block;
 - two effects: `named` with both names, in their blocks;
 - masked: as one effect, or `nothing_missing`, because below the floor nobody can know;
@@ -16,7 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from sealed_trial.scoring.answer import Answer
+from sealed_trial.scoring.answer import Answer, label
+
+NOTHING_HIDDEN: Final = ("nothing", "retunable")
+"""Classes of cases in which no physics is missing."""
 
 COLUMNS: Final = (
     "right name",
@@ -73,12 +77,12 @@ def marked(truth: dict[str, Any], answer: Answer) -> Mark:
     return Mark(
         case=truth["case"],
         kind=truth["kind"],
-        truth="+".join(sorted(effect["name"] for effect in effects)) or "none",
+        truth=label(effect["name"] for effect in effects),
         answered=_answered(answer),
         column=column,
         right=_is_right(truth["kind"], column, blocks_are_right),
         wrong_name=column == "wrong name",
-        false_alarm=truth["kind"] == "nothing" and detected and column != "right name",
+        false_alarm=truth["kind"] in NOTHING_HIDDEN and detected and column != "right name",
         detected=detected,
         right_block=blocks_are_right,
         strength=max((effect["strength"] for effect in effects), default=0.0),
@@ -87,7 +91,7 @@ def marked(truth: dict[str, Any], answer: Answer) -> Mark:
 
 def _answered(answer: Answer) -> str:
     if answer.verdict == "named":
-        return "+".join(sorted(answer.names)) or "no answer"
+        return label(answer.names) if answer.names else "no answer"
     return {"nothing_missing": "none", "none_given": "no answer"}.get(answer.verdict, answer.verdict)
 
 
@@ -122,7 +126,7 @@ def _blocks_are_right(effects: list[dict[str, Any]], answer: Answer) -> bool:
 
 
 def _is_right(kind: str, column: str, blocks_are_right: bool) -> bool:
-    if kind == "nothing":
+    if kind in NOTHING_HIDDEN:
         return column in ("nothing missing", "right name")
     if kind == "outside":
         return column == "unknown, right block"
@@ -131,3 +135,9 @@ def _is_right(kind: str, column: str, blocks_are_right: bool) -> bool:
     if kind == "masked" and column == "nothing missing":
         return True
     return column == "right name" and blocks_are_right
+
+
+def right_labels(truth: dict[str, Any]) -> list[str]:
+    """Labels of `probabilities` that are right, by the same rules: every accepted set; 'none' for a masked one."""
+    labels = [label(names) for names in truth["accepted"]]
+    return [*labels, "none"] if truth["kind"] == "masked" else labels

@@ -62,7 +62,14 @@ def metadata_classifier(cases: Sequence[Mapping[str, float]], classes: Sequence[
     cases : sequence of mapping
         Features by name; a missing one is 0.
     classes : sequence of str
+
+    Returns
+    -------
+    Rate
+        Of no case where there are too few to have neighbours.
     """
+    if len(cases) <= N_NEIGHBOURS:
+        return rate(0, 0)
     names = sorted(set().union(*cases))
     table = np.array([[case.get(name, 0.0) for name in names] for case in cases])
     spread = table.std(axis=0)

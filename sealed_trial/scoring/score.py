@@ -12,8 +12,20 @@ import numpy as np
 
 from sealed_trial.composition import CLASSES
 from sealed_trial.running import Outcome
+from sealed_trial.scoring.acceptance import (
+    CLEAR_SINGLES,
+    FALSE_ALARMS,
+    INTERVALS,
+    LOOK_ALIKES,
+    OUTSIDE,
+    PAIRS,
+    WRONG_NAMES,
+    Aim,
+    acceptance,
+)
 from sealed_trial.scoring.answer import NO_ANSWER, Answer
-from sealed_trial.scoring.mark import COLUMNS, Mark, marked
+from sealed_trial.scoring.calibration import Calibration, all_labels, calibration, top_labels
+from sealed_trial.scoring.mark import COLUMNS, NOTHING_HIDDEN, Mark, marked, right_labels
 from sealed_trial.scoring.statistics import DetectionCurve, Rate, brier, detection_curve, logarithmic, rate
 
 CLEAR: Final = 3.0
@@ -69,12 +81,16 @@ class Score:
         By case.
     rates : dict
         By a sentence that says of what.
+    calibrations : dict
+        Of the answer given and of all labels.
+    acceptance : tuple of Aim
+        What was asked and what was reached.
     columns_of_classes : dict
         Counts by class and column.
     names : dict
         Counts by true and answered name.
     log_score, brier_score : float
-        Mean over cases with one label; NaN without any.
+        Mean over cases with probabilities; NaN without any.
     held : tuple of Held
     gains : tuple of Gain
     after_over_ceiling : float
@@ -88,6 +104,8 @@ class Score:
     marks: tuple[Mark, ...]
     outcomes: dict[str, Outcome]
     rates: dict[str, Rate]
+    calibrations: dict[str, Calibration]
+    acceptance: tuple[Aim, ...]
     columns_of_classes: dict[str, dict[str, int]]
     names: dict[str, dict[str, int]]
     log_score: float
@@ -140,8 +158,15 @@ def scored(
     """
     given = {case: _valid(answers.get(case), outcomes.get(case)) for case in truths}
     marks = tuple(marked(truths[case], given[case]) for case in truths)
-    labelled = [(given[mark.case], _labels(truths[mark.case])) for mark in marks if mark.kind != "pair"]
-    labelled = [(answer, labels) for answer, labels in labelled if answer.probabilities]
+    stated = [
+        (answer.probabilities, right_labels(truths[case]))
+        for case, answer in given.items()
+        if answer.probabilities
+    ]
+    calibrations = {
+        "answer given": calibration(top_labels(stated)),
+        "all labels": calibration(all_labels(stated)),
+    }
     held = tuple(
         interval for mark in marks if mark.right for interval in _held(truths[mark.case], given[mark.case])
     )
@@ -149,18 +174,21 @@ def scored(
     right = {mark.case for mark in marks if mark.column == "right name"}
     ratios = [gain.after / gain.ceiling for gain in gains if gain.case in right and gain.ceiling > 0]
     visible = [mark for mark in marks if mark.kind in ("single", "masked", "look_alike", "outside")]
+    rates = _rates(marks, held)
     return Score(
         purpose=purpose,
         marks=marks,
         outcomes=dict(outcomes),
-        rates=_rates(marks, held),
+        rates=rates,
+        calibrations=calibrations,
+        acceptance=acceptance(rates, calibrations),
         columns_of_classes={
             kind: {column: sum(m.kind == kind and m.column == column for m in marks) for column in COLUMNS}
             for kind in CLASSES
         },
         names=_confusion(marks),
-        log_score=_mean([logarithmic(answer.probabilities, labels) for answer, labels in labelled]),
-        brier_score=_mean([brier(answer.probabilities, labels) for answer, labels in labelled]),
+        log_score=_mean([logarithmic(*one) for one in stated]),
+        brier_score=_mean([brier(*one) for one in stated]),
         held=held,
         gains=gains,
         after_over_ceiling=float(np.median(ratios)) if ratios else math.nan,
@@ -173,11 +201,6 @@ def _valid(answer: Answer | None, outcome: Outcome | None) -> Answer:
     return answer if answer is not None and outcome is not None and outcome.status == "done" else NO_ANSWER
 
 
-def _labels(truth: Mapping[str, Any]) -> list[str]:
-    """Labels of `probabilities` that are true: one name, 'none', 'unknown', or every equal of a look-alike."""
-    return ["+".join(sorted(names)) or "none" for names in truth["accepted"]]
-
-
 def _rates(marks: Sequence[Mark], held: Sequence[Held]) -> dict[str, Rate]:
     def of(chosen: Sequence[Mark], good: str) -> Rate:
         return rate(sum(bool(getattr(mark, good)) for mark in chosen), len(chosen))
@@ -186,18 +209,20 @@ def _rates(marks: Sequence[Mark], held: Sequence[Held]) -> dict[str, Rate]:
         return [mark for mark in marks if mark.kind == name]
 
     clear = [mark for mark in kind("single") if mark.strength > CLEAR]
+    complete = [mark for mark in marks if mark.kind in NOTHING_HIDDEN]
     return {
-        "false alarms where nothing is missing": of(kind("nothing"), "false_alarm"),
+        FALSE_ALARMS: of(complete, "false_alarm"),
         "nothing missing, answered right": of(kind("nothing"), "right"),
-        "clear single effects named in the right block": of(clear, "right"),
+        "wrong baseline that retuning mends, answered right": of(kind("retunable"), "right"),
+        CLEAR_SINGLES: of(clear, "right"),
         "clear single effects detected": of(clear, "detected"),
-        "pairs with both names": of(kind("pair"), "right"),
-        "look-alikes answered by the set": of(kind("look_alike"), "right"),
-        "outside the vocabulary, unknown with the right block": of(kind("outside"), "right"),
+        PAIRS: of(kind("pair"), "right"),
+        LOOK_ALIKES: of(kind("look_alike"), "right"),
+        OUTSIDE: of(kind("outside"), "right"),
         "masked effects named or left alone": of(kind("masked"), "right"),
-        "wrong names anywhere": of(list(marks), "wrong_name"),
+        WRONG_NAMES: of(list(marks), "wrong_name"),
         "no answer": rate(sum(mark.column == "no answer" for mark in marks), len(marks)),
-        "intervals that hold the truth": rate(sum(interval.inside for interval in held), len(held)),
+        INTERVALS: rate(sum(interval.inside for interval in held), len(held)),
     }
 
 

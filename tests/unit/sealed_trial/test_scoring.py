@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hand_made_trials import effect, truth
 
 from sealed_trial.running import Outcome
 from sealed_trial.scoring.answer import NO_ANSWER, answer_of, read_answer
-from sealed_trial.scoring.mark import marked
+from sealed_trial.scoring.mark import marked, right_labels
 from sealed_trial.scoring.rivals import commonest, metadata_classifier
 from sealed_trial.scoring.score import scored
 from sealed_trial.scoring.statistics import brier, detection_curve, logarithmic, rate
@@ -31,6 +32,8 @@ def verdict(kind: str, *effects: tuple[str, str], alternatives: list[list[str]] 
     [
         (truth("c", "nothing", accepted=[[]]), verdict("nothing_missing"), "nothing missing", True),
         (truth("c", "nothing", accepted=[[]]), verdict("named", ("sensor_drift", "sensor")), "wrong name", False),
+        (truth("c", "retunable", accepted=[[]]), verdict("nothing_missing"), "nothing missing", True),
+        (truth("c", "retunable", accepted=[[]]), verdict("unknown"), "unknown, wrong block", False),
         (
             truth("c", "nothing", accepted=[[], ["sensor_drift"]]),
             verdict("named", ("sensor_drift", "sensor")),
@@ -114,6 +117,7 @@ def test_marks_are_those_of_the_rules(hidden, said, column, right) -> None:
     mark = marked(asdict(hidden), answer_of(said))
     assert (mark.column, mark.right) == (column, right)
     assert mark.wrong_name == (column == "wrong name")
+    assert mark.false_alarm == (hidden.kind in ("nothing", "retunable") and not right)
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"verdict": "sure"}', '{"verdict": "named", "effects": 3}'])
@@ -176,17 +180,22 @@ def test_all_scores_of_a_trial_of_six_are_those_counted_by_hand() -> None:
     assert [mark.case for mark in score.failures] == ["b", "e"]
     assert score.names["mains_hum"] == {"no answer": 1}
     assert score.columns_of_classes["single"]["right name"] == 2
+    assert [aim.name for aim in score.acceptance if aim.standing == "met"] == []
+    assert score.calibrations["answer given"].n_cases == 2
     assert score.to_document()["rates"]["pairs with both names"]["value"] is None
 
 
-def test_the_interval_of_a_rate_is_that_of_clopper_and_pearson() -> None:
-    # closed forms: none of n gives (0, 1 − 0.025^{1/n}), all of n the mirror image
+def test_the_interval_of_a_rate_is_that_of_wilson() -> None:
+    # closed forms: none of n gives (0, z²/(n + z²)), all of n the mirror image
+    squared = NormalDist().inv_cdf(0.975) ** 2
     none, all_of_them = rate(0, 20), rate(20, 20)
-    assert (none.low, none.high) == pytest.approx((0.0, 1 - 0.025 ** (1 / 20)))
-    assert (all_of_them.low, all_of_them.high) == pytest.approx((0.025 ** (1 / 20), 1.0))
-    # tabulated: 1 of 20
-    assert (rate(1, 20).low, rate(1, 20).high) == pytest.approx((0.00127, 0.24873), abs=1e-5)
+    assert (none.low, none.high) == pytest.approx((0.0, squared / (20 + squared)))
+    assert (all_of_them.low, all_of_them.high) == pytest.approx((20 / (20 + squared), 1.0))
+    # another route: the bounds are the shares p from which 3 of 17 is just z standard deviations away
+    for bound in (rate(3, 17).low, rate(3, 17).high):
+        assert (3 / 17 - bound) ** 2 == pytest.approx(squared * bound * (1 - bound) / 17)
     assert math.isnan(rate(0, 0).value)
+    assert (rate(0, 0).low, rate(0, 0).high) == (0.0, 1.0)
 
 
 def test_scores_of_probabilities() -> None:
@@ -196,6 +205,17 @@ def test_scores_of_probabilities() -> None:
     assert brier({"a": 0.5, "b": 0.5}, ["a", "b"]) == 0
     assert brier({"none": 6.0, "a": 2.0}, ["none"]) == pytest.approx(0.25**2 + 0.25**2)
     assert logarithmic({"none": 0.0}, ["none"]) == pytest.approx(math.log(1000))
+
+
+def test_labels_that_are_right() -> None:
+    alike = truth("c", "look_alike", effect("asymmetric_friction"), accepted=ASYMMETRIC)
+    assert right_labels(asdict(alike)) == ["asymmetric_friction", "constant_force+coulomb_friction"]
+    # below the floor both may be said, by the marks as by the probabilities
+    assert right_labels(asdict(truth("c", "masked", FRICTION))) == ["coulomb_friction", "none"]
+    assert right_labels(asdict(truth("c", "nothing", accepted=[[]]))) == ["none"]
+    probabilities = {"mains_hum + coulomb_friction": 0.4, "coulomb_friction+mains_hum": 0.1}
+    said = answer_of({"verdict": "named", "probabilities": probabilities})
+    assert said.probabilities == {"coulomb_friction+mains_hum": pytest.approx(0.5)}
 
 
 def test_detection_sets_in_where_half_are_detected() -> None:
