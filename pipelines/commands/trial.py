@@ -1,4 +1,4 @@
-"""The blind proof: `trial seal`, `trial run`, `trial score`."""
+"""The blind proof: `trial seal`, `trial run`, `trial score`, `trial compare`."""
 
 from __future__ import annotations
 
@@ -24,6 +24,19 @@ Key = Annotated[
         show_default=False,
     ),
 ]
+Half = Annotated[
+    str | None,
+    typer.Option(
+        "--half", metavar="HALF", help="odd: cases that develop; even: cases that judge.", show_default=False
+    ),
+]
+Cases = Annotated[
+    str | None,
+    typer.Option("--cases", metavar="A,B,...", help="Cases by number or name; all.", show_default=False),
+]
+Diagnoses = Annotated[
+    str, typer.Option("--diagnoses", metavar="NAME", help="Folder of the trial that takes the answers.")
+]
 
 
 @trial.command()
@@ -47,20 +60,71 @@ def seal(
 @trial.command()
 def run(
     folder: Trial,
+    *,
     workers: Annotated[int, typer.Option(help="Cases at once.")] = 2,
     time_limit: Annotated[float, typer.Option(metavar="S", help="Seconds a case may take.")] = 180.0,
+    half: Half = None,
+    cases: Cases = None,
+    diagnoses: Diagnoses = "diagnoses",
+    perturb: Annotated[
+        int | None,
+        typer.Option(
+            "--perturb",
+            metavar="SEED",
+            min=0,
+            help="Recordings moved by a millionth; answers in DIAGNOSES_perturbed_SEED.",
+            show_default=False,
+        ),
+    ] = None,
     reports: Annotated[bool, typer.Option("--reports", help="Write the report of every case too.")] = False,
     as_json: Json = False,
 ) -> None:
     """Diagnose every case in a process of its own; goes on where it was stopped."""
     from pipelines.diagnosis.trial import run_cases
+    from sealed_trial.sealing.selection import selection_of
 
-    finish(run_cases(folder, n_workers=workers, time_limit_s=time_limit, reports=reports), as_json)
+    summary = run_cases(
+        folder,
+        selection_of(half, cases),
+        n_workers=workers,
+        time_limit_s=time_limit,
+        options=() if reports else ("--no-report",),
+        diagnoses=diagnoses,
+        perturbation=perturb,
+    )
+    finish(summary, as_json)
 
 
 @trial.command()
-def score(folder: Trial, output: OutputFolder, key: Key = None, as_json: Json = False) -> None:
+def score(
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="TRIAL...", help="Folders made by `seal`.", show_default=False)
+    ],
+    *,
+    output: OutputFolder,
+    key: Key = None,
+    half: Half = None,
+    cases: Cases = None,
+    diagnoses: Diagnoses = "diagnoses",
+    as_json: Json = False,
+) -> None:
     """Open the truths, check the commitments, count."""
-    from pipelines.diagnosis.trial import score_trial
+    from pipelines.diagnosis.trial_scores import score_trials
+    from sealed_trial.sealing.selection import selection_of
 
-    finish(score_trial(folder, output, key=key), as_json)
+    chosen = selection_of(half, cases)
+    finish(score_trials(folders, output, key=key, chosen=chosen, diagnoses=diagnoses), as_json)
+
+
+@trial.command()
+def compare(
+    folders: Annotated[
+        list[Path],
+        typer.Argument(metavar="A B...", help="Pairs of folders with the answers of a run.", show_default=False),
+    ],
+    as_json: Json = False,
+) -> None:
+    """Count the cases that two diagnoses answer alike, and list the others."""
+    from pipelines.diagnosis.trial_scores import compare_diagnoses
+
+    finish(compare_diagnoses(folders), as_json)

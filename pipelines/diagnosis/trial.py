@@ -1,34 +1,23 @@
-"""The commands of the blind trial: sealed, run and scored in three steps that share no process."""
+"""Two commands of the blind trial: sealed and run, in steps that share no process."""
 
 from __future__ import annotations
 
-import json
 import os
+import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from pipelines.diagnosis.trial_report import FILES, write_report
-from pipelines.report.outputs import provenance_of, sha256_of
 from pipelines.report.progress import progress
-from pipelines.report.result_folder import require_result_folder
-from sealed_trial.running import DIAGNOSE, DIAGNOSES, OUTCOME, Outcome, require_no_key, run_trial
-from sealed_trial.scoring.answer import read_answer
-from sealed_trial.scoring.rivals import commonest, metadata_classifier, metadata_features
-from sealed_trial.scoring.score import Score, scored
-from sealed_trial.sealing.key import made_or_read_key, read_key
-from sealed_trial.sealing.trial_folder import (
-    COMMITMENTS,
-    LOCKED,
-    READABLE,
-    check_data,
-    opened_truths,
-    read_commitments,
-    seal,
-)
+from sealed_trial.running import DIAGNOSE, DIAGNOSES, Outcome, require_no_key, run_trial
+from sealed_trial.sealing.key import made_or_read_key
+from sealed_trial.sealing.selection import Selection
+from sealed_trial.sealing.trial_folder import read_commitments, seal
 from sloshlab.errors import InputError
 
-MOST_WORKERS = 64
+MOST_WORKERS: Final = 64
+_FOLDER_OF_ANSWERS: Final = re.compile(rf"{DIAGNOSES}(_\w{{1,64}})?", re.ASCII)
 
 
 def seal_trial(folder: Path, *, seed: int, n_cases: int, key: Path | None, development: bool) -> dict[str, Any]:
@@ -54,8 +43,33 @@ def seal_trial(folder: Path, *, seed: int, n_cases: int, key: Path | None, devel
     return {"lines": lines, "cases": len(commitments.cases), "purpose": commitments.purpose}
 
 
-def run_cases(folder: Path, *, n_workers: int, time_limit_s: float, reports: bool) -> dict[str, Any]:
-    """Diagnose every case that has not been; return the summary of the command.
+def run_cases(
+    folder: Path,
+    chosen: Selection,
+    *,
+    n_workers: int,
+    time_limit_s: float,
+    options: Sequence[str] = (),
+    diagnoses: str = DIAGNOSES,
+    perturbation: int | None = None,
+) -> dict[str, Any]:
+    """Diagnose every chosen case that has not been; return the summary of the command.
+
+    Parameters
+    ----------
+    folder : Path
+        The trial.
+    chosen : Selection
+    n_workers : int
+        Cases at once.
+    time_limit_s : float
+        A case may take.
+    options : sequence of str
+        For `sloshlab diagnose`.
+    diagnoses : str
+        Folder of the trial that takes the answers; `_perturbed_SEED` is added to it where recordings are moved.
+    perturbation : int, optional
+        Seed of the moves.
 
     Raises
     ------
@@ -66,65 +80,40 @@ def run_cases(folder: Path, *, n_workers: int, time_limit_s: float, reports: boo
         raise InputError("--workers", got=str(n_workers), allowed=f"1 … {MOST_WORKERS}")
     if not time_limit_s > 0:
         raise InputError("--time-limit", got=f"{time_limit_s:g}", allowed="> 0")
+    require_folder_of_answers(diagnoses)
     # A process that could open the truths must not diagnose.
     require_no_key(folder, sys.argv, os.environ)
-    n_cases = len(read_commitments(folder).cases)
-    command = (*DIAGNOSE,) if reports else (*DIAGNOSE, "--no-report")
+    place = diagnoses if perturbation is None else f"{diagnoses}_perturbed_{perturbation}"
+    n_cases = len(chosen.of([case.case for case in read_commitments(folder).cases]))
     with progress("diagnosing cases", n_cases) as advance:
 
         def finished(outcome: Outcome) -> None:
             advance(f"{outcome.case} {outcome.status} in {outcome.wall_s:.0f} s")
 
         outcomes = run_trial(
-            folder, n_workers=n_workers, time_limit_s=time_limit_s, command=command, finished=finished
+            folder,
+            n_workers=n_workers,
+            time_limit_s=time_limit_s,
+            command=(*DIAGNOSE, *options),
+            chosen=chosen,
+            diagnoses=place,
+            perturbation=perturbation,
+            finished=finished,
         )
     bad = [outcome.case for outcome in outcomes if outcome.status != "done"]
     flags = (
         [f"{len(bad)} of {len(outcomes)} cases crashed or ran out of time: {', '.join(bad[:8])}"] if bad else []
     )
-    return {"lines": [f"{len(outcomes)} cases diagnosed"], "flags": flags, "cases": len(outcomes), "failed": bad}
+    lines = [f"{len(outcomes)} cases diagnosed, answers in {folder / place}"]
+    return {"lines": lines, "flags": flags, "cases": len(outcomes), "failed": bad}
 
 
-def score_trial(folder: Path, output: Path, *, key: Path | None) -> dict[str, Any]:
-    """Open the truths, score, write page, figures and `scores.json`; return the summary of the command.
+def require_folder_of_answers(name: str) -> None:
+    """Refuse a name that could be that of anything else in a trial, or lead out of it.
 
     Raises
     ------
     InputError
-        If a truth, a commitment or a recording is not what was sealed, or cases have not been run.
     """
-    require_result_folder(output, FILES)
-    score = score_of(folder, key)
-    cases = sorted((folder / DIAGNOSES).glob("*/*.json"))
-    diagnosed = {path.relative_to(folder).as_posix(): sha256_of(path) for path in cases}
-    truths = [path for path in (folder / name for name in (READABLE, LOCKED)) if path.is_file()]
-    write_report(score, output, provenance_of("", [folder / COMMITMENTS, *truths], settings=diagnosed))
-    lines = [f"{name}: {rate.successes} of {rate.n}" for name, rate in score.rates.items()]
-    lines.append(f"written: {output / 'blind_trial.md'}")
-    rates = {name: rate.value for name, rate in score.rates.items() if rate.n}
-    return {"lines": lines, "purpose": score.purpose, "rates": rates}
-
-
-def score_of(folder: Path, key: Path | None) -> Score:
-    """All scores of a trial that was run."""
-    commitments = read_commitments(folder)
-    # Recordings first: a score is worth nothing if a file is not the one that was published.
-    for case in commitments.cases:
-        check_data(folder, case)
-    truths = opened_truths(folder, commitments, None if key is None else read_key(key))
-    outcomes, answers = {}, {}
-    for name in truths:
-        place = folder / DIAGNOSES / name
-        if not (place / OUTCOME).is_file():
-            raise InputError(name, got="not diagnosed", allowed="all cases", remedy=f"sloshlab trial run {folder}")
-        outcomes[name] = Outcome(**json.loads((place / OUTCOME).read_bytes()))
-        answers[name] = read_answer(place / "verdict.json")
-    kinds = [truth["kind"] for truth in truths.values()]
-    # Rig and plan are drawn without knowing the class, so that whoever guesses it from all but the signals
-    # scores at chance.
-    features = [metadata_features(folder / "cases" / name) for name in truths]
-    rivals = {
-        "the commonest class, said of every case": commonest(kinds),
-        "nearest neighbours in the metadata alone": metadata_classifier(features, kinds),
-    }
-    return scored(commitments.purpose, truths, answers, outcomes, rivals)
+    if not _FOLDER_OF_ANSWERS.fullmatch(name):
+        raise InputError("--diagnoses", got=name, allowed=f"{DIAGNOSES} or {DIAGNOSES}_NAME")

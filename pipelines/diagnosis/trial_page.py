@@ -9,6 +9,8 @@ from typing import Final
 import numpy as np
 
 from pipelines.diagnosis.trial_figures import CLASS_WORDS
+from sealed_trial.scoring.acceptance import Aim
+from sealed_trial.scoring.calibration import Calibration
 from sealed_trial.scoring.score import Gain, Score
 from sealed_trial.scoring.statistics import Rate
 
@@ -19,16 +21,22 @@ CAPTIONS: Final = {
         "What became of every hidden effect against its strength; filled marks were answered right. "
         "The line is a logistic curve, the dashed one three times the noise floor."
     ),
+    "reliability": (
+        "How often it is true over the probability stated, in ten bins of as many forecasts each, "
+        "with Wilson's intervals; left the most probable label of every case, right every label."
+    ),
     "gains": "Error on held-out runs before and after, over that of the ceiling, as the verdicts state it.",
 }
 
 
-def page_text(score: Score, figures: Sequence[str]) -> str:
-    """The whole page."""
+def page_text(score: Score, figures: Sequence[str], about: str = "") -> str:
+    """The whole page; `about` says which trials and cases were scored."""
     title = "sealed" if score.purpose == "sealed" else "development"
     parts = [
         f"# Blind trial ({title} set)",
-        f"{len(score.marks)} cases. Intervals are those of Clopper and Pearson at 95 %.",
+        about,
+        f"{len(score.marks)} cases. Intervals are at 95 %, those of shares Wilson's.",
+        _acceptance(score.acceptance),
         _rates(score),
         _numbers(score),
         "\n\n".join(f"![{CAPTIONS[name]}](figures/{name}.png)\n\n{CAPTIONS[name]}" for name in figures),
@@ -53,6 +61,25 @@ def _share(rate: Rate) -> list[str]:
     return [f"{rate.successes} of {rate.n}", _percent(rate.value), interval]
 
 
+def _acceptance(aims: Sequence[Aim]) -> str:
+    rows = []
+    for aim in aims:
+        asked = (
+            f"{_fine(aim.least)} … {_fine(aim.most)}"
+            if aim.least and aim.most < 1
+            else (f"≥ {_fine(aim.least)}" if aim.least else f"≤ {_fine(aim.most)}")
+        )
+        reached = [_fine(aim.reached), "yes" if aim.within else "no", f"{_fine(aim.low)} … {_fine(aim.high)}"]
+        counted = [*reached, aim.standing] if aim.n else ["–", "–", "–", aim.standing]
+        rows.append([aim.name, str(aim.n), asked, *counted])
+    head = ["", "counted", "asked", "reached", "as asked", "interval", "standing"]
+    return "## Asked and reached\n\n" + _table(head, rows)
+
+
+def _fine(value: float) -> str:
+    return f"{100 * value:.1f} %"
+
+
 def _rates(score: Score) -> str:
     return _table(
         ["", "cases", "share", "interval"], [[name, *_share(rate)] for name, rate in score.rates.items()]
@@ -64,6 +91,10 @@ def _numbers(score: Score) -> str:
     rows = [
         ["logarithmic score of the probabilities, mean", _number(score.log_score)],
         ["Brier score, mean (0 … 2)", _number(score.brier_score)],
+        *[
+            [f"calibration error by chance alone, {kind}, mean and 97.5 %", _by_chance(calibration)]
+            for kind, calibration in score.calibrations.items()
+        ],
         ["held-out error after naming over the ceiling, median", _number(score.after_over_ceiling)],
         ["strength at which half of the effects are detected", _number(score.curve.half) if score.curve else "–"],
         ["processor time per case, median and largest", _spread([outcome.processor_s for outcome in done], "s")],
@@ -71,6 +102,10 @@ def _numbers(score: Score) -> str:
         ["memory per case, largest", _spread([outcome.memory_mib for outcome in done], "MiB")],
     ]
     return _table(["", ""], rows)
+
+
+def _by_chance(calibration: Calibration) -> str:
+    return f"{_number(calibration.by_chance)} and {_number(calibration.by_chance_high)}"
 
 
 def _number(value: float) -> str:

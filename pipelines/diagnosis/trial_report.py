@@ -22,7 +22,7 @@ FILES: Final = ("blind_trial.md", "scores.json")
 """What is written for certain."""
 
 
-def write_report(score: Score, folder: Path, provenance: Mapping[str, Any]) -> None:
+def write_report(score: Score, folder: Path, provenance: Mapping[str, Any], about: str = "") -> None:
     """Write `blind_trial.md`, its figures and `scores.json`, all together or none."""
     with result_folder(folder, provenance) as complete:
         drawn = {name: draw(score) for name, draw in FIGURES.items()}
@@ -31,6 +31,6 @@ def write_report(score: Score, folder: Path, provenance: Mapping[str, Any]) -> N
                 stamped = with_png_text(png, RESULT_ID, provenance[RESULT_ID])
                 atomic_file.write_bytes(complete / "figures" / f"{name}.png", stamped)
         shown = [name for name, png in drawn.items() if png is not None]
-        atomic_file.write_bytes(complete / "blind_trial.md", page_text(score, shown).encode())
+        atomic_file.write_bytes(complete / "blind_trial.md", page_text(score, shown, about).encode())
         document = json.dumps({RESULT_ID: provenance[RESULT_ID], **score.to_document()}, indent=1, sort_keys=True)
         atomic_file.write_bytes(complete / "scores.json", f"{document}\n".encode())
