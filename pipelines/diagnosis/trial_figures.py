@@ -74,7 +74,7 @@ def _counted(axes: Axes, table: np.ndarray, rows: list[str], columns: list[str])
     axes.tick_params(length=0)
     for (i, j), count in np.ndenumerate(table):
         if count:
-            colour = "white" if count > 0.5 * table.max() and table.max() > 1 else "black"
+            colour = "white" if count > 0.5 * table.max() else "black"
             size = 6.5 if len(columns) > _MOST_SLANTED else 8.5
             axes.text(j, i, f"{count:d}", ha="center", va="center", fontsize=size, color=colour)
 

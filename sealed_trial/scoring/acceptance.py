@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from sealed_trial.scoring.calibration import Calibration
-from sealed_trial.scoring.statistics import Rate
+from sealed_trial.scoring.statistics import Rate, rate
 
 Standing = Literal["met", "not met", "cannot tell at this size"]
 
@@ -85,8 +85,8 @@ def _of_calibration(kind: str, its: Calibration) -> Aim:
     most = LARGEST_CALIBRATION_ERROR
     standing: Standing = "cannot tell at this size"
     # where cases are few the interval is too narrow: what chance makes of right probabilities must fit in, too,
-    # and must not explain what is called an error
-    if max(its.error, its.high, its.by_chance) <= most:
+    # and a share of errors none of which was seen; chance must not explain what is called an error
+    if max(its.error, its.high, its.by_chance, rate(0, its.n_cases).high) <= most:
         standing = "met"
     elif its.low > most and its.error > its.by_chance_high:
         standing = "not met"

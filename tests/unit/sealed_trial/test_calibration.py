@@ -139,6 +139,9 @@ def test_an_aim_is_met_where_the_whole_interval_is_what_is_asked(word, counted, 
         ((0.9, 1000, 700), "not met", False),
         # by chance alone √(2 · 0.9 · 0.1/(π n)): 0.054 of 20 cases
         ((0.9, 20, 18), "cannot tell at this size", True),
+        # always certain, always right; an error never seen in n cases may have a share of z²/(n + z²)
+        ((1.0, 72, 72), "cannot tell at this size", True),
+        ((1.0, 73, 73), "met", True),
         ((0.9, 20, 16), "cannot tell at this size", False),
     ],
 )
