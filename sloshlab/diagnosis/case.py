@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -159,10 +158,11 @@ def level(run: CaseRun) -> float:
     ----------
     run : CaseRun
     """
-    names = [str(name) for name in run.recording.data_vars]
     for quantity in ("acceleration", "displacement", "velocity", "force"):
-        chosen: Sequence[str] = [name for name in names if name.startswith(quantity)]
-        if chosen:
-            values = [np.nanstd(np.asarray(run.recording[name].values, np.float64)) for name in chosen]
-            return float(np.mean(values))
+        chosen = [values for name, values in run.recording.data_vars.items() if str(name).startswith(quantity)]
+        known = [array[np.isfinite(array)] for array in (np.asarray(values, np.float64) for values in chosen)]
+        # A channel whose samples were all lost has no level.
+        levels = [float(values.std()) for values in known if values.size]
+        if levels:
+            return float(np.mean(levels))
     return 0.0

@@ -19,6 +19,7 @@ from sloshlab.diagnosis.free_run_fit import fitted_baseline
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_cost
 from sloshlab.diagnosis.noise_floor import weighted_observations
 from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
+from sloshlab.diagnosis.repeats import require_repeats
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search.ceiling import ceilings
 from sloshlab.diagnosis.search.fits import Fits, Progress, best_fitting
@@ -60,6 +61,8 @@ def findings_of(
         if case.rig is None:
             raise InputError(f"case {case.name}", got="neither a rig nor a twin", allowed="one of them")
         model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs))
+    # Before anything is compared with the twin: what two rigs do differently would be scatter, or missing physics.
+    require_repeats(case, model)
     require_comparable(case, model)
     # Before any fit: what is held out must not depend on what is found.
     parts = split(case)
