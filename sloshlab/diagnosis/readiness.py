@@ -6,15 +6,18 @@ physics: the rig, the units or the folder is another one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.case import Case, CaseRun
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.extension import NOTHING
+from sloshlab.diagnosis.observations import BLOCK_S, observations
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.experiments import EXPERIMENTS
 from sloshlab.rig import Rig
@@ -25,6 +28,76 @@ LARGEST_RATIO: Final = 30.0
 _MASSES_AGREE: Final = 0.05
 """Relative difference, up to which two statements of a mass agree."""
 _FEWEST_SAMPLES: Final = 64
+_AT_BOUND: Final = 0.99
+"""Of the way to a bound: a step of a fit stays a little inside of it."""
+
+
+@dataclass(frozen=True)
+class RefutedBelief:
+    """A believed number that the recordings push to its bound.
+
+    Attributes
+    ----------
+    name : str
+    believed, tolerance : float
+        Mean and standard deviation of its prior.
+    found : float
+        Where the fit ends.
+    units : str
+    """
+
+    name: str
+    believed: float
+    tolerance: float
+    found: float
+    units: str
+
+    @property
+    def deviation_tolerances(self) -> float:
+        """Signed distance of what was found from what was believed, in tolerances."""
+        return (self.found - self.believed) / self.tolerance
+
+
+def refuted_beliefs(
+    values: Mapping[str, float], parameters: Sequence[BaselineParameter]
+) -> tuple[RefutedBelief, ...]:
+    """Believed numbers at whose bounds a fit ends: the recordings want them further away than they may be.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Of a fitted baseline, by name; such as ``explanation.fit.values``. Absent ones are as believed.
+    parameters : sequence of BaselineParameter
+        Priors.
+
+    Returns
+    -------
+    tuple of RefutedBelief
+        The furthest first; empty where the priors hold the fit.
+
+    Examples
+    --------
+    >>> spring = BaselineParameter("stiffness", 1e5, 1e4, "N m-1")
+    >>> [belief.deviation_tolerances for belief in refuted_beliefs({"stiffness": 6e4}, [spring])]
+    [-4.0]
+    >>> refuted_beliefs({"stiffness": 7e4}, [spring])
+    ()
+    """
+    found = [
+        RefutedBelief(
+            parameter.name,
+            parameter.believed,
+            parameter.tolerance,
+            values.get(parameter.name, parameter.believed),
+            parameter.units,
+        )
+        for parameter in parameters
+    ]
+    bounds = [_AT_BOUND * parameter.most_tolerances for parameter in parameters]
+    refuted = [
+        belief for belief, bound in zip(found, bounds, strict=True) if abs(belief.deviation_tolerances) >= bound
+    ]
+    return tuple(sorted(refuted, key=lambda belief: -abs(belief.deviation_tolerances)))
 
 
 def require_one_rig(case: Case) -> None:
@@ -96,12 +169,25 @@ def require_comparable(case: Case, model: DiagnosedModel) -> None:
         )
     ratios: dict[str, list[tuple[float, str, float, float]]] = {}
     for run in case.runs:
+        _require_samples(run, model)
         for channel, values in _simulated(run, model).items():
             sizes = _sizes(run, channel, values)
             if sizes is not None:
                 recorded, simulated = sizes
                 ratios.setdefault(channel, []).append((recorded / simulated, run.name, recorded, simulated))
     _require_same_magnitude(ratios)
+
+
+def _require_samples(run: CaseRun, model: DiagnosedModel) -> None:
+    if observations(run, model.compared(run), model.driving(run)):
+        return
+    known = [int(np.isfinite(run.recording[name].values).sum()) for name in model.compared(run)]
+    raise InputError(
+        f"recording {run.name}",
+        got=f"at most {max(known, default=0)} known samples in a channel that the twin shows",
+        allowed=f"two blocks of {BLOCK_S:g} s in one of them",
+        remedy="leave the run out",
+    )
 
 
 def _simulated(run: CaseRun, model: DiagnosedModel) -> Mapping[str, FloatArray]:

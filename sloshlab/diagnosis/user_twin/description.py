@@ -137,10 +137,24 @@ class TwinRun:
         return np.arange(self.n_samples) / self.sampling_rate_hz
 
     def start(self, channel: str, n_samples: int = 6) -> tuple[float, float]:
-        """Value and slope per second at the first sample, by a cubic through the first ones."""
+        """Value and slope per second at the first sample, by a cubic through the first ones that are not lost.
+
+        Raises
+        ------
+        InputError
+            If more samples are lost at the beginning than the cubic passes through.
+        """
+        values = self.channels[channel]
+        known = np.flatnonzero(np.isfinite(values))[:n_samples]
+        if not known.size or known[0] > n_samples:
+            raise InputError(
+                f"{channel}: beginning",
+                got=f"{known[0] if known.size else values.size} lost samples",
+                allowed=f"at most {n_samples} before the start is read from it",
+                remedy="make the start a parameter with each_run=True, or cut the run",
+            )
         # A cubic through some samples: a difference of the first two would carry the noise of both.
-        first = self.channels[channel][:n_samples]
-        *_, slope, value = np.polyfit(np.arange(first.size), first, min(3, first.size - 1))
+        *_, slope, value = np.polyfit(known, values[known], min(3, known.size - 1))
         return float(value), float(slope) * self.sampling_rate_hz
 
 

@@ -156,7 +156,10 @@ def _numbers(values: ArrayLike, what: str) -> FloatArray:
     except (TypeError, ValueError) as error:
         raise InputError(what, got=f"{type(values).__name__}", allowed="numbers") from error
     if not np.isfinite(array).all():
-        raise AnalysisError(what, got="NaN or infinity", allowed="finite numbers")
+        # Whatever has more values than a mechanism has coordinates is a series.
+        first = int(np.flatnonzero(~np.isfinite(array.ravel()))[0])
+        place = f", first at sample {first}" if array.ndim == 1 and array.size > MOST_COORDINATES else ""
+        raise AnalysisError(what, got=f"NaN or infinity{place}", allowed="finite numbers")
     return array
 
 

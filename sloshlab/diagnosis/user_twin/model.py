@@ -214,7 +214,10 @@ class UserTwinModel:
         if array.shape != shape:
             raise InputError(f"{self.name}: {what}", got=f"shape {array.shape}", allowed=f"{shape}")
         if not np.isfinite(array).all():
-            raise AnalysisError(f"{self.name}: {what}", got="NaN or infinity", allowed="finite numbers")
+            first = int(np.flatnonzero(~np.isfinite(array).reshape(shape[0], -1).all(axis=1))[0])
+            raise AnalysisError(
+                f"{self.name}: {what}", got=f"NaN or infinity, first at sample {first}", allowed="finite numbers"
+            )
         return array
 
     def _call_user_code(self, function: Any, *arguments: Any) -> Any:
@@ -322,6 +325,7 @@ class UserTwinModel:
                 motion = self._truth(run, {}, NOTHING)[1]
             except SloshlabError as error:
                 text = str(error).removeprefix(f"{self.name}: ")
+                text = text if text.startswith(f"{run.name}: ") else f"{run.name}: {text}"
                 raise InputError(f"{self.name} cannot run as believed: {text}") from error
             # Below 0.002 of the largest speed friction is not dry; an explicit step has to stay below 2 × mass ×
             # speed / friction force.
