@@ -68,6 +68,11 @@ class Registry(Generic[T]):
         """What was declared here: name → ``module:attribute``."""
         return dict(self._references)
 
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Names of the entries that were added, or registered, here."""
+        return tuple(self._entries)
+
     def withdraw(self, name: str) -> None:
         """Forget an entry that was added."""
         del self._entries[name]

@@ -1,4 +1,4 @@
-"""Effects that may be missing, and candidates: one effect at one place, with start values and bounds."""
+"""Effects that may be missing, and candidates: one effect at one place, with prior, start values and bounds."""
 
 from __future__ import annotations
 
@@ -7,13 +7,20 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sloshlab.diagnosis.extension import Extension
+from sloshlab.diagnosis.prior import ParameterPrior, Range, about, drawn, one, prior_of
 from sloshlab.diagnosis.units import named_and_units
 from sloshlab.errors import InputError, SloshlabError
+from sloshlab.registry import Registry
 from sloshlab.rig import Rig
 from sloshlab.twin.twin import Twin
 
 BLOCKS: Final = ("excitation", "structure", "tank", "sensor")
+MissingForces = Mapping[str, NDArray[np.float64]]
+"""Run → force [N] that the baseline lacks at every sample, upward positive."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,10 @@ class Surroundings:
         Of the structure.
     incoherent_with_base : frozenset of str
         Channels that are not coherent with the base: not its motion times a gain, with a delay.
+    runs : tuple of str
+        Names of the runs that are fitted, each of which may have numbers of its own.
+    update_rates_hz : mapping of str to tuple of float
+        Channels whose readings change at some instants only, and rates [Hz] of these, the likeliest first.
     """
 
     rig: Rig
@@ -71,6 +82,8 @@ class Surroundings:
     missed_hz: tuple[float, ...] = ()
     n_modes: int = 1
     incoherent_with_base: frozenset[str] = frozenset()
+    runs: tuple[str, ...] = ()
+    update_rates_hz: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def reading(self) -> float:
@@ -101,6 +114,12 @@ class EffectParameter:
         Whether a bound is a value like any other; effects at other bounds are no answer.
     is_between_readings : bool
         Whether it is a ratio to the reading of another channel, so that the gains of both count.
+    range : Range or None
+        What is believed of it; without one, two decades about its largest start.
+    each_run : bool
+        Whether every run has one of its own, as the phase of a machine that runs by itself: ``NAME in RUN``.
+    tolerance : callable or None
+        (surroundings) → scale of its steps in a fit, where that is not its size.
     """
 
     name: str
@@ -108,9 +127,33 @@ class EffectParameter:
     high: float
     may_rest: bool = False
     is_between_readings: bool = False
+    range: Range | None = None
+    each_run: bool = False
+    tolerance: Callable[[Surroundings], float] | None = None
 
 
 Numbers = Mapping[str, float]
+
+
+def in_run(name: str, run: str) -> str:
+    """Name of a number that belongs to one run.
+
+    Examples
+    --------
+    >>> in_run("phase", "run_02")
+    'phase in run_02'
+    """
+    return f"{name} in {run}"
+
+
+def multiples(
+    parameters: Sequence[EffectParameter], *sets: Numbers
+) -> Callable[[Surroundings], Iterable[Numbers]]:
+    """Starts that are stated in multiples of the scales of the parameters' ranges."""
+    scales = {known.name: known.range.scale if known.range else one for known in parameters}
+    return lambda at: [{name: share * scales[name](at) for name, share in numbers.items()} for numbers in sets]
+
+
 _JOINED: Final = "+"
 _FROM: Final = "<"
 
@@ -161,6 +204,12 @@ def _no_further_starts(surroundings: Surroundings) -> Sequence[Numbers]:
     return []
 
 
+def _no_proposals(surroundings: Surroundings, missing: MissingForces) -> Sequence[Numbers]:
+    """Reads nothing from the missing force."""
+    del surroundings, missing
+    return []
+
+
 def never_distinct(size: float) -> Sequence[Mapping[str, tuple[float, float]]]:
     """Has no range in which it is fitted apart from its nested models."""
     del size
@@ -203,6 +252,9 @@ class Effect:
     sought_at : callable
         (surroundings) → more sets of start values, matched to the latent force along the measured motion: many,
         for a multimodal effect.
+    proposes : callable
+        (surroundings, missing force of every run) → sets of start values that the missing force itself shows, for
+        forces whose instants or frequency no other place would meet.
     """
 
     name: str
@@ -222,11 +274,56 @@ class Effect:
     variant_of: str = ""
     size: tuple[str, ...] = ()
     sought_at: Callable[[Surroundings], Iterable[Numbers]] = _no_further_starts
+    proposes: Callable[[Surroundings, MissingForces], Iterable[Numbers]] = _no_proposals
+
+    @property
+    def key(self) -> str:
+        """Block and name."""
+        return f"{self.block}.{self.name}"
 
     @property
     def known_as(self) -> str:
         """The name that an answer has."""
         return self.variant_of or self.name
+
+    def prior(self, surroundings: Surroundings) -> tuple[ParameterPrior, ...]:
+        """What is believed of its numbers there, in their order."""
+        limits = self.limits(surroundings)
+        starts = [] if all(known.range for known in self.parameters) else list(self.starts(surroundings))
+        found = []
+        for known in self.parameters:
+            bounds = limits.get(known.name, (known.low, known.high))
+            if known.range is not None:
+                found.append(prior_of(known.name, known.range, bounds, surroundings))
+            else:
+                size = max((abs(start[known.name]) for start in starts), default=1.0)
+                found.append(about(known.name, size, bounds))
+        return tuple(found)
+
+    def of_runs(self, runs: Sequence[str]) -> Effect:
+        """The effect with a number for every run in place of those that each run has of its own."""
+        own = {known.name for known in self.parameters if known.each_run}
+        if not own:
+            return self
+        parameters = [known for known in self.parameters if not known.each_run]
+        parameters += [
+            replace(known, name=in_run(known.name, run), each_run=False)
+            for known in self.parameters
+            if known.each_run
+            for run in runs
+        ]
+
+        def spread(numbers: Numbers) -> Numbers:
+            shared = {name: value for name, value in numbers.items() if name not in own}
+            # a set may state numbers of some runs; the others have what it states for all
+            return {**{in_run(name, run): numbers[name] for name in own & set(numbers) for run in runs}, **shared}
+
+        return replace(
+            self,
+            parameters=tuple(parameters),
+            starts=lambda at: [spread(numbers) for numbers in self.starts(at)],
+            proposes=lambda at, missing: [spread(numbers) for numbers in self.proposes(at, missing)],
+        )
 
 
 @dataclass(frozen=True)
@@ -258,6 +355,20 @@ class Candidate:
         """More sets of numbers, named as in a fit, to match to the latent force."""
         return self._named(self.effect.sought_at)
 
+    def proposed(self, missing: MissingForces) -> list[dict[str, float]]:
+        """Sets of numbers, named as in a fit, that a missing force itself shows."""
+        return self._named(lambda at: self.effect.proposes(at, missing))
+
+    @property
+    def prior(self) -> tuple[ParameterPrior, ...]:
+        """What is believed of its numbers, named as in a fit."""
+        found = self.effect.prior(replace(self.surroundings, channel=self.channel))
+        return tuple(replace(known, name=f"{self.key}.{known.name}") for known in found)
+
+    def drawn(self, n: int) -> list[dict[str, float]]:
+        """Its first start and n − 1 sets of numbers that fill its prior evenly, named as in a fit."""
+        return [self.starts()[0], *drawn(self.prior, max(n - 1, 0))][:n]
+
     @property
     def is_multimodal(self) -> bool:
         """Whether its cost has many local minima, so that its force is matched from many places."""
@@ -288,7 +399,10 @@ class Candidate:
 
     def scale(self, parameter: str) -> float:
         """Scale of a parameter, for its steps in a fit."""
-        # The largest start, as effects have no tolerance to be scaled by.
+        known = next(known for known in self.effect.parameters if known.name == parameter)
+        if known.tolerance is not None:
+            return known.tolerance(replace(self.surroundings, channel=self.channel))
+        # The largest start, as sizes have no tolerance to be scaled by.
         sizes = [abs(start[f"{self.key}.{parameter}"]) for start in self.starts()]
         return max(max(sizes, default=1.0), 1e-12)
 
@@ -300,7 +414,8 @@ class Candidate:
         return replace(added, key=key)
 
 
-_EFFECTS: dict[str, Effect] = {}
+EFFECTS: Final = Registry[Effect]("effect", group="sloshlab.effects")
+"""By block and name; other packages add theirs as entry points."""
 
 
 def register(effect: Effect) -> Effect:
@@ -313,20 +428,33 @@ def register(effect: Effect) -> Effect:
     """
     if effect.block not in BLOCKS:
         raise InputError(f"effect {effect.name}: block", got=repr(effect.block), allowed=", ".join(BLOCKS))
-    if _EFFECTS.setdefault(f"{effect.block}.{effect.name}", effect) is not effect:
+    # an entry point that is being loaded registers the very effect that it offers
+    if effect.key in EFFECTS.added and EFFECTS[effect.key] is not effect:
         raise InputError(f"effect {effect.name}", got="a name that is taken", remedy="choose another name")
-    return effect
+    return EFFECTS.add(effect.key, effect)
 
 
 def withdraw(effect: Effect) -> None:
     """Make an effect unknown again; nothing happens where it is not known."""
-    if _EFFECTS.get(f"{effect.block}.{effect.name}") is effect:
-        del _EFFECTS[f"{effect.block}.{effect.name}"]
+    if effect.key in EFFECTS.added and EFFECTS[effect.key] is effect:
+        EFFECTS.withdraw(effect.key)
 
 
 def known_effects() -> list[Effect]:
-    """All effects, in the order in which they were registered."""
-    return list(_EFFECTS.values())
+    """All effects, in the order in which they were registered; then those that other packages offer.
+
+    Raises
+    ------
+    InputError
+        If what a package offers cannot be loaded, or is no effect.
+    """
+    found: dict[str, Effect] = {}
+    for name in EFFECTS.names:
+        effect: object = EFFECTS[name]
+        if not isinstance(effect, Effect):
+            raise InputError(f"effect {name}", got=type(effect).__name__, allowed="Effect")
+        found.setdefault(effect.key, effect)
+    return list(found.values())
 
 
 def candidates(surroundings: Surroundings) -> list[Candidate]:
@@ -350,7 +478,8 @@ def candidates(surroundings: Surroundings) -> list[Candidate]:
             # What cannot act here is neither tried nor listed as failed.
             if not effect.needs(surroundings):
                 continue
-            made = [Candidate(effect, surroundings, place) for place in effect.places(surroundings)]
+            own = effect.of_runs(surroundings.runs)
+            made = [Candidate(own, surroundings, place) for place in effect.places(surroundings)]
             for candidate in made:
                 _require_sound(candidate)
         except Exception as error:

@@ -1,4 +1,4 @@
-"""What an effect adds to a simulation: forces, changed liquid, changed structure, faults of sensors."""
+"""What an effect adds to a simulation: forces, changed drive, liquid and structure, faults of sensors."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from sloshlab.twin.structure import Structure
@@ -39,6 +40,34 @@ class SensorFault:
 
 
 @dataclass(frozen=True)
+class ActingDrive:
+    """What acts in place of what a driving channel holds: the channel is a command, and something obeys it badly.
+
+    Attributes
+    ----------
+    channel : str
+    acting : callable
+        From the command to what acts.
+    key : tuple
+        Identifies it, for caches.
+    """
+
+    channel: str
+    acting: Callable[[FloatArray], FloatArray]
+    key: tuple[Any, ...]
+
+
+def with_acting(recording: xr.Dataset, drives: tuple[ActingDrive, ...]) -> xr.Dataset:
+    """A copy of a recording whose driving channels hold what acts; channels that it has not are left out."""
+    for drive in drives:
+        if drive.channel in recording.data_vars:
+            commanded = recording[drive.channel]
+            acting = drive.acting(np.asarray(commanded.values, np.float64))
+            recording = recording.assign({drive.channel: commanded.copy(data=acting)})
+    return recording
+
+
+@dataclass(frozen=True)
 class Extension:
     """Everything that a simulation has beyond its baseline.
 
@@ -53,6 +82,9 @@ class Extension:
         Identifies the extension, for caches: names and numbers of all effects.
     structure : callable or None
         Changes the baseline's structure, after its own numbers were retuned.
+    drives : tuple of ActingDrive
+    run_terms : mapping of str to tuple of Term
+        Forces that are added in one run alone.
     """
 
     terms: tuple[Term, ...] = ()
@@ -60,6 +92,12 @@ class Extension:
     faults: tuple[SensorFault, ...] = ()
     key: tuple[Any, ...] = field(default=())
     structure: Callable[[Structure], Structure] | None = None
+    drives: tuple[ActingDrive, ...] = ()
+    run_terms: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
+
+    def terms_in(self, run: str) -> tuple[Term, ...]:
+        """Forces that are added in a run."""
+        return self.terms + self.run_terms.get(run, ())
 
     def __add__(self, other: Extension) -> Extension:
         """Both together; the other's changes of liquid and structure come after this one's."""
@@ -69,6 +107,11 @@ class Extension:
             self.faults + other.faults,
             self.key + other.key,
             _composed(self.structure, other.structure),
+            self.drives + other.drives,
+            {
+                run: self.run_terms.get(run, ()) + other.run_terms.get(run, ())
+                for run in {**self.run_terms, **other.run_terms}
+            },
         )
 
 

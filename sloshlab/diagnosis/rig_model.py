@@ -18,7 +18,7 @@ from sloshlab.conditioning.combined_channels import weights_by_noise
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.candidate import BLOCKS
 from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
+from sloshlab.diagnosis.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
 from sloshlab.errors import AnalysisError
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
@@ -268,7 +268,7 @@ class RigModel:
     def _simulation(
         self, run: CaseRun, values: Mapping[str, float], extension: Extension, undone: Sequence[SensorFault]
     ) -> Simulation:
-        drive = self._drive(run, tuple(undone))
+        drive = self._drive(run, tuple(undone), extension.drives)
         twin = self._retuned(run, values, extension, fluctuation=values.get(_FLUCTUATION + run.name, 1.0))
         trusted = self._compared_drives(run, undone)
         gains = [values.get(f"gain of {name}", 1.0) for name in trusted]
@@ -320,7 +320,8 @@ class RigModel:
             for term in twin.terms
             if structure is not None or term.place == "tank"
         )
-        terms += tuple(term for term in extension.terms if structure is not None or term.place == "tank")
+        added = extension.terms_in(run.name)
+        terms += tuple(term for term in added if structure is not None or term.place == "tank")
         liquid = tuple(term for term in terms if term.place == "tank")
         others = tuple(term for term in terms if term.place == "structure")
         if extension.liquid is not None:
@@ -335,13 +336,13 @@ class RigModel:
         carried = twin.carried_mass_kg * values.get("carried mass", 1.0)
         return replace(twin, structure=structure, terms=(*others, *liquid), carried_mass_kg=carried)
 
-    def _drive(self, run: CaseRun, undone: tuple[SensorFault, ...]) -> Drive:
-        key = (run.name, *(fault.key for fault in undone))
+    def _drive(self, run: CaseRun, undone: tuple[SensorFault, ...], acting: tuple[ActingDrive, ...] = ()) -> Drive:
+        key = (run.name, *(fault.key for fault in undone), *(drive.key for drive in acting))
         with self._lock:
             if key in self._drives:
                 return self._drives[key]
         driving = self._drives[(run.name,)].channels if undone else ()
-        drive = drive_of(corrected(run, undone, driving), self.twin, by_noise=True)
+        drive = drive_of(with_acting(corrected(run, undone, driving), acting), self.twin, by_noise=True)
         drive = replace(drive, excitation=with_cached_inputs(drive.excitation))
         with self._lock:
             # Drives with faults are as many as a fit has trial values; those of the recordings are kept.

@@ -14,6 +14,7 @@ from sloshlab.diagnosis.candidate import Surroundings
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.update_rates import update_rates_hz
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
 
@@ -70,7 +71,21 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
         n_modes=0 if model.twin.structure is None else model.twin.structure.masses_kg.size,
         incoherent_with_base=_incoherent_with_base(fitting),
         has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
+        runs=tuple(run[0].run.name for run in fitting),
+        update_rates_hz=_update_rates(fitting, float(np.max(frequencies))),
     )
+
+
+def _update_rates(fitting: Sequence[Sequence[Observation]], frequency_hz: float) -> dict[str, tuple[float, ...]]:
+    """Compared channels that look held, in the run that shows it first, and rates of their updates."""
+    found: dict[str, tuple[float, ...]] = {}
+    for observation in (observation for run in fitting for observation in run):
+        rate = observation.run.attributes.sampling_rate_hz
+        values = np.asarray(observation.run.recording[observation.channel].values, np.float64)
+        # a line at twice the frequency is the motion's own
+        if rates := update_rates_hz(values, rate, 2.5 * frequency_hz):
+            found.setdefault(observation.channel, rates)
+    return found
 
 
 def _incoherent_with_base(fitting: Sequence[Sequence[Observation]]) -> frozenset[str]:

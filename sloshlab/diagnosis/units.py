@@ -30,9 +30,12 @@ def named_and_units(parameter: str) -> tuple[str, str]:
     --------
     >>> named_and_units("stribeck_velocity_m_per_s"), named_and_units("ratio")
     (('stribeck velocity', 'm/s'), ('ratio', ''))
+    >>> named_and_units("start_s in run_02")
+    ('start in run_02', 's')
     """
+    parameter, of, run = parameter.partition(" in ")
     # Longer endings come first in the list, as `_m` is the end of `_n_per_m`, too.
     for ending, units in _UNITS:
         if parameter.endswith(ending):
-            return parameter.removesuffix(ending).replace("_", " "), units
-    return parameter.replace("_", " "), ""
+            return parameter.removesuffix(ending).replace("_", " ") + of + run, units
+    return parameter.replace("_", " ") + of + run, ""

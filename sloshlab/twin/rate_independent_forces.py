@@ -170,3 +170,46 @@ FRICTION_BEHIND_PLAY = register(
 
 After a reversal the force unloads, the play is crossed at no force, and the stiffness loads again.
 """
+
+
+@law
+def _behind_play_by_direction(motion, parameters, memory, rates):
+    """As behind a play, with F₊ while the slider is pulled upward and F₋ while it is pulled downward."""
+    behind = memory[0]
+    slips = memory[3] > 0.0
+    rates[0] = 0.0 if slips and behind * memory[1] > 0.0 else motion[VELOCITY]
+    limit = parameters[0] if behind > 0.0 else parameters[1]
+    force = limit if slips else parameters[3] * (abs(behind) - 0.5 * parameters[2])
+    if memory[2] < 0.0:
+        force = 0.0
+    return -force if behind > 0.0 else force
+
+
+@law
+def _behind_play_by_direction_events(motion, parameters, memory, values):
+    beyond = abs(memory[0]) - 0.5 * parameters[2]
+    limit = parameters[0] if memory[0] > 0.0 else parameters[1]
+    values[0] = motion[VELOCITY]
+    values[1] = beyond
+    values[2] = parameters[3] * beyond - limit
+    return 0.0
+
+
+FRICTION_BEHIND_PLAY_BY_DIRECTION = register(
+    ForceKind(
+        "friction_behind_play_by_direction",
+        ("structure",),
+        (
+            Parameter("force_up_n", "N", 0.0, 1e7),
+            Parameter("force_down_n", "N", 0.0, 1e7),
+            Parameter("play_m", "m", 0.0, 10.0),
+            Parameter("stiffness_n_per_m", "N m-1", 0.0, 1e12),
+        ),
+        _behind_play_by_direction,
+        events=_behind_play_by_direction_events,
+        n_switches=3,
+        memory=lambda values, table: (0.0,),
+        equation="−k max(|e| − p/2, 0) sgn e, at most F₊ for e > 0 and F₋ for e < 0; ė = v, zero where it follows",
+    )
+)
+"""The same slider with another friction upward (F₊) than downward (F₋)."""

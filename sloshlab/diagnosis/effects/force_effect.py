@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final
 
-from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, never_distinct, register
+from sloshlab.diagnosis.candidate import (
+    Effect,
+    EffectParameter,
+    Numbers,
+    Surroundings,
+    multiples,
+    never_distinct,
+    register,
+)
 from sloshlab.diagnosis.evidence import (
     CONSERVATIVE,
     DISSIPATIVE,
@@ -21,6 +29,7 @@ from sloshlab.diagnosis.evidence import (
     WORK_3,
 )
 from sloshlab.diagnosis.extension import Extension
+from sloshlab.diagnosis.prior import Range
 from sloshlab.twin.terms import ForceKind
 
 MOST_DAMPING_OF_A_MODE: Final = 0.2
@@ -56,8 +65,9 @@ def rocks(surroundings: Surroundings) -> bool:
 def force_effect(
     kind: ForceKind,
     block: str,
-    starts: Callable[[Surroundings], Iterable[Numbers]],
+    starts: Callable[[Surroundings], Iterable[Numbers]] | Sequence[Numbers],
     *,
+    ranges: Mapping[str, Range] | None = None,
     name: str = "",
     fixed: Callable[[Surroundings], Mapping[str, float]] | None = None,
     fitted: tuple[str, ...] = (),
@@ -78,8 +88,10 @@ def force_effect(
     ----------
     kind : ForceKind
     block : {"structure", "tank"}
-    starts : callable
-        (surroundings) → sets of numbers to start from.
+    starts : callable or sequence of mapping
+        (surroundings) → sets of numbers to start from; or these sets, in multiples of the scales of the ranges.
+    ranges : mapping of str to Range
+        What is believed of the numbers; without one, two decades about the largest start.
     fixed : callable, optional
         (surroundings) → numbers that are not fitted.
     fitted : tuple of str
@@ -112,6 +124,7 @@ def force_effect(
             parameter.name,
             *narrower.get(parameter.name, (parameter.low, parameter.high)),
             may_rest=parameter.name in may_rest,
+            range=(ranges or {}).get(parameter.name),
         )
         for parameter in kind.parameters
         if not fitted or parameter.name in fitted
@@ -122,7 +135,7 @@ def force_effect(
             block,
             kind.equation,
             parameters,
-            starts,
+            starts if callable(starts) else multiples(parameters, *starts),
             extension,
             look_alikes,
             separated_by,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -17,8 +17,10 @@ from sloshlab.diagnosis.candidate import (
     Surroundings,
     channels_of,
     joined_channels,
+    multiples,
     register,
 )
+from sloshlab.diagnosis.effects import scales
 from sloshlab.diagnosis.evidence import (
     CLOCK_DRIFT,
     FOLLOWS_OTHER_CHANNEL,
@@ -31,6 +33,8 @@ from sloshlab.diagnosis.evidence import (
     TREND,
 )
 from sloshlab.diagnosis.extension import Extension, Reading, SensorFault
+from sloshlab.diagnosis.prior import Range
+from sloshlab.diagnosis.update_rates import first_update_s
 
 FloatArray = NDArray[np.float64]
 Others = Mapping[str, FloatArray]
@@ -61,7 +65,7 @@ def _sensor_effect(
     name: str,
     equation: str,
     parameters: tuple[EffectParameter, ...],
-    starts: Callable[[Surroundings], Iterable[Numbers]],
+    starts: Callable[[Surroundings], Iterable[Numbers]] | Sequence[Numbers],
     reading: Callable[[Numbers], Reading],
     *,
     undone: Callable[[Numbers], Reading] | None,
@@ -87,7 +91,7 @@ def _sensor_effect(
             "sensor",
             equation,
             parameters,
-            starts,
+            starts if callable(starts) else multiples(parameters, *starts),
             extension,
             look_alikes,
             separated_by,
@@ -109,8 +113,8 @@ def _scaled(factor: Callable[[Numbers], float]) -> Callable[[Numbers], Reading]:
 GAIN = _sensor_effect(
     "sensor_gain",
     "y → (1 + ε) y",
-    (EffectParameter("ratio", -0.9, 5.0),),
-    lambda at: [{"ratio": ratio} for ratio in (0.05, -0.05)],
+    (EffectParameter("ratio", -0.9, 5.0, range=Range(1e-3, 0.9, may_be_negative=True)),),
+    [{"ratio": ratio} for ratio in (0.05, -0.05)],
     _scaled(lambda numbers: 1 + numbers["ratio"]),
     undone=_scaled(lambda numbers: 1 / (1 + numbers["ratio"])),
     look_alikes=("mass_error",),
@@ -164,8 +168,8 @@ def _shifted(values: FloatArray, samples: float) -> FloatArray:
 DELAY = _sensor_effect(
     "sensor_delay",
     "y(t) → y(t − τ)",
-    (EffectParameter("delay_s", -0.05, 0.05),),
-    lambda at: [{"delay_s": sign * 0.02 / at.frequency_hz} for sign in (1, -1)],
+    (EffectParameter("delay_s", -0.05, 0.05, range=Range(2e-4, 0.25, scales.period, may_be_negative=True)),),
+    [{"delay_s": share} for share in (0.02, -0.02)],
     _delayed,
     undone=_advanced,
     look_alikes=("viscous_damping", "sensor_high_pass"),
@@ -203,8 +207,8 @@ def _high_pass_undone(numbers: Numbers) -> Reading:
 HIGH_PASS = _sensor_effect(
     "sensor_high_pass",
     "τ ẏ + y = τ u̇",
-    (EffectParameter("time_constant_s", 1e-3, 100.0),),
-    lambda at: [{"time_constant_s": value} for value in (2.0, 0.2, 0.03)],
+    (EffectParameter("time_constant_s", 1e-3, 100.0, range=Range(5e-3, 20.0)),),
+    [{"time_constant_s": value} for value in (2.0, 0.2, 0.03)],
     _high_passed,
     undone=_high_pass_undone,
     look_alikes=("sensor_delay",),
@@ -225,8 +229,8 @@ def _clipped(numbers: Numbers) -> Reading:
 CLIPPING = _sensor_effect(
     "sensor_clipping",
     "y → min(max(y, −limit), limit), limit in the unit of the channel",
-    (EffectParameter("limit", 1e-9, 1e9),),
-    lambda at: [{"limit": share * at.peaks.get(at.channel, 2.0 * at.reading)} for share in (1.0, 0.97, 0.8)],
+    (EffectParameter("limit", 1e-9, 1e9, range=Range(0.05, 1.0, scales.peak)),),
+    [{"limit": share} for share in (1.0, 0.97, 0.8)],
     _clipped,
     undone=None,
     spoken_for_by=(SINGLE_CHANNEL, SATURATING),
@@ -247,8 +251,8 @@ def _drifted(numbers: Numbers) -> Reading:
 DRIFT = _sensor_effect(
     "sensor_drift",
     "y → y + rate · t, in the unit of the channel per second",
-    (EffectParameter("rate", -1e6, 1e6),),
-    lambda at: [{"rate": sign * 0.3 * at.reading / at.longest_run_s} for sign in (1, -1)],
+    (EffectParameter("rate", -1e6, 1e6, range=Range(3e-3, 30.0, scales.drift, may_be_negative=True)),),
+    [{"rate": share} for share in (0.3, -0.3)],
     _drifted,
     undone=None,
     look_alikes=("liquid_loss",),
@@ -293,8 +297,8 @@ HUM = [
     _sensor_effect(
         name,
         f"y → y + A cos(2π f t + φ), f about {line:g} Hz, A in the unit of the channel",
-        (EffectParameter("amplitude", 0.0, 1e9),),
-        lambda at: [{"amplitude": 0.02 * at.reading}],
+        (EffectParameter("amplitude", 0.0, 1e9, range=Range(1e-3, 1.0, scales.reading)),),
+        [{"amplitude": 0.02}],
         _with_hum(line, 1.0),
         undone=_with_hum(line, -1.0),
         separated_by="the channel with nothing moving",
@@ -333,13 +337,70 @@ def _interpolated(values: FloatArray, places: FloatArray) -> FloatArray:
 CLOCK = _sensor_effect(
     "clock_skew",
     "y(t) → y((1 + ε) t)",
-    (EffectParameter("ratio", -0.05, 0.05),),
-    lambda at: [{"ratio": sign * 0.02 / (at.frequency_hz * at.longest_run_s)} for sign in (1, -1)],
+    (EffectParameter("ratio", -0.05, 0.05, range=Range(1e-3, 1.0, scales.clock, may_be_negative=True)),),
+    [{"ratio": share} for share in (0.02, -0.02)],
     _with_clock_skew(1.0),
     undone=_with_clock_skew(-1.0),
     look_alikes=("sensor_delay",),
     spoken_for_by=(SINGLE_CHANNEL, CLOCK_DRIFT),
     places=_channels_and_devices,
+)
+
+
+def _held(numbers: Numbers) -> Reading:
+    def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
+        """The instants of the updates are those of the recording in every run, found to a part of a sample.
+
+        Which samples show an update is read from the recording alone, so that numbers of a fit never move a step
+        of the reading to another sample; half a sample, which no step shows, is found by least squares.
+        """
+        del others
+        held_hz = numbers["update_rate_hz"]
+        place = np.arange(values.size, dtype=np.float64)
+        first = first_update_s(recorded, rate, held_hz)
+        # the last update that is not later, in samples
+        updates = rate * (first + np.floor((place / rate - first) * held_hz) / held_hz)
+        shown, slope = _interpolated(values, updates), _interpolated(np.gradient(values), updates)
+        known = np.isfinite(shown + slope + recorded) & (updates >= 0)
+        size = float(slope[known] @ slope[known])
+        late = float((recorded - shown)[known] @ slope[known]) / size if size > 0 else 0.0
+        shown = shown + min(max(late, -0.5), 0.5) * slope
+        # before the first update it holds what was there before the run
+        return np.asarray(np.where((updates < 0) & np.isfinite(recorded), recorded, shown))
+
+    return reading
+
+
+def _held_channels(at: Surroundings) -> list[str]:
+    return [name for name in _compared_channels(at) if name in at.update_rates_hz]
+
+
+def _update_rates(at: Surroundings) -> list[Numbers]:
+    """Those that the recording shows; no other place would be met by a descent."""
+    rates = at.update_rates_hz.get(at.channel) or (0.125 * at.sampling_rate_hz,)
+    return [{"update_rate_hz": rate} for rate in rates]
+
+
+# Images of a line of frequency f at f_u ± f, its size times sinc(f/f_u), and half an update late on average.
+HOLD = _sensor_effect(
+    "sample_and_hold",
+    "y(t) → y(t_k) for t_k ≤ t < t_k + 1/f_u: a reading held between updates",
+    (
+        EffectParameter(
+            "update_rate_hz",
+            1e-2,
+            1e6,
+            range=Range(0.01, 0.5, scales.sampling_rate),
+            # after a slip of one update over the longest run every step is at another sample
+            tolerance=scales.cycle_in_a_run,
+        ),
+    ),
+    _update_rates,
+    _held,
+    undone=None,
+    look_alikes=("sensor_delay",),
+    places=_held_channels,
+    spoken_for_by=(SINGLE_CHANNEL,),
 )
 
 
@@ -386,33 +447,32 @@ def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     return Extension(faults=(SensorFault(to, leaked(1.0), leaked(-1.0), key),))
 
 
-def _ratio_of_readings(at: Surroundings) -> float:
-    """Ratio at which the leak is as large as the reading of the channel itself."""
-    to, _, source = at.channel.partition("<")
-    return at.channels.get(to, 1.0) / max(at.channels.get(source, 1.0), 1e-300)
-
-
-def _leak_starts(at: Surroundings) -> list[Numbers]:
-    return [{"ratio": sign * 0.03 * _ratio_of_readings(at)} for sign in (1, -1)]
-
-
 def _largest_leaks(at: Surroundings) -> Mapping[str, tuple[float, float]]:
     to, _, source = at.channel.partition("<")
-    most = _LARGEST_LEAK * _ratio_of_readings(at)
+    most = _LARGEST_LEAK * scales.leak(at)
     if to.partition("_")[0] == source.partition("_")[0]:
         # A tenth for all was the bound before a base was found to add 14 % to the reading of a tank.
         is_base = to.endswith("_root")  # one that rests reads nothing else
-        most = max(most, _LARGEST_LEAK) if is_base else _LARGEST_LEAK_OF_ITS_KIND * _ratio_of_readings(at)
+        most = max(most, _LARGEST_LEAK) if is_base else _LARGEST_LEAK_OF_ITS_KIND * scales.leak(at)
     return {"ratio": (-most, most)}
 
 
+_LEAK: Final = (
+    EffectParameter(
+        "ratio",
+        -1e6,
+        1e6,
+        is_between_readings=True,
+        range=Range(1e-3, _LARGEST_LEAK_OF_ITS_KIND, scales.leak, may_be_negative=True),
+    ),
+)
 CROSS_TALK = register(
     Effect(
         "cross_talk",
         "sensor",
         "y₁ → y₁ + r y₂, r in the unit of the one channel over that of the other",
-        (EffectParameter("ratio", -1e6, 1e6, is_between_readings=True),),
-        _leak_starts,
+        _LEAK,
+        multiples(_LEAK, *({"ratio": share} for share in (0.03, -0.03))),
         _cross_talk,
         ("mass_error", "sensor_gain"),
         "the second channel disconnected",

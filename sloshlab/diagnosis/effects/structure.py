@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sloshlab.diagnosis.candidate import Numbers, Surroundings
+from sloshlab.diagnosis.effects import scales
 from sloshlab.diagnosis.effects.force_effect import (
     COULOMB_CHARACTER,
     DRAG_CHARACTER,
@@ -28,8 +29,10 @@ from sloshlab.diagnosis.evidence import (
     THIRD_ORDER,
     WORK_1,
 )
+from sloshlab.diagnosis.prior import Range
 from sloshlab.twin.rate_independent_forces import (
     FRICTION_BEHIND_PLAY,
+    FRICTION_BEHIND_PLAY_BY_DIRECTION,
     HYSTERESIS,
     LINEAR_STRUCTURAL_DAMPING,
     STRUCTURAL_DAMPING,
@@ -50,22 +53,23 @@ from sloshlab.twin.structure_forces import (
 )
 
 _OTHER_LEVELS = "decays or sweeps at two or more amplitudes"
-
-
-def _stiffness(at: Surroundings) -> float:
-    return at.moving_mass_kg * at.omega**2
+_FRICTION = Range(1e-4, 1.0, scales.force)
+_LOSS_FACTOR = Range(3e-4, 0.3)
+_PLAY = Range(3e-3, 1.0, scales.displacement)
+_BEHIND_PLAY = Range(0.03, 300.0, scales.secant_stiffness)
 
 
 def _static_stiffness(at: Surroundings) -> float:
     """What the loss factor of the structure is a share of."""
     structure = at.twin.structure
-    return _stiffness(at) if structure is None else structure.static_stiffness_n_per_m
+    return scales.stiffness(at) if structure is None else structure.static_stiffness_n_per_m
 
 
 VISCOUS = force_effect(
     VISCOUS_DAMPING,
     "structure",
-    lambda at: [{"damping_n_s_per_m": 0.01 * at.moving_mass_kg * at.omega}],
+    [{"damping_n_s_per_m": 0.01}],
+    ranges={"damping_n_s_per_m": Range(3e-4, 1.0, scales.damping)},
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
     look_alikes=("structural_damping", "coulomb_friction", "sensor_delay"),
     separated_by=_OTHER_LEVELS + ", and at two frequencies",
@@ -76,7 +80,8 @@ VISCOUS = force_effect(
 COULOMB = force_effect(
     COULOMB_FRICTION,
     "structure",
-    lambda at: [{"force_n": share * at.force_n} for share in (0.003, 0.02)],
+    [{"force_n": share} for share in (0.003, 0.02)],
+    ranges={"force_n": _FRICTION},
     look_alikes=("viscous_damping", "structural_damping", "stribeck_friction", "asymmetric_friction"),
     separated_by=_OTHER_LEVELS + ", down to rest",
     spoken_for_by=COULOMB_CHARACTER,
@@ -95,10 +100,8 @@ def _clearly_asymmetric(force_n: float) -> list[dict[str, tuple[float, float]]]:
 ASYMMETRIC = force_effect(
     ASYMMETRIC_FRICTION,
     "structure",
-    lambda at: [
-        {"force_up_n": 0.015 * at.force_n, "force_down_n": 0.005 * at.force_n},
-        {"force_up_n": 0.005 * at.force_n, "force_down_n": 0.015 * at.force_n},
-    ],
+    [{"force_up_n": 0.015, "force_down_n": 0.005}, {"force_up_n": 0.005, "force_down_n": 0.015}],
+    ranges={"force_up_n": _FRICTION, "force_down_n": _FRICTION},
     look_alikes=("coulomb_friction + constant_force",),
     separated_by="none: the two are the same force; measure the static rest position with the friction taken off",
     spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, RATE_INDEPENDENT, WORK_1, NO_ONSET, CONSTANT),
@@ -110,14 +113,12 @@ ASYMMETRIC = force_effect(
 STRIBECK = force_effect(
     STRIBECK_FRICTION,
     "structure",
-    lambda at: [
-        {
-            "coulomb_n": 0.01 * at.force_n,
-            "static_n": 0.02 * at.force_n,
-            "stribeck_velocity_m_per_s": share * at.velocity_m_per_s,
-        }
-        for share in (0.05, 0.2, 0.6)
-    ],
+    [{"coulomb_n": 0.01, "static_n": 0.02, "stribeck_velocity_m_per_s": share} for share in (0.05, 0.2, 0.6)],
+    ranges={
+        "coulomb_n": _FRICTION,
+        "static_n": _FRICTION,
+        "stribeck_velocity_m_per_s": Range(3e-3, 2.0, scales.velocity),
+    },
     bounds={"stribeck_velocity_m_per_s": (1e-3, 1e3)},
     look_alikes=("coulomb_friction",),
     separated_by="slow motion about the Stribeck velocity",
@@ -127,7 +128,8 @@ STRIBECK = force_effect(
 DRAG = force_effect(
     QUADRATIC_DRAG,
     "structure",
-    lambda at: [{"drag_n_s2_per_m2": 0.01 * at.force_n / at.velocity_m_per_s**2}],
+    [{"drag_n_s2_per_m2": 0.01}],
+    ranges={"drag_n_s2_per_m2": Range(3e-4, 1.0, scales.drag)},
     look_alikes=("viscous_damping",),
     separated_by=_OTHER_LEVELS,
     spoken_for_by=DRAG_CHARACTER,
@@ -136,7 +138,8 @@ DRAG = force_effect(
 STRUCTURAL = force_effect(
     STRUCTURAL_DAMPING,
     "structure",
-    lambda at: [{"loss_factor": 0.01}],
+    [{"loss_factor": 0.01}],
+    ranges={"loss_factor": _LOSS_FACTOR},
     fixed=lambda at: {"stiffness_n_per_m": _static_stiffness(at)},
     fitted=("loss_factor",),
     look_alikes=("viscous_damping", "coulomb_friction"),
@@ -148,7 +151,8 @@ STRUCTURAL = force_effect(
 LINEAR_STRUCTURAL = force_effect(
     LINEAR_STRUCTURAL_DAMPING,
     "structure",
-    lambda at: [{"loss_factor": 0.01, "creep_decades": decades} for decades in (1.2, 2.4)],
+    [{"loss_factor": 0.01, "creep_decades": decades} for decades in (1.2, 2.4)],
+    ranges={"loss_factor": _LOSS_FACTOR, "creep_decades": Range(0.3, 4.0, is_log=False)},
     fixed=lambda at: {"stiffness_n_per_m": _static_stiffness(at), "frequency_hz": at.frequency_hz},
     fitted=("loss_factor", "creep_decades"),
     may_rest=("creep_decades",),
@@ -160,7 +164,7 @@ LINEAR_STRUCTURAL = force_effect(
 
 
 def _bouc_wen(at: Surroundings) -> list[Numbers]:
-    stiffness = 0.05 * _stiffness(at)
+    stiffness = 0.05 * scales.stiffness(at)
     # Products that a recording can tell: force and shape of a Bouc–Wen loop depend on β γ and β δ only.
     return [
         {
@@ -174,11 +178,23 @@ def _bouc_wen(at: Surroundings) -> list[Numbers]:
     ]
 
 
+def _yield(at: Surroundings) -> float:
+    """βγ of a loop that yields at 3 % of m a, between 1/x of the exponent 1 and 1/(x z) of 2: 1/(x √z)."""
+    return float(1.0 / (at.displacement_m * (0.03 * at.force_n) ** 0.5))
+
+
+_YIELD = Range(0.01, 1000.0, _yield, may_be_negative=True)
 # An exponent of one is a value like any other, so that it may rest at that bound.
 BOUC_WEN = force_effect(
     HYSTERESIS,
     "structure",
     _bouc_wen,
+    ranges={
+        "stiffness_n_per_m": Range(1e-3, 3.0, scales.stiffness),
+        "beta_gamma": _YIELD,
+        "beta_delta": _YIELD,
+        "exponent": Range(1.0, 3.0, is_log=False),
+    },
     bounds={"exponent": (1.0, 3.0)},
     may_rest=("exponent",),
     look_alikes=("coulomb_friction", "structural_damping"),
@@ -188,33 +204,41 @@ BOUC_WEN = force_effect(
 )
 
 
-def _is_of_a_user(at: Surroundings) -> bool:
-    """Whether the twin is a user's own: dampers and joints have play, the rigs of the vocabulary have none."""
-    return at.rig is None
-
-
-# For twins of a user's own only: machines have play, rigs of tanks have none.
 BEHIND_PLAY = force_effect(
     FRICTION_BEHIND_PLAY,
     "structure",
-    lambda at: [
-        {
-            "force_n": share * at.force_n,
-            "play_m": 0.1 * at.displacement_m,
-            "stiffness_n_per_m": 5 * share * at.force_n / at.displacement_m,
-        }
-        for share in (0.2, 1.0)
-    ],
+    [{"force_n": share, "play_m": 0.1, "stiffness_n_per_m": 5 * share} for share in (0.2, 1.0)],
+    ranges={"force_n": _FRICTION, "play_m": _PLAY, "stiffness_n_per_m": _BEHIND_PLAY},
     look_alikes=("hysteresis", "coulomb_friction", "clearance"),
     separated_by="slow reversals at several amplitudes, with the force read while it is low",
-    needs=_is_of_a_user,
     spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT),
     includes=("coulomb_friction",),
+)
+# A constant force is nested in it: it moves the middle of the loop by (F₋ − F₊)/2 as long as the slider follows.
+BEHIND_PLAY_BY_DIRECTION = force_effect(
+    FRICTION_BEHIND_PLAY_BY_DIRECTION,
+    "structure",
+    [
+        {"force_up_n": more, "force_down_n": less, "play_m": 0.1, "stiffness_n_per_m": 3.0}
+        for more, less in ((0.9, 0.3), (0.3, 0.9), (0.15, 0.05), (0.05, 0.15))
+    ],
+    ranges={
+        "force_up_n": _FRICTION,
+        "force_down_n": _FRICTION,
+        "play_m": _PLAY,
+        "stiffness_n_per_m": _BEHIND_PLAY,
+    },
+    look_alikes=("hysteresis", "coulomb_friction", "clearance"),
+    separated_by="slow reversals at several amplitudes, with the force read while it is low",
+    spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT, CONSTANT),
+    includes=("friction_behind_play", "asymmetric_friction", "coulomb_friction", "constant_force"),
+    variant_of="friction_behind_play",
 )
 CUBIC = force_effect(
     CUBIC_STIFFNESS,
     "structure",
-    lambda at: [{"stiffness_n_per_m3": sign * 0.03 * at.force_n / at.displacement_m**3} for sign in (1, -1)],
+    [{"stiffness_n_per_m3": share} for share in (0.03, -0.03)],
+    ranges={"stiffness_n_per_m3": Range(1e-3, 3.0, scales.cubic_stiffness, may_be_negative=True)},
     look_alikes=("quadratic_stiffness", "clearance"),
     separated_by="a larger range of amplitudes on both sides of rest",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION, THIRD_ORDER),
@@ -223,7 +247,8 @@ CUBIC = force_effect(
 QUADRATIC = force_effect(
     QUADRATIC_STIFFNESS,
     "structure",
-    lambda at: [{"stiffness_n_per_m2": sign * 0.03 * at.force_n / at.displacement_m**2} for sign in (1, -1)],
+    [{"stiffness_n_per_m2": share} for share in (0.03, -0.03)],
+    ranges={"stiffness_n_per_m2": Range(1e-3, 3.0, scales.quadratic_stiffness, may_be_negative=True)},
     look_alikes=("cubic_stiffness",),
     separated_by="a larger range of amplitudes on both sides of rest",
     spoken_for_by=(CONSERVATIVE, EVEN, STATE_FUNCTION, SECOND_ORDER),
@@ -231,7 +256,8 @@ QUADRATIC = force_effect(
 STIFFNESS = force_effect(
     STIFFNESS_CHANGE,
     "structure",
-    lambda at: [{"stiffness_n_per_m": sign * 0.03 * _stiffness(at)} for sign in (1, -1)],
+    [{"stiffness_n_per_m": share} for share in (0.03, -0.03)],
+    ranges={"stiffness_n_per_m": Range(1e-3, 1.0, scales.stiffness, may_be_negative=True)},
     look_alikes=("mass_error",),
     separated_by="a known mass added to the tank",
     spoken_for_by=INERTIAL_CHARACTER,
@@ -240,10 +266,11 @@ STIFFNESS = force_effect(
 GAP = force_effect(
     CLEARANCE,
     "structure",
-    lambda at: [
-        {"gap_m": share * at.displacement_m, "stiffness_n_per_m": 0.2 * _stiffness(at)}
-        for share in (0.2, 0.5, 0.8)
-    ],
+    [{"gap_m": share, "stiffness_n_per_m": 0.2} for share in (0.2, 0.5, 0.8)],
+    ranges={
+        "gap_m": Range(0.02, 1.0, scales.displacement, is_log=False),
+        "stiffness_n_per_m": Range(3e-3, 100.0, scales.stiffness),
+    },
     look_alikes=("cubic_stiffness",),
     separated_by="amplitudes just below and above the gap",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION, ONSET, THIRD_ORDER),
@@ -262,6 +289,11 @@ MODE = force_effect(
         }
         for frequency in (*(ratio * at.frequency_hz for ratio in (0.6, 1.6, 2.5, 4.0)), *at.missed_hz)
     ],
+    ranges={
+        "frequency_hz": Range(0.1, 20.0, scales.frequency),
+        "damping_ratio": Range(5e-4, MOST_DAMPING_OF_A_MODE),
+        "participation": Range(1e-4, 1.0, scales.mass),
+    },
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("mass_error", "stiffness_change"),
     separated_by="a sweep over the missing mode's frequency",
@@ -273,7 +305,8 @@ MODE = force_effect(
 MASS = force_effect(
     MASS_ERROR,
     "structure",
-    lambda at: [{"mass_kg": sign * 0.03 * at.moving_mass_kg} for sign in (1, -1)],
+    [{"mass_kg": share} for share in (0.03, -0.03)],
+    ranges={"mass_kg": Range(1e-3, 0.7, scales.mass, may_be_negative=True)},
     bounds={"mass_kg": (-10.0, 10.0)},
     look_alikes=("stiffness_change", "sensor_gain"),
     separated_by="a known mass added to the tank",
@@ -283,7 +316,8 @@ MASS = force_effect(
 OFFSET = force_effect(
     CONSTANT_FORCE,
     "structure",
-    lambda at: [{"force_n": sign * 0.01 * at.force_n} for sign in (1, -1)],
+    [{"force_n": share} for share in (0.01, -0.01)],
+    ranges={"force_n": Range(1e-4, 1.0, scales.force, may_be_negative=True)},
     look_alikes=("asymmetric_friction", "quadratic_stiffness"),
     separated_by="the static rest position",
     spoken_for_by=(CONSERVATIVE, EVEN, CONSTANT, NO_ONSET),

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from scipy.stats import qmc
 
-from sloshlab.constants import GRAVITY_M_PER_S2
-from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, register
+from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, multiples, register
+from sloshlab.diagnosis.effects import scales
 from sloshlab.diagnosis.effects.force_effect import (
     COULOMB_CHARACTER,
     DRAG_CHARACTER,
@@ -33,6 +33,7 @@ from sloshlab.diagnosis.evidence import (
     TIME_VARYING,
 )
 from sloshlab.diagnosis.extension import Extension
+from sloshlab.diagnosis.prior import Range
 from sloshlab.twin.liquid_effects import AIR_CUSHION, FARADAY_WAVE, LATERAL_MODE, LIQUID_DAMPING, LIQUID_LOSS
 from sloshlab.twin.structure_forces import COULOMB_FRICTION, MASS_ERROR, QUADRATIC_DRAG, VISCOUS_DAMPING
 from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS, VARYING_MASS, VISCOUS_MAP
@@ -51,18 +52,19 @@ An impact needs many starts: with a gap that differs by 2 % every later bounce i
 _LEVELS = "decays or sweeps at accelerations below and above the threshold"
 
 
-def _liquid_force(at: Surroundings) -> float:
-    return at.rig.liquid_mass_kg * at.acceleration_m_per_s2
-
-
-def _largest_g(at: Surroundings) -> float:
-    return at.acceleration_m_per_s2 / GRAVITY_M_PER_S2
+# Forces of the liquid, in shares of a liquid that is moved as a whole.
+_SHARE_OF_LIQUID: Final = (3e-3, 10.0)
+_BETA: Final = Range(3e-3, 2.0, may_be_negative=True)
+_THRESHOLD: Final = Range(0.02, 1.0, scales.acceleration_g)
+_AVERAGING: Final = Range(0.3, 30.0, scales.period)
+_DAMPING_RATIO: Final = Range(5e-4, MOST_DAMPING_OF_A_MODE)
 
 
 VISCOUS = force_effect(
     VISCOUS_DAMPING,
     "tank",
-    lambda at: [{"damping_n_s_per_m": 0.2 * _liquid_force(at) / at.velocity_m_per_s}],
+    [{"damping_n_s_per_m": 0.2}],
+    ranges={"damping_n_s_per_m": Range(*_SHARE_OF_LIQUID, scales.liquid_damping)},
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
     look_alikes=("quadratic_drag", "coulomb_friction", "sensor_delay"),
     separated_by="two or more amplitudes and frequencies",
@@ -71,7 +73,8 @@ VISCOUS = force_effect(
 COULOMB = force_effect(
     COULOMB_FRICTION,
     "tank",
-    lambda at: [{"force_n": 0.1 * _liquid_force(at)}],
+    [{"force_n": 0.1}],
+    ranges={"force_n": Range(*_SHARE_OF_LIQUID, scales.liquid_force)},
     look_alikes=("viscous_damping",),
     separated_by="two or more amplitudes",
     spoken_for_by=COULOMB_CHARACTER,
@@ -79,7 +82,8 @@ COULOMB = force_effect(
 DRAG = force_effect(
     QUADRATIC_DRAG,
     "tank",
-    lambda at: [{"drag_n_s2_per_m2": 0.2 * _liquid_force(at) / at.velocity_m_per_s**2}],
+    [{"drag_n_s2_per_m2": 0.2}],
+    ranges={"drag_n_s2_per_m2": Range(*_SHARE_OF_LIQUID, scales.liquid_drag)},
     look_alikes=("viscous_damping", "liquid_sloshing"),
     separated_by="two or more amplitudes",
     spoken_for_by=DRAG_CHARACTER,
@@ -87,7 +91,8 @@ DRAG = force_effect(
 MASS = force_effect(
     MASS_ERROR,
     "tank",
-    lambda at: [{"mass_kg": sign * 0.1 * at.rig.liquid_mass_kg} for sign in (1, -1)],
+    [{"mass_kg": share} for share in (0.1, -0.1)],
+    ranges={"mass_kg": Range(*_SHARE_OF_LIQUID, scales.liquid_mass, may_be_negative=True)},
     bounds={"mass_kg": (-10.0, 10.0)},
     look_alikes=("effective_mass", "sensor_gain", "stiffness_change"),
     separated_by="a known mass added to the tank, and a run with frozen liquid",
@@ -97,7 +102,8 @@ MASS = force_effect(
 EFFECTIVE = force_effect(
     EFFECTIVE_MASS,
     "tank",
-    lambda at: [{"beta": sign * 0.1} for sign in (1, -1)],
+    [{"beta": share} for share in (0.1, -0.1)],
+    ranges={"beta": _BETA},
     fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
     fitted=("beta",),
     look_alikes=("mass_error",),
@@ -108,10 +114,8 @@ EFFECTIVE = force_effect(
 FADING = force_effect(
     FADING_MASS,
     "tank",
-    lambda at: [
-        {"beta": sign * 0.1, "fade_g": 0.4 * _largest_g(at), "averaging_s": 2 / at.frequency_hz}
-        for sign in (1, -1)
-    ],
+    [{"beta": share, "fade_g": 0.4, "averaging_s": 2.0} for share in (0.1, -0.1)],
+    ranges={"beta": _BETA, "fade_g": Range(0.03, 3.0, scales.acceleration_g), "averaging_s": _AVERAGING},
     fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
     fitted=("beta", "fade_g", "averaging_s"),
     bounds={"averaging_s": (0.05, 5.0)},
@@ -142,15 +146,16 @@ def _sweeps(at: Surroundings) -> bool:
 VARYING = force_effect(
     VARYING_MASS,
     "tank",
-    lambda at: [
-        {"beta": sign * 0.1, **{f"beta_{name}": slope * 0.1 for name in _VARIES}}
-        for sign in (1, -1)
-        for slope in (1, -1)
+    [
+        {"beta": share, **{f"beta_{name}": slope for name in _VARIES}}
+        for share in (0.1, -0.1)
+        for slope in (0.1, -0.1)
     ],
+    ranges={name: _BETA for name in ("beta", *(f"beta_{name}" for name in _VARIES))},
     fixed=lambda at: {
         "liquid_mass_kg": at.rig.liquid_mass_kg,
         "frequency_hz": at.frequency_hz,
-        "level_g": 0.5 * _largest_g(at),
+        "level_g": 0.5 * scales.acceleration_g(at),
         "averaging_s": 2 / at.frequency_hz,
     },
     fitted=("beta", *(f"beta_{name}" for name in _VARIES)),
@@ -171,27 +176,27 @@ def _damping(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
 
 # A liquid whose damping fluctuates within a run, not only from run to run, looks like this too: a false alarm of
 # the second sealed trial was one.
+_SLOSHING: Final = (
+    EffectParameter("threshold_g", 0.02, 20.0, range=_THRESHOLD),
+    EffectParameter("peak_w_bar", 0.0, 20.0, range=Range(0.01, 5.0)),
+    EffectParameter("rise", 0.05, 20.0, may_rest=True, range=Range(0.1, 10.0)),  # a peak beyond all levels
+    # levels that hardly change do not tell it
+    EffectParameter("averaging_s", 0.01, 5.0, may_rest=True, range=_AVERAGING),
+)
 SLOSHING = register(
     Effect(
         "liquid_sloshing",
         "tank",
         "−(m_l/π) Ω W̄(â) v; W̄ rises from nothing at the threshold a_t to its peak at a_t (1 + rise), and falls",
-        (
-            EffectParameter("threshold_g", 0.02, 20.0),
-            EffectParameter("peak_w_bar", 0.0, 20.0),
-            EffectParameter("rise", 0.05, 20.0, may_rest=True),  # a peak beyond all levels
-            EffectParameter("averaging_s", 0.01, 5.0, may_rest=True),  # levels that hardly change do not tell it
+        _SLOSHING,
+        multiples(
+            _SLOSHING,
+            *(
+                {"threshold_g": share, "peak_w_bar": 0.5, "rise": rise, "averaging_s": 2.0}
+                for share in (0.1, 0.3, 0.6)
+                for rise in (0.5, 2.0)
+            ),
         ),
-        lambda at: [
-            {
-                "threshold_g": share * _largest_g(at),
-                "peak_w_bar": 0.5,
-                "rise": rise,
-                "averaging_s": 2 / at.frequency_hz,
-            }
-            for share in (0.1, 0.3, 0.6)
-            for rise in (0.5, 2.0)
-        ],
         _damping,
         ("viscous_damping", "quadratic_drag"),
         _LEVELS,
@@ -243,27 +248,27 @@ def _damps(at: Surroundings) -> bool:
 _NEVER_CALM_S: Final = 1e9
 # A level that agitates the liquid at once, like a step, left fits in local minima. A soft one leads out of them,
 # and its sharpness follows the recordings.
+_DELAY: Final = (
+    EffectParameter("time_constant_s", 2e-3, 20.0, range=Range(0.05, 100.0, scales.period)),
+    EffectParameter("agitated_g", 0.02, 20.0, range=_THRESHOLD),
+    # a start that goes on does not tell it
+    EffectParameter("averaging_s", 0.01, 5.0, may_rest=True, range=_AVERAGING),
+    EffectParameter("sharpness", 2.0, 50.0, may_rest=True, range=Range(2.0, 50.0)),
+)
 DELAY = register(
     Effect(
         "breakup_delay",
         "tank",
         "the forces of moving liquid times s, ṡ = p (1 − s)/τ, p = rⁿ/(1 + rⁿ), r = â/a_agitated; s stays",
-        (
-            EffectParameter("time_constant_s", 2e-3, 20.0),
-            EffectParameter("agitated_g", 0.02, 20.0),
-            EffectParameter("averaging_s", 0.01, 5.0, may_rest=True),  # a start that goes on does not tell it
-            EffectParameter("sharpness", 2.0, 50.0, may_rest=True),
+        _DELAY,
+        multiples(
+            _DELAY,
+            *(
+                {"time_constant_s": n, "agitated_g": share, "averaging_s": 2.0, "sharpness": 4.0}
+                for n in (1.0, 5.0)
+                for share in (0.1, 0.4)
+            ),
         ),
-        lambda at: [
-            {
-                "time_constant_s": n / at.frequency_hz,
-                "agitated_g": share * _largest_g(at),
-                "averaging_s": 2 / at.frequency_hz,
-                "sharpness": 4.0,
-            }
-            for n in (1.0, 5.0)
-            for share in (0.1, 0.4)
-        ],
         _changed_liquid(
             lambda term, numbers, at: term.changed(
                 break_up_s=numbers["time_constant_s"],
@@ -280,19 +285,17 @@ DELAY = register(
     )
 )
 # Work per cycle goes with the damping and the square of the level, so that (a_s/â)² keeps it where it is.
+_SATURATION: Final = (
+    EffectParameter("threshold_g", 0.02, 50.0, range=_THRESHOLD),
+    EffectParameter("averaging_s", 0.01, 5.0, may_rest=True, range=_AVERAGING),
+)
 SATURATION = register(
     Effect(
         "high_g_saturation",
         "tank",
         "the damping of the liquid times (a_s/â)² beyond a_s: work per cycle stops growing",
-        (
-            EffectParameter("threshold_g", 0.02, 50.0),
-            EffectParameter("averaging_s", 0.01, 5.0, may_rest=True),
-        ),
-        lambda at: [
-            {"threshold_g": share * _largest_g(at), "averaging_s": 2 / at.frequency_hz}
-            for share in (0.3, 0.5, 0.7)
-        ],
+        _SATURATION,
+        multiples(_SATURATION, *({"threshold_g": share, "averaging_s": 2.0} for share in (0.3, 0.5, 0.7))),
         _changed_liquid(
             lambda term, numbers, at: term.changed(
                 saturation_g=numbers["threshold_g"], averaging_s=numbers["averaging_s"]
@@ -314,20 +317,20 @@ def _knows_work(at: Surroundings) -> bool:
 
 # Work per cycle may go on growing, less than with the square of the level.
 # In a simulated tank W̄ falls with the power 0.76 from 4 g on, not with the square.
+_GRADUAL: Final = (
+    EffectParameter("threshold_g", 0.02, 50.0, range=_THRESHOLD),
+    EffectParameter("exponent", 0.2, 4.0, range=Range(0.2, 4.0, is_log=False)),
+    EffectParameter("averaging_s", 0.01, 5.0, may_rest=True, range=_AVERAGING),
+)
 GRADUAL_SATURATION = register(
     Effect(
         "gradual_saturation",
         "tank",
         "the damping of the liquid times (a_s/â)ⁿ beyond a_s: work per cycle grows less, or falls where n > 2",
-        (
-            EffectParameter("threshold_g", 0.02, 50.0),
-            EffectParameter("exponent", 0.2, 4.0),
-            EffectParameter("averaging_s", 0.01, 5.0, may_rest=True),
+        _GRADUAL,
+        multiples(
+            _GRADUAL, *({"threshold_g": share, "exponent": 1.0, "averaging_s": 2.0} for share in (0.3, 0.5, 0.7))
         ),
-        lambda at: [
-            {"threshold_g": share * _largest_g(at), "exponent": 1.0, "averaging_s": 2 / at.frequency_hz}
-            for share in (0.3, 0.5, 0.7)
-        ],
         _changed_liquid(
             lambda term, numbers, at: term.changed(
                 saturation_g=numbers["threshold_g"],
@@ -385,10 +388,10 @@ IMPACT = register(
         "tank",
         "a share of the liquid that flies between floor and ceiling and meets them through spring and damper",
         (
-            EffectParameter("gap_m", 1e-4, 1.0),
-            EffectParameter("stiffness_n_per_m", 50.0, 1e7),
-            EffectParameter("damping_kg_per_s", 0.0, 1e4),
-            EffectParameter("share", 0.002, 1.0, may_rest=True),
+            EffectParameter("gap_m", 1e-4, 1.0, range=Range(0.25, 1.3, scales.room)),
+            EffectParameter("stiffness_n_per_m", 50.0, 1e7, range=Range(1e-3, 16.0, scales.contact_stiffness)),
+            EffectParameter("damping_kg_per_s", 0.0, 1e4, range=Range(1e-4, 4.0, scales.contact_damping)),
+            EffectParameter("share", 0.002, 1.0, may_rest=True, range=Range(5e-3, 1.0)),
         ),
         lambda at: [
             _impact_numbers(at, room, _CONTACT_HZ, 0.3, share) for share in (1.0, 0.2, 0.05) for room in (1.0, 0.6)
@@ -409,6 +412,11 @@ LATERAL = force_effect(
         {"frequency_hz": frequency, "mass_kg": 0.2 * at.rig.liquid_mass_kg, "damping_ratio": 0.01}
         for frequency in (*(ratio * at.frequency_hz for ratio in (0.3, 0.7, 1.4)), *at.missed_hz)
     ],
+    ranges={
+        "frequency_hz": Range(0.1, 10.0, scales.frequency),
+        "mass_kg": Range(3e-3, 1.0, scales.liquid_mass),
+        "damping_ratio": _DAMPING_RATIO,
+    },
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("missing_mode",),
     separated_by="a slow sweep over its frequency at small amplitude",
@@ -421,15 +429,14 @@ LATERAL = force_effect(
 FARADAY = force_effect(
     FARADAY_WAVE,
     "tank",
-    lambda at: [
-        {
-            "frequency_hz": 0.5 * at.frequency_hz,
-            "growth": growth / _largest_g(at),
-            "force_n": 0.3 * _liquid_force(at),
-            "damping_ratio": 0.02,
-        }
-        for growth in (0.3, 1.0)
-    ],
+    [{"frequency_hz": 0.5, "growth": growth, "force_n": 0.3, "damping_ratio": 0.02} for growth in (0.3, 1.0)],
+    ranges={
+        # half of the lowest to half of the highest frequency of a sweep
+        "frequency_hz": Range(0.2, 1.2, scales.frequency),
+        "growth": Range(0.03, 30.0, scales.reciprocal_g),
+        "force_n": Range(*_SHARE_OF_LIQUID, scales.liquid_force),
+        "damping_ratio": _DAMPING_RATIO,
+    },
     bounds={"growth": (1e-3, 100.0), "damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     separated_by="spectra at half the frequency below and above the threshold",
     spoken_for_by=(HALF_ORDER, MEMORY, ONSET),
@@ -438,7 +445,8 @@ FARADAY = force_effect(
 LOSS = force_effect(
     LIQUID_LOSS,
     "tank",
-    lambda at: [{"rate_kg_per_s": 0.1 * at.rig.liquid_mass_kg / at.longest_run_s}],
+    [{"rate_kg_per_s": 0.1}],
+    ranges={"rate_kg_per_s": Range(3e-3, 1.0, scales.loss_rate)},
     look_alikes=("mass_error", "sensor_drift"),
     separated_by="the same test at the beginning and at the end of the day",
     spoken_for_by=(TIME_VARYING, ODD_IN_DISPLACEMENT),
@@ -457,6 +465,12 @@ CUSHION = force_effect(
         }
         for frequency in (*(ratio * at.frequency_hz for ratio in (1.7, 3.0, 6.0)), *at.missed_hz)
     ],
+    ranges={
+        "stiffness_n_per_m": Range(3e-3, 100.0, scales.liquid_stiffness),
+        "mass_kg": Range(3e-3, 1.0, scales.liquid_mass),
+        "hardening_per_m": Range(0.03, 30.0, scales.hardening),
+        "damping_ratio": _DAMPING_RATIO,
+    },
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
     look_alikes=("effective_mass", "lateral_mode"),
     separated_by="two pressures of the gas",

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
+from sloshlab.diagnosis.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
 from sloshlab.diagnosis.rig_model import corrected, steps_per_sample, with_cached_inputs
 from sloshlab.diagnosis.user_module import one_line
 from sloshlab.diagnosis.user_twin.added_force import AddedForce
@@ -52,7 +52,7 @@ class UserTwinModel:
     def __init__(self, twin: UserTwin, runs: Sequence[CaseRun], *, name: str = "twin") -> None:
         self.name, self.described = name, twin
         self.runs: tuple[CaseRun, ...] = tuple(runs)
-        self.blocks: tuple[str, ...] = ("structure", "sensor")
+        self.blocks: tuple[str, ...] = ("excitation", "structure", "sensor")
         # A user's own code may not bear a fork.
         self.may_be_forked = False
         self._lock, self._user_code_lock = threading.Lock(), threading.Lock()
@@ -145,7 +145,8 @@ class UserTwinModel:
             if key in self._truths:
                 self._truths.move_to_end(key)
                 return self._truths[key]
-        view = _view(run, undone) if undone else self._views[run.name]
+        is_changed = undone or extension.drives
+        view = _view(run, undone, extension.drives) if is_changed else self._views[run.name]
         found = self._of_free_twin(view, own, extension) if isinstance(self.described, FreeTwin) else None
         found = found or self._of_engine(view, own, extension)
         with self._lock:
@@ -184,7 +185,7 @@ class UserTwinModel:
         mechanism = self._call_user_code(self.described.mechanism, run, own)
         if not isinstance(mechanism, Mechanism):
             raise InputError(f"{self.name}: mechanism", got=type(mechanism).__name__, allowed="Mechanism")
-        return engine_twin(mechanism, extension.terms, run.n_samples), mechanism
+        return engine_twin(mechanism, extension.terms_in(run.name), run.n_samples), mechanism
 
     def _of_free_twin(
         self, run: TwinRun, own: Mapping[str, float], extension: Extension
@@ -192,7 +193,7 @@ class UserTwinModel:
         assert isinstance(self.described, FreeTwin)
         # The largest speed is known once the baseline has run; that run adds no friction.
         speed = self.described.friction_speed_m_per_s or self._speed_m_per_s or 1e-3
-        added = AddedForce(extension.terms, speed)
+        added = AddedForce(extension.terms_in(run.name), speed)
         with self._user_code_lock:
             response = self._call_user_code(self.described.simulate, run, own, added)
         if not isinstance(response, Response):
@@ -332,9 +333,9 @@ class UserTwinModel:
             self._speed_m_per_s = max(self._speed_m_per_s, 2e-3 * float(np.abs(motion[:, 1]).max()))
 
 
-def _view(run: CaseRun, undone: Sequence[SensorFault]) -> TwinRun:
+def _view(run: CaseRun, undone: Sequence[SensorFault], acting: tuple[ActingDrive, ...] = ()) -> TwinRun:
     """What a twin may know of a run; its arrays cannot be written, since they are kept."""
-    recording = corrected(run, undone, ()) if undone else run.recording
+    recording = with_acting(corrected(run, undone, ()) if undone else run.recording, acting)
     series = {name: np.array(recording[name].values, np.float64) for name in channels(recording)}
     for values in series.values():
         values.setflags(write=False)

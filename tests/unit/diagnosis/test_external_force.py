@@ -1,0 +1,153 @@
+"""Forces that no motion makes: answers to pulses in closed form, and what a missing force shows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recorded_oscillators import (
+    RATE_HZ,
+    decays,
+    effect,
+    rig,
+    surroundings,
+)
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.twin.excitation import free
+from sloshlab.twin.external_forces import HARMONIC_FORCE, PULSE_TRAIN
+from sloshlab.twin.structure import single_degree_of_freedom
+from sloshlab.twin.twin import Twin
+
+assert effects.__all__
+FORCE_N, WIDTH_S, PERIOD_S, START_S = 3.0, 0.06, 0.5, 0.2
+
+
+@pytest.mark.parametrize("alternates", [0.0, 1.0])
+def test_a_train_of_pulses_leaves_the_sum_of_their_impulse_responses(alternates: float) -> None:
+    """A haversine leaves F sin(ωw/2) Ω²/(m ω² (Ω² − ω²)) sin ω(t − t_k − w/2) behind, Ω = 2π/w."""
+    m, k = 2.0, 3200.0
+    omega, big = 40.0, 2 * np.pi / WIDTH_S
+    term = PULSE_TRAIN(
+        place="structure",
+        size_n=FORCE_N,
+        start_s=START_S,
+        period_s=PERIOD_S,
+        width_s=WIDTH_S,
+        alternates=alternates,
+    )
+    run = Twin(single_degree_of_freedom(m, k)).with_term(term).simulate(free(2.5, 1000.0), n_substeps=4)
+    time = np.arange(run.displacement_m.size) / 1000.0
+    one = FORCE_N * np.sin(0.5 * omega * WIDTH_S) * big**2 / (m * omega**2 * (big**2 - omega**2))
+    starts = START_S + PERIOD_S * np.arange(5)
+    signs = (-1.0) ** np.arange(5) if alternates else np.ones(5)
+    for n in range(1, 6):
+        after = (time > starts[n - 1] + WIDTH_S) & (time < START_S + PERIOD_S * n)
+        expected = sum(
+            sign * one * np.sin(omega * (time[after] - start - 0.5 * WIDTH_S))
+            for sign, start in zip(signs[:n], starts[:n], strict=True)
+        )
+        # Runge–Kutta of order 4 with 4000 steps a second
+        np.testing.assert_allclose(run.displacement_m[after], expected, atol=1e-6 * one)
+    assert np.abs(run.displacement_m[time < START_S]).max() == 0.0
+
+
+def test_a_machine_shakes_a_mass_by_its_dynamic_stiffness() -> None:
+    """F/|k − m ω² + i c ω| and its phase, once the start has died away."""
+    m, k, frequency, phase, reference = 2.0, 3200.0, 9.0, 0.15, 5.0
+    c = 2 * 0.05 * np.sqrt(k * m)
+    term = HARMONIC_FORCE(
+        place="structure", frequency_hz=frequency, size_n=2.0, phase=phase, reference_s=reference
+    )
+    run = Twin(single_degree_of_freedom(m, k, c)).with_term(term).simulate(free(10.0, 1000.0), n_substeps=2)
+    time = np.arange(run.displacement_m.size) / 1000.0
+    w = 2 * np.pi * frequency
+    answer = 2.0 / (k - m * w**2 + 1j * c * w) * np.exp(2j * np.pi * (frequency * (time - reference) + phase))
+    late = time > 8.0
+    np.testing.assert_allclose(run.displacement_m[late], answer.imag[late], atol=2e-6 * abs(answer[0]))
+
+
+@pytest.fixture(scope="module")
+def pulsed(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
+    """Two decays with a train that begins at another instant in each, integrated by scipy."""
+    folder = tmp_path_factory.mktemp("pulsed")
+    runs = [
+        replace(decays((0.01,), 4.0, noise={}, force=pulses(start))[0], name=name)
+        for name, start in (("first", 0.37), ("second", 0.81))
+    ]
+    return RigModel(rig(folder), folder, runs)
+
+
+def pulses(start_s: float) -> Callable[[float, float, float], float]:
+    def force(t: float, x: float, v: float) -> float:
+        within = (t - start_s) % PERIOD_S
+        inside = t >= start_s and within < WIDTH_S
+        return FORCE_N * 0.5 * (1 - np.cos(2 * np.pi * within / WIDTH_S)) if inside else 0.0
+
+    return force
+
+
+def of_runs(model: RigModel) -> Surroundings:
+    return replace(surroundings(model), runs=tuple(run.name for run in model.runs))
+
+
+def test_every_run_has_instants_of_its_own(pulsed: RigModel) -> None:
+    at = of_runs(pulsed)
+    [train] = [candidate for candidate in candidates(at) if candidate.key == "structure.external_force"]
+    names = [parameter.name for parameter in train.effect.parameters]
+    assert names == ["size_n", "period_s", "width_s", "start_s in first", "start_s in second"]
+    numbers = dict(zip(names, (FORCE_N, PERIOD_S, WIDTH_S, 0.37, 0.81), strict=True))
+    extension = train.extension(numbers)
+    for run in pulsed.runs:
+        x = pulsed.simulate(run, pulsed.believed, extension)["displacement_tank"]
+        # a pulse is rounded where the samples of the engine's steps fall
+        np.testing.assert_allclose(x, run.recording["displacement_tank"].values, atol=2e-6)
+    exchanged = train.extension(numbers | {"start_s in first": 0.81, "start_s in second": 0.37})
+    for run in pulsed.runs:
+        x = pulsed.simulate(run, pulsed.believed, exchanged)["displacement_tank"]
+        assert np.abs(x - run.recording["displacement_tank"].values).max() > 1e-3
+
+
+def test_a_missing_force_shows_the_train_that_is_in_it(pulsed: RigModel) -> None:
+    generator = np.random.default_rng(5)
+    time = np.arange(2000) / RATE_HZ
+    missing = {
+        name: np.array([pulses(start)(t, 0.0, 0.0) for t in time]) + 0.3 * generator.standard_normal(time.size)
+        for name, start in (("first", 0.37), ("second", 0.21))
+    }
+    train = Candidate(effect("structure.external_force").of_runs(("first", "second")), of_runs(pulsed))
+    best = train.proposed(missing)[0]
+    key = "structure.external_force"
+    # within half a width over eight seconds
+    assert best[f"{key}.period_s"] == pytest.approx(PERIOD_S, abs=0.5 * WIDTH_S * PERIOD_S / 8.0)
+    assert best[f"{key}.size_n"] == pytest.approx(FORCE_N, rel=0.25)
+    for name, start in (("first", 0.37), ("second", 0.21)):
+        off = (best[f"{key}.start_s in {name}"] - start + 0.5 * PERIOD_S) % PERIOD_S - 0.5 * PERIOD_S
+        assert abs(off) < WIDTH_S
+
+
+def test_a_missing_force_shows_the_line_that_is_in_it(pulsed: RigModel) -> None:
+    generator = np.random.default_rng(6)
+    at = of_runs(pulsed)
+    time = np.arange(1000) / RATE_HZ
+    middle = 0.5 * at.longest_run_s
+    phases = {"first": 0.8, "second": 0.3}
+    missing = {
+        name: 1.7 * np.sin(2 * np.pi * (11.3 * (time - middle) + phase)) + 0.3 * generator.standard_normal(1000)
+        for name, phase in phases.items()
+    }
+    line = Candidate(effect("structure.harmonic_force").of_runs(tuple(phases)), at)
+    best = line.proposed(missing)[0]
+    assert best["structure.harmonic_force.frequency_hz"] == pytest.approx(11.3, abs=0.05)
+    assert best["structure.harmonic_force.size_n"] == pytest.approx(1.7, rel=0.05)
+    for name, phase in phases.items():
+        off = (best[f"structure.harmonic_force.phase in {name}"] - phase + 0.5) % 1.0 - 0.5
+        assert abs(off) < 0.03
+
+
+def test_forces_of_runs_are_not_sought_where_runs_have_no_names(pulsed: RigModel) -> None:
+    assert not [found for found in candidates(surroundings(pulsed)) if found.effect.known_as == "external_force"]
