@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,8 @@ from sealed_trial.case_signals import Laboratory, scales_of
 from sealed_trial.composition import SINGLES, class_sizes, possible
 from sealed_trial.hidden_physics.effect import Change, DrawnEffect, HiddenEffect, Scales, Signals
 from sealed_trial.hidden_physics.unknown_physics import UNKNOWN_PHYSICS
-from sealed_trial.laboratory.hidden_rig import HiddenRig, drawn_rig
+from sealed_trial.laboratory.hidden_rig import HiddenRig, drawn_rig, wrongly_believed
+from sealed_trial.laboratory.recorder import drawn_recorder
 from sealed_trial.laboratory.sensors import Sensor, drawn_sensor
 from sealed_trial.laboratory.test_plan import PLANS, TestPlan, drawn_plan
 from sealed_trial.look_alikes import possible_look_alikes
@@ -138,7 +139,9 @@ class CaseDrawing:
             generator = self._generator(number, 2, redrawn)
             rig = drawn_rig(plan_name.partition("_")[0], generator)
             plan = drawn_plan(plan_name, rig, generator)
-            laboratory = Laboratory(rig, plan, int(generator.integers(2**31)))
+            seed = int(generator.integers(2**31))
+            # from a generator of its own: rigs and plans are those of trials without recorders
+            laboratory = Laboratory(rig, plan, seed, drawn_recorder(self._generator(number, 6, redrawn)))
             plain = laboratory.signals()
             scales = scales_of(laboratory, plain)
             sensors = {
@@ -169,7 +172,9 @@ class CaseDrawing:
             described.append(_description(effect, change, reached))
             if not all(map(math.isfinite, (reached, *change.parameters.values()))):
                 raise ArithmeticError(f"{effect.name} has no finite size")
-        signals = laboratory.signals(changes) if changes else plain
+        if kind == "retunable":
+            laboratory = replace(laboratory, rig=wrongly_believed(laboratory.rig, hidden))
+        signals = laboratory.signals(changes) if changes or kind == "retunable" else plain
         # what is stuck tells nothing of what holds it
         if _motion(signals) < _LEAST_MOTION * _motion(plain):
             raise LookupError("what is hidden leaves no motion to speak of")
@@ -180,7 +185,16 @@ class CaseDrawing:
         for description in described:
             self._used[description["name"]] += 1
         truth = HiddenTruth(
-            name, kind, described, accepted, {"plan": plan_name, "rig_factors": laboratory.rig.factors, **nuisance}
+            name,
+            kind,
+            described,
+            accepted,
+            {
+                "plan": plan_name,
+                "rig_factors": laboratory.rig.factors,
+                "recorder": asdict(laboratory.recorder),
+                **nuisance,
+            },
         )
         late = tuple(change for change in changes if change.late_distortion is not None)
         return DrawnCase(laboratory, sensors, signals, late, truth)
@@ -189,7 +203,7 @@ class CaseDrawing:
         self, kind: str, plan: TestPlan, rig: HiddenRig, scales: Scales, generator: np.random.Generator
     ) -> tuple[list[DrawnEffect], list[list[str]], list[float]]:
         """Effects, the answers that are right, and the strengths wanted."""
-        if kind == "nothing":
+        if kind in ("nothing", "retunable"):
             return [], [[]], []
         if kind == "look_alike":
             choices = possible_look_alikes(plan, rig)
@@ -264,9 +278,9 @@ def _scaled(
             changed = laboratory.signals([change], relative_tolerance=QUICK) if effect.block != "sensor" else plain
         except ArithmeticError:
             return 1e6
-        for distortion in (change.distortion if effect.block == "sensor" else None, change.late_distortion):
-            if distortion is not None:
-                changed = [distortion(run, rate) for run in changed]
+        if effect.block == "sensor":
+            changed = change.distorted(changed, rate)
+        changed = change.distorted(changed, rate, late=True)
         return floor.strength(changed, damping_is_known=effect.name in ONLY_DAMPING)
 
     magnitude, reached = magnitude_for(strength_of, wanted, effect.least, effect.most)

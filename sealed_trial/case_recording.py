@@ -25,16 +25,18 @@ def write_case(folder: Path, case: DrawnCase, generator: np.random.Generator) ->
     (folder / "recordings").mkdir(parents=True)
     (folder / "rig.toml").write_text(rig_text(case.laboratory.rig), encoding="utf-8")
     plan = case.laboratory.plan
-    for number, (run, signals) in enumerate(zip(plan.runs, case.signals, strict=True), start=1):
+    read = []
+    for run, signals in zip(plan.runs, case.signals, strict=True):
         n_samples = round(run.duration_s * plan.sampling_rate_hz) + 1
         noisy = {}
         for name, values in signals.items():
             sensor = case.sensors[name]
             noise = sensor.noise_of(n_samples, plan.sampling_rate_hz, generator)
             noisy[name] = sensor.gain * values[:n_samples] + noise
-        for change in case.late:
-            assert change.late_distortion is not None
-            noisy = change.late_distortion(noisy, plan.sampling_rate_hz)
+        read.append(noisy)
+    for change in case.late:
+        read = change.distorted(read, plan.sampling_rate_hz, late=True)
+    for number, (run, noisy) in enumerate(zip(plan.runs, read, strict=True), start=1):
         counts = {name: case.sensors[name].counts(values) for name, values in noisy.items()}
         path = folder / "recordings" / f"run_{number:02d}.nc"
         write_recording(path, counts, case.sensors, case.laboratory.rig, run_attributes(number, run, plan))

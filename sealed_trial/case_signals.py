@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from sealed_trial.hidden_physics.effect import Change, Scales, Signals
 from sealed_trial.laboratory.hidden_rig import HiddenRig
-from sealed_trial.laboratory.signals import true_signals
+from sealed_trial.laboratory.recorder import Recorder
+from sealed_trial.laboratory.signals import Setting, true_signals
 from sealed_trial.laboratory.test_plan import TestPlan
 
 FloatArray = npt.NDArray[np.float64]
@@ -18,11 +19,12 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Laboratory:
-    """A rig, a plan and the seed of its motions."""
+    """A rig, a plan, the seed of its motions, and the recorder of all channels."""
 
     rig: HiddenRig
     plan: TestPlan
     seed: int
+    recorder: Recorder = field(default_factory=Recorder)
 
     def signals(self, changes: Sequence[Change] = (), *, relative_tolerance: float = 1e-9) -> list[Signals]:
         """Perfect signals of every run, as the chains pass them on before noise.
@@ -43,13 +45,20 @@ class Laboratory:
         )
         exponents = [change.relaxation_exponent for change in changes if change.relaxation_exponent]
         system = replace(system, relaxation_exponent=exponents[0] if exponents else 0.0)
-        runs = [
-            true_signals(self.rig, system, run, self.plan, self.seed, relative_tolerance=relative_tolerance)
-            for run in self.plan.runs
-        ]
+        obeyed = [change.obeyed for change in changes if change.obeyed is not None]
+        setting = Setting(self.plan, self.seed, self.recorder, obeyed[0] if obeyed else None)
+        runs = []
+        for number, run in enumerate(self.plan.runs):
+            own: dict[int, float] = {}
+            for change in changes:
+                own |= change.kernel_of_run(number)
+            runs.append(
+                true_signals(
+                    self.rig, system.with_parameters(own), run, setting, relative_tolerance=relative_tolerance
+                )
+            )
         for change in changes:
-            if change.distortion is not None:
-                runs = [change.distortion(run, self.plan.sampling_rate_hz) for run in runs]
+            runs = change.distorted(runs, self.plan.sampling_rate_hz)
         return runs
 
 

@@ -14,9 +14,9 @@ from sealed_trial.hidden_physics.tank_effects import TANK_EFFECTS
 from sealed_trial.laboratory.hidden_rig import HiddenRig
 from sealed_trial.laboratory.test_plan import TestPlan
 
-CLASSES: Final = ("nothing", "single", "pair", "masked", "look_alike", "outside")
-SHARES: Final = (20, 20, 5, 5, 5, 5)
-"""Of 60 cases; other sizes in proportion."""
+CLASSES: Final = ("nothing", "retunable", "single", "pair", "masked", "look_alike", "outside")
+SHARES: Final = (60, 20, 80, 25, 20, 20, 15)
+"""Of 240 cases; other sizes in proportion."""
 
 SINGLES: Final = (*STRUCTURE_EFFECTS, *TANK_EFFECTS, *SENSOR_EFFECTS)
 
@@ -26,10 +26,10 @@ def class_sizes(n_cases: int) -> dict[str, int]:
 
     Examples
     --------
+    >>> class_sizes(240)
+    {'nothing': 60, 'retunable': 20, 'single': 80, 'pair': 25, 'masked': 20, 'look_alike': 20, 'outside': 15}
     >>> class_sizes(60)
-    {'nothing': 20, 'single': 20, 'pair': 5, 'masked': 5, 'look_alike': 5, 'outside': 5}
-    >>> class_sizes(24)
-    {'nothing': 8, 'single': 8, 'pair': 2, 'masked': 2, 'look_alike': 2, 'outside': 2}
+    {'nothing': 15, 'retunable': 5, 'single': 20, 'pair': 6, 'masked': 5, 'look_alike': 5, 'outside': 4}
     """
     exact = np.array(SHARES) * n_cases / sum(SHARES)
     sizes = np.floor(exact).astype(int)
@@ -47,6 +47,7 @@ def possible(effects: Sequence[HiddenEffect], plan: TestPlan, rig: HiddenRig) ->
         if plan.kind in effect.kinds
         and (plan.has_levels or not effect.needs_levels)
         and (plan.has_frequencies or not effect.needs_frequencies)
+        and (plan.has_driven_base or not effect.needs_driven_base)
         and effect.tank_model in ("", tank_model)
         and not (effect.is_friction and rig.coulomb_n)
     ]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
+from sealed_trial.laboratory.prescribed_motion import Motion
+
 FloatArray = npt.NDArray[np.float64]
 Signals = dict[str, FloatArray]
-Distortion = Callable[[Signals, float], Signals]
-"""Takes the perfect signals of a run and its sampling rate; returns them as a faulty chain would pass them on."""
+Distortion = Callable[[Signals, float, int], Signals]
+"""From perfect signals, sampling rate and number of a run to its signals as a faulty chain would pass them on."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,10 @@ class Change:
     relaxation_exponent : float
     distortion, late_distortion : callable or None
         Of the signals before, and after noise was added.
+    obeyed : callable or None
+        From the commanded motion of a base to what it does.
+    of_runs : tuple of dict
+        Kernel parameters of each run, what happens outside knowing nothing of when a recording begins.
     """
 
     parameters: dict[str, float]
@@ -80,6 +86,19 @@ class Change:
     relaxation_exponent: float = 0.0
     distortion: Distortion | None = None
     late_distortion: Distortion | None = None
+    obeyed: Callable[[Motion], Motion] | None = None
+    of_runs: tuple[dict[int, float], ...] = ()
+
+    def kernel_of_run(self, number: int) -> dict[int, float]:
+        """Kernel parameters of a run alone; more runs than are stated begin anew."""
+        return self.of_runs[number % len(self.of_runs)] if self.of_runs else {}
+
+    def distorted(self, runs: Sequence[Signals], rate_hz: float, *, late: bool = False) -> list[Signals]:
+        """All runs as the chain passes them on, before noise or after it."""
+        distortion = self.late_distortion if late else self.distortion
+        if distortion is None:
+            return list(runs)
+        return [distortion(run, rate_hz, number) for number, run in enumerate(runs)]
 
 
 @dataclass(frozen=True)
@@ -127,6 +146,7 @@ class HiddenEffect:
         Rigs that can have it.
     needs_levels, needs_frequencies : bool
         A plan without them cannot tell it from other effects.
+    needs_driven_base : bool
     tank_model : str
         'frozen' or 'viscous' where only that baseline leaves it out, else empty.
     is_friction : bool
@@ -139,5 +159,6 @@ class HiddenEffect:
     kinds: tuple[str, ...]
     needs_levels: bool = False
     needs_frequencies: bool = False
+    needs_driven_base: bool = False
     tank_model: str = ""
     is_friction: bool = False

@@ -15,12 +15,15 @@ from sealed_trial.hidden_physics.effect import Change, Distortion, DrawnEffect, 
 FloatArray = npt.NDArray[np.float64]
 _ALL = ("sdof", "beam", "shaker")
 _CARRIED = ("sdof", "beam")
+_MOST_RUNS: Final = 16
+"""Of a plan."""
 
 
 def _of_channel(channel: str, distorted: Callable[[FloatArray, float], FloatArray]) -> Distortion:
     """A distortion of one channel alone."""
 
-    def distort(signals: Signals, rate_hz: float) -> Signals:
+    def distort(signals: Signals, rate_hz: float, run: int) -> Signals:
+        del run
         return {**signals, channel: distorted(signals[channel], rate_hz)}
 
     return distort
@@ -152,12 +155,32 @@ def cross_talk(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     unit = 0.05 if channel == "acceleration_root" else 0.1
 
     def change(m: float) -> Change:
-        def distort(signals: Signals, rate_hz: float) -> Signals:
+        def distort(signals: Signals, rate_hz: float, run: int) -> Signals:
             return {**signals, channel: signals[channel] + m * unit * signals[source]}
 
         return Change({"ratio": m * unit}, distortion=distort)
 
     return DrawnEffect("cross_talk", "sensor", change, channel, most=8.0)
+
+
+def hold(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A device that updates its output more slowly than it is recorded, at instants of its own in every run."""
+    channel, first = _motions(scales, generator), generator.random(_MOST_RUNS)
+
+    def change(m: float) -> Change:
+        update_rate = 300.0 / m
+
+        def distort(signals: Signals, rate_hz: float, run: int) -> Signals:
+            values = signals[channel]
+            time = np.arange(values.size) / rate_hz
+            n = int(np.ceil(time[-1] * update_rate)) + 1
+            updates = (np.arange(-1, n) + first[run % _MOST_RUNS]) / update_rate
+            read = CubicSpline(time, values)(np.clip(updates, 0.0, time[-1]))
+            return {**signals, channel: read[np.searchsorted(updates, time, side="right") - 1]}
+
+        return Change({"update_rate_hz": update_rate}, distortion=distort)
+
+    return DrawnEffect("sample_and_hold", "sensor", change, channel, 0.65, 15.0)
 
 
 SENSOR_EFFECTS: Final = (
@@ -169,4 +192,5 @@ SENSOR_EFFECTS: Final = (
     HiddenEffect("mains_hum", "sensor", hum, _ALL),
     HiddenEffect("clock_skew", "sensor", skew, _ALL),
     HiddenEffect("cross_talk", "sensor", cross_talk, _CARRIED, needs_frequencies=True),
+    HiddenEffect("sample_and_hold", "sensor", hold, _ALL),
 )

@@ -10,7 +10,9 @@ from typing import Final
 import numpy as np
 
 from sealed_trial.hidden_physics.effect import Change, DrawnEffect, HiddenEffect, Scales
+from sealed_trial.hidden_physics.outside_forces import outside_force
 from sealed_trial.laboratory import kernel_layout as at
+from sealed_trial.laboratory.prescribed_motion import acting
 from sealed_trial.laboratory.system import storage_of_springs
 
 _CARRIED = ("sdof", "beam")
@@ -132,12 +134,6 @@ def quadratic(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     return _proportional("quadratic_stiffness", "stiffness_n_per_m2", at.STIFFNESS_QUADRATIC, unit, most=12.0)
 
 
-def stiffness(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
-    """Spring beyond the laboratory's uncertainty."""
-    unit = 0.1 * _sign(generator) * scales.stiffness_n_per_m
-    return _proportional("stiffness_change", "stiffness_n_per_m", at.STIFFNESS_CHANGE, unit, least=0.1, most=4.0)
-
-
 def clearance(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """Stops on both sides."""
     gap, unit = scales.displacement_m * generator.uniform(0.35, 0.65), 0.3 * scales.stiffness_n_per_m
@@ -162,12 +158,6 @@ def missing_mode(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     return _effect("missing_mode", change, most=12.0)
 
 
-def mass(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
-    """Moving mass that is not in the tank."""
-    unit = 0.1 * _sign(generator) * scales.mass_kg
-    return _proportional("mass_error", "mass_kg", at.STRUCTURE_MASS, unit, least=0.1, most=3.0)
-
-
 def constant(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """A force that never changes."""
     return _proportional(
@@ -185,6 +175,43 @@ def rocking(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     return DrawnEffect("base_rocking", "excitation", change, least=0.02, most=12.0)
 
 
+def behind_play(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A slider with dry friction behind a play; in half of the cases it holds more in one direction."""
+    unit, play = 0.02 * scales.force_n, scales.displacement_m * generator.uniform(0.15, 0.5)
+    give = scales.displacement_m * generator.uniform(0.05, 0.2)
+    differs = generator.random() < 0.5
+    root = generator.uniform(1.5, 2.5) ** (0.5 * _sign(generator)) if differs else 1.0
+
+    def change(m: float) -> Change:
+        up, down, stiffness = m * unit * root, m * unit / root, m * unit / give
+        forces = {"force_up_n": up, "force_down_n": down} if differs else {"force_n": up}
+        return Change(
+            {**forces, "play_m": play, "stiffness_n_per_m": stiffness},
+            {at.SLIDER_UP: up, at.SLIDER_DOWN: down, at.SLIDER_PLAY: play, at.SLIDER_STIFFNESS: stiffness},
+        )
+
+    return _effect("friction_behind_play", change, most=20.0)
+
+
+def saturation(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """An actuator under the base that gives no more than it can, in half of the cases with a dead zone."""
+    peak, rms = scales.peak["acceleration_root"], scales.rms["acceleration_root"]
+    share = generator.uniform(0.05, 0.15) if generator.random() < 0.5 else 0.0
+
+    def change(m: float) -> Change:
+        limit, dead_zone = peak / (1 + 0.4 * m), share * rms * min(m, 3.0)
+        return Change(
+            {"limit": limit, "dead_zone": dead_zone}, obeyed=lambda motion: acting(motion, limit, dead_zone)
+        )
+
+    return DrawnEffect("actuator_saturation", "excitation", change, "acceleration_root", 0.05, 10.0)
+
+
+def outside(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """Blows, or another machine, at the structure."""
+    return outside_force("structure", 0.01 * scales.force_n, scales, generator)
+
+
 STRUCTURE_EFFECTS: Final = (
     HiddenEffect("viscous_damping", "structure", viscous, ("sdof",), needs_frequencies=True),
     HiddenEffect("coulomb_friction", "structure", coulomb, _CARRIED, needs_levels=True, is_friction=True),
@@ -198,5 +225,10 @@ STRUCTURE_EFFECTS: Final = (
     HiddenEffect("missing_mode", "structure", missing_mode, _CARRIED, needs_levels=True),
     HiddenEffect("constant_force", "structure", constant, _CARRIED),
     HiddenEffect("base_rocking", "excitation", rocking, ("beam",)),
+    HiddenEffect("friction_behind_play", "structure", behind_play, _CARRIED, needs_levels=True, is_friction=True),
+    HiddenEffect("external_force", "structure", outside, _CARRIED),
+    HiddenEffect(
+        "actuator_saturation", "excitation", saturation, _CARRIED, needs_levels=True, needs_driven_base=True
+    ),
 )
 """Singles; asymmetric friction is missing because it always has an equal."""

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from sealed_trial.hidden_physics.effect import Change, DrawnEffect, HiddenEffect, Scales
+from sealed_trial.hidden_physics.outside_forces import outside_force
 from sealed_trial.laboratory import kernel_layout as at
 
 _ALL = ("sdof", "beam", "shaker")
@@ -174,6 +175,12 @@ def mass(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     return _effect("mass_error", lambda m: Change({"mass_kg": m * unit}, {at.TANK_MASS: m * unit}), 0.1, 3.0)
 
 
+def outside(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """Blows, or another machine, at a tank on a shaker, which itself goes on as it does."""
+    unit = 0.02 * scales.liquid_mass_kg * scales.acceleration_g * at.GRAVITY
+    return outside_force("tank", unit, scales, generator)
+
+
 TANK_EFFECTS: Final = (
     HiddenEffect("viscous_damping", "tank", viscous, _ALL, needs_frequencies=True, tank_model="frozen"),
     HiddenEffect("coulomb_friction", "tank", coulomb, ("shaker",), needs_levels=True, is_friction=True),
@@ -187,5 +194,6 @@ TANK_EFFECTS: Final = (
     HiddenEffect("lateral_mode", "tank", lateral, ("beam",), needs_frequencies=True),
     HiddenEffect("air_cushion", "tank", air, ("sdof", "shaker"), needs_frequencies=True),
     HiddenEffect("liquid_loss", "tank", loss, _ALL),
+    HiddenEffect("external_force", "tank", outside, ("shaker",)),
 )
 """Singles; a tank's mass is missing because an effective mass equals it."""

@@ -66,14 +66,6 @@ def loosening(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     return _unknown("structure", "stiffness that drops at an instant", change, most=10.0)
 
 
-def machine(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
-    """Another machine shakes the structure at its own frequency."""
-    unit, rate = 0.005 * scales.force_n, scales.rate_rad_per_s * generator.uniform(1.25, 1.7)
-    return _unknown(
-        "structure", "a foreign tone", lambda m: Change({}, {at.TONE_FORCE: m * unit, at.TONE_RATE: rate})
-    )
-
-
 def one_sided_damping(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
     """A liquid that dissipates on the way down only."""
     unit = 2 * scales.liquid_mass_kg * scales.rate_rad_per_s * 0.6 / math.pi
@@ -87,7 +79,7 @@ def crooked_sensor(scales: Scales, generator: np.random.Generator) -> DrawnEffec
     order, peak = int(generator.choice([2, 3])), scales.peak[channel]
 
     def change(m: float) -> Change:
-        def distort(signals: Signals, rate_hz: float) -> Signals:
+        def distort(signals: Signals, rate_hz: float, run: int) -> Signals:
             values = signals[channel]
             return {**signals, channel: values + 0.03 * m * peak * (values / peak) ** order}
 
@@ -96,12 +88,32 @@ def crooked_sensor(scales: Scales, generator: np.random.Generator) -> DrawnEffec
     return _unknown("sensor", f"characteristic with a term of order {order}", change, channel, most=10.0)
 
 
+def sticky_sensor(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
+    """A sensor with play: its reading turns only after the motion has gone back by some way."""
+    names = [name for name in sorted(scales.rms) if name not in ("force_interface", "acceleration_root")]
+    channel = str(generator.choice(names))
+
+    def change(m: float) -> Change:
+        half = 0.02 * m * scales.peak[channel]
+
+        def distort(signals: Signals, rate_hz: float, run: int) -> Signals:
+            follows, reading = np.empty_like(signals[channel]), float(signals[channel][0])
+            for k, value in enumerate(signals[channel].tolist()):
+                reading = min(max(reading, value - half), value + half)
+                follows[k] = reading
+            return {**signals, channel: follows}
+
+        return Change({}, distortion=distort)
+
+    return _unknown("sensor", "a sensor with play", change, channel, most=20.0)
+
+
 UNKNOWN_PHYSICS: Final = (
     HiddenEffect("pumped_stiffness", "structure", pumped_stiffness, _CARRIED),
     HiddenEffect("fractional", "structure", fractional, ("sdof",), needs_frequencies=True),
     HiddenEffect("damping_with_displacement", "structure", damping_with_displacement, _CARRIED, True),
     HiddenEffect("loosening", "structure", loosening, _CARRIED),
-    HiddenEffect("machine", "structure", machine, _CARRIED),
     HiddenEffect("one_sided_damping", "tank", one_sided_damping, _ALL),
     HiddenEffect("crooked_sensor", "sensor", crooked_sensor, _ALL, True),
+    HiddenEffect("sticky_sensor", "sensor", sticky_sensor, _ALL, True),
 )

@@ -47,9 +47,34 @@ def elastic_force(t, x, p):  # type: ignore[no-untyped-def]
         force -= p[at.STIFFNESS_MODULATION] * math.cos(p[at.STIFFNESS_MODULATION_RATE] * t) * x
     if p[at.STIFFNESS_STEP] != 0.0 and t > p[at.STIFFNESS_STEP_TIME]:
         force -= p[at.STIFFNESS_STEP] * x
-    if p[at.TONE_FORCE] != 0.0:
-        force += p[at.TONE_FORCE] * math.sin(p[at.TONE_RATE] * t)
     return force + p[at.CONSTANT]
+
+
+@njit(cache=True)
+def outside_force(t, p):  # type: ignore[no-untyped-def]
+    """Of a machine that runs by itself, and of blows F sin²(π s/w) that repeat [N]."""
+    force = 0.0
+    if p[at.TONE_FORCE] != 0.0:
+        force += p[at.TONE_FORCE] * math.sin(p[at.TONE_RATE] * t + p[at.TONE_PHASE])
+    if p[at.PULSE_FORCE] != 0.0 and t >= p[at.PULSE_START]:
+        n = math.floor((t - p[at.PULSE_START]) / p[at.PULSE_PERIOD])
+        s = t - p[at.PULSE_START] - n * p[at.PULSE_PERIOD]
+        if s < p[at.PULSE_WIDTH]:
+            blow = p[at.PULSE_FORCE] * math.sin(math.pi * s / p[at.PULSE_WIDTH]) ** 2
+            force += -blow if p[at.PULSE_ALTERNATES] != 0.0 and n % 2 == 1 else blow
+    return force
+
+
+@njit(cache=True)
+def slider_pull(x, slider, p):  # type: ignore[no-untyped-def]
+    """Force of the spring with play that drags the slider, positive upward on the slider [N]."""
+    stretch = x - slider
+    half = 0.5 * p[at.SLIDER_PLAY]
+    if stretch > half:
+        return p[at.SLIDER_STIFFNESS] * (stretch - half)
+    if stretch < -half:
+        return p[at.SLIDER_STIFFNESS] * (stretch + half)
+    return 0.0
 
 
 @njit(cache=True)
@@ -59,6 +84,8 @@ def structure_force(t, place, state, p, conditions):  # type: ignore[no-untyped-
     force = elastic_force(t, x, p)
     force -= v * (p[at.STRUCTURE_VISCOUS] + p[at.STRUCTURE_DRAG] * abs(v) + p[at.DAMPING_OF_DISPLACEMENT] * x * x)
     force -= state[at.S_HYSTERESIS]
+    if p[at.SLIDER_STIFFNESS] != 0.0:
+        force -= slider_pull(x, state[at.S_SLIDER], p)
     side = conditions[at.D_CLEARANCE]
     if side != 0:
         force -= p[at.CLEARANCE_STIFFNESS] * (x - side * p[at.CLEARANCE_GAP]) + p[at.CLEARANCE_DAMPING] * v
@@ -161,6 +188,8 @@ def state_rates(rates, state, motion, p, conditions):  # type: ignore[no-untyped
         if v * z > 0.0:
             share -= (abs(z) / p[at.HYSTERESIS_YIELD]) ** p[at.HYSTERESIS_EXPONENT]
         rates[at.S_HYSTERESIS] = p[at.HYSTERESIS_STIFFNESS] * v * share
+    if conditions[at.D_SLIDER] != 0:
+        rates[at.S_SLIDER] = v
     rates[at.S_MEAN_SQUARE_A] = (tank_acceleration**2 - state[at.S_MEAN_SQUARE_A]) / at.AVERAGING_TIME
     rates[at.S_MEAN_SQUARE_V] = (tank_velocity**2 - state[at.S_MEAN_SQUARE_V]) / at.AVERAGING_TIME
     if p[at.BUILD_UP_TIME] > 0.0:

@@ -259,6 +259,21 @@ def drawn_rig(kind: str, generator: np.random.Generator) -> HiddenRig:
     return replace(rig, factors=factors)
 
 
+def wrongly_believed(rig: HiddenRig, generator: np.random.Generator) -> HiddenRig:
+    """The same beliefs about a rig of which one or two numbers are off by two to three tolerances.
+
+    Losses are smaller than believed: a loss that is larger by as much is one that is missing.
+    """
+    names = list(rig.tunable)
+    wrong = generator.choice(names, min(len(names), int(generator.integers(1, 3))), replace=False)
+    factors = dict(rig.factors)
+    for name in map(str, wrong):
+        is_loss = name.startswith(("damping", "coulomb", "tank_damping"))
+        sign = -1.0 if is_loss or generator.random() < 0.5 else 1.0
+        factors[name] = 1 + sign * rig.tunable[name] * generator.uniform(2.0, 3.0)
+    return replace(rig, factors=factors)
+
+
 def _drawn_sdof(generator: np.random.Generator) -> HiddenRig:
     uniform = generator.uniform
     height = float(np.round(uniform(0.05, 0.07), 4))

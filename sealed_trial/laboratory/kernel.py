@@ -12,7 +12,9 @@ from sealed_trial.laboratory import kernel_layout as at
 from sealed_trial.laboratory.equations import (
     base_motion,
     friction_limit,
+    outside_force,
     relaxation_rates,
+    slider_pull,
     state_rates,
     structure_force,
     tank_extra_mass,
@@ -21,6 +23,8 @@ from sealed_trial.laboratory.equations import (
 
 STANDSTILL = 1e-10
 """Velocity that counts as none [m/s]."""
+EQUAL_FORCES = 1e-9
+"""Share of its friction by which a slider that rests may be pulled more than it holds: it came to rest there."""
 
 
 @njit(cache=True)
@@ -42,6 +46,11 @@ def evaluate(t, y, rates, seen, system):  # type: ignore[no-untyped-def]
     moved = extra + p[at.STRUCTURE_MASS]
     on_structure = structure_force(t, (x, v), state, p, conditions)
     on_tank = tank_force(tank[0], state, p, conditions, base[3])
+    outside = outside_force(t, p)
+    if p[at.OUTSIDE_AT_TANK] != 0.0:
+        on_tank += outside
+    else:
+        on_structure += outside
     sliding = v + at_tank * base[1]
     friction = hold = 0.0
     if n == 0:
@@ -112,6 +121,14 @@ def margins(y, seen, conditions, p, out):  # type: ignore[no-untyped-def]
     if p[at.CLEARANCE_STIFFNESS] != 0.0:
         x, gap, side = seen[at.O_RELATIVE_DISPLACEMENT], p[at.CLEARANCE_GAP], conditions[at.D_CLEARANCE]
         out[at.D_CLEARANCE] = gap - abs(x) if side == 0 else side * x - gap
+    if p[at.SLIDER_STIFFNESS] != 0.0:
+        pull = slider_pull(seen[at.O_RELATIVE_DISPLACEMENT], y[2 * n + at.S_SLIDER], p)
+        side = conditions[at.D_SLIDER]
+        if side == 0:
+            spare = EQUAL_FORCES * (p[at.SLIDER_UP] + p[at.SLIDER_DOWN])
+            out[at.D_SLIDER] = min(p[at.SLIDER_UP] - pull, p[at.SLIDER_DOWN] + pull) + spare
+        else:
+            out[at.D_SLIDER] = side * seen[at.O_RELATIVE_VELOCITY] + STANDSTILL
     if p[at.LOOSE_MASS] != 0.0:
         z, side = y[2 * n + at.S_LOOSE], conditions[at.D_LOOSE]
         if side == 0:
@@ -139,5 +156,7 @@ def switch(which, y, seen, conditions, p):  # type: ignore[no-untyped-def]
             conditions[which] = 1 if seen[at.O_RELATIVE_DISPLACEMENT] > 0 else -1
     elif conditions[which] != 0:
         conditions[which] = 0
+    elif which == at.D_SLIDER:
+        conditions[which] = 1 if seen[at.O_RELATIVE_DISPLACEMENT] > y[2 * n + at.S_SLIDER] else -1
     else:
         conditions[which] = -1 if y[2 * n + at.S_LOOSE] < 0.5 * p[at.LOOSE_GAP] else 1

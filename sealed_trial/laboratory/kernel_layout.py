@@ -67,11 +67,26 @@ STIFFNESS_MODULATION_RATE: Final = 50  # [rad/s]
 DAMPING_OF_DISPLACEMENT: Final = 51  # c x² v [N s/m³]
 STIFFNESS_STEP: Final = 52  # [N/m] from an instant on
 STIFFNESS_STEP_TIME: Final = 53  # [s]
+
+# forces from outside, whatever the motion
 TONE_FORCE: Final = 54  # [N]
 TONE_RATE: Final = 55  # [rad/s]
+TONE_PHASE: Final = 57  # [rad], of every run its own
+PULSE_FORCE: Final = 58  # largest of a pulse [N]
+PULSE_START: Final = 59  # of the first [s], of every run its own
+PULSE_PERIOD: Final = 60  # [s]
+PULSE_WIDTH: Final = 61  # [s]
+PULSE_ALTERNATES: Final = 62  # 1: every other pulse pulls
+OUTSIDE_AT_TANK: Final = 63  # 1: they act on the tank, 0: on the structure
+
+# a slider with dry friction that is dragged through a spring with a play
+SLIDER_UP: Final = 64  # friction while it is dragged upward [N]
+SLIDER_DOWN: Final = 65  # [N]
+SLIDER_PLAY: Final = 66  # free travel in all [m]
+SLIDER_STIFFNESS: Final = 67  # [N/m]
 
 CARRIED_MASS: Final = 56  # M_dry + m_l [kg]
-N_PARAMETERS: Final = 57
+N_PARAMETERS: Final = 68
 
 # states beyond the coordinates and their velocities
 S_HYSTERESIS: Final = 0  # [N]
@@ -87,7 +102,8 @@ S_LOOSE_RATE: Final = 9
 S_APPENDAGE: Final = 10  # relative to the place [m]
 S_APPENDAGE_RATE: Final = 11
 S_DISSIPATED: Final = 12  # work of the structure's friction, viscous and contact forces at the tank's place [J]
-S_RELAXATION: Final = 13  # elastic forces of the relaxing springs over their gain
+S_SLIDER: Final = 13  # where the slider is [m]
+S_RELAXATION: Final = 14  # elastic forces of the relaxing springs over their gain
 N_RELAXATION: Final = 12
 N_STATES: Final = S_RELAXATION + N_RELAXATION
 
@@ -95,7 +111,8 @@ N_STATES: Final = S_RELAXATION + N_RELAXATION
 D_FRICTION: Final = 0  # +1 up, −1 down, 0 sticks
 D_CLEARANCE: Final = 1  # −1, 0, +1
 D_LOOSE: Final = 2  # −1 floor, 0 flight, +1 ceiling
-N_CONDITIONS: Final = 3
+D_SLIDER: Final = 3  # +1 slides up, −1 down, 0 rests
+N_CONDITIONS: Final = 4
 
 # what the laboratory sees
 O_DISPLACEMENT: Final = 0  # of the tank, absolute

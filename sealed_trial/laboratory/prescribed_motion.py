@@ -17,6 +17,8 @@ FloatArray = npt.NDArray[np.float64]
 
 TABLE_RATE_HZ = 4096.0
 _GRAVITY = 9.81
+_SLOW_HZ = 0.5
+"""Below which the position loop of a shaker leaves no motion."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,28 @@ def wandering_motion(duration_s: float, level_g: float, start_hz: float, stop_hz
     amplitude = _limited(level * _GRAVITY / rate**2, 0.0125)
     phase = CubicSpline(time, rate).antiderivative()(time)
     return _harmonic(time, amplitude, phase, rate, slope)
+
+
+def acting(motion: Motion, limit: float, dead_zone: float) -> Motion:
+    """What an actuator makes of a commanded acceleration: nothing within its dead zone, no more than its limit.
+
+    Its position loop takes what is slower than half a hertz, of fourth order.
+    """
+    commanded = motion.table[:, 2]
+    beyond = np.sign(commanded) * np.maximum(np.abs(commanded) - dead_zone, 0.0)
+    wanted = np.minimum(np.abs(beyond), limit) * np.sign(beyond)
+    # mirrored and faded out, or what ends suddenly would ring in what is slow
+    n = min(wanted.size - 1, round(4.0 / motion.step_s))
+    fade = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, n + 1) / n)
+    padded = np.concatenate([-(wanted[n:0:-1] * fade[::-1]), wanted, -(wanted[-2 : -n - 2 : -1] * fade)])
+    spectrum, rate = np.fft.rfft(padded), 2 * math.pi * np.fft.rfftfreq(padded.size, motion.step_s)
+    rate[0], spectrum[0] = 1.0, 0.0
+    spectrum /= 1 + (2 * math.pi * _SLOW_HZ / rate) ** 4
+    table = motion.table.copy()
+    for column, power in ((0, -2), (1, -1), (2, 0)):
+        found = np.fft.irfft(spectrum * (1j * rate) ** power, padded.size)
+        table[:, column] = found[n : n + wanted.size]
+    return Motion(motion.step_s, table)
 
 
 def with_modulation(motion: Motion, strength: float, generator: np.random.Generator) -> Motion:

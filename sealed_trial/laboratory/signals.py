@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -18,6 +20,7 @@ from sealed_trial.laboratory.prescribed_motion import (
     wandering_motion,
     with_modulation,
 )
+from sealed_trial.laboratory.recorder import Recorder
 from sealed_trial.laboratory.system import System, simulate
 from sealed_trial.laboratory.test_plan import RunPlan, TestPlan
 
@@ -62,22 +65,59 @@ def motion_of(run: RunPlan, chaos: float, seed: int) -> Motion:
     return with_modulation(motion, chaos, once) if chaos else motion
 
 
+@dataclass(frozen=True)
+class Setting:
+    """What is done in a laboratory, whatever its rig is.
+
+    Attributes
+    ----------
+    plan : TestPlan
+    seed : int
+        Of its motions.
+    recorder : Recorder
+    obeyed : callable or None
+        From the commanded motion of the base to what it does; the recording has the command.
+    """
+
+    plan: TestPlan
+    seed: int
+    recorder: Recorder = field(default_factory=Recorder)
+    obeyed: Callable[[Motion], Motion] | None = None
+
+
 def true_signals(
-    rig: HiddenRig, system: System, run: RunPlan, plan: TestPlan, seed: int, *, relative_tolerance: float = 1e-9
+    rig: HiddenRig, system: System, run: RunPlan, setting: Setting, *, relative_tolerance: float = 1e-9
 ) -> Signals:
-    """Perfect signals of a run and `SPARE_S` more, SI units, upward positive."""
-    motion = motion_of(run, rig.chaos, seed)
+    """Perfect signals of a run and `SPARE_S` more as the recorder passes them, SI units, upward positive."""
+    seed, rate, recorder = setting.seed, setting.plan.sampling_rate_hz, setting.recorder
+    commanded = motion_of(run, rig.chaos, seed)
+    is_free = run.motion == "free"
+    motion = commanded if setting.obeyed is None or is_free else setting.obeyed(commanded)
     scatter = np.random.default_rng([seed, run.test, run.repeat, 1]).standard_normal()
-    deflection = run.level * (1 + 0.002 * scatter) if run.motion == "free" else 0.0
-    rate = plan.sampling_rate_hz
-    seen = simulate(
+    n_held = recorder.n_held if is_free else 0
+    simulated = simulate(
         system,
         motion,
-        run.duration_s + SPARE_S,
+        run.duration_s + SPARE_S - n_held / rate,
         rate,
-        deflection_m=deflection,
+        deflection_m=run.level * (1 + 0.002 * scatter) if is_free else 0.0,
+        first_s=recorder.first_s_in_samples / rate if is_free else 0.0,
         relative_tolerance=relative_tolerance,
-    ).seen
+    )
+    signals, start = (
+        _readings(rig, system, seen, commanded, motion, rate) for seen in (simulated.seen, simulated.start[None])
+    )
+    recorded = {}
+    for name, values in signals.items():
+        # a tank that is held does not accelerate; what holds it pulls at it as its spring does
+        before = 0.0 if is_free and name.startswith("acceleration") else float(start[name][0])
+        recorded[name] = recorder.passed(np.concatenate([np.full(n_held, before), values]), before)
+    return recorded
+
+
+def _readings(
+    rig: HiddenRig, system: System, seen: FloatArray, commanded: Motion, motion: Motion, rate_hz: float
+) -> Signals:
     tank, force = seen[:, at.O_ACCELERATION], seen[:, at.O_INTERFACE_FORCE]
     if rig.kind == "shaker":
         return {
@@ -87,13 +127,13 @@ def true_signals(
             "acceleration_roof_2": tank.copy(),
             "acceleration_control": tank.copy(),
         }
-    every = round(1 / (rate * motion.step_s))
-    root = motion.table[: every * tank.size : every, 2].copy()
+    every = round(1 / (rate_hz * motion.step_s))
+    root, told = (table[: every * tank.size : every, 2].copy() for table in (motion.table, commanded.table))
     signals = {
         "force_interface": force.copy(),
         "acceleration_tip": tank.copy(),
         "displacement_tank": seen[:, at.O_DISPLACEMENT].copy(),
-        "acceleration_root": root,
+        "acceleration_root": told,
     }
     if rig.kind == "beam":
         n = system.shape.size

@@ -78,6 +78,11 @@ class TestPlan:
         return self.name not in ("sdof_one_frequency", "shaker_one_frequency")
 
     @property
+    def has_driven_base(self) -> bool:
+        """A base under a structure that is commanded to move."""
+        return self.kind != "shaker" and any(run.motion != "free" for run in self.runs)
+
+    @property
     def has_frequencies(self) -> bool:
         """More than the first natural frequency or the one of a single dwell."""
         return self.name in (

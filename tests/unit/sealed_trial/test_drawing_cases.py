@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,8 @@ from sealed_trial.hidden_physics.effect import Change, DrawnEffect, Scales
 from sealed_trial.hidden_physics.sensor_effects import gain
 from sealed_trial.hidden_physics.structure_effects import asymmetric
 from sealed_trial.hidden_physics.unknown_physics import UNKNOWN_PHYSICS
-from sealed_trial.laboratory.hidden_rig import drawn_rig, rig_text
+from sealed_trial.laboratory.hidden_rig import drawn_rig, rig_text, wrongly_believed
+from sealed_trial.laboratory.recorder import drawn_recorder
 from sealed_trial.laboratory.recording_file import run_attributes
 from sealed_trial.laboratory.test_plan import PLANS, drawn_plan
 from sealed_trial.look_alikes import possible_look_alikes
@@ -23,11 +25,12 @@ from sealed_trial.strength import magnitude_for
 
 VOCABULARY = {
     "viscous_damping", "coulomb_friction", "asymmetric_friction", "stribeck_friction", "quadratic_drag",
-    "structural_damping", "hysteresis", "cubic_stiffness", "quadratic_stiffness", "stiffness_change", "clearance",
+    "structural_damping", "hysteresis", "cubic_stiffness", "quadratic_stiffness", "clearance",
     "missing_mode", "mass_error", "constant_force", "liquid_sloshing", "effective_mass", "ceiling_impact",
     "breakup_delay", "high_g_saturation", "faraday_wave", "lateral_mode", "liquid_loss", "air_cushion",
     "base_rocking", "sensor_gain", "sensor_delay", "sensor_high_pass", "sensor_clipping", "sensor_drift",
-    "mains_hum", "clock_skew", "cross_talk",
+    "mains_hum", "clock_skew", "cross_talk", "sample_and_hold", "actuator_saturation", "external_force",
+    "friction_behind_play",
 }  # fmt: skip
 
 
@@ -78,13 +81,13 @@ def test_every_effect_of_the_vocabulary_can_be_hidden() -> None:
 def test_classes_are_in_proportion(n: int) -> None:
     sizes = class_sizes(n)
     assert sum(sizes.values()) == n
-    for name, size in class_sizes(60).items():
-        assert abs(sizes[name] - size * n / 60) < 1
+    for name, size in class_sizes(240).items():
+        assert abs(sizes[name] - size * n / 240) < 1
 
 
 def test_the_class_of_a_case_changes_neither_rig_nor_plan_nor_sensors() -> None:
     cases = {}
-    for kind in ("nothing", "single", "outside"):
+    for kind in ("nothing", "retunable", "single", "outside"):
         drawing = CaseDrawing([11, 12])
         drawing._plans = ["shaker_one_frequency"]
         cases[kind] = drawing.case(0, "case_001", kind)
@@ -92,6 +95,13 @@ def test_the_class_of_a_case_changes_neither_rig_nor_plan_nor_sensors() -> None:
     for other in (cases["single"], cases["outside"]):
         assert other.laboratory == plain.laboratory
         assert other.sensors == plain.sensors
+    wrong = cases["retunable"]
+    assert wrong.truth.accepted == [[]]
+    assert wrong.truth.effects == []
+    assert wrong.sensors == plain.sensors
+    # what the laboratory believes, does and records is the same
+    assert replace(wrong.laboratory, rig=plain.laboratory.rig) == plain.laboratory
+    assert replace(wrong.laboratory.rig, factors=plain.laboratory.rig.factors) == plain.laboratory.rig
     assert cases["single"].truth.accepted == [[cases["single"].truth.effects[0]["name"]]]
     assert cases["outside"].truth.accepted == [["unknown"]]
     assert cases["single"].truth.effects[0]["strength"] >= 3.0
@@ -201,6 +211,39 @@ def test_what_moves_less_than_it_must_is_not_drawn(
             drawn._attempted(0, 0, "case_001", "nothing", "sdof_one_frequency")
     else:
         assert drawn._attempted(0, 0, "case_001", "nothing", "sdof_one_frequency").truth.effects == []
+
+
+def test_one_or_two_numbers_are_off_by_two_to_three_tolerances_and_losses_are_smaller() -> None:
+    generator = np.random.default_rng(8)
+    sizes = []
+    for k in range(200):
+        rig = drawn_rig(("sdof", "beam", "shaker")[k % 3], generator)
+        wrong = wrongly_believed(rig, generator)
+        assert rig_text(wrong) == rig_text(rig)
+        off = {name: (factor - 1) / rig.tunable[name] for name, factor in wrong.factors.items()}
+        far = {name: size for name, size in off.items() if abs(size) > 1.0}
+        assert 1 <= len(far) <= 2
+        for name, size in far.items():
+            assert 2.0 <= abs(size) <= 3.0
+            assert size < 0 or not name.startswith(("damping", "coulomb", "tank_damping"))
+        sizes += list(far.values())
+    assert min(sizes) < -2.8
+    assert max(sizes) > 2.8
+
+
+def test_some_recorders_filter_and_some_begin_early_whatever_the_class() -> None:
+    generator = np.random.default_rng(9)
+    drawn = [drawn_recorder(generator) for _ in range(1000)]
+    # four in ten of each, three standard deviations of a thousand draws
+    assert abs(np.mean([recorder.filters for recorder in drawn]) - 0.4) < 0.05
+    assert abs(np.mean([recorder.lead_samples > 0 for recorder in drawn]) - 0.4) < 0.05
+    kinds = ("nothing", "retunable", "outside")
+    recorders = []
+    for kind in kinds:
+        drawing = CaseDrawing([11, 13])
+        drawing._plans = ["shaker_one_frequency"]
+        recorders.append(drawing.case(0, "case_001", kind).laboratory.recorder)
+    assert recorders[1:] == recorders[:-1]
 
 
 def test_the_same_seed_draws_the_same_case() -> None:
