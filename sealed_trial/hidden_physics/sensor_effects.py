@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.signal import lfilter
 
 from sealed_trial.hidden_physics.effect import Change, Distortion, DrawnEffect, HiddenEffect, Scales, Signals
@@ -175,7 +175,8 @@ def hold(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
             time = np.arange(values.size) / rate_hz
             n = int(np.ceil(time[-1] * update_rate)) + 1
             updates = (np.arange(-1, n) + first[run % _MOST_RUNS]) / update_rate
-            read = CubicSpline(time, values)(np.clip(updates, 0.0, time[-1]))
+            # of a high degree: a beam moves at up to a third of the sampling rate
+            read = make_interp_spline(time, values, k=7)(np.clip(updates, 0.0, time[-1]))
             return {**signals, channel: read[np.searchsorted(updates, time, side="right") - 1]}
 
         return Change({"update_rate_hz": update_rate}, distortion=distort)

@@ -31,9 +31,10 @@ def _squared_differences(values: FloatArray) -> FloatArray:
 
 
 def update_rates_hz(values: FloatArray, sampling_rate_hz: float, lowest_hz: float) -> tuple[float, ...]:
-    """Rates at which a reading may have been updated, none, one or two, the likeliest first.
+    """Rates at which a reading may have been updated, the likeliest first; none where nothing shows any.
 
-    They are the strongest line of the comb and the lowest that is about as strong, where that is another.
+    They are the strongest line of the comb and the lowest that is about as strong, where that is another; and of
+    both what is as far below the sampling rate, as updates of more than half of it are seen there.
 
     Parameters
     ----------
@@ -56,7 +57,8 @@ def update_rates_hz(values: FloatArray, sampling_rate_hz: float, lowest_hz: floa
     fundamental = int(np.flatnonzero(power >= _EQUAL * power[strongest])[0])
     # neighbours are one line between two frequencies of the transform
     found = (strongest, fundamental) if strongest - fundamental > 1 else (strongest,)
-    return tuple(_refined(squares, sampling_rate_hz, frequency[k]) for k in found)
+    rates = [_refined(squares, sampling_rate_hz, float(frequency[k])) for k in found]
+    return (*rates, *(sampling_rate_hz - rate for rate in rates))
 
 
 def _refined(squares: FloatArray, rate_hz: float, line_hz: float) -> float:
