@@ -207,7 +207,8 @@ BOUC_WEN = force_effect(
 BEHIND_PLAY = force_effect(
     FRICTION_BEHIND_PLAY,
     "structure",
-    [{"force_n": share, "play_m": 0.1, "stiffness_n_per_m": 5 * share} for share in (0.2, 1.0)],
+    # dampers and joints of machines hold as much as moves; what a rig has beside its spring holds little
+    [{"force_n": share, "play_m": 0.1, "stiffness_n_per_m": 5 * share} for share in (0.2, 1.0, 0.02)],
     ranges={"force_n": _FRICTION, "play_m": _PLAY, "stiffness_n_per_m": _BEHIND_PLAY},
     look_alikes=("hysteresis", "coulomb_friction", "clearance"),
     separated_by="slow reversals at several amplitudes, with the force read while it is low",
@@ -219,8 +220,8 @@ BEHIND_PLAY_BY_DIRECTION = force_effect(
     FRICTION_BEHIND_PLAY_BY_DIRECTION,
     "structure",
     [
-        {"force_up_n": more, "force_down_n": less, "play_m": 0.1, "stiffness_n_per_m": 3.0}
-        for more, less in ((0.9, 0.3), (0.3, 0.9), (0.15, 0.05), (0.05, 0.15))
+        {"force_up_n": up, "force_down_n": down, "play_m": 0.1, "stiffness_n_per_m": 5 * max(up, down)}
+        for up, down in ((0.6, 0.3), (0.3, 0.6), (0.02, 0.01), (0.01, 0.02))
     ],
     ranges={
         "force_up_n": _FRICTION,
