@@ -282,7 +282,7 @@ class ForceStarts:
 
     def _added(self, extension: Extension, drive: Excitation) -> FloatArray | None:
         """The force that an extension adds along a motion; None where it adds something else."""
-        if extension.faults or extension.structure is not None:
+        if extension.faults or extension.drives or extension.run_terms or extension.structure is not None:
             return None
         force = _force_along(extension.terms, drive)
         if extension.liquid is not None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import Effect, EffectParameter, Numbers, Surroundings, multiples, register
 from sloshlab.diagnosis.effects import scales
-from sloshlab.diagnosis.evidence import CONSERVATIVE, NO_ONSET, ODD_IN_DISPLACEMENT
+from sloshlab.diagnosis.evidence import CONSERVATIVE, MEMORY, NO_ONSET, ODD_IN_DISPLACEMENT, ONSET, THIRD_ORDER
 from sloshlab.diagnosis.extension import ActingDrive, Extension
 from sloshlab.diagnosis.prior import Range
 from sloshlab.twin.base_rocking import BaseRocking
@@ -101,5 +101,6 @@ SATURATION = register(
         "the motion or force of the actuator beside its command, at two levels",
         places=_commands,
         limits=_up_to_the_peak,
+        spoken_for_by=(MEMORY, ONSET, THIRD_ORDER),
     )
 )

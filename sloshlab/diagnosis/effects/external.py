@@ -24,6 +24,7 @@ from sloshlab.diagnosis.candidate import (
 )
 from sloshlab.diagnosis.effects import scales
 from sloshlab.diagnosis.effects.force_effect import has_structure
+from sloshlab.diagnosis.evidence import IMPULSIVE, MEMORY, TIME_VARYING
 from sloshlab.diagnosis.extension import Extension
 from sloshlab.diagnosis.prior import Range
 from sloshlab.twin.external_forces import HARMONIC_FORCE, PULSE_TRAIN
@@ -238,6 +239,7 @@ def _registered(block: str) -> tuple[Effect, Effect, Effect]:
                 ("ceiling_impact",),
                 _SEPARATED_BY,
                 _can_act(block),
+                spoken_for_by=(IMPULSIVE, MEMORY, TIME_VARYING),
                 variant_of=variant_of,
                 size=("size_n",),
                 proposes=_pulses_in(alternate=alternates),
@@ -258,6 +260,7 @@ def _registered(block: str) -> tuple[Effect, Effect, Effect]:
         ("missing_mode", "faraday_wave"),
         _SEPARATED_BY,
         _can_act(block),
+        spoken_for_by=(MEMORY, TIME_VARYING),
         variant_of="external_force",
         size=("size_n",),
         proposes=_lines_in,

@@ -370,7 +370,7 @@ def _held(numbers: Numbers) -> Reading:
         size = float(slope[known] @ slope[known])
         late = float((recorded - shown)[known] @ slope[known]) / size if size > 0 else 0.0
         late = min(max(late, -0.5), 0.5)
-        shown = shown + late * slope
+        shown = _interpolated(values, updates + late)
         # an update so near to a sample may be shown by it or not
         since, until = place - updates, updates + samples - place
         beside = updates + samples * (1.0 * (until < _NEAR_SAMPLES) - 1.0 * (since < _NEAR_SAMPLES))

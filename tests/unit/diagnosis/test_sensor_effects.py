@@ -175,7 +175,9 @@ def test_a_held_sine_has_images_about_the_update_rate(model: RigModel) -> None:
             assert np.angle(amplitude) == pytest.approx(-2 * np.pi * line_hz * 3.5 / RATE, abs=2e-3)
 
 
-@pytest.mark.parametrize(("update_rate_hz", "phase"), [(61.7, 0.37), (200.0, 0.9), (143.3, 0.0), (50.0, 0.55)])
+@pytest.mark.parametrize(
+    ("update_rate_hz", "phase"), [(61.7, 0.37), (200.0, 0.9), (143.3, 0.0), (50.0, 0.55), (100.0, 0.31)]
+)
 def test_a_held_reading_is_told_to_a_part_of_a_sample(
     model: RigModel, update_rate_hz: float, phase: float
 ) -> None:
