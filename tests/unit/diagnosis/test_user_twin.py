@@ -150,6 +150,28 @@ class TestMechanism:
         first = np.array([acceleration(t, state)[0] for t, state in zip(TIME, y.T, strict=True)])
         np.testing.assert_allclose(found["acceleration_first"], first, atol=3e-3 * np.abs(first).max())
 
+    def test_a_command_that_is_not_obeyed_acts_on_what_the_twin_is_fed(self) -> None:
+        """Limit 4 N and dead zone 1 N of a push of up to 8 N, integrated by scipy."""
+        run = case_run(
+            force_push=(np.array([push(t) for t in TIME]), "force"),
+            displacement_cart=(np.zeros(N), "displacement"),
+        )
+        model = UserTwinModel(CART, [run])
+        saturation = next(known for known in known_effects() if known.name == "actuator_saturation")
+        assert saturation.block in model.blocks
+        numbers = {"limit": 4.0, "dead_zone": 1.0}
+        extension = saturation.extension(numbers, None, "force_push")  # type: ignore[arg-type]
+        found = model.simulate(run, {}, Extension(drives=extension.drives, key=(("saturates", 4.0, 1.0),)))
+
+        def acting(t: float) -> float:
+            return float(np.sign(push(t)) * min(max(abs(push(t)) - 1.0, 0.0), 4.0))
+
+        y = by_scipy(lambda t, y: [y[1], (acting(t) - STIFFNESS * y[0] - DAMPING * y[1]) / MASS_KG], [0, 0])
+        # corners of what acts, between samples of the command
+        np.testing.assert_allclose(found["displacement_cart"], y[0], atol=5e-3 * np.abs(y[0]).max())
+        plain = model.simulate(run, {}, NOTHING)["displacement_cart"]
+        assert np.abs(plain - y[0]).max() > 0.3 * np.abs(y[0]).max()
+
     def test_a_moving_base_drives_relative_coordinates(self) -> None:
         def shaken(run: TwinRun, values: Mapping[str, float]) -> Mechanism:
             base = run.channels["acceleration_base"]
