@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.diagnosis.results import Diagnosis
+from pipelines.diagnosis.worker_threads import WorkerThreads
 from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines
 from pipelines.report.progress import amounts
 from pipelines.report.result_folder import require_result_folder, result_folder
@@ -64,7 +65,9 @@ def diagnose_case(
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
         # The search finds, the gates judge and may ask for more fits; only then is it said where and how.
-        found = findings_of(case, lambda what, done, of: advance(done, max(of, 1)), model)
+        found = findings_of(
+            case, lambda what, done, of: advance(done, max(of, 1)), model, executor=WorkerThreads()
+        )
         found, verdict = answered(found, lambda what, done, of: advance(done, max(of, 1)))
     examination = examined(found)
     verdict = with_place(found, verdict, seen_at(examination, verdict.best), owning_block(examination))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -12,9 +13,35 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import Extension
+from sloshlab.errors import SloshlabError
+from sloshlab.twin.lane_preparation import Executor
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """A simulation that is asked for.
+
+    Attributes
+    ----------
+    run : CaseRun
+    values : mapping
+        Of the parameters of a model; absent ones are as believed.
+    extension : Extension
+    only : collection of str
+        Channels that are asked for; all of them by default.
+    """
+
+    run: CaseRun
+    values: Mapping[str, float]
+    extension: Extension
+    only: Collection[str] = ()
+
+
+Readings = dict[str, FloatArray]
+"""What channels read, by name."""
 
 
 class DiagnosedModel(Protocol):
@@ -27,15 +54,14 @@ class DiagnosedModel(Protocol):
         Those whose names end with ``release of RUN`` or ``in RUN`` belong to that run alone.
     blocks : tuple of str
         Of `sloshlab.diagnosis.candidate.BLOCKS`, those in which something may be missing.
-    may_be_forked : bool
-        Whether a copy of this process simulates the same and costs little memory; code of others may not bear to
-        be copied as it runs.
+    executor : Executor
+        Shares simulations and fits among its workers; results do not depend on it.
     """
 
     runs: tuple[CaseRun, ...]
     parameters: tuple[BaselineParameter, ...]
     blocks: tuple[str, ...]
-    may_be_forked: bool
+    executor: Executor
 
     @property
     def twin(self) -> Twin:
@@ -57,8 +83,11 @@ class DiagnosedModel(Protocol):
 
     def simulate(
         self, run: CaseRun, values: Mapping[str, float], extension: Extension, only: Collection[str] = ()
-    ) -> dict[str, FloatArray]:
+    ) -> Readings:
         """What the compared channels of a run read, all or some; raises `AnalysisError` where it does not end."""
+
+    def simulate_many(self, requests: Sequence[Request]) -> list[Readings | SloshlabError]:
+        """The same of many simulations; in place of those that do not reach their end, why."""
 
     def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
         """Displacement, velocity, acceleration of the place where effects act, shape (n, 3)."""

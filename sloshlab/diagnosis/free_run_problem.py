@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
 from typing import Final, TypeVar
@@ -13,12 +12,9 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate, channels_of
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel, Request
 from sloshlab.diagnosis.extension import NOTHING, Extension
-from sloshlab.diagnosis.forked_process import N_WORKERS
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.parallel_pieces import is_single_threaded
-from sloshlab.diagnosis.second_process import SecondProcess, second_process
 from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
@@ -29,6 +25,8 @@ _COARSE_STEP: Final = 0.03
 """The same in stages with inflated noise, past the small-scale roughness that friction and contacts cause."""
 _TOLERANCES_OF_DAMPING: Final = 3.0
 """Factor of the coarse step of dampings of the baseline."""
+_Part = tuple[Sequence[Observation], Mapping[str, float]]
+"""Observations of one run, and parameters with which it is simulated."""
 HUBER_LIMIT: Final = 4.0
 """Standard deviations beyond which Huber's loss is linear: bursts of noise and lost blocks are outliers."""
 _FEWEST_IN_A_RUN: Final = 50
@@ -37,7 +35,8 @@ _QUIETER_SHARE: Final = 0.75
 """Of the times of a channel, without the bursts in the others."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel up to which nothing but noise is left."""
-_POOL: Final = ThreadPoolExecutor(N_WORKERS)
+_MOST_BYTES_AT_ONCE: Final = 1e8
+"""Of the readings of simulations that are weighted together; results do not depend on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,35 +214,19 @@ class FreeRunProblem:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
-        # Runs are shared between threads only where nothing else is: three of them take two threads as long as
-        # four would. Columns of a Jacobian and whole sets of parameters share better.
-        if is_single_threaded() or len(self.runs) == 1:
-            return self._of_runs_in_turn(theta)
-        values, beside = self.values(theta), self._second_process()
-        return np.concatenate(list(_POOL.map(lambda run: self._of_runs([run], values, beside), self.runs)))
+        return self.residuals([theta])[0]
 
     def residuals(self, thetas: Sequence[FloatArray]) -> list[FloatArray]:
-        """Residuals of several sets of parameters, as many at a time as there are workers."""
-        if is_single_threaded() or len(thetas) == 1:
-            return [self.residual(theta) for theta in thetas]
-        beside = self._second_process()
-        return list(_POOL.map(lambda theta: self._of_runs_in_turn(theta, beside), thetas))
+        """Residuals of several sets of parameters, all runs of all sets simulated together."""
+        parts = [(run, values) for values in map(self.values, thetas) for run in self.runs]
+        found = iter(self._weighted(parts))
+        return [np.concatenate([next(found) for run in self.runs for _ in run]) for _ in thetas]
 
-    def _second_process(self) -> SecondProcess | None:
-        return second_process(residuals_of_runs, self.model, self.runs, self.candidates)
-
-    def _of_runs_in_turn(self, theta: FloatArray, beside: SecondProcess | None = None) -> FloatArray:
-        return self._of_runs(self.runs, self.values(theta), beside)
-
-    def _of_runs(
-        self, runs: Sequence[Sequence[Observation]], values: Mapping[str, float], beside: SecondProcess | None
-    ) -> FloatArray:
-        """Residuals of runs, by the second process where there is one and it has nothing else to do."""
-        # Threads of one interpreter wait for each other, as half of a simulation is Python; a second process
-        # does not.
-        self.n_simulations += len(runs)
-        found = None if beside is None else beside.done(runs, values, self.candidates)
-        return residuals_of_runs(self.model, runs, values, self.candidates) if found is None else found
+    def _weighted(self, parts: Sequence[_Part]) -> Iterator[FloatArray]:
+        """Weighted residuals of every observation of every part, one after the other."""
+        self.n_simulations += len(parts)
+        for some in _at_once(parts):
+            yield from weighted_residuals(self.model, some, self.candidates)
 
     def inflation_weights(self, inflation: float) -> FloatArray:
         """Factors of the residuals with inflated noise: every channel known only to a share of its RMS.
@@ -285,36 +268,42 @@ class FreeRunProblem:
             moved[column] += step if physical <= self.high[column] else -step
             places.append(moved)
 
-        beside = None if is_single_threaded() else self._second_process()
-
-        def derivative(place: FloatArray, column: int) -> dict[int, FloatArray]:
-            found = self._moved(place, column, beside)
+        changed = [self._changed_by(column) for column in columns]
+        parts = [
+            (chosen, self.values(place))
+            for place, (_, by_run) in zip(places, changed, strict=True)
+            for chosen in by_run
+        ]
+        residuals = self._weighted(parts)
+        derivatives = []
+        for place, column, (blocks, _) in zip(places, columns, changed, strict=True):
+            found = {block: next(residuals) for block in blocks}
             # In place, as a column is as large as all recordings that it changes.
-            for block, moved in found.items():
-                moved -= at[self._rows[block]]
-                moved /= place[column] - theta[column]
+            for block, derivative in found.items():
+                derivative -= at[self._rows[block]]
+                derivative /= place[column] - theta[column]
             # A parameter whose simulation fails has no derivative, and the step does not use it.
-            return found if all(np.isfinite(moved).all() for moved in found.values()) else {}
-
-        found = list((map if is_single_threaded() else _POOL.map)(derivative, places, columns))
+            good = all(np.isfinite(derivative).all() for derivative in found.values())
+            derivatives.append(found if good else {})
         return BlockJacobian.of_blocks(
-            found, [observation.spectra.size for run in self.runs for observation in run]
+            derivatives, [observation.spectra.size for run in self.runs for observation in run]
         )
 
     def residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
         """Residuals after one parameter was moved; unchanged in other runs and channels where it has its own."""
-        found = at.copy()
-        for block, moved in self._moved(theta, column, None).items():
+        found, (blocks, by_run) = at.copy(), self._changed_by(column)
+        values = self.values(theta)
+        for block, moved in zip(blocks, self._weighted([(chosen, values) for chosen in by_run]), strict=True):
             found[self._rows[block]] = moved
         return found
 
-    def _moved(self, theta: FloatArray, column: int, beside: SecondProcess | None) -> dict[int, FloatArray]:
-        """Residuals of the channels of runs which a parameter changes, by their number, after it was moved."""
+    def _changed_by(self, column: int) -> tuple[list[int], list[list[Observation]]]:
+        """Blocks that a parameter changes, and their observations run by run."""
         # The sparsity of the Jacobian: a release or an offset is simulated for its run alone, a gain for its
         # channel alone.
         owner, seen_by = run_of(self.names[column], self.model), self._channels_changed[column]
-        runs: list[list[Observation]] = []
         blocks: list[int] = []
+        runs: list[list[Observation]] = []
         n_before = 0
         for run in self.runs:
             if not owner or run[0].run.name == owner:
@@ -322,41 +311,69 @@ class FreeRunProblem:
                 runs += [[run[i] for i in chosen]] if chosen else []
                 blocks += [n_before + i for i in chosen]
             n_before += len(run)
-        if not runs:
-            return {}
-        moved = self._of_runs(runs, self.values(theta), None if seen_by else beside)
-        ends = np.cumsum([observation.spectra.size for run in runs for observation in run])
-        return dict(zip(blocks, np.split(moved, ends[:-1]), strict=True))
+        return blocks, runs
 
 
-def residuals_of_runs(
-    model: DiagnosedModel,
-    runs: Sequence[Sequence[Observation]],
-    values: Mapping[str, float],
-    candidates: Sequence[Candidate],
-) -> FloatArray:
-    """Weighted residuals of runs, one after another; infinite of a run whose simulation does not reach its end.
+def _at_once(parts: Sequence[_Part]) -> Iterator[Sequence[_Part]]:
+    """Parts whose readings together take no more memory than they may."""
+    first, n_bytes = 0, 0
+    for i, (run, _) in enumerate(parts):
+        n_bytes += 8 * sum(observation.known.size for observation in run)
+        if n_bytes > _MOST_BYTES_AT_ONCE:
+            yield parts[first : i + 1]
+            first, n_bytes = i + 1, 0
+    yield parts[first:]
+
+
+def weighted_residuals(
+    model: DiagnosedModel, parts: Sequence[_Part], candidates: Sequence[Candidate]
+) -> list[FloatArray]:
+    """Weighted residuals; infinite of a run whose simulation does not reach its end.
 
     Parameters
     ----------
     model : DiagnosedModel
-    runs : sequence of sequences of Observation
-    values : mapping
-        Of the baseline, and ``key.parameter`` of every candidate.
+    parts : sequence of (observations of one run, values)
+        Values of the baseline, and ``key.parameter`` of every candidate.
     candidates : sequence of Candidate
+
+    Returns
+    -------
+    list of ndarray, shape (size of the observation,)
+        Of every observation of every part, one after the other.
     """
-    found: list[FloatArray] = []
-    for run in runs:
+    # of each observation, where its residuals go and what was simulated
+    simulated: dict[int, tuple[Observation, list[int], list[FloatArray]]] = {}
+    requests: list[Request | None] = []
+    for run, values in parts:
+        # Numbers with which an effect cannot be said describe nothing, like those of a simulation that fails.
         try:
-            names = [observation.channel for observation in run]
-            readings = model.simulate(run[0].run, values, extension_of(candidates, values), names)
+            extension = extension_of(candidates, values)
         except SloshlabError:
+            requests.append(None)
+        else:
+            requests.append(Request(run[0].run, values, extension, [observation.channel for observation in run]))
+    readings = iter(model.simulate_many([request for request in requests if request is not None]))
+    sizes: list[int] = []
+    for (run, _), request in zip(parts, requests, strict=True):
+        of_run = None if request is None else next(readings)
+        for observation in run:
             # A simulation that fails describes nothing. It must not end the search, which tries many parameters
             # that do not run.
-            found += [np.full(observation.spectra.size, np.inf) for observation in run]
-        else:
-            found += [observation.residual(readings[observation.channel]).ravel() for observation in run]
-    return np.concatenate(found)
+            if isinstance(of_run, dict):
+                _, places, series = simulated.setdefault(id(observation), (observation, [], []))
+                places.append(len(sizes))
+                series.append(of_run[observation.channel])
+            sizes.append(observation.spectra.size)
+    found: dict[int, FloatArray] = {}
+
+    def weigh(item: tuple[Observation, list[int], list[FloatArray]]) -> None:
+        observation, places, series = item
+        for place, residual in zip(places, observation.residuals(series), strict=True):
+            found[place] = residual.ravel()
+
+    list(model.executor.map(weigh, simulated.values()))
+    return [found[i] if i in found else np.full(size, np.inf) for i, size in enumerate(sizes)]
 
 
 def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str, ...]:

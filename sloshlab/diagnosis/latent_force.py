@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.diagnosed_model import Request
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.force_inversion import (
     ORDERS,
@@ -133,9 +134,7 @@ def run_forces(
         If the baseline does not reach the end of the run.
     """
     run = observed[0].run
-    # A fault of a driving channel is taken out of the drive; one of another channel only changes what it reads.
-    undone = [fault for fault in extension.faults if fault.channel in model.driving(run)]
-    simulation = model._simulation(run, values, extension, undone)
+    simulation = model.whole_simulation(Request(run, values, extension))
     readings = model.simulate(run, values, extension)
     missed = {
         observation.channel: _missed(observation, readings[observation.channel], values, run.is_free)
@@ -275,7 +274,7 @@ def _on_structure(
         return LatentForce(run, place, series[kept], error, time[kept], motion[kept])
 
     measured = _measured(observed, believed, missed)
-    # Motion alone tells the sum of both forces only.
+    # Simulation alone tells the sum of both forces only.
     if measured is None:
         return (latent(EITHER, force - on_structure - in_tank, inverted.noise, relative),), left
     missed_force, force_noise = measured

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 import xarray as xr
+from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
@@ -100,20 +101,34 @@ class Observation:
 
     def of(self, values: FloatArray) -> FloatArray:
         """Spectra of simulated values, treated as the recording was; samples beyond their end are zero."""
-        return _spectra(values, self.known, self.keeps_mean, self.n_bands, self.run)[:, : self.spectra.shape[1]]
+        return np.asarray(self._of([values])[0])
+
+    def _of(self, several: Sequence[FloatArray]) -> FloatArray:
+        found = _spectra(several, self.known, self._taper, self.keeps_mean, self.n_bands)
+        return found[..., : self.spectra.shape[1]]
 
     def residual(self, values: FloatArray) -> FloatArray:
         """Whitened residual: recorded minus simulated spectra in standard deviations, shape (n_blocks,
         n_bands).
         """
+        return np.asarray(self.residuals([values])[0])
+
+    def residuals(self, several: Sequence[FloatArray]) -> FloatArray:
+        """Whitened residuals of several simulations, shape (n_simulations, n_blocks, n_bands)."""
         # Division by the standard deviation of each coefficient makes the sum of squares a negative
         # log-likelihood of independent normal errors; the lapped transform is orthogonal and keeps white noise
         # white.
-        return np.asarray((self.spectra - self.of(values)) / self._deviation)
+        found = self.spectra - self._of(several)
+        found *= self._inverse_deviation
+        return np.asarray(found)
 
     @cached_property
-    def _deviation(self) -> FloatArray:
-        return np.asarray(np.sqrt(self.variance))
+    def _inverse_deviation(self) -> FloatArray:
+        return np.asarray(1.0 / np.sqrt(self.variance))
+
+    @cached_property
+    def _taper(self) -> FloatArray:
+        return _taper(self.known.size, self.n_bands, is_free=self.run.is_free)
 
 
 def observations(
@@ -150,7 +165,7 @@ def observations(
             continue
         # The zero of accelerometers and force sensors means nothing; a displacement has a static part.
         keeps_mean = variable.attrs["quantity"] == "displacement" or bool(variable.attrs.get(ZERO_IS_KNOWN, 0))
-        spectra = _spectra(values, known, keeps_mean, n_bands, run)
+        spectra = _spectra_of(variable, known, keeps_mean, run)
         # Without it a channel that states no noise and has quiet high bands would be known beyond its
         # quantisation.
         least = (_LEAST_SHARE * float(np.sqrt(np.mean(spectra**2)))) ** 2
@@ -197,7 +212,7 @@ def noise_of_sensor(run: CaseRun, name: str) -> float:
     variable = run.recording[name]
     values, n_bands = np.asarray(variable.values, np.float64), _n_bands(run)
     known = np.isfinite(values)
-    white = _white_level(_spectra(values, known, False, n_bands, run)) if known.sum() >= 2 * n_bands else 0.0
+    white = _white_level(_spectra_of(variable, known, False, run)) if known.sum() >= 2 * n_bands else 0.0
     return float(np.sqrt(max(_stated_variance(variable), white)))
 
 
@@ -338,26 +353,57 @@ def _weighted(observation: Observation, variance: FloatArray) -> Observation:
     return replace(observation, variance=np.maximum(variance, observation.variance))
 
 
+def _spectra_of(variable: xr.DataArray, known: NDArray[np.bool_], keeps_mean: bool, run: CaseRun) -> FloatArray:
+    """Spectra of the known samples of a recorded channel."""
+    n_bands = _n_bands(run)
+    taper = _taper(known.size, n_bands, is_free=run.is_free)
+    found = _spectra([np.asarray(variable.values, np.float64)], known, taper, keeps_mean, n_bands)
+    return np.asarray(found[0])
+
+
 def _spectra(
-    values: FloatArray, known: NDArray[np.bool_], keeps_mean: bool, n_bands: int, run: CaseRun
+    several: Sequence[FloatArray], known: NDArray[np.bool_], taper: FloatArray, keeps_mean: bool, n_bands: int
 ) -> FloatArray:
-    """Spectra of the known samples, tapered at both ends.
+    """Spectra of the known samples of several series, tapered at both ends."""
+    masked = np.zeros((len(several), known.size))
+    for row, values in zip(masked, several, strict=True):
+        _mask(values, known, taper, keeps_mean, row)
+    return lapped_spectra(masked, n_bands)
+
+
+def _taper(n: int, n_bands: int, *, is_free: bool) -> FloatArray:
+    """Weights of the samples.
 
     An abrupt end leaks the scatter of strong bands into weak ones, where it would count far too much. A release
     has a short taper at its start: its first cycles hold most of the information.
     """
-    # Lost samples are zero in the recording and in the simulation alike, so that they leave no residual.
-    masked = np.zeros(known.size)
-    n = min(known.size, values.size)
-    chosen = known[:n]
-    part = values[:n][chosen]
-    # The mean of the known samples alone, on both sides: zeros of the lost ones would shift it.
-    masked[:n][chosen] = part if keeps_mean or not part.size else part - part.mean()
-    n_in, n_out = max(1, n_bands // (32 if run.is_free else 2)), max(1, n_bands // 2)
-    if n_in + n_out <= masked.size:
-        masked[:n_in] *= np.sin(0.5 * np.pi * np.arange(n_in) / n_in) ** 2
-        masked[-n_out:] *= np.cos(0.5 * np.pi * (np.arange(n_out) + 1) / n_out) ** 2
-    return lapped_spectra(masked, n_bands)
+    weights = np.ones(n)
+    n_in, n_out = max(1, n_bands // (32 if is_free else 2)), max(1, n_bands // 2)
+    if n_in + n_out <= n:
+        weights[:n_in] = np.sin(0.5 * np.pi * np.arange(n_in) / n_in) ** 2
+        weights[-n_out:] = np.cos(0.5 * np.pi * (np.arange(n_out) + 1) / n_out) ** 2
+    return weights
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _mask(
+    values: FloatArray, known: NDArray[np.bool_], taper: FloatArray, keeps_mean: bool, masked: FloatArray
+) -> None:
+    """Tapered values without their mean.
+
+    Lost samples are zero in the recording and in the simulation alike, so that they leave no residual.
+    """
+    n, total, n_known = min(known.size, values.size), 0.0, 0
+    if not keeps_mean:
+        # The mean of the known samples alone, on both sides: zeros of the lost ones would shift it.
+        for i in range(n):
+            if known[i]:
+                total += values[i]
+                n_known += 1
+    mean = total / n_known if n_known else 0.0
+    for i in range(n):
+        if known[i]:
+            masked[i] = (values[i] - mean) * taper[i]
 
 
 def _white_level(spectra: FloatArray) -> float:

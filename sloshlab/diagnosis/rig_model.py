@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -18,13 +18,17 @@ from sloshlab.conditioning.combined_channels import weights_by_noise
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.candidate import BLOCKS
 from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.diagnosed_model import Readings, Request
 from sloshlab.diagnosis.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
-from sloshlab.errors import AnalysisError
+from sloshlab.errors import AnalysisError, SloshlabError
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
-from sloshlab.twin.excitation import Excitation
+from sloshlab.twin.excitation import with_cached_inputs
+from sloshlab.twin.lane_preparation import IN_TURN, Executor, Lane, done, motions
+from sloshlab.twin.motion import Motion
+from sloshlab.twin.preparation import run as simulated
 from sloshlab.twin.recorded_run import Drive, drive_of
-from sloshlab.twin.simulated_channels import ORDER_OF_DERIVATIVE, true_channel
+from sloshlab.twin.simulated_channels import ORDER_OF_DERIVATIVE, channel_weights, combined, rows_of
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import save_twin
 from sloshlab.twin.structure import Structure
@@ -50,9 +54,9 @@ _LEAST_STEPS_PER_S: Final = 500.0
 At 64 Hz the memory of the liquid's damping was integrated in steps of a seventh of a cycle and diverged.
 """
 _MOST_KEPT_BYTES: Final = 5e7
-"""Of simulated channels in each process; answers do not depend on it."""
-_MOST_READINGS_TO_FORK: Final = 350_000
-"""Of all channels and runs: with a third more, the processes together were seen to hold three gigabytes."""
+"""Of simulated channels; answers do not depend on it."""
+_MOST_BYTES_AT_ONCE: Final = 2e8
+"""Of the motions of lanes that are simulated together; answers do not depend on it."""
 RELEASE: Final = "release of "
 _FLUCTUATION: Final = "damping of the liquid in "
 _TOLERANCE_OF_FLUCTUATION: Final = 0.05
@@ -79,17 +83,20 @@ class _Channels:
 
 
 @dataclass(frozen=True, eq=False)
-class _TrueReadings:
-    """Readings of perfect sensors in a run, and motions of the modes, (n, n_modes), for those along a beam."""
+class _Truth:
+    """What perfect sensors read in a run: weights of the rows of a motion; rows without weight are empty."""
 
-    channels: dict[str, FloatArray]
-    modes: dict[str, FloatArray]
+    rows: Sequence[FloatArray]
+    weights: dict[str, FloatArray]
 
     @property
     def n_bytes(self) -> int:
         """Memory that it holds."""
-        held = {id(part): part.nbytes for part in (*self.channels.values(), *self.modes.values())}
-        return sum(held.values())
+        return sum(row.nbytes for row in self.rows)
+
+    def channel(self, name: str) -> FloatArray:
+        """What a perfect sensor reads."""
+        return combined(self.rows, self.weights[name])
 
 
 class RigModel:
@@ -101,6 +108,8 @@ class RigModel:
     folder : Path
         Of the rig file.
     runs : sequence of CaseRun
+    executor : Executor, optional
+        Shares simulations and fits among its workers; results do not depend on it.
 
     Raises
     ------
@@ -108,17 +117,13 @@ class RigModel:
         If a run cannot drive the twin.
     """
 
-    def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun]) -> None:
-        self.rig = rig
+    def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun], *, executor: Executor = IN_TURN) -> None:
+        self.rig, self.executor = rig, executor
         self.blocks = BLOCKS
-        n_readings = sum(run.recording[name].size for run in runs for name in channels(run.recording))
-        # Each process holds simulated channels of its own: six sweeps of 240 s at 512 Hz took 7.4 GB in three
-        # processes and 3.3 GB in one.
-        self.may_be_forked = n_readings <= _MOST_READINGS_TO_FORK
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}
-        self._truths: OrderedDict[tuple[Any, ...], _TrueReadings] = OrderedDict()
+        self._truths: OrderedDict[tuple[Any, ...], _Truth] = OrderedDict()
         self._kept_bytes = 0
         self._lock = threading.Lock()
         self._channels = {run.name: self._channels_of(run) for run in self.runs}
@@ -129,6 +134,14 @@ class RigModel:
             if name.partition("_")[2].startswith("beam")
         }
         self.parameters = self._parameters()
+        self._moving = {
+            run.name: [
+                (parameter.name, parameter.believed)
+                for parameter in self.parameters
+                if not parameter.is_reading and self._belongs(parameter.name, run)
+            ]
+            for run in self.runs
+        }
 
     @property
     def believed(self) -> dict[str, float]:
@@ -145,7 +158,18 @@ class RigModel:
 
     def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
         """Displacement, velocity, acceleration of the tank, absolute, shape (n, 3)."""
-        return np.asarray(self._simulation(run, values, NOTHING, ()).places[:, 1])
+        return np.asarray(self.whole_simulation(Request(run, values, NOTHING)).places[:, 1])
+
+    def whole_simulation(self, request: Request) -> Simulation:
+        """Motion and every force of the twin; faults of driving channels are taken out of the drive.
+
+        Raises
+        ------
+        AnalysisError
+            If the simulation does not reach its end.
+        """
+        lane = self._lane(request)
+        return simulated(lane.twin, lane.excitation, lane.start, lane.n_substeps).require_done()
 
     def _belongs(self, parameter: str, run: CaseRun) -> bool:
         """Whether a parameter of the motion belongs to this run or to all."""
@@ -194,82 +218,138 @@ class RigModel:
 
     def simulate(
         self, run: CaseRun, values: Mapping[str, float], extension: Extension, only: Collection[str] = ()
-    ) -> dict[str, FloatArray]:
-        """What the channels of a run read.
-
-        Parameters
-        ----------
-        run : CaseRun
-        values : mapping
-            Of `parameters`; absent ones are as believed.
-        extension : Extension
-        only : collection of str
-            Channels that are asked for; all of them by default.
+    ) -> Readings:
+        """What the channels of a run read: one request of `simulate_many`.
 
         Raises
         ------
         AnalysisError
             If the simulation does not reach its end.
         """
-        truth = self._truth(run, values, extension)
-        rate = run.attributes.sampling_rate_hz
-        others, readings = {**self._channels[run.name].driving, **truth.channels}, {}
-        for name, true in truth.channels.items():
-            if only and name not in only:
+        [found] = self.simulate_many([Request(run, values, extension, only)])
+        if isinstance(found, SloshlabError):
+            raise found
+        return found
+
+    def simulate_many(self, requests: Sequence[Request]) -> list[Readings | SloshlabError]:
+        """What the channels read in many simulations; of those that do not reach their end, why.
+
+        Parameters
+        ----------
+        requests : sequence of Request
+        """
+        truths = self._truths_of(requests)
+        return [
+            truth if isinstance(truth, SloshlabError) else self._readings(request, truth)
+            for request, truth in zip(requests, truths, strict=True)
+        ]
+
+    def _readings(self, request: Request, truth: _Truth) -> Readings:
+        run, values, faults = request.run, request.values, request.extension.faults
+        known, readings = self._channels[run.name], {}
+        others = {**known.driving, **{name: truth.channel(name) for name in truth.weights}} if faults else {}
+        for name in truth.weights:
+            if request.only and name not in request.only:
                 continue
-            reading = true * values.get(f"gain of {name}", 1.0) * _relative_share(name, truth.channels, values)
-            # Shapes are off by a per cent, gains too: their product is left out.
-            if name in truth.modes:
-                reading = reading + truth.modes[name] @ [values.get(shape, 0.0) for shape in self._shapes[name]]
+            reading = combined(truth.rows, self._read_weights(name, truth.weights, values))
             # A fault acts on what the sensor would read, gain included; the zero of the channel is added last
             # and is not delayed, filtered or clipped.
-            for fault in extension.faults:
+            for fault in faults:
                 if fault.channel == name:
-                    reading = fault.reading(reading, rate, others, self._channels[run.name].recorded[name])
-            readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
+                    reading = fault.reading(reading, run.attributes.sampling_rate_hz, others, known.recorded[name])
+            zero = values.get(f"offset of {name} in {run.name}", 0.0)
+            readings[name] = reading + zero if zero else reading
         return readings
 
-    def _truth(self, run: CaseRun, values: Mapping[str, float], extension: Extension) -> _TrueReadings:
-        # Gains, offsets and shapes change readings only: a simulation serves for all of their values.
-        physical = tuple(
-            values.get(parameter.name, parameter.believed)
-            for parameter in self.parameters
-            if not parameter.is_reading and self._belongs(parameter.name, run)
-        )
-        # A fault of a driving channel changes the motion, so that it is part of the key; others only read it.
-        undone = tuple(fault for fault in extension.faults if fault.channel in self.driving(run))
-        others = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
-        key = (run.name, physical, tuple(others), tuple(fault.key for fault in undone))
+    def _read_weights(self, name: str, true: Mapping[str, FloatArray], values: Mapping[str, float]) -> FloatArray:
+        """Weights of the rows in what a sensor of its gain at its place reads."""
+        weights = true[name] * (values.get(f"gain of {name}", 1.0) * _relative_share(name, true, values))
+        # Shapes are off by a per cent, gains too: their product is left out.
+        if name in self._shapes:
+            shapes = self._shapes[name]
+            first = ORDER_OF_DERIVATIVE[name.partition("_")[0]] * len(shapes)
+            weights[first : first + len(shapes)] += [values.get(shape, 0.0) for shape in shapes]
+        return weights
+
+    def _truths_of(self, requests: Sequence[Request]) -> list[_Truth | SloshlabError]:
+        """Readings of perfect sensors, simulated together where they are not kept from before."""
+        keys = [self._key(request) for request in requests]
+        found: dict[tuple[Any, ...], _Truth | SloshlabError] = {}
         with self._lock:
-            if key in self._truths:
-                self._truths.move_to_end(key)
-                return self._truths[key]
-        simulation = self._simulation(run, values, extension, undone)
-        known, truth = self._channels[run.name], _TrueReadings({}, {})
-        moving: dict[int, FloatArray] = {}
+            for key in keys:
+                if key in self._truths:
+                    self._truths.move_to_end(key)
+                    found[key] = self._truths[key]
+        unknown = {key: request for key, request in zip(keys, requests, strict=True) if key not in found}
+        for part in self._parts(unknown):
+            for key, truth in self._simulated(part):
+                found[key] = truth
+                if not isinstance(truth, SloshlabError):
+                    self._keep(key, truth)
+        return [found[key] for key in keys]
+
+    def _key(self, request: Request) -> tuple[Any, ...]:
+        """What a motion depends on: gains, offsets and shapes change readings only."""
+        run, values, extension = request.run, request.values, request.extension
+        physical = tuple(values.get(name, believed) for name, believed in self._moving[run.name])
+        # A fault of a driving channel changes the motion, so that it is part of the key; others only read it.
+        others = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
+        return (run.name, physical, tuple(others), tuple(fault.key for fault in self._undone(request)))
+
+    def _undone(self, request: Request) -> tuple[SensorFault, ...]:
+        return tuple(fault for fault in request.extension.faults if fault.channel in self.driving(request.run))
+
+    def _parts(self, requests: Mapping[tuple[Any, ...], Request]) -> Iterator[dict[tuple[Any, ...], Request]]:
+        """Requests whose motions together take no more memory than they may."""
+        n_modes = 0 if self.twin.structure is None else self.twin.structure.masses_kg.size
+        part, n_bytes = {}, 0
+        for key, request in requests.items():
+            part[key] = request
+            n_bytes += 8 * (3 * n_modes + 1) * request.run.recording.sizes["time"]
+            if n_bytes > _MOST_BYTES_AT_ONCE:
+                yield part
+                part, n_bytes = {}, 0
+        if part:
+            yield part
+
+    def _simulated(
+        self, requests: Mapping[tuple[Any, ...], Request]
+    ) -> Iterator[tuple[tuple[Any, ...], _Truth | SloshlabError]]:
+        lanes = {}
+        for key, request in requests.items():
+            try:
+                lanes[key] = self._lane(request)
+            except SloshlabError as error:
+                yield key, error
+        for key, motion in zip(lanes, motions(list(lanes.values()), self.executor), strict=True):
+            try:
+                yield key, self._truth(requests[key].run, done(motion))
+            except SloshlabError as error:
+                yield key, error
+
+    def _truth(self, run: CaseRun, motion: Motion) -> _Truth:
+        known, weights = self._channels[run.name], {}
         for name in known.compared:
-            found = true_channel(simulation, name, known.attributes[name], self.rig, n_cells=known.n_cells)
+            found = channel_weights(motion.twin, name, known.attributes[name], self.rig, n_cells=known.n_cells)
             if found is not None:
-                truth.channels[name] = found
-            if name in self._shapes:
-                order = ORDER_OF_DERIVATIVE[known.attributes[name]["quantity"]]
-                moving.setdefault(order, np.ascontiguousarray(simulation.modes[:, order]))
-                truth.modes[name] = moving[order]
+                weights[name] = found
+        return _Truth(rows_of(motion), weights)
+
+    def _keep(self, key: tuple[Any, ...], truth: _Truth) -> None:
         with self._lock:
             if key in self._truths:
                 self._kept_bytes -= self._truths.pop(key).n_bytes
             self._truths[key] = truth
             self._kept_bytes += truth.n_bytes
-            # The least recently used first; 300 MB in each of three processes took a case to 2.1 GB.
             while self._kept_bytes > _MOST_KEPT_BYTES and len(self._truths) > 1:
                 self._kept_bytes -= self._truths.popitem(last=False)[1].n_bytes
-        return truth
 
-    def _simulation(
-        self, run: CaseRun, values: Mapping[str, float], extension: Extension, undone: Sequence[SensorFault]
-    ) -> Simulation:
-        drive = self._drive(run, tuple(undone), extension.drives)
-        twin = self._retuned(run, values, extension, fluctuation=values.get(_FLUCTUATION + run.name, 1.0))
+    def _lane(self, request: Request) -> Lane:
+        run, values = request.run, request.values
+        undone = self._undone(request)
+        drive = self._drive(run, undone, request.extension.drives)
+        fluctuation = values.get(_FLUCTUATION + run.name, 1.0)
+        twin = self._retuned(run, values, request.extension, fluctuation=fluctuation)
         trusted = self._compared_drives(run, undone)
         gains = [values.get(f"gain of {name}", 1.0) for name in trusted]
         excitation = drive.excitation
@@ -288,7 +368,7 @@ class RigModel:
             # Stiffness and damping for which the integrator's step moves each mode exactly: with them half as many
             # steps are enough.
             twin = replace(twin, structure=twin.structure.for_steps_of(1.0 / (rate * n_substeps)))
-        return twin.simulate(excitation, initial_displacement_m=start, n_substeps=n_substeps).require_done()
+        return Lane(twin, excitation, (start, 0.0), n_substeps)
 
     def _compared_drives(self, run: CaseRun, undone: Sequence[SensorFault] = ()) -> list[str]:
         """Channels whose mean drives the tank and which are compared, too: their gains scale the drive."""
@@ -312,7 +392,7 @@ class RigModel:
         structure = twin.structure
         if structure is not None:
             # Retuned before it is extended: a rocking base turns the modes of the beam as it is.
-            structure = _retuned_structure(structure, values)
+            structure = retuned_structure(structure, values)
             if extension.structure is not None:
                 structure = extension.structure(structure)
         terms = tuple(
@@ -474,7 +554,8 @@ def _structure_parameters(structure: Structure, *, moves: bool) -> list[Baseline
     return found
 
 
-def _retuned_structure(structure: Structure, values: Mapping[str, float]) -> Structure:
+def retuned_structure(structure: Structure, values: Mapping[str, float]) -> Structure:
+    """The structure with the retuned frequencies, losses, masses and participations of its modes."""
     n = structure.masses_kg.size
     frequency = np.array([values.get(f"frequency of mode {i + 1}", 1.0) for i in range(n)])
     damping = np.array([values.get(f"damping of mode {i + 1}", 1.0) for i in range(n)])
@@ -540,19 +621,3 @@ def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str
         variable = recording[fault.channel].copy(data=corrected)
         recording = recording.assign({fault.channel: variable})
     return recording
-
-
-def with_cached_inputs(excitation: Excitation) -> Excitation:
-    """The excitation with a cache of its interpolated inputs, which every simulation of a run asks for again."""
-    inputs = excitation.inputs
-    if inputs is None:
-        return excitation
-    kept: dict[tuple[float, int, float], FloatArray] = {}
-
-    def cached(time: FloatArray) -> FloatArray:
-        key = (float(time[0]), time.size, float(time[-1]))
-        if key not in kept:
-            kept[key] = inputs(time)
-        return kept[key]
-
-    return replace(excitation, inputs=cached)

@@ -27,7 +27,7 @@ from sloshlab.twin.status import Status
 
 DONE, UNSTABLE, FAULT, CHATTER, NO_ACCELERATION = (int(status) for status in Status)
 
-_SWITCH_TOLERANCE = 1e-13
+SWITCH_TOLERANCE = 1e-13
 """An event function so little below zero has not changed its sign: rounding, right after its own event."""
 # Far below a step: an event that is off by δ costs the force's jump times δ, which must not spoil the order 4.
 _EVENT_TIME_TOLERANCE_S = 1e-12
@@ -59,7 +59,7 @@ def _events(m: Model, i: int, y: FloatArray, s: Scratch) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def _margin(m: Model, y: FloatArray, s: Scratch) -> float:
+def margin(m: Model, y: FloatArray, s: Scratch) -> float:
     """Smallest of all event functions, each positive while its switch holds."""
     smallest = np.inf
     for i in range(m.law.size):
@@ -97,9 +97,9 @@ def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scra
             # away from both ends, or the bracket hardly shrinks
             middle = min(max(middle, low + 0.01 * (high - low)), high - 0.01 * (high - low))
         advance_by_call(m, excited, start, Time(middle * step, 2.0 * middle), s)
-        value = _margin(m, s.trial, s)
+        value = margin(m, s.trial, s)
         # a step so long that it diverges is beyond the event, too
-        if value < -_SWITCH_TOLERANCE or not np.isfinite(value):
+        if value < -SWITCH_TOLERANCE or not np.isfinite(value):
             # Illinois: an end that stays while the other moves twice counts half, so that it moves, too
             high, below = middle, value
             above *= 0.5 if kept == 1 else 1.0
@@ -178,8 +178,8 @@ def _fault_of(y: FloatArray, largest: FloatArray) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
-    """Set the switches and the friction of the start and record it; the term that is beyond its limit, or −1."""
+def begin(m: Model, excited: Excited, s: Scratch) -> int:
+    """Set the switches and the friction of the start; the term that is beyond its limit, or −1."""
     start = Time(0.0, 0.0)
     # the event functions read the motion, which the rates fill in
     rates_by_call(m, excited, start, s)
@@ -202,7 +202,6 @@ def begin(m: Model, excited: Excited, s: Scratch, out: Outputs) -> int:
             set_friction(m, excited, start, s)
     # again, with the forces that the switches turn on
     rates_by_call(m, excited, start, s)
-    _record(m, 0, s, out)
     return -1
 
 
@@ -238,13 +237,67 @@ def _update_due(m: Model, excited: Excited, now: Time, tolerance_s: float, s: Sc
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _next_update(m: Model, s: Scratch) -> float:
+def next_update(m: Model, s: Scratch) -> float:
     """When [s] a model in discrete time takes its next step; infinite without any."""
     due = np.inf
     for i in range(m.law.size):
         if m.update_period[i] > 0.0:
             due = min(due, s.updates[i] * m.update_period[i])
     return due
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def take_step(
+    m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Outputs, index: int, due: float
+) -> tuple[int, int, float]:
+    """One step with all its events; status, what ended the simulation, and when the next update is due."""
+    step = stretch.step_s
+    done, n_switched = 0.0, 0
+    while done < 1.0:
+        # instants are counted from the start and never summed up, so that they do not drift
+        now, share = Time((index + done) * step, 2.0 * (index + done)), 1.0 - done
+        # written so that an infinite `due` is the last, too
+        is_last = not (due - now.seconds) / step < share - _SHARE_TOLERANCE
+        if not is_last:
+            # A model in discrete time steps at its own instants, so that nothing is resampled: the step
+            # is cut there.
+            share = max((due - now.seconds) / step, 0.0)
+        good = advance(m, excited, now, Time(share * step, 2.0 * share), s)
+        gap = margin(m, s.trial, s)
+        if not good:
+            where = _fault_of(s.trial, stretch.largest)
+            return (NO_ACCELERATION if where < 0 else UNSTABLE), where, due
+        # a margin that is no number is accepted here and found as a fault at the end of the row
+        if not gap < -SWITCH_TOLERANCE:
+            _accept(s)
+            done = 1.0 if is_last else done + share
+            now = Time((index + done) * step, 2.0 * (index + done))
+            if due <= now.seconds + _SHARE_TOLERANCE * step:
+                _update_due(m, excited, now, _SHARE_TOLERANCE * step, s)
+                due = next_update(m, s)
+            continue
+        # The rest of the step starts anew from the event, with the switches turned: no stage looks across it.
+        done += _to_event(m, excited, now, _PastEvent(step, share, gap), s)
+        _accept(s)
+        now = Time((index + done) * step, 2.0 * (index + done))
+        where = _switch(m, excited, now, s, out)
+        if where >= 0:
+            return FAULT, where, due
+        # the forces jump at an event, so that the last rates of the step before it no longer hold
+        rates_by_call(m, excited, now, s)
+        n_switched += 1
+        if n_switched > _MOST_EVENTS_PER_STEP:
+            return CHATTER, -1, due
+    return DONE, -1, due
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def end_row(m: Model, excited: Excited, s: Scratch, stretch: Stretch, row: int) -> int:
+    """Updates of models that follow the output; the state that is beyond its bound after them, or −1."""
+    if m.updates:
+        n = row * stretch.n_substeps
+        _update(m, excited, Time(n * stretch.step_s, 2.0 * n), s)
+    return _fault_of(s.state, stretch.largest)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
@@ -256,51 +309,16 @@ def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Out
     tuple of int
         Status, rows filled, term or state that ended the simulation.
     """
-    step, n_substeps = stretch.step_s, stretch.n_substeps
-    due = _next_update(m, s)
+    if stretch.first_row == 1:
+        _record(m, 0, s, out)
+    due = next_update(m, s)
     for row in range(stretch.first_row, stretch.last_row):
-        for substep in range(n_substeps):
-            index = (row - 1) * n_substeps + substep
-            done, n_switched = 0.0, 0
-            while done < 1.0:
-                # instants are counted from the start and never summed up, so that they do not drift
-                now, share = Time((index + done) * step, 2.0 * (index + done)), 1.0 - done
-                # written so that an infinite `due` is the last, too
-                is_last = not (due - now.seconds) / step < share - _SHARE_TOLERANCE
-                if not is_last:
-                    # A model in discrete time steps at its own instants, so that nothing is resampled: the step
-                    # is cut there.
-                    share = max((due - now.seconds) / step, 0.0)
-                good = advance(m, excited, now, Time(share * step, 2.0 * share), s)
-                gap = _margin(m, s.trial, s)
-                if not good:
-                    where = _fault_of(s.trial, stretch.largest)
-                    return (NO_ACCELERATION if where < 0 else UNSTABLE), row, where
-                # a margin that is no number is accepted here and found as a fault at the end of the row
-                if not gap < -_SWITCH_TOLERANCE:
-                    _accept(s)
-                    done = 1.0 if is_last else done + share
-                    now = Time((index + done) * step, 2.0 * (index + done))
-                    if due <= now.seconds + _SHARE_TOLERANCE * step:
-                        _update_due(m, excited, now, _SHARE_TOLERANCE * step, s)
-                        due = _next_update(m, s)
-                    continue
-                # The rest of the step starts anew from the event, with the switches turned: no stage looks
-                # across it.
-                done += _to_event(m, excited, now, _PastEvent(step, share, gap), s)
-                _accept(s)
-                now = Time((index + done) * step, 2.0 * (index + done))
-                where = _switch(m, excited, now, s, out)
-                if where >= 0:
-                    return FAULT, row, where
-                # the forces jump at an event, so that the last rates of the step before it no longer hold
-                rates_by_call(m, excited, now, s)
-                n_switched += 1
-                if n_switched > _MOST_EVENTS_PER_STEP:
-                    return CHATTER, row, -1
-        if m.updates:
-            _update(m, excited, Time(row * n_substeps * step, 2.0 * row * n_substeps), s)
-        where = _fault_of(s.state, stretch.largest)
+        for substep in range(stretch.n_substeps):
+            index = (row - 1) * stretch.n_substeps + substep
+            status, where, due = take_step(m, excited, s, stretch, out, index, due)
+            if status != DONE:
+                return status, row, where
+        where = end_row(m, excited, s, stretch, row)
         if where >= 0:
             return UNSTABLE, row, where
         _record(m, row, s, out)

@@ -16,7 +16,7 @@ from numba import njit
 
 from sloshlab.conditioning.resampling import HALF_WIDTH, resampled
 from sloshlab.errors import InputError
-from sloshlab.twin.model import INPUTS
+from sloshlab.twin.model import INPUTS, N_OF_BASE_MOTION
 
 FloatArray = npt.NDArray[np.float64]
 _DISPLACEMENT, _VELOCITY, _ACCELERATION, _PHASE, _FREQUENCY, _FORCE = range(len(INPUTS))
@@ -37,12 +37,15 @@ class Excitation:
         the tank. None where nothing drives.
     moves_base : bool
         Whether the base moves.
+    factor : float
+        Of the motion of the base, over that of `inputs`.
     """
 
     sampling_rate_hz: float
     n_samples: int
     inputs: Callable[[FloatArray], FloatArray] | None = None
     moves_base: bool = False
+    factor: float = 1.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.sampling_rate_hz) and self.sampling_rate_hz > 0):
@@ -54,7 +57,7 @@ class Excitation:
     def half_steps(self, n_substeps: int, first: int = 0, stop: int | None = None) -> FloatArray:
         """Inputs at steps and half-way between, rows `first` … `stop` of (2 (n − 1) n_substeps + 1, 6).
 
-        Empty where nothing drives.
+        Without `factor`; empty where nothing drives.
         """
         if self.inputs is None:
             return np.empty((0, len(INPUTS)))
@@ -64,22 +67,18 @@ class Excitation:
 
     def scaled(self, factor: float) -> Excitation:
         """The same with the motion of the base times a factor: what a sensor of another gain would have told."""
-        inputs = self.inputs
-        if inputs is None or factor == 1.0:
-            return self
-
-        def of(time: FloatArray) -> FloatArray:
-            table = inputs(time).copy()
-            # force, phase and frequency are not read by the sensor
-            table[:, : _ACCELERATION + 1] *= factor
-            return table
-
-        return replace(self, inputs=of)
+        # beside the inputs, not within them, so that simulations with many factors share one table
+        return replace(self, factor=factor * self.factor)
 
     def at_start(self) -> FloatArray:
         """Inputs at the first sample, shape (6,)."""
         rows = self.half_steps(1, 0, 2)
-        return rows[0] if rows.size else np.zeros(len(INPUTS))
+        if not rows.size:
+            return np.zeros(len(INPUTS))
+        first: FloatArray = rows[0].copy()
+        # force, phase and frequency are not read by the sensor of the base
+        first[:N_OF_BASE_MOTION] *= self.factor
+        return first
 
 
 def _n_samples(duration_s: float, sampling_rate_hz: float) -> int:

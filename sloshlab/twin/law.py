@@ -21,6 +21,8 @@ from typing import Any, Final
 
 from numba import cfunc, types
 
+from sloshlab.twin.lane_vector import LANE_COLUMNS, LANE_VECTOR
+
 TIME: Final = 0
 """Time [s]."""
 DISPLACEMENT: Final = 1
@@ -42,6 +44,7 @@ N_MOTION: Final = 8
 
 _POINTER = types.CPointer(types.float64)
 _SIGNATURE = types.float64(_POINTER, _POINTER, _POINTER, _POINTER)
+_SIGNATURE_OF_LANES = LANE_VECTOR(LANE_COLUMNS, LANE_COLUMNS, LANE_COLUMNS, LANE_COLUMNS)
 _COMPILING = threading.Lock()
 
 
@@ -52,6 +55,8 @@ class Law:
     ----------
     function : callable
         Plain function as the module describes; what numba cannot compile is refused on first use.
+    of_lanes : bool
+        Whether it only adds, multiplies and takes absolute values of motion and parameters.
 
     Examples
     --------
@@ -62,14 +67,21 @@ class Law:
     True
     """
 
-    def __init__(self, function: Callable[..., float]) -> None:
-        self.function = function
+    def __init__(self, function: Callable[..., float], *, of_lanes: bool = False) -> None:
+        self.function, self.of_lanes = function, of_lanes
         self.__module__ = function.__module__
         self.__name__, self.__doc__ = function.__name__, function.__doc__
 
     @functools.cached_property
     def _compiled(self) -> Any:
-        compiled = functools.partial(cfunc, _SIGNATURE, nopython=True, error_model="numpy")
+        return self._compiled_as(_SIGNATURE)
+
+    @functools.cached_property
+    def _compiled_of_lanes(self) -> Any:
+        return self._compiled_as(_SIGNATURE_OF_LANES)
+
+    def _compiled_as(self, signature: Any) -> Any:
+        compiled = functools.partial(cfunc, signature, nopython=True, error_model="numpy")
         has_module = self.function.__code__.co_filename.endswith(".py")  # else nothing to keep it beside
         with _COMPILING:
             try:
@@ -82,6 +94,11 @@ class Law:
         """Address of the compiled function in this process."""
         return int(self._compiled.address)
 
+    @property
+    def address_of_lanes(self) -> int:
+        """Address of the same function of eight lanes at once; 0 where it takes one lane at a time."""
+        return int(self._compiled_of_lanes.address) if self.of_lanes else 0
+
     # by name: a compiled function and its address mean nothing in another process
     def __reduce__(self) -> str:
         return self.function.__qualname__
@@ -90,3 +107,8 @@ class Law:
 def law(function: Callable[..., float]) -> Law:
     """Make a force law, or an events function, of a plain function; see the module's text."""
     return Law(function)
+
+
+def law_of_lanes(function: Callable[..., float]) -> Law:
+    """The same of a function that only adds and multiplies, without memory: eight lanes are one call."""
+    return Law(function, of_lanes=True)

@@ -28,6 +28,9 @@ RELATIVE, ABSOLUTE = 0, 1
 INPUTS: Final = ("displacement", "velocity", "acceleration", "phase", "frequency", "force")
 """Columns of the excitation: motion of the base, phase and frequency of the excitation, force on the tank."""
 
+N_OF_BASE_MOTION: Final = 3
+"""Columns of the excitation that a sensor at the base has read: they come first."""
+
 N_OTHER_WORKS: Final = 3
 """Works after two per term: modal damping, inertia of the base motion, external force."""
 
@@ -68,7 +71,7 @@ class Scratch(NamedTuple):
     """Working memory of one simulation; `state`, `works`, `updates` and `friction` go on from call to call."""
 
     state: FloatArray  # (n_states,) q, q̇, memory of the terms
-    works: FloatArray  # (2 n_terms + N_OTHER_WORKS,)
+    works: FloatArray  # (2 n_terms + N_OTHER_WORKS,), or empty where nobody asks for works
     updates: FloatArray  # (n_terms,) how many of those with a period are done
     friction: FloatArray  # (4,) direction, holding force, smallest, largest it can be
     motion: FloatArray  # (2 N_MOTION,) one row per frame
@@ -103,6 +106,7 @@ class Excited(NamedTuple):
 
     table: FloatArray  # (n_half_steps or 0, len(INPUTS))
     first: int  # half step of the whole simulation in its first row
+    factor: float  # of the motion of the base
 
 
 class Outputs(NamedTuple):

@@ -16,6 +16,7 @@ from sloshlab.twin.excitation import Excitation
 from sloshlab.twin.model import (
     DRY_FRICTION,
     INPUTS,
+    N_OF_BASE_MOTION,
     USES_ACCELERATION,
     Excited,
     Model,
@@ -186,13 +187,17 @@ def start_state(
 
 
 def run(
-    twin: Blocks, excitation: Excitation, start: tuple[float, float], n_substeps: int, watch: Watch | None
+    twin: Blocks,
+    excitation: Excitation,
+    start: tuple[float, float],
+    n_substeps: int,
+    watch: Watch | None = None,
 ) -> Simulation:
     """Integrate stretch by stretch; `watch` is told samples done and samples in all after each."""
     ready = prepared(twin.terms, twin.structure, excitation)
     model, n_rows = ready.model, excitation.n_samples
-    largest = _state_bounds(model.stiffness.size, ready.memory.size)
-    s = scratch(model, start_state(twin, ready, excitation.at_start(), *start), _n_event_functions(twin.terms))
+    largest = bounds_of_states(model.stiffness.size, ready.memory.size)
+    s = scratch(model, start_state(twin, ready, excitation.at_start(), *start), most_event_functions(twin.terms))
     n_kept = n_columns(model.stiffness.size, model.law.size, ready.memory.size)
     _check_size(n_rows, n_kept)
     out = Outputs(np.empty((n_rows, n_kept)), np.empty((_LARGEST_EVENT_LOG, 4)), np.zeros(1, np.int64))
@@ -200,11 +205,12 @@ def run(
     step = 1.0 / (excitation.sampling_rate_hz * n_substeps)
     status, filled, where = int(Status.DONE), 1, -1
     # each stretch is cut with a margin, so that one stretch or many give the same bytes
-    for first_row, last_row in _stretches(n_rows, n_substeps):
-        excited = _excited(excitation, n_substeps, first_row - 1, last_row - 1)
+    for first_row, last_row in stretches(n_rows, n_substeps):
+        table, first = half_steps_of(excitation, n_substeps, first_row - 1, last_row - 1)
+        excited = Excited(table, first, excitation.factor)
         _keep_inputs(excited, n_substeps, first_row - 1, last_row, inputs)
         if first_row == 1:
-            where = engine.begin(model, excited, s, out)
+            where = engine.begin(model, excited, s)
             if where >= 0:
                 status, filled = int(Status.FAULT), 0
                 break
@@ -214,7 +220,7 @@ def run(
             watch(filled, n_rows)
         if status != Status.DONE:
             break
-    ending = Ending(Status(status), filled / excitation.sampling_rate_hz, _place_of(twin, model, status, where))
+    ending = Ending(Status(status), filled / excitation.sampling_rate_hz, place_of(twin, model, status, where))
     return _simulation(twin, excitation.sampling_rate_hz, ending, inputs, out, n_filled=filled)
 
 
@@ -230,18 +236,27 @@ def _check_size(n_rows: int, n_kept: int) -> None:
         )
 
 
-def _stretches(n_rows: int, n_substeps: int) -> Iterator[tuple[int, int]]:
+def stretches(n_rows: int, n_substeps: int) -> Iterator[tuple[int, int]]:
     at_once = max(1, _HALF_STEPS_AT_ONCE // (2 * n_substeps))
     for first in range(1, n_rows, at_once):
         yield first, min(first + at_once, n_rows)
 
 
-def _excited(excitation: Excitation, n_substeps: int, first_sample: int, last_sample: int) -> Excited:
+def half_steps_of(
+    excitation: Excitation, n_substeps: int, first_sample: int, last_sample: int
+) -> tuple[FloatArray, int]:
+    """Inputs of a stretch, and the half step in its first row.
+
+    Parameters
+    ----------
+    excitation : Excitation
+    n_substeps, first_sample, last_sample : int
+    """
     # six half steps on both sides: the six-point polynomial of a cut step must find the same neighbours in every
     # cut
     first = max(0, 2 * n_substeps * first_sample - _MARGIN)
     stop = min(2 * n_substeps * last_sample + 1 + _MARGIN, 2 * n_substeps * (excitation.n_samples - 1) + 1)
-    return Excited(excitation.half_steps(n_substeps, first, stop), first)
+    return excitation.half_steps(n_substeps, first, stop), first
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,22 +271,22 @@ def _keep_inputs(excited: Excited, n_substeps: int, first: int, stop: int, input
     if excited.table.size:
         begin, per_row = 2 * n_substeps * first - excited.first, 2 * n_substeps
         of_rows = excited.table[begin : begin + per_row * (stop - first) : per_row]
-        inputs.base_motion[first:stop] = of_rows[:, :3]
+        inputs.base_motion[first:stop] = excited.factor * of_rows[:, :N_OF_BASE_MOTION]
         inputs.external_force_n[first:stop] = of_rows[:, INPUTS.index("force")]
 
 
-def _state_bounds(n_modes: int, n_memory: int) -> FloatArray:
+def bounds_of_states(n_modes: int, n_memory: int) -> FloatArray:
     """Bounds of the state: displacement and velocity of the modes, memory of the terms."""
     bounds = np.full(2 * n_modes + n_memory, _LARGEST_MEMORY)
     bounds[:n_modes], bounds[n_modes : 2 * n_modes] = _LARGEST_DISPLACEMENT_M, _LARGEST_VELOCITY_M_PER_S
     return bounds
 
 
-def _n_event_functions(terms: Sequence[Term]) -> int:
+def most_event_functions(terms: Sequence[Term]) -> int:
     return max((term.kind.n_switches + len(term.kind.limits) for term in terms), default=0)
 
 
-def _place_of(twin: Blocks, model: Model, status: int, where: int) -> str:
+def place_of(twin: Blocks, model: Model, status: int, where: int) -> str:
     """Name of what ended the simulation."""
     if status == Status.FAULT:
         kind = twin.terms[where].kind
@@ -305,6 +320,7 @@ def _simulation(
         modes=modes,
         base_motion=inputs.base_motion[:n_filled],
         external_force_n=inputs.external_force_n[:n_filled],
+        tank_force_n=forces[:, [term.place == "tank" for term in twin.terms]].sum(axis=1),
         forces_n=forces,
         memory=memory,
         works_j=works,

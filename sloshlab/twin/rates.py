@@ -20,6 +20,7 @@ from sloshlab.twin.law_call import call_law
 from sloshlab.twin.model import (
     ABSOLUTE,
     DRY_FRICTION,
+    N_OF_BASE_MOTION,
     RELATIVE,
     STICKS,
     USES_ACCELERATION,
@@ -52,6 +53,7 @@ def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
     if abs(place - nearest) < 1e-9 or n < 6:
         for column in range(inputs.size):
             inputs[column] = table[nearest, column]
+        _scale(excited.factor, inputs)
         return
     # steps cut by events; fifth degree, so that the order 4 of the scheme survives
     first = min(max(int(np.floor(place)) - 2, 0), n - 6)
@@ -64,6 +66,13 @@ def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
                 weight *= (place - first - j) / (i - j)
         for column in range(inputs.size):
             inputs[column] += weight * table[first + i, column]
+    _scale(excited.factor, inputs)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _scale(factor: float, inputs: FloatArray) -> None:
+    for column in range(N_OF_BASE_MOTION):
+        inputs[column] *= factor
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -244,12 +253,15 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
 def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
-    """Power of each term on the modes and in its own frame, then those of `N_OTHER_WORKS`."""
+    """Power of each term on the modes and in its own frame, then those of `N_OTHER_WORKS`, if works are kept."""
     n, n_terms, base = m.stiffness.size, m.law.size, s.inputs[2]
-    y, power = stage.state, s.powers[stage.row]
     for i in range(n_terms):
         # the recorded force of a term contains its inertia, with the absolute acceleration
         s.force[i] -= m.mass[i] * s.motion[N_MOTION + ACCELERATION]
+    if s.works.size == 0:
+        return
+    y, power = stage.state, s.powers[stage.row]
+    for i in range(n_terms):
         # on the modes by the relative velocity, which closes the balance of energy; in its own frame it is the
         # loss
         power[2 * i] = s.force[i] * v

@@ -18,6 +18,7 @@ from sloshlab.errors import InputError
 from sloshlab.modal.rig_beam import shapes_at
 from sloshlab.recording import LOST, channels, quality_attributes
 from sloshlab.rig import Rig
+from sloshlab.twin.motion import Motion
 from sloshlab.twin.simulation import Simulation
 from sloshlab.units import SI_UNITS
 
@@ -93,7 +94,7 @@ def simulated_run(
 
 
 def true_channel(
-    simulation: Simulation, name: str, attributes: Mapping[str, Any], rig: Rig, *, n_cells: int = 1
+    motion: Motion, name: str, attributes: Mapping[str, Any], rig: Rig, *, n_cells: int = 1
 ) -> FloatArray | None:
     """What a perfect sensor of this name shows, or None where the twin has no such place.
 
@@ -102,40 +103,41 @@ def true_channel(
     """
     quantity, _, place = name.partition("_")
     if quantity == "force":
-        return _force(simulation, place, attributes, n_cells)
+        return _force(motion, place, attributes, n_cells)
     if quantity not in ORDER_OF_DERIVATIVE:
         return None
     order = ORDER_OF_DERIVATIVE[quantity]
     along = attributes.get("x_m")
-    has_structure = simulation.twin.structure is not None
+    has_structure = motion.twin.structure is not None
     # the control accelerometer is on what the shaker moves: the tank, or the base where a structure carries the
     # tank
     if place.startswith("root") or along == 0.0 or (place.startswith("control") and has_structure):
-        return simulation.base_motion[:, order] if has_structure else None
+        return motion.base_motion[:, order] if has_structure else None
     if place.startswith("beam"):
-        return _along_beam(simulation, along, order, rig)
-    return _of_tank(simulation, order) if place.startswith(_TANK_PLACES) else None
+        return _along_beam(motion, along, order, rig)
+    return _of_tank(motion, order) if place.startswith(_TANK_PLACES) else None
 
 
-def _of_tank(simulation: Simulation, order: int) -> FloatArray:
-    of_orders = (simulation.displacement_m, simulation.velocity_m_per_s, simulation.acceleration_m_per_s2)
-    return of_orders[order]
+def _of_tank(motion: Motion, order: int) -> FloatArray:
+    if order == 0:
+        return motion.displacement_m
+    return motion.velocity_m_per_s if order == 1 else motion.acceleration_m_per_s2
 
 
-def _force(simulation: Simulation, place: str, attributes: Mapping[str, Any], n_cells: int) -> FloatArray | None:
+def _force(motion: Motion, place: str, attributes: Mapping[str, Any], n_cells: int) -> FloatArray | None:
     sign = -1.0 if attributes.get("block_from") == "tank" else 1.0
     if place.startswith("cell"):
         # cells carry equal shares: the twin's tank does not tilt
-        return sign * simulation.interface_force_n / n_cells
-    return sign * simulation.interface_force_n if place in ("interface", "total") else None
+        return sign * motion.interface_force_n / n_cells
+    return sign * motion.interface_force_n if place in ("interface", "total") else None
 
 
-def _along_beam(simulation: Simulation, along: float | None, order: int, rig: Rig) -> FloatArray | None:
-    described, structure = rig.structure, simulation.twin.structure
+def _along_beam(motion: Motion, along: float | None, order: int, rig: Rig) -> FloatArray | None:
+    described, structure = rig.structure, motion.twin.structure
     if along is None or structure is None or described is None or described.kind != "beam":
         return None
     shape = structure.shapes(shapes_at(described, [along]), [along])[0]
-    return np.asarray(simulation.base_motion[:, order] + simulation.modes[:, order] @ shape)
+    return np.asarray(motion.base_motion[:, order] + motion.modes[:, order] @ shape)
 
 
 def _as_read(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import exp, pi
 
-from sloshlab.twin.law import BASE_ACCELERATION, DIRECTION, DISPLACEMENT, VELOCITY, law
+from sloshlab.twin.law import BASE_ACCELERATION, DIRECTION, DISPLACEMENT, VELOCITY, law, law_of_lanes
 from sloshlab.twin.terms import ForceKind, Parameter, register
 
 # the laws are compiled, so their arguments are described once, in sloshlab.twin.law
@@ -16,12 +16,12 @@ from sloshlab.twin.terms import ForceKind, Parameter, register
 _BOTH = ("structure", "tank")
 
 
-@law
+@law_of_lanes
 def _viscous(motion, parameters, memory, rates):
     return -parameters[0] * motion[VELOCITY]
 
 
-@law
+@law_of_lanes
 def _coulomb(motion, parameters, memory, rates):
     # DIRECTION, not the sign of v: the engine holds it within a step and knows sticking, where it asks for both
     # signs
@@ -40,7 +40,7 @@ def _stribeck(motion, parameters, memory, rates):
     return -(parameters[0] + (parameters[1] - parameters[0]) * exp(-ratio * ratio)) * motion[DIRECTION]
 
 
-@law
+@law_of_lanes
 def _quadratic_drag(motion, parameters, memory, rates):
     return -parameters[0] * motion[VELOCITY] * abs(motion[VELOCITY])
 
@@ -55,12 +55,12 @@ def _quadratic(motion, parameters, memory, rates):
     return -parameters[0] * motion[DISPLACEMENT] ** 2
 
 
-@law
+@law_of_lanes
 def _linear(motion, parameters, memory, rates):
     return -parameters[0] * motion[DISPLACEMENT]
 
 
-@law
+@law_of_lanes
 def _constant(motion, parameters, memory, rates):
     return parameters[0]
 

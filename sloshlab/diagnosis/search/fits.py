@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Final, TypeVar
 
@@ -12,7 +12,6 @@ from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.explanation import Explanation
-from sloshlab.diagnosis.forked_process import is_fork
 from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, best_start, fitted
 from sloshlab.diagnosis.free_run_problem import (
     FreeRunFit,
@@ -21,14 +20,11 @@ from sloshlab.diagnosis.free_run_problem import (
     mean_squares,
     mean_squares_of_runs,
     repeatable_mean_squares,
-    residuals_of_runs,
     rms_without_bursts,
     run_of,
 )
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.parallel_pieces import in_parallel
 from sloshlab.diagnosis.rig_model import RELEASE
-from sloshlab.diagnosis.second_process import second_process
 
 _LEAST_MISFIT_RATIO: Final = 1.2
 """Misfit of a held-out run over that of the fitted ones, from which other releases are tried."""
@@ -73,9 +69,7 @@ class Fits:
         tests: Sequence[Sequence[str]] = (),
     ) -> None:
         self.model, self.fitting, self.held_out = model, fitting, held_out
-        # Nobody reads the progress of a fork.
-        self.progress: Progress = lambda what, done, of: None if is_fork() else progress(what, done, of)
-        self.tests = tests
+        self.progress, self.tests = progress, tests
         self.failed: dict[str, str] = {}
         self.screened: dict[str, float] = {}
 
@@ -113,41 +107,29 @@ class Fits:
         chosen = [i for i, name in enumerate(of_runs) if name in present]
         return jacobian.part(chosen, [all_names.index(name) for name in names])
 
-    def share_with_second_process(self, candidates: Sequence[Candidate]) -> None:
-        """Start the second process with many effects at once: an unknown one would start another process."""
-        second_process(residuals_of_runs, self.model, [*self.fitting, *self.held_out], candidates)
-
-    def in_parallel(
-        self, pieces: Sequence[Callable[[], _Result]], candidates: Iterable[Candidate]
-    ) -> list[_Result]:
-        """Results of pieces of work that do not depend on each other, in two processes where that can be.
+    def in_parallel(self, pieces: Sequence[Callable[[], _Result]]) -> list[_Result]:
+        """Results of pieces of work that do not depend on each other, in their order.
 
         Parameters
         ----------
         pieces : sequence of callable
-        candidates : iterable of Candidate
-            Those that results may contain.
+            Without effects beyond their results.
         """
-        # A user's own twin may not bear a fork, and of many readings each process would hold its own.
-        if not self.model.may_be_forked:
-            return [piece() for piece in pieces]
-        return in_parallel(pieces, candidates)
+        return list(self.model.executor.map(lambda piece: piece(), pieces))
 
-    def all_fitted(
-        self, pieces: Sequence[Callable[[], FreeRunFit]], candidates: Iterable[Candidate]
-    ) -> list[Explanation]:
+    def all_fitted(self, pieces: Sequence[Callable[[], FreeRunFit]]) -> list[Explanation]:
         """Fits that do not depend on each other, each validated; without those that did not run."""
 
         def validated(piece: Callable[[], FreeRunFit]) -> Explanation | None:
             fit = piece()
             return None if fit.trouble else self.validated(fit)
 
-        found = self.in_parallel([partial(validated, piece) for piece in pieces], candidates)
+        found = self.in_parallel([partial(validated, piece) for piece in pieces])
         return [explanation for explanation in found if explanation is not None]
 
-    def all_validated(self, fits: Sequence[FreeRunFit], candidates: Iterable[Candidate]) -> list[Explanation]:
+    def all_validated(self, fits: Sequence[FreeRunFit]) -> list[Explanation]:
         """Fits, each validated; without those that did not run."""
-        return self.in_parallel([partial(self.validated, fit) for fit in fits if not fit.trouble], candidates)
+        return self.in_parallel([partial(self.validated, fit) for fit in fits if not fit.trouble])
 
     def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
         """The fitted runs with some effects."""

@@ -65,7 +65,7 @@ class ForwardSelection:
         selected = self._selected(base, coarse_fits, stages, more)
         done = self._refined(base, jacobian, selected, what, stages)
         self.fits.failed |= {fit.candidates[-1].key: fit.trouble for fit in done if fit.trouble}
-        kept = self.fits.all_validated(done, [*base.candidates, *pool])
+        kept = self.fits.all_validated(done)
         # Look-alikes before nesting models, which start from the best of all that is known.
         kept += self.substitution.look_alikes(base, kept, pool, what)
         return [*kept, *self.substitution.nesting_models(base, kept, pool, what)]
@@ -84,13 +84,12 @@ class ForwardSelection:
             self.fits.progress(f"{what}: {screened.candidate.key}", i, 2 * len(chosen))
             problem = self.subset.problem((*base.candidates, screened.candidate))
             coarse_fit = coarsely_fitted(problem, screened.starts, stages, near=base_jacobian)
-            # Jacobians are not sent between processes, which would each hold a copy; it is computed anew.
+            # The Jacobian is computed anew on all runs: those of all coarse fits would take much memory.
             return coarse_fit.fit, coarse_fit.cost
 
         pieces = [partial(first_stages, i, screened) for i, screened in enumerate(chosen)]
-        candidates = [*base.candidates, *(screened.candidate for screened in chosen)]
         found = []
-        for screened, (fit, cost) in zip(chosen, self.fits.in_parallel(pieces, candidates), strict=True):
+        for screened, (fit, cost) in zip(chosen, self.fits.in_parallel(pieces), strict=True):
             if fit.trouble:
                 self.fits.failed[screened.candidate.key] = fit.trouble
             else:
@@ -147,7 +146,7 @@ class ForwardSelection:
             return refined(coarse_fit, stages)
 
         pieces = [partial(to_the_end, i, coarse_fit) for i, coarse_fit in enumerate(selected)]
-        done = self.fits.in_parallel(pieces, [of for coarse_fit in selected for of in coarse_fit.fit.candidates])
+        done = self.fits.in_parallel(pieces)
         # Far from the recordings a fit ends in the local minimum of the size that it began with.
         if stages == INFLATION_STAGES:
             done[:_MOST_SIZE_SCANS] = [self._size_scanned(fit, stages) for fit in done[:_MOST_SIZE_SCANS]]
@@ -162,5 +161,5 @@ class ForwardSelection:
         pieces = [
             partial(fitted_from_scaled, problem, fit, name, factor, stages) for factor in SCANNED_SIZE_FACTORS
         ]
-        others = self.fits.in_parallel(pieces, fit.candidates)
+        others = self.fits.in_parallel(pieces)
         return min([fit, *(other for other in others if not other.trouble)], key=lambda other: other.cost)

@@ -19,7 +19,6 @@ from sloshlab.diagnosis.free_run_fit import fitted_baseline
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_cost
 from sloshlab.diagnosis.noise_floor import weighted_observations
 from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
-from sloshlab.diagnosis.repeats import require_repeats
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.search.ceiling import ceilings
 from sloshlab.diagnosis.search.fits import Fits, Progress, best_fitting
@@ -30,6 +29,7 @@ from sloshlab.diagnosis.search.substitution import LEAST_COST_DECREASE, Substitu
 from sloshlab.diagnosis.split import split
 from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import InputError
+from sloshlab.twin.lane_preparation import IN_TURN, Executor
 
 assert effects.__all__  # importing the vocabulary makes it known
 
@@ -44,7 +44,11 @@ _SHARE_OF_A_NESTED_MODEL: Final = 0.5
 
 
 def findings_of(
-    case: Case, progress: Progress = lambda what, done, of: None, model: DiagnosedModel | None = None
+    case: Case,
+    progress: Progress = lambda what, done, of: None,
+    model: DiagnosedModel | None = None,
+    *,
+    executor: Executor = IN_TURN,
 ) -> Findings:
     """Retune, select effects greedily, refine them, and find the ceiling.
 
@@ -55,14 +59,14 @@ def findings_of(
         Takes what is being done, how much of it is done, and how much there is.
     model : DiagnosedModel, optional
         A user's own twin of the same runs; that of the rig file by default.
+    executor : Executor, optional
+        Shares simulations and fits among its workers; findings do not depend on it.
     """
     require_one_rig(case)
     if model is None:
         if case.rig is None:
             raise InputError(f"case {case.name}", got="neither a rig nor a twin", allowed="one of them")
-        model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs))
-    # Before anything is compared with the twin: what two rigs do differently would be scatter, or missing physics.
-    require_repeats(case, model)
+        model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs, executor=executor))
     require_comparable(case, model)
     # Before any fit: what is held out must not depend on what is found.
     parts = split(case)
@@ -85,7 +89,6 @@ def findings_of(
     # Of the retuned baseline: places in frequency where it misses most are starts for modes.
     surroundings = surroundings_of(problem, retuned_fit, case.rig)
     pool = candidates(surroundings)
-    fits.share_with_second_process(pool)
     # First effect: all candidates beside the retuned baseline.
     found = ForwardSelection(fits).fitted(retuned_fit, jacobian, pool, "fitting one effect")
     refinement, best = Refinement(fits), best_fitting(found)
@@ -183,7 +186,6 @@ def _second_effects(
         return []
     more = ForwardSelection(fits)
     pool = [*pool, *_candidates_beside(best, at, pool)]
-    fits.share_with_second_process(pool)
     pairs = more.fitted(best.fit, fits.jacobian(best.fit), pool, "fitting a second effect")
     alone = []
     pair = best_fitting(pairs)

@@ -78,7 +78,7 @@ def with_randomised_baselines(
         return fitted(problem, fit.values, n_iterations=6, stages=INFLATION_STAGES[-2:], known=jacobian)[0]
 
     draws = np.clip(draws, -_MOST_TOLERANCES, _MOST_TOLERANCES)
-    reached = fits.in_parallel([partial(from_draw, i, draw) for i, draw in enumerate(draws)], candidates)
+    reached = fits.in_parallel([partial(from_draw, i, draw) for i, draw in enumerate(draws)])
     ends = [best.fit, *(fit for fit in reached if not fit.trouble)]
     # By misfit: costs of different priors cannot be compared.
     lowest = min(ends, key=lambda end: end.misfit)

@@ -119,7 +119,7 @@ class Refinement:
             return self._restarted_from_prior(explanation)
 
         pieces = [partial(piece, i, explanation) for i, explanation in enumerate(chosen)]
-        found = self.fits.in_parallel(pieces, [of for explanation in chosen for of in explanation.fit.candidates])
+        found = self.fits.in_parallel(pieces)
         return [better for of_one in found for better in of_one]
 
     def _restarted_from_prior(self, explanation: Explanation) -> list[Explanation]:
@@ -147,9 +147,7 @@ class Refinement:
             first = coarsely_fitted(problem, [Start(start)])
             return first.fit, first.cost
 
-        reached = self.fits.in_parallel(
-            [partial(beginning, start) for start in starts], explanation.fit.candidates
-        )
+        reached = self.fits.in_parallel([partial(beginning, start) for start in starts])
         fits = [
             (cost, {**start, **fit.values})
             for (fit, cost), start in zip(reached, starts, strict=True)
@@ -168,7 +166,7 @@ class Refinement:
         """The best of fits of the same effects from several starts; none where that is no better."""
         problem = self.fits.problem_of(explanation.fit)
         pieces = [partial(_fitted_from, problem, place) for place in places]
-        best = min(self.fits.in_parallel(pieces, explanation.fit.candidates), key=lambda fit: fit.cost)
+        best = min(self.fits.in_parallel(pieces), key=lambda fit: fit.cost)
         # Held-out runs are simulated for what is kept only, and choose nothing here.
         return [self.fits.validated(best)] if not best.trouble and best.cost < explanation.fit.cost else []
 
@@ -223,7 +221,7 @@ class Refinement:
         # From the pair's own optimum: one of the two may be enough where the retuned baseline did not lead to
         # it.
         pieces = [partial(left_alone, candidate) for candidate in pair.fit.candidates]
-        return self.fits.all_fitted(pieces, pair.fit.candidates)
+        return self.fits.all_fitted(pieces)
 
     def retuned_from(self, known: Sequence[Explanation], retuned: Explanation) -> Explanation:
         """The baseline retuned once more from that of the best explanations.

@@ -160,7 +160,7 @@ class Screening:
         # An effect twice is the same effect with another size.
         others = [candidate for candidate in pool if candidate.key not in {known.key for known in base.candidates}]
         pieces = [partial(screened_candidate, i, candidate) for i, candidate in enumerate(others)]
-        results = self.fits.in_parallel(pieces, pool)
+        results = self.fits.in_parallel(pieces)
         for candidate, screened in zip(others, results, strict=True):
             if screened is None:
                 self.fits.failed[candidate.key] = "does not run from any start"

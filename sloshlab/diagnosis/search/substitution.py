@@ -92,7 +92,7 @@ class Substitution:
                 nearest_of[name] = _NearStart(min(costs), problem, starts[int(np.argmin(costs))])
         best_of = sorted(nearest_of.values(), key=attrgetter("cost"))[:most]
         pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, after) for near in best_of]
-        return self.fits.all_fitted(pieces, pool)
+        return self.fits.all_fitted(pieces)
 
     def exchanged(
         self, pair: Explanation, base: FreeRunFit, known: Sequence[Explanation], pool: Sequence[Candidate]
@@ -131,7 +131,7 @@ class Substitution:
                     of_replaced.append(near)
             nearest_starts += sorted(of_replaced, key=attrgetter("cost"))[:_MOST_LOOK_ALIKES]
         pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, reached) for near in nearest_starts]
-        return self.fits.all_fitted(pieces, [*pair.fit.candidates, *pool])
+        return self.fits.all_fitted(pieces)
 
     def replaced_by_single(
         self, wider: FreeRunFit, base: FreeRunFit, pool: Sequence[Candidate]
@@ -167,7 +167,7 @@ class Substitution:
                 found.append(near)
         best_of = sorted(found, key=attrgetter("cost"))[:_MOST_SINGLE]
         pieces = [partial(_fitted_unless_abandoned, near.problem, near.values, most) for near in best_of]
-        return self.fits.all_fitted(pieces, pool)
+        return self.fits.all_fitted(pieces)
 
     def nesting_models(
         self, base: FreeRunFit, kept: Sequence[Explanation], pool: Sequence[Candidate], what: str
@@ -222,7 +222,7 @@ class Substitution:
             ]
             start = best_start(problem, starts, INFLATION_STAGES[-1])
             pieces.append(partial(_fitted_closely, problem, start))
-        return self.fits.all_fitted(pieces, [*base.candidates, *pool])
+        return self.fits.all_fitted(pieces)
 
     def _distinct_from_nested(
         self, problem: FreeRunProblem, candidate: Candidate, special: Candidate, fit: FreeRunFit
@@ -267,7 +267,7 @@ class Substitution:
                 at_start = huber_cost(problem.residual(problem.theta_of(start)))
                 if at_start < tried.get(frozenset((special.key, *(other.key for other in others))), np.inf):
                     pieces.append(partial(_fitted_closely, problem, start))
-        return self.fits.all_fitted(pieces, [*wider.fit.candidates, *pool])
+        return self.fits.all_fitted(pieces)
 
 
 def _near_start(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]]) -> _NearStart:

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.diagnosed_model import Readings, Request
 from sloshlab.diagnosis.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
-from sloshlab.diagnosis.rig_model import corrected, steps_per_sample, with_cached_inputs
+from sloshlab.diagnosis.rig_model import corrected, steps_per_sample
 from sloshlab.diagnosis.user_module import one_line
 from sloshlab.diagnosis.user_twin.added_force import AddedForce
 from sloshlab.diagnosis.user_twin.description import Compared, FreeTwin, Parameter, Response, TwinRun, UserTwin
@@ -23,7 +24,8 @@ from sloshlab.diagnosis.user_twin.extended import save_extended
 from sloshlab.diagnosis.user_twin.mechanism import EngineTwin, Mechanism, engine_twin, reading_of
 from sloshlab.errors import AnalysisError, InputError, SloshlabError
 from sloshlab.recording import channels
-from sloshlab.twin.excitation import Excitation, free, recorded
+from sloshlab.twin.excitation import Excitation, free, recorded, with_cached_inputs
+from sloshlab.twin.lane_preparation import IN_TURN, Executor
 from sloshlab.twin.structure import single_degree_of_freedom
 from sloshlab.twin.twin import Twin
 from sloshlab.units import SI_UNITS
@@ -53,8 +55,8 @@ class UserTwinModel:
         self.name, self.described = name, twin
         self.runs: tuple[CaseRun, ...] = tuple(runs)
         self.blocks: tuple[str, ...] = ("excitation", "structure", "sensor")
-        # A user's own code may not bear a fork.
-        self.may_be_forked = False
+        # A user's own code may not bear several workers.
+        self.executor: Executor = IN_TURN
         self._lock, self._user_code_lock = threading.Lock(), threading.Lock()
         self._truths: OrderedDict[tuple[Any, ...], tuple[dict[str, FloatArray], FloatArray]] = OrderedDict()
         self._excitations: OrderedDict[str, Excitation] = OrderedDict()
@@ -102,7 +104,7 @@ class UserTwinModel:
 
     def simulate(
         self, run: CaseRun, values: Mapping[str, float], extension: Extension, only: Collection[str] = ()
-    ) -> dict[str, FloatArray]:
+    ) -> Readings:
         """What the compared channels of a run read, all or some.
 
         Raises
@@ -122,6 +124,16 @@ class UserTwinModel:
                     reading = fault.reading(reading, rate, others, self._views[run.name].channels[name])
             readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
         return readings
+
+    def simulate_many(self, requests: Sequence[Request]) -> list[Readings | SloshlabError]:
+        """The same of many simulations, one after the other; in place of those that do not end, why."""
+        return [self._simulated(request) for request in requests]
+
+    def _simulated(self, request: Request) -> Readings | SloshlabError:
+        try:
+            return self.simulate(request.run, request.values, request.extension, request.only)
+        except SloshlabError as error:
+            return error
 
     def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
         """Displacement, velocity, acceleration of the coordinate on which added forces act, shape (n, 3)."""

@@ -25,7 +25,7 @@ from recorded_oscillators import (
 from scipy.interpolate import CubicSpline
 from scipy.signal import lsim
 
-from sloshlab.diagnosis import effects
+from sloshlab.diagnosis import effects, rig_model
 from sloshlab.diagnosis.candidate import Candidate, Effect, EffectParameter
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import Extension
@@ -33,6 +33,7 @@ from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, _step_within_bound
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost, robust_weights
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.twin.lane_preparation import motions
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING
 
 assert effects.__all__
@@ -329,6 +330,38 @@ def test_what_one_channel_or_run_alone_shows_is_as_if_all_were_simulated(tmp_pat
     assert touched >= 5  # two gains, two releases and this one
 
 
+def test_derivatives_by_what_only_sensors_read_cost_no_simulation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are those of full simulations, which one at a time know nothing of each other."""
+    runs, simulated = decays(duration_s=1.5), []
+    problem = FreeRunProblem(
+        model := RigModel(rig(tmp_path), tmp_path, runs),
+        [observations(run, model.compared(run)) for run in runs],
+    )
+    theta = problem.theta_of(model.believed) + 0.2
+    at = problem.residual(theta)
+    reads = [i for i, moves in enumerate(problem.changes_motion) if not moves]
+
+    def counted(lanes: Sequence[Any], executor: Any) -> Any:
+        simulated.extend(lanes)
+        return motions(lanes, executor)
+
+    monkeypatch.setattr(rig_model, "motions", counted)
+    jacobian = problem.jacobian(theta, at, reads)
+    assert len(reads) >= 3
+    assert not simulated
+    for place, column in enumerate(reads):
+        moved = []
+        for step in (0.5, -0.5):
+            model._truths.clear()
+            moved.append(problem.residual(theta + step * np.eye(theta.size)[column]))
+        # linear, so that a difference of any size is the derivative
+        found = jacobian.times(np.eye(len(reads))[place])
+        np.testing.assert_allclose(found, moved[0] - moved[1], atol=1e-9 * np.abs(found).max())
+    assert len(simulated) == 2 * len(reads) * len(runs)
+
+
 def test_only_channels_that_are_asked_for_are_made(tmp_path: Path) -> None:
     runs = decays(duration_s=1.5)
     model = RigModel(rig(tmp_path), tmp_path, runs)
@@ -350,7 +383,7 @@ def test_no_step_is_simulated_that_predicts_next_to_nothing(
     def counted(self: FreeRunProblem, at: np.ndarray) -> np.ndarray:
         nonlocal n_made
         n_made += 1
-        return self._of_runs_in_turn(at)
+        return self.residuals([at])[0]
 
     monkeypatch.setattr(FreeRunProblem, "residual", counted)
     again, _ = fitted(problem, best.values, stages=INFLATION_STAGES[-1:])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,7 +24,8 @@ from decays_under_friction import (
 )
 from recorded_oscillators import decays, effect, rig, surroundings
 
-from sloshlab.diagnosis import effects, forked_process
+from pipelines.diagnosis.worker_threads import WorkerThreads
+from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.case import Case
 from sloshlab.diagnosis.explanation import Explanation, Findings
@@ -227,7 +228,6 @@ def test_a_mode_is_fitted_again_from_other_frequencies(case: Decays, monkeypatch
         last.append(start)
         return replace(fit, values=dict(start), cost=fit.cost - 50.0 + abs(start[frequency] - 12.0)), None
 
-    monkeypatch.setattr(forked_process, "N_WORKERS", 1)  # a copy of this process would watch for itself
     monkeypatch.setattr(refinement, "coarsely_fitted", beginning)
     monkeypatch.setattr(refinement, "fitted", watched)
     [found] = Refinement(case.fits).restarted_from_prior(case.baseline, [Explanation(fit, 0.0, 1.0)])
@@ -267,7 +267,6 @@ def test_beside_dry_friction_simple_effects_are_fitted_from_other_sizes(
         left = cost - 50.0 + 10.0 * abs(start[COULOMB_N] / size - 2.0)
         return replace(coulomb.fit, values=dict(start), cost=left), None
 
-    monkeypatch.setattr(forked_process, "N_WORKERS", 1)  # a copy of this process would watch for itself
     monkeypatch.setattr(refinement, "fitted", stays)
     monkeypatch.setattr(Fits, "is_complete", lambda self, explanation: is_complete)
     terms = (SimpleNamespace(kind=SimpleNamespace(dry_friction=is_dry)),)
@@ -339,8 +338,16 @@ def test_a_better_place_takes_the_place_of_what_was_found(case: Decays, coulomb:
     assert found.fit.values[COULOMB_N] == pytest.approx(coulomb.fit.values[COULOMB_N], rel=0.03)
 
 
-def test_derivatives_and_places_are_the_same_on_one_core_and_on_two(
-    case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch
+class LastFirst:
+    """Does work in the reverse order."""
+
+    def map(self, function: Callable[[Any], Any], items: Iterable[Any], /) -> list[Any]:
+        return [function(item) for item in reversed(list(items))][::-1]
+
+
+@pytest.mark.parametrize("executor", [LastFirst(), WorkerThreads(2), WorkerThreads(5)])
+def test_residuals_and_derivatives_do_not_depend_on_who_works_in_which_order(
+    case: Decays, coulomb: Explanation, monkeypatch: pytest.MonkeyPatch, executor: Any
 ) -> None:
     problem = case.fits.problem_of(coulomb.fit)
     at_fit = problem.theta_of(coulomb.fit.values)
@@ -348,15 +355,18 @@ def test_derivatives_and_places_are_the_same_on_one_core_and_on_two(
     units = np.eye(at_fit.size)
 
     def found() -> tuple[Any, ...]:
+        # what is kept from before must not answer
+        problem.model._truths.clear()
         residuals = problem.residuals(places)
         jacobian = problem.jacobian(at_fit, residuals[0], range(at_fit.size))
         return np.array(residuals), np.array([jacobian.times(unit) for unit in units])
 
-    on_two = found()
-    monkeypatch.setattr(forked_process, "N_WORKERS", 1)
-    for explanation, other in zip(found(), on_two, strict=True):
-        np.testing.assert_array_equal(explanation, other)
-    for residual, place in zip(on_two[0], places, strict=True):
+    in_turn = found()
+    monkeypatch.setattr(problem.model, "executor", executor)
+    for by_others, expected in zip(found(), in_turn, strict=True):
+        np.testing.assert_array_equal(by_others, expected)
+    for residual, place in zip(in_turn[0], places, strict=True):
+        problem.model._truths.clear()
         np.testing.assert_array_equal(residual, problem.residual(place))
 
 

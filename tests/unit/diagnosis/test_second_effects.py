@@ -66,7 +66,6 @@ def sought(
         problem_of=lambda fit: SimpleNamespace(is_down_to_noise=lambda fit: is_noise),
         jacobian=lambda fit: None,
         has_little_repeatable=lambda explanation: has_little_repeatable,
-        share_with_second_process=lambda pool: None,
     )
     monkeypatch.setattr(model_search, "ForwardSelection", lambda fits: tried)
     monkeypatch.setattr(model_search, "_candidates_beside", lambda best, at, pool: [])
