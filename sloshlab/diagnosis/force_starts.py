@@ -23,9 +23,9 @@ from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.latent_force import EITHER, STRUCTURE, TANK, LatentForce, run_forces
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.rig_model import RigModel, with_cached_inputs
+from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.errors import SloshlabError
-from sloshlab.twin.excitation import Excitation, recorded
+from sloshlab.twin.excitation import Excitation, recorded, with_cached_inputs
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 

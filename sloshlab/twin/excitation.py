@@ -244,6 +244,22 @@ def recorded(
     return Excitation(sampling_rate_hz, shape[0], inputs, moves_base=moves)
 
 
+def with_cached_inputs(excitation: Excitation) -> Excitation:
+    """The excitation with a cache of its interpolated inputs, which every simulation of a run asks for again."""
+    inputs = excitation.inputs
+    if inputs is None:
+        return excitation
+    kept: dict[tuple[float, int, float], FloatArray] = {}
+
+    def cached(time: FloatArray) -> FloatArray:
+        key = (float(time[0]), time.size, float(time[-1]))
+        if key not in kept:
+            kept[key] = inputs(time)
+        return kept[key]
+
+    return replace(excitation, inputs=cached)
+
+
 class _BandLimitedSeries:
     """Band-limited values of a series at instants between its samples; beyond the ends it is reflected there.
 

@@ -203,7 +203,8 @@ class _Pack:
     def motions(self) -> list[Motion]:
         """Simulate all of them."""
         n_rows = self.excitation.n_samples
-        series = np.empty((N_LANES, 3 * self.n_modes + 1, n_rows))
+        own = [np.empty((3 * self.n_modes + 1, n_rows)) for _ in self.lanes]
+        series = engine.Series(_addresses(own), n_rows)
         side_by_side, scratches = self._side_by_side(), self._scratch()
         status, filled, where = (np.full(N_LANES, value) for value in (int(Status.DONE), n_rows, -1))
         out = Outputs(np.empty((0, 0)), np.empty((0, 4)), np.zeros(1, np.int64))
@@ -221,7 +222,7 @@ class _Pack:
             else:
                 engine.integrate_in_turn(self.twins, drives, scratches, stretch, ends, series)
             del tables  # kept up to here, as the loop has only their addresses
-        return [self._motion(i, series[i], ends, inputs) for i in range(len(self.lanes))]
+        return [self._motion(i, own[i], ends, inputs) for i in range(len(self.lanes))]
 
     def _side_by_side(self) -> engine.SideBySide:
         n, twins = self.n_modes, self.twins
@@ -252,7 +253,7 @@ class _Pack:
             rate,
             Ending(status, filled / rate, place),
             series[: 3 * n, :filled].reshape(3, n, filled).transpose(2, 0, 1),
-            self.factors[i] * base_motion[:filled],
+            base_motion[:filled] if self.factors[i] == 1.0 else self.factors[i] * base_motion[:filled],
             external_force_n[:filled],
             series[3 * n, :filled],
         )
@@ -268,7 +269,7 @@ class _Inputs:
         self._lanes = lanes
         n = lanes[0].excitation.n_samples
         self._distinct: dict[int, Excitation] = {id(lane.excitation.inputs): lane.excitation for lane in lanes}
-        self._kept = {key: (np.zeros((n, N_OF_BASE_MOTION)), np.zeros(n)) for key in self._distinct}
+        self._kept = {key: (np.zeros((N_OF_BASE_MOTION, n)).T, np.zeros(n)) for key in self._distinct}
 
     def of(self, first_row: int, last_row: int, factors: FloatArray) -> tuple[list[FloatArray], engine.Drives]:
         """Tables of a stretch, and where the compiled loop finds them."""
@@ -277,10 +278,8 @@ class _Inputs:
         for key, excitation in self._distinct.items():
             tables[key], first = half_steps_of(excitation, n_substeps, first_row - 1, last_row - 1)
             self._keep(key, tables[key], 2 * n_substeps * (first_row - 1) - first, (first_row - 1, last_row))
-        addresses = np.zeros(N_LANES, np.int64)
         n_rows = next(iter(tables.values())).shape[0]
-        for i, lane in enumerate(self._lanes):
-            addresses[i] = tables[id(lane.excitation.inputs)].ctypes.data
+        addresses = _addresses([tables[id(lane.excitation.inputs)] for lane in self._lanes])
         drives = engine.Drives(addresses, n_rows, first, factors, len(tables) == 1)
         return list(tables.values()), drives
 
@@ -296,6 +295,12 @@ class _Inputs:
     def kept(self, i: int) -> tuple[FloatArray, FloatArray]:
         """Motion of the base at the samples, before the factor of the lane, and force on the tank."""
         return self._kept[id(self._lanes[i].excitation.inputs)]
+
+
+def _addresses(tables: Sequence[FloatArray]) -> npt.NDArray[np.int64]:
+    addresses = np.zeros(N_LANES, np.int64)
+    addresses[: len(tables)] = [table.ctypes.data for table in tables]
+    return addresses
 
 
 def _empty_rows(n: int) -> FloatArray:

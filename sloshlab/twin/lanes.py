@@ -122,6 +122,13 @@ class LaneScratch(NamedTuple):
     no_powers: FloatArray  # (5, 0)
 
 
+class Series(NamedTuple):
+    """Where lanes are recorded: q, q̇, q̈, sum of the forces on the tank, each over time."""
+
+    tables: IntArray  # (8,) addresses, of (3 n_modes + 1, n_rows) numbers each: lanes share no memory that is kept
+    n_rows: int
+
+
 class LaneEnds(NamedTuple):
     """How lanes have ended so far."""
 
@@ -188,12 +195,15 @@ def _set_directions(lanes: Lanes, b: SideBySide, s: LaneScratch) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def _set_motion(lanes: Lanes, seconds: float, x: Any, v: Any, b: SideBySide) -> None:
+def _set_motion(lanes: Lanes, seconds: float, stage: int, x: Any, v: Any, b: SideBySide) -> None:
     for frame in range(lanes.first_frame, lanes.last_frame + 1):
         at, share = frame * N_MOTION, alike(float(frame))
-        put(b.motion, at + TIME, alike(seconds))
         put(b.motion, at + DISPLACEMENT, x + share * numbers_of(b.inputs, 0))
         put(b.motion, at + VELOCITY, v + share * numbers_of(b.inputs, 1))
+        if stage == 2 or stage == 4:
+            continue
+        # what the second and the fourth stage share with those before them
+        put(b.motion, at + TIME, alike(seconds))
         put(b.motion, at + ACCELERATION, alike(np.nan))
         put(b.motion, at + BASE_ACCELERATION, numbers_of(b.inputs, 2))
         put(b.motion, at + PHASE, numbers_of(b.inputs, 3))
@@ -306,7 +316,7 @@ def _rates(
     total = numbers_of(b.inputs, 5) - added_mass * base
     if n_terms:
         put(b.place, _FREE, free)
-        _set_motion(lanes, seconds, x, v, b)
+        _set_motion(lanes, seconds, stage, x, v, b)
         total = _add_forces(lanes, at, total, b, s, ends)
     a = (free + numbers_of(lanes.mobility, 0) * total) * numbers_of(lanes.inverse_inertia, 0)
     total = total - added_mass * a
@@ -425,13 +435,14 @@ def _stop(lane: int, status: int, filled: int, where: int, ends: LaneEnds) -> No
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
-def _record_alone(lanes: Lanes, lane: int, row: int, s: LaneScratch, series: FloatArray) -> None:
+def _record_alone(lanes: Lanes, lane: int, row: int, s: LaneScratch, series: Series) -> None:
     n = lanes.n_modes
+    of_lane = table_at(series.tables[lane], 3 * n + 1, series.n_rows)
     for j in range(2 * n):
-        series[lane, j, row] = s.state[lane, j]
+        of_lane[j, row] = s.state[lane, j]
     for j in range(n):
-        series[lane, 2 * n + j, row] = s.slopes[lane, 0, n + j]
-    series[lane, 3 * n, row] = _tank_force(lanes, s.force[lane], 0, 1)
+        of_lane[2 * n + j, row] = s.slopes[lane, 0, n + j]
+    of_lane[3 * n, row] = _tank_force(lanes, s.force[lane], 0, 1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -445,15 +456,21 @@ def _tank_force(lanes: Lanes, forces: FloatArray, first: int, step: int) -> floa
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
 def _end_row(
-    lanes: Lanes, row: int, stretch: Stretch, b: SideBySide, s: LaneScratch, ends: LaneEnds, series: FloatArray
+    lanes: Lanes, row: int, stretch: Stretch, b: SideBySide, s: LaneScratch, ends: LaneEnds, series: Series
 ) -> None:
     """Record the lanes whose states are within their bounds; the others end here."""
     n, n_states = lanes.n_modes, s.state.shape[1]
+    share = alike(0.0)
+    for j in range(2 * n):
+        share = share + abs(numbers_of(b.state, j)) * alike(1.0 / stretch.largest[j])
+    put(b.place, _FREE, share)
     for lane in range(lanes.n_used):
         if ends.status[lane] != DONE:
             continue
-        where = -1
-        for j in range(n_states - 1, -1, -1):
+        # A sum of shares of the bounds below one half leaves each within its bound; only others are looked at one
+        # by one. A sum that is no number is not below.
+        where, first = -1, (2 * n if b.place[_FREE * N_LANES + lane] < 0.5 else 0)
+        for j in range(n_states - 1, first - 1, -1):
             value = b.state[j * N_LANES + lane] if j < 2 * n else s.state[lane, j]
             # not "abs(value) > largest", which is false for NaN
             if not abs(value) <= stretch.largest[j]:
@@ -461,11 +478,12 @@ def _end_row(
         if where >= 0:
             _stop(lane, UNSTABLE, row, where, ends)
             continue
+        of_lane = table_at(series.tables[lane], 3 * n + 1, series.n_rows)
         for j in range(2 * n):
-            series[lane, j, row] = b.state[j * N_LANES + lane]
+            of_lane[j, row] = b.state[j * N_LANES + lane]
         for j in range(n):
-            series[lane, 2 * n + j, row] = b.slopes[(n + j) * N_LANES + lane]
-        series[lane, 3 * n, row] = _tank_force(lanes, b.force, lane, N_LANES)
+            of_lane[2 * n + j, row] = b.slopes[(n + j) * N_LANES + lane]
+        of_lane[3 * n, row] = _tank_force(lanes, b.force, lane, N_LANES)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
@@ -476,15 +494,9 @@ def integrate_together(
     s: LaneScratch,
     stretch: Stretch,
     ends: LaneEnds,
-    series: FloatArray,
+    series: Series,
 ) -> None:
-    """Integrate all lanes on, and fill their rows of a stretch.
-
-    Parameters
-    ----------
-    series : ndarray, shape (8, 3 n_modes + 1, n_rows)
-        q, q̇, q̈, and the sum of the forces on the tank.
-    """
+    """Integrate all lanes on, and fill their rows of a stretch."""
     cares = lanes.of_first.friction_frame >= 0
     for i in range(lanes.of_first.law.size):
         cares |= lanes.of_first.events[i] != 0
@@ -509,7 +521,7 @@ def integrate_together(
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def begin_lanes(
-    lanes: Lanes, drives: Drives, b: SideBySide, s: LaneScratch, ends: LaneEnds, series: FloatArray
+    lanes: Lanes, drives: Drives, b: SideBySide, s: LaneScratch, ends: LaneEnds, series: Series
 ) -> None:
     """Set switches and friction of every lane, and record its start."""
     for lane in range(lanes.n_used):
@@ -524,7 +536,7 @@ def begin_lanes(
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
 def integrate_in_turn(
-    lanes: Lanes, drives: Drives, s: LaneScratch, stretch: Stretch, ends: LaneEnds, series: FloatArray
+    lanes: Lanes, drives: Drives, s: LaneScratch, stretch: Stretch, ends: LaneEnds, series: Series
 ) -> None:
     """The same, one lane after the other."""
     for lane in range(lanes.n_used):

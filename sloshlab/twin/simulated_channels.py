@@ -6,18 +6,20 @@ after the end of a simulation are lost: NaN, flagged in `quality`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from numba import njit
 
 from sloshlab.errors import InputError
 from sloshlab.modal.rig_beam import shapes_at
 from sloshlab.recording import LOST, channels, quality_attributes
 from sloshlab.rig import Rig
+from sloshlab.twin.blocks import Blocks
 from sloshlab.twin.motion import Motion
 from sloshlab.twin.simulation import Simulation
 from sloshlab.units import SI_UNITS
@@ -29,6 +31,8 @@ LIQUID_FORCE: Final = "force_liquid"
 
 _TANK_PLACES = ("tank", "tip", "roof", "control", "mean")
 _KEPT = ("block_from", "block_to", "x_m")
+_N_OTHER_ROWS: Final = 5
+"""Beside the modes: motion of the base, force of the terms on the tank, external force."""
 ORDER_OF_DERIVATIVE: Final = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
@@ -101,43 +105,84 @@ def true_channel(
     Forces are those of the structure or the shaker on the tank, or the reverse where `block_from` is the tank;
     each of several force cells carries an equal share.
     """
+    weights = channel_weights(motion.twin, name, attributes, rig, n_cells=n_cells)
+    return None if weights is None else combined(rows_of(motion), weights)
+
+
+def rows_of(motion: Motion) -> list[FloatArray]:
+    """What channels are made of: q, q̇, q̈ mode by mode, u, u̇, ü of the base, Δf and external force on the tank."""
+    modes = [motion.modes[:, order, j] for order in range(3) for j in range(motion.modes.shape[2])]
+    return [*modes, *motion.base_motion.T, motion.tank_force_n, motion.external_force_n]
+
+
+def channel_weights(
+    twin: Blocks, name: str, attributes: Mapping[str, Any], rig: Rig, *, n_cells: int = 1
+) -> FloatArray | None:
+    """The channel of `true_channel` as weights of `rows_of` a motion of this twin, shape (3 n_modes + 5,)."""
     quantity, _, place = name.partition("_")
     if quantity == "force":
-        return _force(motion, place, attributes, n_cells)
+        return _force(twin, place, attributes, n_cells)
     if quantity not in ORDER_OF_DERIVATIVE:
         return None
-    order = ORDER_OF_DERIVATIVE[quantity]
+    order, has_structure = ORDER_OF_DERIVATIVE[quantity], twin.structure is not None
     along = attributes.get("x_m")
-    has_structure = motion.twin.structure is not None
     # the control accelerometer is on what the shaker moves: the tank, or the base where a structure carries the
     # tank
     if place.startswith("root") or along == 0.0 or (place.startswith("control") and has_structure):
-        return motion.base_motion[:, order] if has_structure else None
+        return _moving(twin, order, np.zeros(_n_modes(twin))) if has_structure else None
     if place.startswith("beam"):
-        return _along_beam(motion, along, order, rig)
-    return _of_tank(motion, order) if place.startswith(_TANK_PLACES) else None
+        shape = _shape_along_beam(twin, along, rig)
+        return None if shape is None else _moving(twin, order, shape)
+    return _of_tank(twin, order) if place.startswith(_TANK_PLACES) else None
 
 
-def _of_tank(motion: Motion, order: int) -> FloatArray:
-    if order == 0:
-        return motion.displacement_m
-    return motion.velocity_m_per_s if order == 1 else motion.acceleration_m_per_s2
+def combined(rows: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
+    """Sum of weighted rows, shape (n,); rows of no weight are not read."""
+    total = np.zeros(rows[-1].size)
+    for i in np.flatnonzero(weights).tolist():
+        _add(weights[i], rows[i], total)
+    return total
 
 
-def _force(motion: Motion, place: str, attributes: Mapping[str, Any], n_cells: int) -> FloatArray | None:
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _add(weight: float, row: FloatArray, total: FloatArray) -> None:
+    for i in range(total.size):
+        total[i] += weight * row[i]
+
+
+def _n_modes(twin: Blocks) -> int:
+    return 0 if twin.structure is None else twin.structure.masses_kg.size
+
+
+def _moving(twin: Blocks, order: int, shape: FloatArray) -> FloatArray:
+    """Absolute motion of a place of this deflection per mode."""
+    n = _n_modes(twin)
+    weights = np.zeros(3 * n + _N_OTHER_ROWS)
+    weights[order * n : (order + 1) * n] = shape
+    weights[3 * n + order] = 1.0
+    return weights
+
+
+def _of_tank(twin: Blocks, order: int) -> FloatArray:
+    return _moving(twin, order, np.zeros(0) if twin.structure is None else twin.structure.mode_shape)
+
+
+def _force(twin: Blocks, place: str, attributes: Mapping[str, Any], n_cells: int) -> FloatArray | None:
+    if not (place.startswith("cell") or place in ("interface", "total")):
+        return None
+    # (1.19) solved for the force: F_ext = (M_dry + m_l) ü − Δf
+    weights = twin.carried_mass_kg * _of_tank(twin, 2)
+    weights[-2:] = -1.0
     sign = -1.0 if attributes.get("block_from") == "tank" else 1.0
-    if place.startswith("cell"):
-        # cells carry equal shares: the twin's tank does not tilt
-        return sign * motion.interface_force_n / n_cells
-    return sign * motion.interface_force_n if place in ("interface", "total") else None
+    # cells carry equal shares: the twin's tank does not tilt
+    return sign * weights / (n_cells if place.startswith("cell") else 1)
 
 
-def _along_beam(motion: Motion, along: float | None, order: int, rig: Rig) -> FloatArray | None:
-    described, structure = rig.structure, motion.twin.structure
+def _shape_along_beam(twin: Blocks, along: float | None, rig: Rig) -> FloatArray | None:
+    described, structure = rig.structure, twin.structure
     if along is None or structure is None or described is None or described.kind != "beam":
         return None
-    shape = structure.shapes(shapes_at(described, [along]), [along])[0]
-    return np.asarray(motion.base_motion[:, order] + motion.modes[:, order] @ shape)
+    return np.asarray(structure.shapes(shapes_at(described, [along]), [along])[0])
 
 
 def _as_read(

@@ -10,20 +10,26 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from sloshlab.twin.excitation import Excitation, free, recorded
+from sloshlab.twin.excitation import Excitation, free, recorded, with_cached_inputs
+from sloshlab.twin.lane_preparation import Lane, done, motions
 from sloshlab.twin.structure import Structure, modal_structure
+from sloshlab.twin.structure_forces import QUADRATIC_DRAG, VISCOUS_DAMPING
 from sloshlab.twin.tank_forces import BOUNCING_BALL
 from sloshlab.twin.twin import Twin
 
 RATE_HZ, DURATION_S, DEFLECTION_M = 20_000.0, 10.0, -0.0146
 FREE_LABEL = "twin: 10 s of beam and ball at 20 kHz [s]"
 RANDOM_LABEL = "twin: 90 s of random base motion at 20 kHz [s]"
+LANES_LABEL = "twin: 64 beams one at a time, over side by side"
+BALL_LABEL = "… with a ball, over side by side"
+N_SIDE_BY_SIDE = 64
 RIVAL_LABEL = "twin: time of solve_ivp ({}) at equal error over ours"
 METHODS, LOOSEST = ("RK45", "DOP853"), 5.0
 BALL = {
@@ -137,13 +143,54 @@ def errors() -> tuple[float, dict[str, tuple[float, float]]]:
     return ours, found
 
 
+def lanes_of(twins: Sequence[Twin], base: Excitation) -> list[Lane]:
+    """Twins driven alike, with integration steps as a diagnosis takes them: 8 per period of the highest mode."""
+    return [Lane(twin, base, n_substeps=2) for twin in twins]
+
+
+def over_side_by_side(twins: Sequence[Twin]) -> float:
+    """Processor time of simulations one at a time over that of the same side by side, on one core."""
+    lanes = lanes_of(twins, with_cached_inputs(random_run(10.0)))
+
+    def one_at_a_time() -> None:
+        for lane in lanes:
+            assert isinstance(lane.twin, Twin)
+            lane.twin.simulate(lane.excitation, n_substeps=lane.n_substeps).require_done()
+
+    def together() -> None:
+        for motion in motions(lanes):
+            done(motion)
+
+    return best_of(one_at_a_time, 5) / best_of(together, 5)
+
+
+def different_beams() -> list[Structure]:
+    """The beam with frequencies that differ by a thousandth from lane to lane."""
+    own = beam()
+    factors = 1.0 + 0.002 * np.arange(N_SIDE_BY_SIDE)
+    return [replace(own, stiffnesses_n_per_m=own.stiffnesses_n_per_m * factor) for factor in factors]
+
+
+def side_by_side_figures() -> dict[str, float]:
+    """Damped beams, of which all of a step is taken together, and beams with a ball, whose law is called alone."""
+    damped = (VISCOUS_DAMPING(place="tank", damping_n_s_per_m=0.5), QUADRATIC_DRAG(drag_n_s2_per_m2=0.5))
+    return {
+        LANES_LABEL: over_side_by_side([Twin(own, damped) for own in different_beams()]),
+        BALL_LABEL: over_side_by_side([Twin(own, (BOUNCING_BALL(**BALL),)) for own in different_beams()]),
+    }
+
+
 def twin_figures() -> dict[str, float]:
     """Times and their ratios, compiled before; both give the displacement of the tank at every sample."""
     twin, run, base = sloshing_beam(), free(DURATION_S, RATE_HZ), random_run()
     ours = best_of(lambda: twin.simulate(run, initial_displacement_m=DEFLECTION_M).displacement_m, 9)
     random = best_of(lambda: twin.simulate(base, n_substeps=20).require_done().displacement_m, 3)
     error, rivals = errors()
-    figures = {FREE_LABEL: ours, RANDOM_LABEL: random, "twin: its largest error in these 10 s [m]": error}
+    figures = side_by_side_figures() | {
+        FREE_LABEL: ours,
+        RANDOM_LABEL: random,
+        "twin: its largest error in these 10 s [m]": error,
+    }
     for method, (tolerance, theirs) in rivals.items():
         taken = best_of(lambda m=method, t=tolerance: rival(m, DURATION_S, t), 3)  # type: ignore[misc]
         figures[RIVAL_LABEL.format(method)] = taken / ours

@@ -154,7 +154,7 @@ def test_a_long_run_is_cut_into_stretches_alike() -> None:
     assert_as_alone(lanes, motions(lanes))
 
 
-@pytest.mark.parametrize("terms", ["nothing", "together", "together and alone", "friction", "contacts"])
+@pytest.mark.parametrize("terms", ["nothing", "together", "memory", "friction", "contacts"])
 def test_a_lane_that_diverges_or_leaves_its_range_disturbs_no_other(terms: str) -> None:
     grows = replace(OSCILLATOR, stiffnesses_n_per_m=np.array([-1e5]))
     lanes = [
