@@ -16,15 +16,13 @@ from pipelines.report.result_folder import require_result_folder, result_folder
 from sloshlab import atomic_file
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.consistency.samples import examined_samples
-from sloshlab.diagnosis.answer import answered
 from sloshlab.diagnosis.case import Case, read_case
-from sloshlab.diagnosis.examination import examination_facts, examined, owning_block, seen_at
-from sloshlab.diagnosis.explanation import explained_extension
+from sloshlab.diagnosis.examination import examination_facts, examined, seen_at
 from sloshlab.diagnosis.extension import NOTHING
-from sloshlab.diagnosis.search import findings_of
+from sloshlab.diagnosis.findings import explained_extension, findings_of
 from sloshlab.diagnosis.user_effects import load_user_effects
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
-from sloshlab.diagnosis.verdict import verdict_facts, with_place
+from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 
 
 def files_of(*, report: bool) -> tuple[str, ...]:
@@ -64,13 +62,13 @@ def diagnose_case(
     own = [effect for file in effects for effect in load_user_effects(file)]
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
-        # The search finds, the gates judge and may ask for more fits; only then is it said where and how.
         found = findings_of(
             case, lambda what, done, of: advance(done, max(of, 1)), model, executor=WorkerThreads()
         )
-        found, verdict = answered(found, lambda what, done, of: advance(done, max(of, 1)))
+        verdict = verdict_of(found)
     examination = examined(found)
-    verdict = with_place(found, verdict, seen_at(examination, verdict.best), owning_block(examination))
+    named = verdict.best if verdict.kind != "unknown" else None
+    verdict = verdict.seen(seen_at(examination, named, verdict.block))
     provenance = _provenance(case, command, twin, effects)
     facts = {RESULT_ID: provenance[RESULT_ID], **verdict_facts(found, verdict)}
     facts |= examination_facts(examination, found)
@@ -78,7 +76,7 @@ def diagnose_case(
     with result_folder(target, provenance) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.best or found.retuned
-        found.model.save_extended(best.fit.values, explained_extension(best), complete / "extended_twin.toml")
+        found.model.save_extended(best.values, explained_extension(best), complete / "extended_twin.toml")
         found.model.save_extended(found.retuned.fit.values, NOTHING, complete / "retuned_twin.toml")
         if report:
             # Drawing is imported only where a report is wanted: the trial runs without.

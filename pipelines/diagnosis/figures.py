@@ -11,10 +11,10 @@ from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.axes import power_of_ten
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, WORK_COLOURS, new_figure, plain, png_bytes
-from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.mismatch import ChannelMismatch, mismatches
 from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.verdict.wording import form_and_place
+from sloshlab.diagnosis.wording import form_and_place
 
 FloatArray = NDArray[np.float64]
 _MOST_ROWS = 14
@@ -25,17 +25,15 @@ _EXCESS_OF_NOISE = 1.0
 
 
 def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
-    """Believed, retuned, named and ceiling on runs that chose nothing."""
+    """Believed, retuned and named on runs that chose nothing."""
     found = diagnosis.findings
-    rows: list[tuple[str, Explanation, str]] = [
+    rows: list[tuple[str, ScoredModel, str]] = [
         ("as believed", found.believed, NEUTRAL_COLOUR),
         ("retuned", found.retuned, NEUTRAL_COLOUR),
     ]
     if diagnosis.verdict.best is not None:
         rows.append((words(diagnosis.verdict.best, "\n+ "), diagnosis.verdict.best, REFERENCE_COLOUR))
-    if found.ceilings:
-        rows.append(("ceiling", min(found.ceilings, key=lambda ceiling: ceiling.held_out), FAINT_COLOUR))
-    values = [explanation.held_out_rms for _, explanation, _ in rows]
+    values = [explanation.held_out_rms or explanation.fitted_rms for _, explanation, _ in rows]
     figure = new_figure(0.6 + 0.36 * len(rows))
     axes = figure.subplots()
     axes.barh(range(len(rows)), values, color=[colour for _, _, colour in rows], height=0.6)
@@ -53,17 +51,16 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
         beside = max(value, 1.0) if 0.75 < value < 1.0 else value
         axes.annotate(f"{value:.2f}", (beside, i), (4, 0), textcoords="offset points", va="center", fontsize=8)
     runs = ", ".join(run.name for run in found.split.held_out)
-    sought = "" if found.ceilings else " No ceiling was sought, because nothing stands out of the noise any more."
     caption = (
         "Root mean square of the residuals of short-time spectra over their noise, where the recording stands out "
-        f"of the noise, on runs that chose nothing ({runs}). The dashed line is the noise floor.{sought}"
+        f"of the noise, on runs that chose nothing ({runs}). The dashed line is the noise floor."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
 
 
 def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
     """What each explanation leaves, on fitted and on held-out runs."""
-    found, everything = diagnosis.findings, diagnosis.explanations
+    found, everything = diagnosis.findings, diagnosis.findings.explanations
     if not everything:
         raise NothingToDrawError("no candidate promised anything")
     n_singles = sum(len(explanation.keys) == 1 for explanation in everything)
@@ -77,10 +74,7 @@ def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
         ("baseline retuned", found.retuned),
     ]
     left = np.array(
-        [
-            (explanation.held_out / found.n_held_out, explanation.fit.misfit / found.n_fitting)
-            for _, explanation in rows
-        ],
+        [(explanation.held_out_rms**2, explanation.fitted_rms**2) for _, explanation in rows],
         np.float64,
     )
     left = np.where(np.isfinite(left), left, np.nan)
@@ -97,7 +91,7 @@ def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
     plain_ticks_within_decades(axes.xaxis)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", ncols=2)
     caption = (
-        "What each explanation leaves of the recordings, over all coefficients; the best on held-out runs is on "
+        "Mean square that each model leaves where recordings stand out of the noise; the largest evidence is on "
         "top. All single effects that were fitted to the end and the best pairs: "
         f"{len(chosen)} of {len(everything)}."
     )
@@ -254,7 +248,7 @@ def extended_label(diagnosis: Diagnosis) -> str:
     return "nearest known effect" if diagnosis.verdict.kind == "unknown" else "with what was left out"
 
 
-def words(explanation: Explanation, between: str = " + ") -> str:
+def words(explanation: ScoredModel, between: str = " + ") -> str:
     """Effects of an explanation and where they act."""
     return between.join(plain(form_and_place(candidate), 64) for candidate in explanation.fit.candidates)
 

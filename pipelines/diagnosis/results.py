@@ -8,7 +8,7 @@ from typing import Any
 
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.diagnosis.examination import Examination
-from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.verdict import Verdict
 
 
@@ -33,11 +33,3 @@ class Diagnosis:
     def flags(self) -> tuple[str, ...]:
         """What a reader must know before using the verdict."""
         return (*self.findings.split.limits, *(flag for one in self.recordings for flag in one.flags))
-
-    @property
-    def explanations(self) -> list[Explanation]:
-        """Every explanation that was fitted, once, by its best fit; the best on held-out runs first."""
-        best: dict[frozenset[str], Explanation] = {}
-        for explanation in sorted(self.findings.explanations, key=lambda explanation: explanation.fit.cost):
-            best.setdefault(frozenset(explanation.keys), explanation)
-        return sorted(best.values(), key=lambda explanation: explanation.held_out)

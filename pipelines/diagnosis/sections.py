@@ -91,14 +91,13 @@ def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     lines = []
     if verdict.separating_experiment:
         lines.append(f"To tell them apart: {verdict.separating_experiment}.")
-    names = sorted(verdict.probabilities.items(), key=lambda item: -item[1])[:4]
+    names = [(name, p) for name, p in verdict.probabilities.items() if p >= 0.005][:4]
     lines.append(
         "Probabilities: " + ", ".join(f"{name.replace('_', ' ')} {100 * p:.0f} %" for name, p in names) + "."
     )
     lines.append(
         f"{len(found.case.runs)} runs, {len(found.split.fitting)} fitted and "
-        f"{len(found.split.held_out)} held out; "
-        f"{len(diagnosis.explanations)} explanations fitted, {len(found.screened)} candidates set aside early, "
-        f"{len(found.failed)} failed."
+        f"{len(found.split.held_out)} held out; {found.n_candidates} effects at all places were tried, "
+        f"{len(found.explanations)} models fitted to the end, {len(found.failed)} failed."
     )
     return tuple(lines)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
 from typing import Final
 
 import numpy as np
@@ -14,13 +13,12 @@ from pipelines.report.numbers import MISSING, signed, text
 from pipelines.report.tables import Table
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.evidence import CANNOT_TELL, SINGLE_CHANNEL
-from sloshlab.diagnosis.explanation import Explanation
+from sloshlab.diagnosis.inference.decision import standard_error_of_difference
+from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.units import named_and_units
-from sloshlab.diagnosis.verdict.interval import interval
-from sloshlab.diagnosis.verdict.wording import form_and_place, named_and_placed
+from sloshlab.diagnosis.wording import form_and_place, named_and_placed
 
 _MOST_EXPLANATIONS: Final = 14
-_MOST_LEFT_OUT: Final = 12
 _OF_THE_CHANNEL: Final = ("limit", "amplitude")
 
 
@@ -32,11 +30,11 @@ def effect_parameter_table(diagnosis: Diagnosis) -> Table | None:
     rows: list[tuple[str, ...]] = []
     for candidate in best.fit.candidates:
         for parameter in candidate.effect.parameters:
-            estimate, low, high = interval(best, candidate, parameter.name)
+            its = diagnosis.verdict.intervals[candidate.key, parameter.name]
             words, units = named_and_units(parameter.name)
             unit = units or ("of the channel" if parameter.name in _OF_THE_CHANNEL else "1")
-            bounds = f"{text(low, 4)} … {text(high, 4)}"
-            rows.append((named_and_placed(candidate), words, text(estimate, 4), bounds, unit))
+            bounds = f"{text(its.low, 4)} … {text(its.high, 4)}"
+            rows.append((named_and_placed(candidate), words, text(its.estimate, 4), bounds, unit))
     is_named = diagnosis.verdict.kind != "unknown"
     return Table(
         "Numbers of what was left out" if is_named else "Numbers of the nearest known effect",
@@ -79,54 +77,45 @@ def _moved(parameter: BaselineParameter, value: float) -> str:
 
 
 def explanation_table(diagnosis: Diagnosis) -> Table:
-    """All explanations, the best on held-out runs first."""
+    """All models, the largest evidence first."""
     found = diagnosis.findings
-    everything: list[tuple[str, Explanation]] = [
-        ("baseline as believed", found.believed),
-        ("baseline retuned", found.retuned),
-        *[(f"{_named(ceiling)} (ceiling)", ceiling) for ceiling in found.ceilings],
-        *[(_named(explanation), explanation) for explanation in diagnosis.explanations],
-    ]
-    rows = [
-        (label, text(explanation.fit.cost, 4), text(explanation.held_out, 4), text(explanation.held_out_rms, 3))
-        for label, explanation in sorted(everything, key=lambda pair: pair[1].held_out)
-    ]
-    header = ("explanation", "cost on fitted runs", "held-out sum of squares", "held-out error / noise floor")
+    everything = sorted((found.retuned, *found.explanations), key=lambda model: -model.evidence)
+    best = everything[0]
+    rows = []
+    for model in everything:
+        error = standard_error_of_difference(model, best)
+        place = max(model.remainder.places, key=model.remainder.gain, default="")
+        left = model.remainder.gain(place) if place else 0.0
+        rows.append(
+            (
+                _named(model) or "baseline retuned",
+                "0" if model is best else f"{signed(model.evidence - best.evidence, 0)} ± {text(error, 2)}",
+                text(model.complexity, 3),
+                f"{100 * model.relative_error:.0f} %" if model.fit.candidates else MISSING,
+                text(model.held_out_rms, 3),
+                f"{place} ({text(left, 3)})" if left > 0 else "nothing",
+            )
+        )
+    header = (
+        "model",
+        "log evidence beside the best",
+        "of it cost of its freedom",
+        "law known to",
+        "held-out error / noise floor",
+        "what remains, and its log evidence",
+    )
     caption = (
-        f"Sums over {found.n_fitting} coefficients of the fitted and {found.n_held_out} of the held-out runs; "
-        "residuals beyond four standard deviations count linearly."
+        "Log evidence over all runs with the standard error of its difference by stretches of two seconds. What "
+        "remains is any force of a block, or any error of a sensor, that describes the rest better than noise and "
+        "bursts do."
     )
-    return Table("Explanations", header, tuple(rows), caption)
+    return Table("Models", header, tuple(rows), caption)
 
 
-def left_out_table(diagnosis: Diagnosis) -> Table:
-    """Candidates that were not fitted to the end, and why."""
-    found = diagnosis.findings
-    fitted = {explanation.keys[0] for explanation in found.explanations if len(explanation.keys) == 1}
-    gains = sorted(found.screened.items(), key=lambda item: -item[1])
-    rows = [(_beside(name, fitted), f"failed: {why}") for name, why in sorted(found.failed.items())]
-    rows += [(_beside(name, fitted), text(gain, 3)) for name, gain in gains[:_MOST_LEFT_OUT]]
-    if rest := gains[_MOST_LEFT_OUT:]:
-        rows.append((_grouped([name for name, _ in rest]), f"{text(rest[0][1], 3)} or less"))
-    return Table(
-        "Candidates that were not fitted to the end",
-        ("candidate", "promised decrease of the sum of squares"),
-        tuple(rows) or ((MISSING, MISSING),),
-        "Each was simulated from every one of its starts, and set aside by what a first step promised or by what "
-        "the first stages of a fit had gained, beside better ones.",
-    )
-
-
-def _grouped(keys: Sequence[str]) -> str:
-    """Effects with the number of places where each was tried."""
-    effects = [".".join(key.split(".")[:2]) for key in keys]
-    counts = {effect: effects.count(effect) for effect in dict.fromkeys(effects)}
-    return ", ".join(effect if n == 1 else f"{effect} ({n} places)" for effect, n in counts.items())
-
-
-def _beside(key: str, fitted: Collection[str]) -> str:
-    """A candidate, and that it was tried beside another where it has a fit of its own."""
-    return f"{key} (as a second effect)" if key in fitted else key
+def left_out_table(diagnosis: Diagnosis) -> Table | None:
+    """Models that could not be fitted, and why."""
+    rows = tuple(sorted(diagnosis.findings.failed.items()))
+    return Table("Models that could not be fitted", ("model", "why"), rows) if rows else None
 
 
 def cut_table(diagnosis: Diagnosis) -> Table:
@@ -231,12 +220,11 @@ def _share(value: float) -> str:
 
 
 def evidence_table(diagnosis: Diagnosis) -> Table | None:
-    """For and against each explanation, the best on held-out runs first."""
+    """For and against each explanation, the largest evidence first."""
     found, examination = diagnosis.findings, diagnosis.examination
     if not found.explanations:
         return None
-    chosen = diagnosis.explanations[:_MOST_EXPLANATIONS]
-    alternatives = {alternative.keys for alternative in diagnosis.verdict.alternatives}
+    chosen = found.explanations[:_MOST_EXPLANATIONS]
     rows = []
     for explanation in chosen:
         for_: list[str] = []
@@ -252,11 +240,11 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
                 own = candidate.channel.partition("<")[0]
                 # A fault of one channel while another one contradicts all the rest is unlikely.
                 (for_ if own == suspect else against).append(f"{suspect} contradicts the others")
-        gain = found.retuned.held_out - explanation.held_out
+        gain = explanation.evidence - found.retuned.evidence
         rows.append(
             (
                 _named(explanation),
-                _standing(diagnosis, explanation, alternatives),
+                _standing(diagnosis, explanation),
                 text(gain, 3),
                 "; ".join(dict.fromkeys(for_)) or MISSING,
                 "; ".join(dict.fromkeys(against)) or MISSING,
@@ -268,7 +256,7 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
         (
             "explanation",
             "standing",
-            "gain on held-out runs",
+            "log evidence over nothing missing",
             "speaks for it",
             "speaks against it",
             "cannot be told",
@@ -324,19 +312,16 @@ def limits_table(diagnosis: Diagnosis) -> Table:
     return Table("Limits", ("what these recordings cannot tell",), rows)
 
 
-def _named(explanation: Explanation) -> str:
-    """Effects of an explanation and where they act."""
-    return " + ".join(form_and_place(candidate) for candidate in explanation.fit.candidates)
+def _named(model: ScoredModel) -> str:
+    """Effects of a model and where they act."""
+    return " + ".join(form_and_place(candidate) for candidate in model.fit.candidates)
 
 
-def _standing(diagnosis: Diagnosis, explanation: Explanation, alternatives: Collection[tuple[str, ...]]) -> str:
+def _standing(diagnosis: Diagnosis, model: ScoredModel) -> str:
     verdict = diagnosis.verdict
-    if verdict.best is not None and explanation.keys == verdict.best.keys:
+    if verdict.best is not None and model.keys == verdict.best.keys:
         return verdict.kind if verdict.kind != "unknown" else "nearest, not adequate"
-    if explanation.keys in alternatives:
-        return "as good"
-    is_more = verdict.best is not None and set(explanation.keys) > set(verdict.best.keys)
-    return "not worth one more effect" if is_more and verdict.kind != "unknown" else "worse"
+    return "as good" if model.names in verdict.alternatives else "worse"
 
 
 def _holds(holds: bool | None) -> str:

@@ -110,10 +110,6 @@ class EffectParameter:
     name : str
         With its unit, as in the vocabulary.
     low, high : float
-    may_rest : bool
-        Whether a bound is a value like any other; effects at other bounds are no answer.
-    is_between_readings : bool
-        Whether it is a ratio to the reading of another channel, so that the gains of both count.
     range : Range or None
         What is believed of it; without one, two decades about its largest start.
     each_run : bool
@@ -125,8 +121,6 @@ class EffectParameter:
     name: str
     low: float
     high: float
-    may_rest: bool = False
-    is_between_readings: bool = False
     range: Range | None = None
     each_run: bool = False
     tolerance: Callable[[Surroundings], float] | None = None
@@ -210,12 +204,6 @@ def _no_proposals(surroundings: Surroundings, missing: MissingForces) -> Sequenc
     return []
 
 
-def never_distinct(size: float) -> Sequence[Mapping[str, tuple[float, float]]]:
-    """Has no range in which it is fitted apart from its nested models."""
-    del size
-    return []
-
-
 @dataclass(frozen=True)
 class Effect:
     """One kind of missing physics.
@@ -228,23 +216,16 @@ class Effect:
         (surroundings) → sets of numbers to start from, each small enough to leave the simulation running.
     extension : callable
         (numbers, surroundings, channel) → what it adds to the simulation.
-    look_alikes : tuple of str
-        Effects that the same recordings may show.
     separated_by : str
-        The experiment that tells it from them.
+        An experiment that tells it from others like it.
     needs : callable
         (surroundings) → whether it can act there.
     places : callable
         (surroundings) → channels on which it may act; one empty name where it acts on none.
-    includes : tuple of str
-        Effects that are nested in it, in the same block.
     limits : callable
         (surroundings) → bounds of parameters that depend on the place, in place of their own.
     spoken_for_by : tuple of str
         Terms of `evidence.TERMS` that hold for the latent force, or the sensor, where it is missing.
-    differs : callable
-        (parameter of a nested model that was found) → bounds of its own parameters, in which it clearly differs
-        from that; where it describes as much there, the two are indistinguishable.
     variant_of : str
         Name of the effect of which this is another form; answers have that name.
     size : tuple of str
@@ -263,14 +244,11 @@ class Effect:
     parameters: tuple[EffectParameter, ...]
     starts: Callable[[Surroundings], Iterable[Numbers]]
     extension: Callable[[Numbers, Surroundings, str], Extension]
-    look_alikes: tuple[str, ...] = ()
     separated_by: str = ""
     needs: Callable[[Surroundings], bool] = _always_possible
     places: Callable[[Surroundings], Sequence[str]] = _no_channel
     spoken_for_by: tuple[str, ...] = ()
-    includes: tuple[str, ...] = ()
     limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = _no_other_limits
-    differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = never_distinct
     variant_of: str = ""
     size: tuple[str, ...] = ()
     sought_at: Callable[[Surroundings], Iterable[Numbers]] = _no_further_starts
@@ -368,11 +346,6 @@ class Candidate:
     def drawn(self, n: int) -> list[dict[str, float]]:
         """Its first start and n − 1 sets of numbers that fill its prior evenly, named as in a fit."""
         return [self.starts()[0], *drawn(self.prior, max(n - 1, 0))][:n]
-
-    @property
-    def is_multimodal(self) -> bool:
-        """Whether its cost has many local minima, so that its force is matched from many places."""
-        return self.effect.sought_at is not _no_further_starts
 
     def _named(self, sets: Callable[[Surroundings], Iterable[Numbers]]) -> list[dict[str, float]]:
         return [

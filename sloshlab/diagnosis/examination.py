@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import Effect
 from sloshlab.diagnosis.evidence import CANNOT_TELL, Evidence, evidence
-from sloshlab.diagnosis.explanation import Explanation, Findings
+from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.force_character import Answer, ForceCharacter, force_character
+from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.interface_cut import InterfaceCut, interface_cut, own_tolerances
 from sloshlab.diagnosis.latent_force import EITHER, RunForces
 from sloshlab.diagnosis.mismatch import mismatches, summary
@@ -24,8 +25,6 @@ from sloshlab.diagnosis.sensor_character import SensorAnswer, decided_terms, sen
 FloatArray = NDArray[np.float64]
 _LEAST_RATIO_WITHIN_CYCLE = 1.5
 """Of the mean squares in the parts of a cycle, from which one of them is told."""
-_SHARE_OF_AN_OWNER = 0.8
-"""Of the mismatch, from which a block owns it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,23 +115,16 @@ def _damping_shift(model: RigModel, run: RunForces, place: str, values: Mapping[
     return shift
 
 
-def owning_block(examination: Examination) -> str:
-    """The block that surely owns most of the mismatch; empty where the cut cannot tell."""
-    if examination.cut is None:
-        return ""
-    # Sure by its interval, too: a wrong answer is worse than none.
-    sure = [cut.block for cut in examination.cut.blocks if cut.share > _SHARE_OF_AN_OWNER and cut.low > 0.5]
-    return sure[0] if len(sure) == 1 and sure[0] != EITHER else ""
-
-
-def seen_at(examination: Examination, best: Explanation | None) -> str:
+def seen_at(examination: Examination, best: ScoredModel | None, block: str = "") -> str:
     """Where in the cycle, and at which levels, what is missing shows; empty where it shows everywhere.
 
     Parameters
     ----------
     examination : Examination
-    best : Explanation or None
+    best : ScoredModel or None
         What was named.
+    block : str
+        Of what has no name.
     """
     faulty = best.channels if best is not None else ()
     worst = (faulty or examination.where.get("channels") or [""])[0]
@@ -141,8 +133,8 @@ def seen_at(examination: Examination, best: Explanation | None) -> str:
             _cycle_of_channel(residual_map) for residual_map in examination.maps if residual_map.channel == worst
         ]
     else:
-        block = best.fit.candidates[0].effect.block if best is not None else owning_block(examination)
-        cycle = [_cycle_of_force(examination, block)]
+        place = best.fit.candidates[0].effect.block if best is not None else block
+        cycle = [_cycle_of_force(examination, place)]
     words = " ".join(part for part in (*cycle, _levels(examination, worst)) if part)
     return f"seen {words}" if words else ""
 

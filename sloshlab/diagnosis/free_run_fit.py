@@ -8,7 +8,6 @@ then within the inflated noise while the coarse motion is fitted.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -42,14 +41,8 @@ _LARGEST_INFLATION_RATIO: Final = 1.5
 """Noise inflation over the largest relative residual, from which a stage would hide all that is to be fitted."""
 _LEAST_ROOM: Final = 1e-12
 """Added to the bounds of a step, in scaled values: the solver refuses bounds that coincide."""
-_SAME_MINIMUM: Final = 0.02
-"""Of a parameter, within which a fit from elsewhere has found the same minimum."""
-_MOST_ITERATIONS: Final = 15
-"""Steps of a stage: where an effect and the baseline are correlated, the fit follows a narrow valley."""
 INFLATION_STAGES: Final = (0.3, 0.1, 0.03, 0.01, 0.0)
 """Share of the RMS of every channel that is added to its noise."""
-SCANNED_SIZE_FACTORS: Final = (0.75, 0.9, 1.1, 1.3)
-"""Over the size that was found: other starts of a fit far from the recordings."""
 
 
 def _limit(residual: FloatArray) -> float:
@@ -157,14 +150,13 @@ class _LevenbergMarquardt:
         # Gauss–Newton Hessian of half the cost. The prior enters as one more reading of each baseline parameter,
         # known to its tolerance; parameters of effects have none and must be told by the recordings.
         self.hessian = normal + np.diag(prior)
-        expected = self.problem.expected
-        gradient = pull + prior * (theta - expected)
+        gradient = pull + prior * theta
 
         def cost(at: FloatArray, r: FloatArray) -> float:
             # A simulation that does not reach its end costs infinitely much, so that the step to it is refused.
             if not np.isfinite(r).all():
                 return np.inf
-            return huber_cost(inflation_weights * r, limit) + float((prior * (at - expected) ** 2).sum())
+            return huber_cost(inflation_weights * r, limit) + float((prior * at**2).sum())
 
         before = cost(theta, residual)
         while damping < _LARGEST_DAMPING:
@@ -195,7 +187,7 @@ class _LevenbergMarquardt:
         return FreeRunFit(
             self.problem.candidates,
             self.problem.values(self.theta),
-            misfit + float((self.prior * (self.theta - self.problem.expected) ** 2).sum()),
+            misfit + float((self.prior * self.theta**2).sum()),
             misfit,
             # Effects have no prior, so that the Hessian is singular where nothing tells their parameters: no
             # inverse then.
@@ -230,122 +222,6 @@ def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class CoarseFit:
-    """A fit after its first two stages of noise inflation.
-
-    Attributes
-    ----------
-    problem : FreeRunProblem
-    fit : FreeRunFit
-    jacobian : BlockJacobian
-        Near its optimum.
-    cost : float
-        With the noise of the second stage.
-    """
-
-    problem: FreeRunProblem
-    fit: FreeRunFit
-    jacobian: BlockJacobian
-    cost: float
-
-
-@dataclass(frozen=True)
-class Start:
-    """Parameters from which a fit begins.
-
-    Attributes
-    ----------
-    values : mapping
-    is_near : bool
-        Whether the baseline's parameters are those of a fit whose Jacobian is known.
-    """
-
-    values: Mapping[str, float]
-    is_near: bool = False
-
-
-def coarsely_fitted(
-    problem: FreeRunProblem,
-    starts: Sequence[Start],
-    stages: Sequence[float] = INFLATION_STAGES,
-    *,
-    near: BlockJacobian | None = None,
-    n_iterations: int = 6,
-) -> CoarseFit:
-    """The first two stages of a fit from the best of several starts.
-
-    Parameters
-    ----------
-    problem : FreeRunProblem
-    starts : sequence of Start
-    stages : sequence of float
-        All stages.
-    near : BlockJacobian, optional
-        Of the parameters without those of the last candidate, where starts that are near have them.
-    n_iterations : int
-        At most, per stage.
-    """
-    first, second = stages[0], stages[min(1, len(stages) - 1)]
-    best: CoarseFit | None = None
-    for start in starts:
-        # A warm start saves the derivatives by all baseline parameters, most of the simulations of a fit.
-        known = _extended_jacobian(problem, start.values, near) if near is not None and start.is_near else None
-        fit, jacobian = fitted(
-            problem, start.values, n_iterations=n_iterations, stages=(first,), known=known, is_last=False
-        )
-        if not fit.trouble:
-            reached = CoarseFit(problem, fit, jacobian, inflated_cost(problem, fit, first))
-            best = reached if best is None or reached.cost < best.cost else best
-    if best is None:
-        trouble = "does not run from any of its starts"
-        fit = FreeRunFit(problem.candidates, dict(starts[0].values), np.inf, np.inf, trouble=trouble)
-        return CoarseFit(problem, fit, BlockJacobian(len(problem.names), ()), np.inf)
-    if second == first:
-        return best
-    fit, jacobian = fitted(
-        problem, best.fit.values, n_iterations=n_iterations, stages=(second,), known=best.jacobian, is_last=False
-    )
-    return CoarseFit(problem, fit, jacobian, inflated_cost(problem, fit, second))
-
-
-def extended_to_all_runs(
-    coarse_fit: CoarseFit, problem: FreeRunProblem, others: Mapping[str, float], near: BlockJacobian
-) -> CoarseFit:
-    """A coarse fit to some of the runs, to be refined on all of them.
-
-    Parameters
-    ----------
-    coarse_fit : CoarseFit
-    problem : FreeRunProblem
-        Of all runs.
-    others : mapping
-        Parameters of the runs that were left out.
-    near : BlockJacobian
-        Of all runs, without the last candidate.
-    """
-    # The coarse fit has no releases, offsets and fluctuations of the runs that it left out.
-    values = {**others, **coarse_fit.fit.values}
-    known = _extended_jacobian(problem, values, near) or BlockJacobian(len(problem.names), ())
-    return CoarseFit(problem, replace(coarse_fit.fit, values=values), known, coarse_fit.cost)
-
-
-def best_start(
-    problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inflation: float
-) -> Mapping[str, float]:
-    """The start with the lowest cost before anything is fitted, with inflated noise.
-
-    Parameters
-    ----------
-    problem : FreeRunProblem
-    starts : sequence of mappings
-    inflation : float
-    """
-    if len(starts) == 1:
-        return starts[0]
-    return starts[int(np.argmin(costs_at(problem, starts, inflation)))]
-
-
 def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inflation: float) -> list[float]:
     """Costs before anything is fitted, with inflated noise; infinite of what does not run.
 
@@ -360,42 +236,6 @@ def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inf
     return [
         huber_cost(inflation_weights * residual) if np.isfinite(residual).all() else np.inf for residual in left
     ]
-
-
-def refined(
-    coarse_fit: CoarseFit, stages: Sequence[float] = INFLATION_STAGES, *, n_iterations: int = _MOST_ITERATIONS
-) -> FreeRunFit:
-    """The remaining stages of a coarse fit; the last one in any case."""
-    rest = stages[2:] or stages[-1:]
-    values, known = coarse_fit.fit.values, coarse_fit.jacobian
-    return fitted(coarse_fit.problem, values, n_iterations=n_iterations, stages=rest, known=known)[0]
-
-
-def fitted_from(
-    problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], *, n_iterations: int = 6
-) -> FreeRunFit:
-    """The fit from the best of several starts, chosen after its first stage.
-
-    Parameters
-    ----------
-    problem : FreeRunProblem
-    starts : sequence of mappings
-    n_iterations : int
-        At most, per stage.
-    """
-    start = coarsely_fitted(problem, [Start(start) for start in starts], n_iterations=n_iterations)
-    return start.fit if start.fit.trouble else refined(start, n_iterations=n_iterations)
-
-
-def _extended_jacobian(
-    problem: FreeRunProblem, start: Mapping[str, float], near: BlockJacobian
-) -> BlockJacobian | None:
-    """A Jacobian from nearby with columns for the parameters that it lacks, computed where a fit starts."""
-    theta = problem.theta_of(start)
-    at = problem.residual(theta)
-    if not np.isfinite(at).all():
-        return None
-    return near.beside(problem.jacobian(theta, at, range(near.n_columns, theta.size)))
 
 
 def inflated_cost(problem: FreeRunProblem, fit: FreeRunFit, inflation: float) -> float:
@@ -444,47 +284,6 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
         if not other[0].trouble and other[0].cost < best[0].cost:
             best = other
     return best
-
-
-def fitted_from_scaled(
-    problem: FreeRunProblem,
-    fit: FreeRunFit,
-    name: str,
-    factor: float,
-    stages: Sequence[float] = INFLATION_STAGES,
-    *,
-    n_iterations: int = 5,
-) -> FreeRunFit:
-    """A fit from another value of one of its parameters, to leave a local minimum.
-
-    Parameters
-    ----------
-    problem : FreeRunProblem
-    fit : FreeRunFit
-    name : str
-        Of the parameter.
-    factor : float
-        Over its value.
-    stages : sequence of float
-        Stages; the first is left out.
-    n_iterations : int
-        At most, per stage.
-
-    Returns
-    -------
-    FreeRunFit
-        With its trouble where it was abandoned, as it was left behind or led back.
-    """
-    start, inflation = {**fit.values, name: fit.values[name] * factor}, stages[1]
-    other, _ = fitted(problem, start, n_iterations=n_iterations, stages=(inflation,))
-    if other.trouble:
-        return other
-    # Compared at the same inflation: with the full noise a fit that is still on its way always looks worse.
-    if inflated_cost(problem, other, inflation) > _ABANDON_COST_RATIO * inflated_cost(problem, fit, inflation):
-        return replace(other, trouble="was left behind")
-    if abs(other.values[name] - fit.values[name]) < _SAME_MINIMUM * abs(fit.values[name]):
-        return replace(other, trouble="came back")
-    return fitted(problem, other.values, n_iterations=n_iterations, stages=stages[2:])[0]
 
 
 def _step_within_bounds(

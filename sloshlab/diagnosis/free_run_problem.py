@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
 from sloshlab.diagnosis.candidate import Candidate, channels_of
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel, Request
@@ -29,10 +30,6 @@ _Part = tuple[Sequence[Observation], Mapping[str, float]]
 """Observations of one run, and parameters with which it is simulated."""
 HUBER_LIMIT: Final = 4.0
 """Standard deviations beyond which Huber's loss is linear: bursts of noise and lost blocks are outliers."""
-_FEWEST_IN_A_RUN: Final = 50
-"""Coefficients, below which a mean square is too uncertain to be used."""
-_QUIETER_SHARE: Final = 0.75
-"""Of the times of a channel, without the bursts in the others."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel up to which nothing but noise is left."""
 _MOST_BYTES_AT_ONCE: Final = 1e8
@@ -82,10 +79,29 @@ class FreeRunFit:
         The covariance C = (JᵀJ + P)⁻¹, with P one for each baseline parameter, is C JᵀJ C + C P C.
         """
         i = self.names.index(name)
-        n_baseline = len(self.names) - sum(len(candidate.effect.parameters) for candidate in self.candidates)
+        own = tuple(f"{candidate.key}." for candidate in self.candidates)
+        n_baseline = sum(not own or not name.startswith(own) for name in self.names)
         of_belief = float((self.covariance[i, :n_baseline] ** 2).sum())
         of_noise = max(float(self.covariance[i, i]) - of_belief, 0.0)
         return float(np.sqrt(of_noise) * self.scales[i]), float(np.sqrt(of_belief) * self.scales[i])
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A free number: counted from its centre in units of its scale, within its bounds.
+
+    Numbers of the baseline are counted in tolerances from what is believed, so that the negative logarithm of
+    their prior is half the sum of squares of theta; those of effects by their starts, from zero, where an effect
+    is absent. `channels` are those that it alone changes, none where it changes the motion.
+    """
+
+    name: str
+    centre: float
+    scale: float
+    low: float
+    high: float
+    channels: tuple[str, ...]
+    is_reading: bool
 
 
 class FreeRunProblem:
@@ -98,9 +114,7 @@ class FreeRunProblem:
         Per run.
     candidates : sequence of Candidate
     fixed : mapping, optional
-        Baseline parameters that are not free.
-    expected : mapping, optional
-        Prior means of baseline parameters, where they differ from what the model believes.
+        Parameters that are not free.
     """
 
     def __init__(
@@ -109,71 +123,30 @@ class FreeRunProblem:
         runs: Sequence[Sequence[Observation]],
         candidates: Sequence[Candidate] = (),
         fixed: Mapping[str, float] | None = None,
-        expected: Mapping[str, float] | None = None,
     ) -> None:
         self.model, self.runs, self.candidates = model, [run for run in runs if run], tuple(candidates)
         self.fixed = dict(fixed or {})
         present = {observation.run.name for run in self.runs for observation in run}
-        self._baseline = [
-            parameter
-            for parameter in model.parameters
-            if parameter.name not in self.fixed and run_of(parameter.name, model) in ("", *present)
-        ]
-        self.names = tuple(
-            [parameter.name for parameter in self._baseline]
-            + [
-                f"{candidate.key}.{parameter.name}"
-                for candidate in self.candidates
-                for parameter in candidate.effect.parameters
-            ]
-        )
-        # Baseline parameters are scaled by their tolerances, so that the negative logarithm of their prior is
-        # half the sum of squares of theta; those of effects by their starts, about zero, where the effect is
-        # absent.
-        self.scales = np.array(
-            [parameter.tolerance for parameter in self._baseline]
-            + [
-                candidate.scale(parameter.name)
-                for candidate in self.candidates
-                for parameter in candidate.effect.parameters
-            ]
-        )
-        self.centres = np.array(
-            [parameter.believed for parameter in self._baseline] + [0.0] * (len(self.names) - len(self._baseline))
-        )
-        self.n_baseline = len(self._baseline)
-        # Fits about other baselines move the means of the prior, not the places where parameters are counted
-        # from: scaled parameters of all fits stay comparable.
-        self.expected = np.array(
-            [
-                ((expected or {}).get(parameter.name, parameter.believed) - parameter.believed)
-                / parameter.tolerance
-                for parameter in self._baseline
-            ]
-            + [0.0] * (len(self.names) - self.n_baseline)
-        )
-        # A gain or an offset needs the derivative of one channel only. An effect on a sensor that drives changes
-        # the motion and with it every channel.
+
+        def is_free(name: str) -> bool:
+            return name not in self.fixed and run_of(name, model) in ("", *present)
+
+        baseline = [_of_baseline(known) for known in model.parameters if is_free(known.name)]
+        # An effect on a sensor that drives changes the motion and with it every channel.
         driving = {name for run in self.runs for name in model.driving(run[0].run)}
-        self._channels_changed = [
-            (parameter.channel,) if parameter.channel else () for parameter in self._baseline
-        ] + [
-            _only_channels(candidate, driving)
-            for candidate in self.candidates
-            for _ in candidate.effect.parameters
-        ]
-        bounds = [
-            (
-                parameter.believed - parameter.most_tolerances * parameter.tolerance,
-                parameter.believed + parameter.most_tolerances * parameter.tolerance,
-            )
-            for parameter in self._baseline
-        ] + [
-            candidate.bounds(parameter)
-            for candidate in self.candidates
-            for parameter in candidate.effect.parameters
-        ]
-        self.low, self.high = (np.array([pair[i] for pair in bounds]) for i in range(2))
+        of_effects = [number for candidate in self.candidates for number in _of_effect(candidate, driving)]
+        # Numbers of runs that are not there rest where they start.
+        absent = {n.name: n.scale for n in of_effects if n.name not in self.fixed and not is_free(n.name)}
+        self.fixed |= absent
+        free = [*baseline, *(number for number in of_effects if is_free(number.name))]
+        self.n_baseline = len(baseline)
+        self.names = tuple(number.name for number in free)
+        self.centres, self.scales, self.low, self.high = (
+            np.array([getattr(number, of) for number in free], np.float64)
+            for of in ("centre", "scale", "low", "high")
+        )
+        self._channels_changed = [number.channels for number in free]
+        self._is_reading = np.array([number.is_reading for number in baseline], bool)
         ends = np.cumsum([0] + [observation.spectra.size for run in self.runs for observation in run])
         self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
         self.n_simulations = 0
@@ -186,7 +159,7 @@ class FreeRunProblem:
     @property
     def changes_motion(self) -> NDArray[np.bool_]:
         """Which of the baseline's parameters change the motion, not only what a channel reads."""
-        return np.array([not parameter.is_reading for parameter in self._baseline])
+        return ~self._is_reading
 
     def is_down_to_noise(self, fit: FreeRunFit) -> bool:
         """Whether a fit leaves no more than the noise in any channel."""
@@ -289,12 +262,27 @@ class FreeRunProblem:
             derivatives, [observation.spectra.size for run in self.runs for observation in run]
         )
 
-    def residual_moved(self, theta: FloatArray, column: int, at: FloatArray) -> FloatArray:
-        """Residuals after one parameter was moved; unchanged in other runs and channels where it has its own."""
-        found, (blocks, by_run) = at.copy(), self._changed_by(column)
-        values = self.values(theta)
-        for block, moved in zip(blocks, self._weighted([(chosen, values) for chosen in by_run]), strict=True):
-            found[self._rows[block]] = moved
+    def residuals_moved(self, thetas: Sequence[FloatArray], column: int, at: FloatArray) -> list[FloatArray]:
+        """Residuals after one parameter, or others that change the same channels, were moved.
+
+        Unchanged in other runs and channels where the parameter has its own.
+
+        Parameters
+        ----------
+        thetas : sequence of ndarray
+        column : int
+            Of the parameter.
+        at : ndarray
+            Residuals where nothing is moved.
+        """
+        blocks, by_run = self._changed_by(column)
+        weighted = iter(self._weighted([(chosen, self.values(theta)) for theta in thetas for chosen in by_run]))
+        found = []
+        for _ in thetas:
+            moved = at.copy()
+            for block in blocks:
+                moved[self._rows[block]] = next(weighted)
+            found.append(moved)
         return found
 
     def _changed_by(self, column: int) -> tuple[list[int], list[list[Observation]]]:
@@ -376,6 +364,34 @@ def weighted_residuals(
     return [found[i] if i in found else np.full(size, np.inf) for i, size in enumerate(sizes)]
 
 
+def _of_baseline(known: BaselineParameter) -> _Number:
+    reach = known.most_tolerances * known.tolerance
+    return _Number(
+        known.name,
+        known.believed,
+        known.tolerance,
+        known.believed - reach,
+        known.believed + reach,
+        (known.channel,) if known.channel else (),
+        known.is_reading,
+    )
+
+
+def _of_effect(candidate: Candidate, driving: Collection[str]) -> list[_Number]:
+    channels = _only_channels(candidate, driving)
+    return [
+        _Number(
+            f"{candidate.key}.{known.name}",
+            0.0,
+            candidate.scale(known.name),
+            *candidate.bounds(known),
+            channels,
+            False,
+        )
+        for known in candidate.effect.parameters
+    ]
+
+
 def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str, ...]:
     """Channels that alone an effect changes; none given where it changes the motion."""
     changed = channels_of(candidate.channel) if candidate.effect.block == "sensor" else ()
@@ -404,101 +420,6 @@ def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[
         Of all of them, one after another.
     """
     return _means(observed, residual, lambda observation: observation.channel)
-
-
-def rms_without_bursts(observed: Sequence[Observation], residual: FloatArray) -> float:
-    """RMS of the informative residuals in the quieter three quarters of the times of every channel of every run.
-
-    A burst of noise, or a block that was lost, shows in few of them; what a simulation lacks in most.
-
-    Parameters
-    ----------
-    observed : sequence of Observation
-    residual : ndarray
-        Of all of them, one after another.
-    """
-    total, n, first = 0.0, 0, 0
-    for observation in observed:
-        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
-        first += observation.spectra.size
-        # Without the loudest quarter of the times a quarter of a second of noise in one channel looks like
-        # missing physics, as it did in the second sealed trial.
-        times = [
-            huber_cost(row[known]) / known.sum()
-            for row, known in zip(own, observation.informative, strict=True)
-            if known.any()
-        ]
-        # Times are weighted by how many of their coefficients are informative: a quiet time tells little.
-        counts = [int(known.sum()) for known in observation.informative if known.any()]
-        for k in np.argsort(times)[: int(np.ceil(_QUIETER_SHARE * len(times)))]:
-            total, n = total + times[k] * counts[k], n + counts[k]
-    return float(np.sqrt(total / n)) if n else 0.0
-
-
-def repeatable_mean_squares(
-    tests: Sequence[Sequence[str]], observed: Sequence[Observation], residual: FloatArray
-) -> dict[tuple[str, str], float]:
-    """Repeatable mean square: what the informative residuals of repeats of one test have in common.
-
-    Missing physics is missing in each repeat alike, noise and a liquid's chaos are not: the mean product of the
-    residuals of two repeats is the mean square of their common part. Large residuals are clipped.
-
-    Parameters
-    ----------
-    tests : sequence of sequences of str
-        Names of the runs of each test.
-    observed : sequence of Observation
-    residual : ndarray
-        Of all of them, one after another.
-
-    Returns
-    -------
-    dict
-        Per name of a test's first run, and channel, where repeats show enough of it together; none of a channel
-        that need not be described to its noise.
-    """
-    parts: dict[tuple[str, str], tuple[FloatArray, NDArray[np.bool_]]] = {}
-    first = 0
-    for observation in observed:
-        own = residual[first : first + observation.spectra.size].reshape(observation.spectra.shape)
-        first += observation.spectra.size
-        # What a channel need not describe may well repeat, such as the ripple of a servo axis: it must forbid no
-        # name.
-        if not observation.is_rough:
-            parts[observation.run.name, observation.channel] = (
-                # A product of two residuals is not robust by itself: one burst would outweigh all the rest.
-                np.clip(own, -HUBER_LIMIT, HUBER_LIMIT),
-                observation.informative,
-            )
-    found = {}
-    for test in tests:
-        # Products of different repeats have no noise in their mean, so that it may be negative where nothing
-        # repeats.
-        for channel in dict.fromkeys(of for run, of in parts if run in test):
-            total, n = 0.0, 0
-            for name, other in combinations([run for run in test if (run, channel) in parts], 2):
-                (first_left, shown), (other_left, shown_too) = parts[name, channel], parts[other, channel]
-                # Repeats start alike but may be longer or shorter by some blocks.
-                both = tuple(slice(0, min(sizes)) for sizes in zip(shown.shape, shown_too.shape, strict=True))
-                known = shown[both] & shown_too[both]
-                total += float(first_left[both][known] @ other_left[both][known])
-                n += int(known.sum())
-            if n >= _FEWEST_IN_A_RUN:
-                found[test[0], channel] = total / n
-    return found
-
-
-def mean_squares_of_runs(observed: Sequence[Observation], residual: FloatArray) -> dict[tuple[str, str], float]:
-    """The same per run and channel, where a run shows enough of a channel.
-
-    Parameters
-    ----------
-    observed : sequence of Observation
-    residual : ndarray
-    """
-    return _means(
-        observed, residual, lambda observation: (observation.run.name, observation.channel), least=_FEWEST_IN_A_RUN
-    )
 
 
 def _means(

@@ -79,10 +79,14 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     sensors = {name: _with_simulated(observed, raw[name]) for name, observed in plain.items()}
     # The noise of drives goes in before the scatter of repeats, as a lower limit to it: a resonance passes that
     # noise in a band so narrow that two repeats tell little of it.
-    noise = _noise_of_drives(case, model, sensors, fit)
+    noise, draws = _noise_of_drives(case, model, sensors, fit)
     plain = {
         name: [
-            _with_noise_of_drive(observation, noise, model.driving(observation.run)) for observation in observed
+            replace(
+                _with_noise_of_drive(observation, noise, model.driving(observation.run)),
+                of_drive=draws.get((observation.run.name, observation.channel)),
+            )
+            for observation in observed
         ]
         for name, observed in sensors.items()
     }
@@ -114,8 +118,11 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
 
 def _noise_of_drives(
     case: Case, model: DiagnosedModel, plain: dict[str, list[Observation]], fit: FreeRunFit
-) -> dict[tuple[str, str], FloatArray]:
-    """Mean square that the noise of driving accelerometers adds to each coefficient, per run and channel.
+) -> tuple[dict[tuple[str, str], FloatArray], dict[tuple[str, str], FloatArray]]:
+    """Mean square that the noise of driving accelerometers adds to each coefficient, and draws of what it adds.
+
+    Both per run and channel; draws have the shape (n_draws, n_blocks, n_bands), and those of all channels of a run
+    are of the same noise of all accelerometers that drive it.
 
     At a resonance it is narrow, and two repeats estimate it to a factor of two or three only. It is computed by
     simulations whose drive has as much noise once more, with the spectrum that repeats tell
@@ -124,8 +131,9 @@ def _noise_of_drives(
     """
     # A twin of a user's own cannot be asked what the noise of its drive makes of its channels.
     if not isinstance(model, RigModel) or case.rig is None:
-        return {}
-    found: dict[tuple[str, str], FloatArray] = {}
+        return {}, {}
+    squares: dict[tuple[str, str], FloatArray] = {}
+    draws: dict[tuple[str, str], FloatArray] = {}
     spectrum_of = {
         name: _spectrum_of_drive_noise(case, name)
         for run in case.runs
@@ -140,11 +148,15 @@ def _noise_of_drives(
         for kept in driving:
             # An effect on a sensor leaves the drive to the others, against whose noise its gain must count.
             recording = run.recording.drop_vars([name for name in driving if name != kept])
-            kept_alone, spectrum = replace(run, recording=recording), spectrum_of[kept]
-            for place, noise in _propagated_noise(case, kept_alone, kept, spectrum, plain=plain, fit=fit).items():
+            kept_alone = replace(run, recording=recording)
+            drawn = _propagated_noise(case, kept_alone, {kept: spectrum_of[kept]}, plain=plain, fit=fit)
+            for place, added in drawn.items():
                 # The maximum, not the sum: one sensor at a time drives alone.
-                found[place] = np.maximum(found.get(place, 0.0), _over_bands_of_a_resonance(noise))
-    return found
+                square = _over_bands_of_a_resonance(np.mean(added**2, axis=0))
+                squares[place] = np.maximum(squares.get(place, 0.0), square)
+        spectra = {name: spectrum_of[name] for name in driving}
+        draws |= _propagated_noise(case, run, spectra, plain=plain, fit=fit)
+    return squares, draws
 
 
 def _with_noise_of_drive(
@@ -243,43 +255,51 @@ def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
 def _propagated_noise(
     case: Case,
     run: CaseRun,
-    driving: str,
-    spectrum: _NoiseSpectrum,
+    driving: Mapping[str, _NoiseSpectrum],
     *,
     plain: dict[str, list[Observation]],
     fit: FreeRunFit,
 ) -> dict[tuple[str, str], FloatArray]:
-    """Mean square that the noise of one driving accelerometer adds to each coefficient of every other channel."""
-    variable = run.recording[driving]
-    if variable.attrs["quantity"] != "acceleration" or case.rig is None:
+    """What draws of the noise of driving accelerometers add to each coefficient of the residual of every channel.
+
+    A driving accelerometer that is compared, too, has its own noise in its residual beside what all of it makes of
+    the simulation.
+    """
+    if case.rig is None or any(run.recording[name].attrs["quantity"] != "acceleration" for name in driving):
         return {}
-    std, values = noise_of_sensor(run, driving), np.asarray(variable.values, np.float64)
-    found: dict[tuple[str, str], FloatArray] = {}
+    rate = run.attributes.sampling_rate_hz
+    drawn: dict[tuple[str, str], list[FloatArray]] = {}
     with suppress(SloshlabError):
         # The recorded drive has its noise already, in a draw that nobody knows. As much noise once more changes
         # the simulation by as much, on average.
         noise_free = _readings(case, run, fit)
         # Fixed seeds: the same case gives the same answer.
         for seed in range(_N_NOISE_DRAWS):
-            white = std * np.random.default_rng(seed).standard_normal(values.size)
-            noise = spectrum.coloured(white, run.attributes.sampling_rate_hz)
-            noisier = run.recording.assign({driving: variable.copy(data=values + noise)})
+            generator = np.random.default_rng(seed)
+            noise = {
+                name: spectrum.coloured(
+                    noise_of_sensor(run, name) * generator.standard_normal(run.recording[name].size), rate
+                )
+                for name, spectrum in driving.items()
+            }
+            noisier = run.recording.assign(
+                {name: run.recording[name].copy(data=run.recording[name].values + noise[name]) for name in noise}
+            )
             noisy = _readings(case, replace(run, recording=noisier), fit)
             for observation in plain[run.name]:
-                if observation.channel in noisy and observation.channel != driving:
-                    square = (
-                        observation.of(noisy[observation.channel])
-                        - observation.of(noise_free[observation.channel])
-                    ) ** 2
-                    found[run.name, observation.channel] = (
-                        found.get((run.name, observation.channel), 0.0) + square / _N_NOISE_DRAWS
-                    )
-    for observation in plain[run.name]:
-        if observation.channel not in run.recording.data_vars:
-            # A sensor that was left out of the drive is compared with the motion of the one kept, and so with
-            # its noise.
-            found[run.name, observation.channel] = np.full(observation.spectra.shape, std**2)
-    return found
+                name = observation.channel
+                if name in noisy and (name not in driving or len(driving) > 1):
+                    added = observation.of(noise_free[name]) - observation.of(noisy[name])
+                    if name in noise:
+                        added = added + observation.of(noise[name])
+                elif name not in run.recording.data_vars:
+                    # A sensor that was left out of the drive is compared with the motion of the one kept, and so
+                    # with its noise.
+                    [added] = (-observation.of(own) for own in noise.values())
+                else:
+                    continue
+                drawn.setdefault((run.name, name), []).append(added)
+    return {place: np.stack(draws) for place, draws in drawn.items()}
 
 
 def _over_bands_of_a_resonance(square: FloatArray) -> FloatArray:

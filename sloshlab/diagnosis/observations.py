@@ -12,6 +12,7 @@ import xarray as xr
 from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
+from scipy.stats import chi2
 
 from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import DRIFT_CORNER_HZ
@@ -33,6 +34,8 @@ IGNORED_VARIANCE: Final = 100.0
 """Factor of a variance with which a coefficient counts for next to nothing."""
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
 """Of the blocks, in which a band must be informative to be kept."""
+_MEDIAN_OF_SQUARE: Final = 0.4549
+"""Of a normal number, over its mean (χ² with one degree of freedom)."""
 _LEAST_SHARE: Final = 1e-4
 """Of the RMS of a channel: least standard deviation of a coefficient, for quantisation and rounding."""
 
@@ -59,6 +62,8 @@ class Observation:
         Whether a model need not describe the channel to its noise (`known_to`), although the rest repeats.
     simulated : ndarray of shape of `spectra`, or None
         Of the same, as a first fit of the baseline simulates it, where that is known.
+    of_drive : ndarray, shape (n_draws, n_blocks, n_kept), or None
+        What draws of the noise of a driving accelerometer make of the channel; all channels of a run share a draw.
     """
 
     run: CaseRun
@@ -70,6 +75,7 @@ class Observation:
     n_transformed: int = 0
     is_rough: bool = False
     simulated: FloatArray | None = None
+    of_drive: FloatArray | None = None
 
     @property
     def n_bands(self) -> int:
@@ -258,6 +264,9 @@ def within_informative_bands(observed: Sequence[Observation]) -> list[Observatio
             simulated=None
             if observation.simulated is None
             else np.ascontiguousarray(observation.simulated[:, :n_kept]),
+            of_drive=None
+            if observation.of_drive is None
+            else np.ascontiguousarray(observation.of_drive[:, :, :n_kept]),
             n_transformed=n_bands,
         )
         for observation in observed
@@ -279,7 +288,7 @@ def with_scatter(
     Notes
     -----
     The scatter about the mean of the repeats is averaged over three blocks and nine bands; it is never taken as
-    less than the noise of the sensor.
+    less than what is steady in its band, or than the noise of the sensor.
     """
     n = len(group)
     scatter: dict[str, FloatArray] = {}
@@ -297,7 +306,8 @@ def with_scatter(
         # visible, and the chaos of a liquid does not count.
         about = ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0) / (n - 1)
         # Two repeats leave one degree of freedom per coefficient; 27 neighbours together tell a variance.
-        scatter[name] = uniform_filter(about, (3, 9), mode="nearest")
+        local = uniform_filter(about, (3, 9), mode="nearest")
+        scatter[name] = np.maximum(local, _steady_noise(about, n - 1))
     return [
         [
             _weighted(observation, np.maximum(scatter[observation.channel], observation.variance))
@@ -307,6 +317,19 @@ def with_scatter(
         ]
         for repeat in group
     ]
+
+
+def _steady_noise(about: FloatArray, n_degrees: int) -> FloatArray:
+    """Variance of noise that is the same at all times, per band, shape (n_bands,).
+
+    Noise of sensors is steady and grows towards low frequencies, where nine bands would smear it. Medians over all
+    times and an octave: neither a loud stretch nor a line, such as a hum whose phase differs between repeats, is
+    such noise.
+    """
+    by_band = np.median(about, axis=0) * n_degrees / float(chi2.median(n_degrees))
+    k = np.arange(by_band.size) + 0.5
+    low, high = np.floor(k / np.sqrt(2)).astype(int), np.ceil(k * np.sqrt(2)).astype(int)
+    return np.array([np.median(by_band[first:end]) for first, end in zip(low, high, strict=True)])
 
 
 def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observation]) -> list[Observation]:
@@ -327,22 +350,19 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
             for source in sources
             if source.channel == observation.channel and source.n_bands == observation.n_bands
         ]
-        if not any(source.informative.any() for source in alike):
+        if not alike:
             weighted.append(observation)
             continue
-        alike = [source for source in alike if source.informative.any()]
         # A repeated test has other levels at other times, so that its variance cannot be taken over place by
         # place.
         quiet = np.min([np.median(source.variance, axis=0) for source in alike], axis=0)
+        shares = [
+            source.variance[source.informative].sum() / (source.spectra**2)[source.informative].sum()
+            for source in alike
+            if source.informative.any()
+        ]
         # The median over the repeats, so that a burst in one of them does not set it.
-        share = float(
-            np.median(
-                [
-                    source.variance[source.informative].sum() / (source.spectra**2)[source.informative].sum()
-                    for source in alike
-                ]
-            )
-        )
+        share = float(np.median(shares)) if shares else 0.0
         local = uniform_filter(observation.spectra**2, (3, 9), mode="nearest")
         weighted.append(_weighted(observation, np.maximum(quiet[None, :], share * local)))
     return weighted
@@ -412,4 +432,4 @@ def _white_level(spectra: FloatArray) -> float:
     width = max(4, upper.shape[1] // 8)
     levels = [float(np.median(upper[:, i : i + width] ** 2)) for i in range(0, upper.shape[1] - width + 1, width)]
     # medians, as a line of the mains or a harmonic in some of the bands must not count
-    return min(levels) / 0.4549  # the median of a squared normal number over its mean
+    return min(levels) / _MEDIAN_OF_SQUARE

@@ -71,7 +71,7 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
         n_modes=0 if model.twin.structure is None else model.twin.structure.masses_kg.size,
         incoherent_with_base=_incoherent_with_base(fitting),
         has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
-        runs=tuple(run[0].run.name for run in fitting),
+        runs=tuple(run.name for run in model.runs),
         update_rates_hz=_update_rates(fitting, float(np.max(frequencies))),
     )
 

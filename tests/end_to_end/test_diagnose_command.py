@@ -94,14 +94,14 @@ def case(folder: Path, *runs: xr.Dataset, rig: str = RIG) -> Path:
 
 @pytest.fixture(scope="module")
 def lone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One run of what the twin says, diagnosed with an effect of the user's own that cannot run."""
+    """One run of what the twin says, and an effect of the user's own that cannot run."""
     folder = case(tmp_path_factory.mktemp("lone") / "case", decay(0.01, 1.5))
     (folder.parent / "runaway.py").write_text(RUNAWAY, encoding="utf-8")
     return folder
 
 
 def test_one_run_alone_is_answered_and_what_it_cannot_decide_is_said(lone: Path, capsys: Any) -> None:
-    """Exit 3; a candidate that cannot run is in `failed`; the twin is there, the case as it was."""
+    """Exit 3; the twin is there, the case as it was."""
     before = contents(lone)
     code = run(["diagnose", str(lone), "--effects", str(lone.parent / "runaway.py"), "--no-report", "--json"])
     decided_terms = capsys.readouterr()
@@ -112,7 +112,6 @@ def test_one_run_alone_is_answered_and_what_it_cannot_decide_is_said(lone: Path,
     verdict = json.loads((lone / "diagnosis" / "verdict.json").read_bytes())
     assert verdict["verdict"] == "nothing_missing"
     assert verdict["effects"] == []
-    assert verdict["failed"]["structure.runaway"] == "does not run from any start"
     assert len(verdict["limits"]) == 2
     assert verdict["statement"] in decided_terms.out
     assert {"format", "alternatives", "probabilities", "separating_experiment"} <= verdict.keys()
@@ -129,6 +128,18 @@ def test_one_run_alone_is_answered_and_what_it_cannot_decide_is_said(lone: Path,
     assert {name: data for name, data in (contents(lone) or {}).items() if "diagnosis" not in name} == before
     assert leftovers(lone) == []
     assert json.loads(decided_terms.out.splitlines()[-1])["verdict"] == "nothing_missing"
+
+
+def test_one_run_alone_names_nothing_and_says_what_cannot_run(tmp_path: Path, capsys: Any) -> None:
+    """A spring that hardens, in a single run: something is missing, and no other run can confirm its name."""
+    folder = case(tmp_path / "case", decay(0.018, 1.5, 3e5))
+    (tmp_path / "runaway.py").write_text(RUNAWAY.replace("runaway", "runaway_again"), encoding="utf-8")
+    code = run(["diagnose", str(folder), "--effects", str(tmp_path / "runaway.py"), "--no-report"])
+    assert code == DONE_BUT_FLAGGED, capsys.readouterr().err
+    verdict = json.loads((folder / "diagnosis" / "verdict.json").read_bytes())
+    assert verdict["verdict"] == "unknown"
+    assert "that one run alone does not tell" in verdict["statement"]
+    assert verdict["failed"]["structure.runaway_again"] == "does not run from any start"
 
 
 @pytest.mark.slow

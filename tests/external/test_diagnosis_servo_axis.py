@@ -17,7 +17,7 @@ import pytest
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, known_effects
 from sloshlab.diagnosis.case import read_case
-from sloshlab.diagnosis.free_run_fit import fitted, fitted_from
+from sloshlab.diagnosis.free_run_fit import fitted
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
@@ -65,7 +65,10 @@ class Axis:
         [effect] = [effect for effect in known_effects() if effect.name == "asymmetric_friction"]
         candidate = Candidate(effect, surroundings)
         problem = FreeRunProblem(self.model, self.fitted, (candidate,))
-        self.extended = fitted_from(problem, [{**self.model.believed, **start} for start in candidate.starts()])
+        self.extended = min(
+            (fitted(problem, {**self.model.believed, **start})[0] for start in candidate.starts()),
+            key=lambda fit: fit.cost,
+        )
 
     def error(self, fit: FreeRunFit) -> float:
         problem = FreeRunProblem(self.model, [self.held_out], fit.candidates)

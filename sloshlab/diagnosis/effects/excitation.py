@@ -47,7 +47,6 @@ ROCKING = register(
         _ROCKING,
         multiples(_ROCKING, {"compliance_rad_per_n_m": 0.03}, {"compliance_rad_per_n_m": 0.005}),
         _rocks,
-        ("stiffness_change", "mass_error", "missing_mode"),
         "two accelerometers on the base, one before and one behind the root, in a decay",
         _has_root_moment,
         spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, NO_ONSET),
@@ -79,8 +78,8 @@ def _up_to_the_peak(at: Surroundings) -> Mapping[str, tuple[float, float]]:
 
 
 _SATURATION: Final = (
-    EffectParameter("limit", 1e-12, 1e12, may_rest=True, range=Range(0.05, 1.0, scales.peak, is_log=False)),
-    EffectParameter("dead_zone", 0.0, 1e12, may_rest=True, range=Range(1e-3, 0.5, scales.peak)),
+    EffectParameter("limit", 1e-12, 1e12, range=Range(0.05, 1.0, scales.peak, is_log=False)),
+    EffectParameter("dead_zone", 0.0, 1e12, range=Range(1e-3, 0.5, scales.peak)),
 )
 # In the unit of the channel that drives, which is read before the actuator and not behind it.
 SATURATION = register(
@@ -97,7 +96,6 @@ SATURATION = register(
             ),
         ),
         _saturates,
-        ("sensor_gain", "sensor_clipping"),
         "the motion or force of the actuator beside its command, at two levels",
         places=_commands,
         limits=_up_to_the_peak,

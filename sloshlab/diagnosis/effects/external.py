@@ -66,7 +66,6 @@ _PULSES: Final = (
         "start_s",
         0.0,
         1e5,
-        may_rest=True,
         range=Range(0.0, 1.0, scales.duration, is_log=False),
         each_run=True,
         tolerance=scales.period,
@@ -164,7 +163,7 @@ _LINE: Final = (
     EffectParameter(
         "frequency_hz", 1e-2, 1e5, range=Range(0.05, 20.0, scales.frequency), tolerance=scales.cycle_in_a_run
     ),
-    EffectParameter("phase", -1.0, 2.0, may_rest=True, range=Range(0.0, 1.0, is_log=False), each_run=True),
+    EffectParameter("phase", -1.0, 2.0, range=Range(0.0, 1.0, is_log=False), each_run=True),
 )
 
 
@@ -236,7 +235,6 @@ def _registered(block: str) -> tuple[Effect, Effect, Effect]:
                 _PULSES,
                 train,
                 _in_every_run(_pulses(block, alternates=alternates)),
-                ("ceiling_impact",),
                 _SEPARATED_BY,
                 _can_act(block),
                 spoken_for_by=(IMPULSIVE, MEMORY, TIME_VARYING),
@@ -257,7 +255,6 @@ def _registered(block: str) -> tuple[Effect, Effect, Effect]:
         _LINE,
         _line_starts,
         _in_every_run(_line(block)),
-        ("missing_mode", "faraday_wave"),
         _SEPARATED_BY,
         _can_act(block),
         spoken_for_by=(MEMORY, TIME_VARYING),

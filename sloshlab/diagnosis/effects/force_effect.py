@@ -11,7 +11,6 @@ from sloshlab.diagnosis.candidate import (
     Numbers,
     Surroundings,
     multiples,
-    never_distinct,
     register,
 )
 from sloshlab.diagnosis.evidence import (
@@ -72,13 +71,9 @@ def force_effect(
     fixed: Callable[[Surroundings], Mapping[str, float]] | None = None,
     fitted: tuple[str, ...] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    may_rest: tuple[str, ...] = (),
-    look_alikes: tuple[str, ...] = (),
     separated_by: str = "",
     needs: Callable[[Surroundings], bool] | None = None,
     spoken_for_by: tuple[str, ...] = (),
-    includes: tuple[str, ...] = (),
-    differs: Callable[[float], Sequence[Mapping[str, tuple[float, float]]]] = never_distinct,
     variant_of: str = "",
     size: tuple[str, ...] = (),
 ) -> Effect:
@@ -100,9 +95,7 @@ def force_effect(
         That of the kind by default.
     bounds : mapping, optional
         Narrower ones than those of the kind.
-    may_rest : tuple of str
-        Names of parameters for which a bound is a value like any other.
-    look_alikes, separated_by, needs, spoken_for_by, includes, differs, variant_of, size
+    separated_by, needs, spoken_for_by, variant_of, size
         As of `Effect`.
 
     Examples
@@ -123,7 +116,6 @@ def force_effect(
         EffectParameter(
             parameter.name,
             *narrower.get(parameter.name, (parameter.low, parameter.high)),
-            may_rest=parameter.name in may_rest,
             range=(ranges or {}).get(parameter.name),
         )
         for parameter in kind.parameters
@@ -137,13 +129,10 @@ def force_effect(
             parameters,
             starts if callable(starts) else multiples(parameters, *starts),
             extension,
-            look_alikes,
             separated_by,
             needs or (has_structure if block == "structure" else lambda surroundings: True),
             spoken_for_by=spoken_for_by,
-            includes=includes,
             variant_of=variant_of,
-            differs=differs,
             size=size,
         )
     )

@@ -69,7 +69,6 @@ def _sensor_effect(
     reading: Callable[[Numbers], Reading],
     *,
     undone: Callable[[Numbers], Reading] | None,
-    look_alikes: tuple[str, ...] = (),
     separated_by: str = "the channel beside a second sensor at the same place",
     places: Callable[[Surroundings], list[str]] | None = None,
     spoken_for_by: tuple[str, ...] = (),
@@ -93,7 +92,6 @@ def _sensor_effect(
             parameters,
             starts if callable(starts) else multiples(parameters, *starts),
             extension,
-            look_alikes,
             separated_by,
             places=places or (_compared_channels if undone is None else lambda at: list(at.channels)),
             spoken_for_by=spoken_for_by,
@@ -117,7 +115,6 @@ GAIN = _sensor_effect(
     [{"ratio": ratio} for ratio in (0.05, -0.05)],
     _scaled(lambda numbers: 1 + numbers["ratio"]),
     undone=_scaled(lambda numbers: 1 / (1 + numbers["ratio"])),
-    look_alikes=("mass_error",),
     spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_READING),
     places=_channels_and_devices,
 )
@@ -172,7 +169,6 @@ DELAY = _sensor_effect(
     [{"delay_s": share} for share in (0.02, -0.02)],
     _delayed,
     undone=_advanced,
-    look_alikes=("viscous_damping", "sensor_high_pass"),
     spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_RATE),
     places=_channels_and_devices,
 )
@@ -211,7 +207,6 @@ HIGH_PASS = _sensor_effect(
     [{"time_constant_s": value} for value in (2.0, 0.2, 0.03)],
     _high_passed,
     undone=_high_pass_undone,
-    look_alikes=("sensor_delay",),
     spoken_for_by=(SINGLE_CHANNEL, PROPORTIONAL_TO_INTEGRAL),
     places=_channels_and_devices,
 )
@@ -255,7 +250,6 @@ DRIFT = _sensor_effect(
     [{"rate": share} for share in (0.3, -0.3)],
     _drifted,
     undone=None,
-    look_alikes=("liquid_loss",),
     spoken_for_by=(SINGLE_CHANNEL, TREND),
 )
 
@@ -341,7 +335,6 @@ CLOCK = _sensor_effect(
     [{"ratio": share} for share in (0.02, -0.02)],
     _with_clock_skew(1.0),
     undone=_with_clock_skew(-1.0),
-    look_alikes=("sensor_delay",),
     spoken_for_by=(SINGLE_CHANNEL, CLOCK_DRIFT),
     places=_channels_and_devices,
 )
@@ -409,7 +402,6 @@ HOLD = _sensor_effect(
     _update_rates,
     _held,
     undone=None,
-    look_alikes=("sensor_delay",),
     places=_held_channels,
     spoken_for_by=(SINGLE_CHANNEL,),
 )
@@ -473,7 +465,6 @@ _LEAK: Final = (
         "ratio",
         -1e6,
         1e6,
-        is_between_readings=True,
         range=Range(1e-3, _LARGEST_LEAK_OF_ITS_KIND, scales.leak, may_be_negative=True),
     ),
 )
@@ -485,7 +476,6 @@ CROSS_TALK = register(
         _LEAK,
         multiples(_LEAK, *({"ratio": share} for share in (0.03, -0.03))),
         _cross_talk,
-        ("mass_error", "sensor_gain"),
         "the second channel disconnected",
         places=_pairs,
         limits=_largest_leaks,

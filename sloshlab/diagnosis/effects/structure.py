@@ -71,7 +71,6 @@ VISCOUS = force_effect(
     [{"damping_n_s_per_m": 0.01}],
     ranges={"damping_n_s_per_m": Range(3e-4, 1.0, scales.damping)},
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
-    look_alikes=("structural_damping", "coulomb_friction", "sensor_delay"),
     separated_by=_OTHER_LEVELS + ", and at two frequencies",
     spoken_for_by=VISCOUS_CHARACTER,
 )
@@ -82,19 +81,9 @@ COULOMB = force_effect(
     "structure",
     [{"force_n": share} for share in (0.003, 0.02)],
     ranges={"force_n": _FRICTION},
-    look_alikes=("viscous_damping", "structural_damping", "stribeck_friction", "asymmetric_friction"),
     separated_by=_OTHER_LEVELS + ", down to rest",
     spoken_for_by=COULOMB_CHARACTER,
 )
-
-
-def _clearly_asymmetric(force_n: float) -> list[dict[str, tuple[float, float]]]:
-    """More than twice as large in one direction, about the force that was found without a direction."""
-    # Fitted within these bounds and listed beside Coulomb friction: where no channel tells its constant part,
-    # asymmetric friction would be called by that name.
-    more, less = (1.35 * force_n, 2.0 * force_n), (0.0, 0.65 * force_n)
-    return [{"force_up_n": more, "force_down_n": less}, {"force_up_n": less, "force_down_n": more}]
-
 
 # The same force as dry friction of (F₊ + F₋)/2 with a constant force of (F₋ − F₊)/2, whatever is recorded.
 ASYMMETRIC = force_effect(
@@ -102,11 +91,8 @@ ASYMMETRIC = force_effect(
     "structure",
     [{"force_up_n": 0.015, "force_down_n": 0.005}, {"force_up_n": 0.005, "force_down_n": 0.015}],
     ranges={"force_up_n": _FRICTION, "force_down_n": _FRICTION},
-    look_alikes=("coulomb_friction + constant_force",),
     separated_by="none: the two are the same force; measure the static rest position with the friction taken off",
     spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, RATE_INDEPENDENT, WORK_1, NO_ONSET, CONSTANT),
-    includes=("coulomb_friction", "constant_force"),
-    differs=_clearly_asymmetric,
 )
 # Where friction falls with the speed over all of the motion, what it takes away is what a damper adds: then it
 # cannot be told from Coulomb friction and a damper.
@@ -120,17 +106,14 @@ STRIBECK = force_effect(
         "stribeck_velocity_m_per_s": Range(3e-3, 2.0, scales.velocity),
     },
     bounds={"stribeck_velocity_m_per_s": (1e-3, 1e3)},
-    look_alikes=("coulomb_friction",),
     separated_by="slow motion about the Stribeck velocity",
     spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, NO_ONSET, THIRD_ORDER),
-    includes=("coulomb_friction",),
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,
     "structure",
     [{"drag_n_s2_per_m2": 0.01}],
     ranges={"drag_n_s2_per_m2": Range(3e-4, 1.0, scales.drag)},
-    look_alikes=("viscous_damping",),
     separated_by=_OTHER_LEVELS,
     spoken_for_by=DRAG_CHARACTER,
 )
@@ -142,7 +125,6 @@ STRUCTURAL = force_effect(
     ranges={"loss_factor": _LOSS_FACTOR},
     fixed=lambda at: {"stiffness_n_per_m": _static_stiffness(at)},
     fitted=("loss_factor",),
-    look_alikes=("viscous_damping", "coulomb_friction"),
     separated_by="the same amplitude at two frequencies",
     spoken_for_by=STRUCTURAL_CHARACTER,
 )
@@ -155,8 +137,6 @@ LINEAR_STRUCTURAL = force_effect(
     ranges={"loss_factor": _LOSS_FACTOR, "creep_decades": Range(0.3, 4.0, is_log=False)},
     fixed=lambda at: {"stiffness_n_per_m": _static_stiffness(at), "frequency_hz": at.frequency_hz},
     fitted=("loss_factor", "creep_decades"),
-    may_rest=("creep_decades",),
-    look_alikes=("viscous_damping", "coulomb_friction"),
     separated_by="the same amplitude at two frequencies",
     spoken_for_by=STRUCTURAL_CHARACTER,
     variant_of="structural_damping",
@@ -196,11 +176,8 @@ BOUC_WEN = force_effect(
         "exponent": Range(1.0, 3.0, is_log=False),
     },
     bounds={"exponent": (1.0, 3.0)},
-    may_rest=("exponent",),
-    look_alikes=("coulomb_friction", "structural_damping"),
     separated_by="slow loops of several amplitudes",
     spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT),
-    includes=("coulomb_friction", "stiffness_change"),
 )
 
 
@@ -210,10 +187,8 @@ BEHIND_PLAY = force_effect(
     # dampers and joints of machines hold as much as moves; what a rig has beside its spring holds little
     [{"force_n": share, "play_m": 0.1, "stiffness_n_per_m": 5 * share} for share in (0.2, 1.0, 0.02)],
     ranges={"force_n": _FRICTION, "play_m": _PLAY, "stiffness_n_per_m": _BEHIND_PLAY},
-    look_alikes=("hysteresis", "coulomb_friction", "clearance"),
     separated_by="slow reversals at several amplitudes, with the force read while it is low",
     spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT),
-    includes=("coulomb_friction",),
 )
 # A constant force is nested in it: it moves the middle of the loop by (F₋ − F₊)/2 as long as the slider follows.
 BEHIND_PLAY_BY_DIRECTION = force_effect(
@@ -229,10 +204,8 @@ BEHIND_PLAY_BY_DIRECTION = force_effect(
         "play_m": _PLAY,
         "stiffness_n_per_m": _BEHIND_PLAY,
     },
-    look_alikes=("hysteresis", "coulomb_friction", "clearance"),
     separated_by="slow reversals at several amplitudes, with the force read while it is low",
     spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT, CONSTANT),
-    includes=("friction_behind_play", "asymmetric_friction", "coulomb_friction", "constant_force"),
     variant_of="friction_behind_play",
 )
 CUBIC = force_effect(
@@ -240,7 +213,6 @@ CUBIC = force_effect(
     "structure",
     [{"stiffness_n_per_m3": share} for share in (0.03, -0.03)],
     ranges={"stiffness_n_per_m3": Range(1e-3, 3.0, scales.cubic_stiffness, may_be_negative=True)},
-    look_alikes=("quadratic_stiffness", "clearance"),
     separated_by="a larger range of amplitudes on both sides of rest",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION, THIRD_ORDER),
 )
@@ -250,7 +222,6 @@ QUADRATIC = force_effect(
     "structure",
     [{"stiffness_n_per_m2": share} for share in (0.03, -0.03)],
     ranges={"stiffness_n_per_m2": Range(1e-3, 3.0, scales.quadratic_stiffness, may_be_negative=True)},
-    look_alikes=("cubic_stiffness",),
     separated_by="a larger range of amplitudes on both sides of rest",
     spoken_for_by=(CONSERVATIVE, EVEN, STATE_FUNCTION, SECOND_ORDER),
 )
@@ -259,7 +230,6 @@ STIFFNESS = force_effect(
     "structure",
     [{"stiffness_n_per_m": share} for share in (0.03, -0.03)],
     ranges={"stiffness_n_per_m": Range(1e-3, 1.0, scales.stiffness, may_be_negative=True)},
-    look_alikes=("mass_error",),
     separated_by="a known mass added to the tank",
     spoken_for_by=INERTIAL_CHARACTER,
 )
@@ -272,10 +242,8 @@ GAP = force_effect(
         "gap_m": Range(0.02, 1.0, scales.displacement, is_log=False),
         "stiffness_n_per_m": Range(3e-3, 100.0, scales.stiffness),
     },
-    look_alikes=("cubic_stiffness",),
     separated_by="amplitudes just below and above the gap",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION, ONSET, THIRD_ORDER),
-    includes=("stiffness_change",),
     size=("stiffness_n_per_m",),
 )
 # Far from its frequency a mode acts as a mass or as a spring, which are nested in it.
@@ -296,10 +264,8 @@ MODE = force_effect(
         "participation": Range(1e-4, 1.0, scales.mass),
     },
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
-    look_alikes=("mass_error", "stiffness_change"),
     separated_by="a sweep over the missing mode's frequency",
     spoken_for_by=(MEMORY,),
-    includes=("mass_error", "stiffness_change", "viscous_damping"),
     size=("participation",),
 )
 # Of either sign, as a stiffness: on one mode a mass is a softer spring with less damping, whatever moves it.
@@ -309,7 +275,6 @@ MASS = force_effect(
     [{"mass_kg": share} for share in (0.03, -0.03)],
     ranges={"mass_kg": Range(1e-3, 0.7, scales.mass, may_be_negative=True)},
     bounds={"mass_kg": (-10.0, 10.0)},
-    look_alikes=("stiffness_change", "sensor_gain"),
     separated_by="a known mass added to the tank",
     spoken_for_by=INERTIAL_CHARACTER,
 )
@@ -319,7 +284,6 @@ OFFSET = force_effect(
     "structure",
     [{"force_n": share} for share in (0.01, -0.01)],
     ranges={"force_n": Range(1e-4, 1.0, scales.force, may_be_negative=True)},
-    look_alikes=("asymmetric_friction", "quadratic_stiffness"),
     separated_by="the static rest position",
     spoken_for_by=(CONSERVATIVE, EVEN, CONSTANT, NO_ONSET),
 )

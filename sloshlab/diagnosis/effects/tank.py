@@ -66,7 +66,6 @@ VISCOUS = force_effect(
     [{"damping_n_s_per_m": 0.2}],
     ranges={"damping_n_s_per_m": Range(*_SHARE_OF_LIQUID, scales.liquid_damping)},
     bounds={"damping_n_s_per_m": (0.0, 1e4)},
-    look_alikes=("quadratic_drag", "coulomb_friction", "sensor_delay"),
     separated_by="two or more amplitudes and frequencies",
     spoken_for_by=VISCOUS_CHARACTER,
 )
@@ -75,7 +74,6 @@ COULOMB = force_effect(
     "tank",
     [{"force_n": 0.1}],
     ranges={"force_n": Range(*_SHARE_OF_LIQUID, scales.liquid_force)},
-    look_alikes=("viscous_damping",),
     separated_by="two or more amplitudes",
     spoken_for_by=COULOMB_CHARACTER,
 )
@@ -84,7 +82,6 @@ DRAG = force_effect(
     "tank",
     [{"drag_n_s2_per_m2": 0.2}],
     ranges={"drag_n_s2_per_m2": Range(*_SHARE_OF_LIQUID, scales.liquid_drag)},
-    look_alikes=("viscous_damping", "liquid_sloshing"),
     separated_by="two or more amplitudes",
     spoken_for_by=DRAG_CHARACTER,
 )
@@ -94,7 +91,6 @@ MASS = force_effect(
     [{"mass_kg": share} for share in (0.1, -0.1)],
     ranges={"mass_kg": Range(*_SHARE_OF_LIQUID, scales.liquid_mass, may_be_negative=True)},
     bounds={"mass_kg": (-10.0, 10.0)},
-    look_alikes=("effective_mass", "sensor_gain", "stiffness_change"),
     separated_by="a known mass added to the tank, and a run with frozen liquid",
     spoken_for_by=INERTIAL_CHARACTER,
 )
@@ -106,7 +102,6 @@ EFFECTIVE = force_effect(
     ranges={"beta": _BETA},
     fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
     fitted=("beta",),
-    look_alikes=("mass_error",),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT, STATE_FUNCTION),
 )
@@ -119,11 +114,8 @@ FADING = force_effect(
     fixed=lambda at: {"liquid_mass_kg": at.rig.liquid_mass_kg},
     fitted=("beta", "fade_g", "averaging_s"),
     bounds={"averaging_s": (0.05, 5.0)},
-    may_rest=("averaging_s",),
-    look_alikes=("cubic_stiffness", "hysteresis", "clearance"),
     separated_by="runs with frozen and moving liquid, at several amplitudes",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
-    includes=("mass_error",),
     variant_of="effective_mass",
 )
 
@@ -162,7 +154,6 @@ VARYING = force_effect(
     needs=_sweeps,
     separated_by="runs with frozen and moving liquid, at several amplitudes",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
-    includes=("mass_error",),
     variant_of="effective_mass",
 )
 
@@ -179,9 +170,9 @@ def _damping(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
 _SLOSHING: Final = (
     EffectParameter("threshold_g", 0.02, 20.0, range=_THRESHOLD),
     EffectParameter("peak_w_bar", 0.0, 20.0, range=Range(0.01, 5.0)),
-    EffectParameter("rise", 0.05, 20.0, may_rest=True, range=Range(0.1, 10.0)),  # a peak beyond all levels
+    EffectParameter("rise", 0.05, 20.0, range=Range(0.1, 10.0)),  # a peak beyond all levels
     # levels that hardly change do not tell it
-    EffectParameter("averaging_s", 0.01, 5.0, may_rest=True, range=_AVERAGING),
+    EffectParameter("averaging_s", 0.01, 5.0, range=_AVERAGING),
 )
 SLOSHING = register(
     Effect(
@@ -198,7 +189,6 @@ SLOSHING = register(
             ),
         ),
         _damping,
-        ("viscous_damping", "quadratic_drag"),
         _LEVELS,
         spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, ONSET),
         size=("peak_w_bar",),
@@ -252,8 +242,8 @@ _DELAY: Final = (
     EffectParameter("time_constant_s", 2e-3, 20.0, range=Range(0.05, 100.0, scales.period)),
     EffectParameter("agitated_g", 0.02, 20.0, range=_THRESHOLD),
     # a start that goes on does not tell it
-    EffectParameter("averaging_s", 0.01, 5.0, may_rest=True, range=_AVERAGING),
-    EffectParameter("sharpness", 2.0, 50.0, may_rest=True, range=Range(2.0, 50.0)),
+    EffectParameter("averaging_s", 0.01, 5.0, range=_AVERAGING),
+    EffectParameter("sharpness", 2.0, 50.0, range=Range(2.0, 50.0)),
 )
 DELAY = register(
     Effect(
@@ -277,7 +267,6 @@ DELAY = register(
             ),
             _OF_MOVING_LIQUID,
         ),
-        ("high_g_saturation",),
         "a sudden start at constant amplitude",
         _damps,
         spoken_for_by=(MEMORY, ODD_IN_VELOCITY),
@@ -287,7 +276,7 @@ DELAY = register(
 # Work per cycle goes with the damping and the square of the level, so that (a_s/â)² keeps it where it is.
 _SATURATION: Final = (
     EffectParameter("threshold_g", 0.02, 50.0, range=_THRESHOLD),
-    EffectParameter("averaging_s", 0.01, 5.0, may_rest=True, range=_AVERAGING),
+    EffectParameter("averaging_s", 0.01, 5.0, range=_AVERAGING),
 )
 SATURATION = register(
     Effect(
@@ -302,7 +291,6 @@ SATURATION = register(
             ),
             _DAMPERS,
         ),
-        ("breakup_delay", "liquid_sloshing"),
         _LEVELS,
         _damps,
         spoken_for_by=(ODD_IN_VELOCITY, ONSET),
@@ -320,7 +308,7 @@ def _knows_work(at: Surroundings) -> bool:
 _GRADUAL: Final = (
     EffectParameter("threshold_g", 0.02, 50.0, range=_THRESHOLD),
     EffectParameter("exponent", 0.2, 4.0, range=Range(0.2, 4.0, is_log=False)),
-    EffectParameter("averaging_s", 0.01, 5.0, may_rest=True, range=_AVERAGING),
+    EffectParameter("averaging_s", 0.01, 5.0, range=_AVERAGING),
 )
 GRADUAL_SATURATION = register(
     Effect(
@@ -339,11 +327,9 @@ GRADUAL_SATURATION = register(
             ),
             (VISCOUS_MAP.name,),
         ),
-        ("breakup_delay", "liquid_sloshing"),
         _LEVELS,
         _knows_work,
         spoken_for_by=(ODD_IN_VELOCITY, ONSET),
-        includes=("high_g_saturation",),
         variant_of="high_g_saturation",
     )
 )
@@ -391,13 +377,12 @@ IMPACT = register(
             EffectParameter("gap_m", 1e-4, 1.0, range=Range(0.25, 1.3, scales.room)),
             EffectParameter("stiffness_n_per_m", 50.0, 1e7, range=Range(1e-3, 16.0, scales.contact_stiffness)),
             EffectParameter("damping_kg_per_s", 0.0, 1e4, range=Range(1e-4, 4.0, scales.contact_damping)),
-            EffectParameter("share", 0.002, 1.0, may_rest=True, range=Range(5e-3, 1.0)),
+            EffectParameter("share", 0.002, 1.0, range=Range(5e-3, 1.0)),
         ),
         lambda at: [
             _impact_numbers(at, room, _CONTACT_HZ, 0.3, share) for share in (1.0, 0.2, 0.05) for room in (1.0, 0.6)
         ],
         _impact,
-        ("liquid_sloshing", "clearance"),
         "accelerations below and above 1 g, forces sampled fast",
         spoken_for_by=(DISSIPATIVE, IMPULSIVE, ONSET, MEMORY),
         size=("stiffness_n_per_m", "damping_kg_per_s", "share"),
@@ -418,11 +403,9 @@ LATERAL = force_effect(
         "damping_ratio": _DAMPING_RATIO,
     },
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
-    look_alikes=("missing_mode",),
     separated_by="a slow sweep over its frequency at small amplitude",
     needs=rocks,
     spoken_for_by=(MEMORY,),
-    includes=("mass_error", "effective_mass"),
     size=("mass_kg",),
 )
 # A parametric instability: the wave is at half the frequency of the motion.
@@ -447,7 +430,6 @@ LOSS = force_effect(
     "tank",
     [{"rate_kg_per_s": 0.1}],
     ranges={"rate_kg_per_s": Range(3e-3, 1.0, scales.loss_rate)},
-    look_alikes=("mass_error", "sensor_drift"),
     separated_by="the same test at the beginning and at the end of the day",
     spoken_for_by=(TIME_VARYING, ODD_IN_DISPLACEMENT),
 )
@@ -472,9 +454,7 @@ CUSHION = force_effect(
         "damping_ratio": _DAMPING_RATIO,
     },
     bounds={"damping_ratio": (0.0, MOST_DAMPING_OF_A_MODE)},
-    look_alikes=("effective_mass", "lateral_mode"),
     separated_by="two pressures of the gas",
     spoken_for_by=(CONSERVATIVE, ODD_IN_DISPLACEMENT),
-    includes=("mass_error", "effective_mass", "lateral_mode"),
     size=("stiffness_n_per_m", "mass_kg"),
 )

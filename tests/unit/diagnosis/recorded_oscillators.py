@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 
 from sloshlab.diagnosis.candidate import Surroundings, known_effects
 from sloshlab.diagnosis.case import CaseRun
+from sloshlab.diagnosis.free_run_fit import fitted
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.recording import run_attributes
 from sloshlab.rig import Rig
@@ -176,6 +178,15 @@ def driven(
     root = np.array([base_motion(t) for t in time])
     channels = changed({"acceleration_tip": a + root, "acceleration_root": root})
     return [run_of("driven", channels, noise, seed, experiment="other")]
+
+
+def fitted_from(
+    problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], n_iterations: int = 6
+) -> FreeRunFit:
+    """The best of the fits from several starts."""
+    return min(
+        (fitted(problem, start, n_iterations=n_iterations)[0] for start in starts), key=lambda fit: fit.cost
+    )
 
 
 def surroundings(model: RigModel) -> Surroundings:

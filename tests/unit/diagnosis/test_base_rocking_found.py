@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_oscillators import effect, run_of, surroundings
+from recorded_oscillators import effect, fitted_from, run_of, surroundings
 from scipy.signal import lsim
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, candidates
-from sloshlab.diagnosis.free_run_fit import fitted_from
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm, t
 
 from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.search.cluster_robust_errors import cluster_robust_errors
+from sloshlab.diagnosis.cluster_robust_errors import cluster_robust_errors
 
 N_TIMES, N_BANDS = 8, 5
 EFFECT = "tank.viscous_damping.damping_n_s_per_m"

@@ -50,16 +50,6 @@ VOCABULARY = [
 ]
 BY_DIRECTION = {"force_n": {"force_up_n", "force_down_n"}}
 """Numbers that a form with a direction has in place of one."""
-LOOK_ALIKES = [
-    ("asymmetric_friction", "coulomb_friction + constant_force"),
-    ("mass_error", "stiffness_change"),
-    ("viscous_damping", "structural_damping"),
-    ("structural_damping", "coulomb_friction"),
-    ("viscous_damping", "coulomb_friction"),
-    ("sensor_delay", "viscous_damping"),
-    ("sensor_gain", "mass_error"),
-    ("cubic_stiffness", "quadratic_stiffness"),
-]
 
 
 def built_in() -> list[Effect]:
@@ -97,29 +87,6 @@ def test_another_form_of_an_effect_answers_with_its_name_block_and_parameters() 
         has = {parameter.name for parameter in form.parameters}
         for needed in required[original.name]:
             assert needed in has or BY_DIRECTION[needed] <= has, (form.name, needed)
-
-
-@pytest.mark.parametrize(("first", "other"), LOOK_ALIKES)
-def test_look_alikes_know_each_other_and_what_separates_them(first: str, other: str) -> None:
-    assert any(other in effect.look_alikes for effect in named(first))
-    if " + " not in other:
-        assert any(first in effect.look_alikes for effect in named(other))
-    for name in (first, *other.split(" + ")):
-        assert all(effect.separated_by for effect in named(name))
-
-
-def test_what_moves_a_frequency_with_the_level_is_tried_in_place_of_what_does_so_too() -> None:
-    """A mass that fades in violent motion detunes a beam as a spring of third order does."""
-    [fading] = named("fading_mass")
-    assert {"cubic_stiffness", "hysteresis", "clearance"} <= set(fading.look_alikes)
-    assert not set(named("effective_mass")[0].look_alikes) & {"cubic_stiffness", "hysteresis", "clearance"}
-
-
-def test_whatever_has_a_look_alike_says_what_separates_it_and_names_known_ones() -> None:
-    names = {effect.name for effect in known_effects()}
-    for effect in known_effects():
-        assert bool(effect.separated_by) or not effect.look_alikes, effect.name
-        assert {part for name in effect.look_alikes for part in name.split(" + ")} <= names, effect.name
 
 
 def test_blocks_and_names_are_checked() -> None:

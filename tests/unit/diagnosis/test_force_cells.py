@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_oscillators import DRY_KG, LIQUID_KG, RATE_HZ, RIG, effect, run_of
+from recorded_oscillators import DRY_KG, LIQUID_KG, RATE_HZ, RIG, effect, fitted_from, run_of
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, channels_of, joined_channels
-from sloshlab.diagnosis.free_run_fit import fitted_from
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel

@@ -47,18 +47,19 @@ def test_noise_of_the_base_comes_through_the_resonance_as_its_closed_form_says(t
     run = quiet_run(60.0)
     plain = {"quiet": observations(run, ["acceleration_tip"])}
     fit = FreeRunFit((), {"damping of mode 1": MORE_DAMPING}, 0.0, 0.0)
-    [(place, found)] = _propagated_noise(
-        case_of(tmp_path, run), run, "acceleration_root", _WHITE, plain=plain, fit=fit
+    [(place, draws)] = _propagated_noise(
+        case_of(tmp_path, run), run, {"acceleration_root": _WHITE}, plain=plain, fit=fit
     ).items()
+    found = np.mean(draws**2, axis=0)
     ratio = MORE_DAMPING * DAMPING / (2 * MASS_KG * OMEGA)
     density = 2 * NOISE_M_PER_S2**2 / RATE_HZ
     expected = density * np.pi * OMEGA / (2 * np.pi) * (1 + 4 * ratio**2) / (4 * ratio)
     assert place == ("quiet", "acceleration_tip")
     noisier = _NoiseSpectrum(np.zeros(1), np.array([4.0]))
     [of_louder] = _propagated_noise(
-        case_of(tmp_path, run), run, "acceleration_root", noisier, plain=plain, fit=fit
+        case_of(tmp_path, run), run, {"acceleration_root": noisier}, plain=plain, fit=fit
     ).values()
-    assert of_louder == pytest.approx(4.0 * found)
+    assert of_louder == pytest.approx(2.0 * draws)
     assert float(found.mean()) == pytest.approx(expected, rel=0.15)
     frequencies, bands = plain["quiet"][0].frequencies_hz, found.mean(axis=0)
     resonance, above = (int(np.argmin(np.abs(frequencies - f))) for f in (OMEGA / (2 * np.pi), 25.0))
@@ -71,9 +72,10 @@ def test_a_channel_that_is_left_out_of_the_drive_is_compared_with_another_sensor
     without = CaseRun(run.name, run.recording.drop_vars("acceleration_tip"), run.attributes)
     fit = FreeRunFit((), {}, 0.0, 0.0)
     [found] = _propagated_noise(
-        case_of(tmp_path, run), without, "acceleration_root", _WHITE, plain=plain, fit=fit
+        case_of(tmp_path, run), without, {"acceleration_root": _WHITE}, plain=plain, fit=fit
     ).values()
-    assert found == pytest.approx(np.full(found.shape, NOISE_M_PER_S2**2))
+    # Away from the tapered ends, draws of white noise as loud as the sensor: 4 × 5 × 124 of them tell 3 %.
+    assert float(np.mean(found[:, 2:-2] ** 2)) == pytest.approx(NOISE_M_PER_S2**2, rel=0.08)
 
 
 SLOW, WHITE = 0.6, 0.8

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from recorded_oscillators import fitted_from
 from scipy.integrate import solve_ivp
 
 from pipelines.command_line import run as command
@@ -16,7 +17,6 @@ from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, known_effects
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.extension import NOTHING, Extension, SensorFault
-from sloshlab.diagnosis.free_run_fit import fitted_from
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.user_twin import (

@@ -6,7 +6,7 @@ import pytest
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, known_effects
-from sloshlab.diagnosis.verdict.wording import form_and_place, named_and_placed
+from sloshlab.diagnosis.wording import form_and_place, named_and_placed
 
 assert effects.__all__
 

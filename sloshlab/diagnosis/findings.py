@@ -1,0 +1,174 @@
+"""Everything that a diagnosis finds: fitted models with their likelihood, and the posterior of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Surroundings
+from sloshlab.diagnosis.case import Case
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.extension import Extension
+from sloshlab.diagnosis.free_run_fit import fitted_baseline
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of
+from sloshlab.diagnosis.inference.posterior import Posterior, posterior
+from sloshlab.diagnosis.inference.run_noise import run_noise
+from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
+from sloshlab.diagnosis.inference.whitened import whitened
+from sloshlab.diagnosis.noise_floor import weighted_observations
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
+from sloshlab.diagnosis.repeats import require_repeats
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
+from sloshlab.diagnosis.selection.model_selection import ModelSelection
+from sloshlab.diagnosis.split import Split, split
+from sloshlab.diagnosis.surroundings import surroundings_of
+from sloshlab.errors import InputError
+from sloshlab.twin.lane_preparation import IN_TURN, Executor
+
+assert effects.__all__  # importing the vocabulary makes it known
+
+FloatArray = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+_MOST_SCORED: Final = 16
+"""Models with effects, the lowest costs first: the others are too far behind to have any probability."""
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """Everything that a verdict is made of.
+
+    Attributes
+    ----------
+    case : Case
+    model : DiagnosedModel
+    split : Split
+    surroundings : Surroundings
+    fitting, held_out : list of list of Observation
+    believed, retuned : ScoredModel
+        Nothing missing: as the laboratory believes, and with its best numbers.
+    explanations : list of ScoredModel
+        With effects, the largest evidence first.
+    posterior : Posterior
+    failed : dict
+        Models that could not be fitted, and why.
+    n_candidates : int
+        Effects at all places that were tried.
+    """
+
+    case: Case
+    model: DiagnosedModel
+    split: Split
+    surroundings: Surroundings
+    fitting: list[list[Observation]]
+    held_out: list[list[Observation]]
+    believed: ScoredModel
+    retuned: ScoredModel
+    explanations: list[ScoredModel]
+    posterior: Posterior
+    failed: dict[str, str]
+    n_candidates: int
+
+    def readings(self, explanation: ScoredModel) -> dict[str, dict[str, FloatArray]]:
+        """What every channel of every run reads in an explanation."""
+        return {
+            run.name: self.model.simulate(run, explanation.values, explained_extension(explanation))
+            for run in self.case.runs
+        }
+
+
+def explained_extension(explanation: ScoredModel) -> Extension:
+    """What an explanation adds to the baseline."""
+    return extension_of(explanation.fit.candidates, explanation.values)
+
+
+def findings_of(
+    case: Case,
+    progress: Progress = lambda what, done, of: None,
+    model: DiagnosedModel | None = None,
+    *,
+    executor: Executor = IN_TURN,
+) -> Findings:
+    """Retune, search, and score every model that was found.
+
+    Parameters
+    ----------
+    case : Case
+    progress : callable, optional
+        Takes what is being done, how much of it is done, and how much there is.
+    model : DiagnosedModel, optional
+        A user's own twin of the same runs; that of the rig file by default.
+    executor : Executor, optional
+        Shares simulations among its workers; results do not depend on it.
+
+    Raises
+    ------
+    InputError, AnalysisError
+        If the case cannot be diagnosed.
+    """
+    require_one_rig(case)
+    if model is None:
+        if case.rig is None:
+            raise InputError(f"case {case.name}", got="neither a rig nor a twin", allowed="one of them")
+        model = cast(DiagnosedModel, RigModel(case.rig, case.folder, case.runs, executor=executor))
+    require_repeats(case, model)
+    require_comparable(case, model)
+    # Before any fit: what is held out must not depend on what is found.
+    parts = split(case)
+    progress("retuning the baseline", 0, 1)
+    # The noise floor uses all runs, held-out ones too: it says how well readings are known and chooses nothing.
+    weighted = weighted_observations(case, model)
+    fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
+    held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]] if parts.has_held_out else []
+    runs = FittedRuns(model, fitting, case.names_by_test())
+    problem = runs.problem()
+    # A plain refit can hide physics (leaving out the dry friction of a servo axis doubles its damping), and a
+    # wrong mass is no missing physics: retuning within tolerances comes before any question about effects.
+    retuned_fit, _ = fitted_baseline(problem)
+    selection = ModelSelection(runs, surroundings_of(problem, retuned_fit, case.rig), progress)
+    fits = selection.selected(retuned_fit)
+    nothing = next(fit for fit in fits if not fit.candidates)
+    with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)
+    believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), np.inf, np.inf)
+    believed, *models = _scored(
+        model, fitting, held_out, [believed_fit, nothing, *with_effects[:_MOST_SCORED]], nothing
+    )
+    return Findings(
+        case,
+        model,
+        parts,
+        selection.at,
+        fitting,
+        held_out,
+        believed,
+        models[0],
+        sorted(models[1:], key=lambda scored_model: -scored_model.evidence),
+        posterior(models, len(selection.pool)),
+        selection.failed,
+        len(selection.pool),
+    )
+
+
+def _scored(
+    model: DiagnosedModel,
+    fitting: Sequence[Sequence[Observation]],
+    held_out: Sequence[Sequence[Observation]],
+    fits: Sequence[FreeRunFit],
+    nothing: FreeRunFit,
+) -> list[ScoredModel]:
+    """Models with their likelihood over fitted and held-out runs, without those that do not run on the latter."""
+    everything = [*fitting, *held_out]
+    noise = [run_noise(model, run, nothing.values) for run in everything]
+    names, found = {run[0].run.name for run in held_out}, []
+    for fit in fits:
+        values = values_of_runs(model, held_out, fit)
+        runs = whitened(model, everything, fit.candidates, values, noise)
+        if runs is not None:
+            found.append(scored(fit, values, runs, names))
+    return found

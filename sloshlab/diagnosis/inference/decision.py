@@ -1,0 +1,121 @@
+"""The decision: what is said, from the posterior alone, by the numbers below.
+
+- What is named has the posterior `NAMED`; a set of names that has it together is said as a set.
+- Two models that predict the same within `TOLD_APART` (`posterior`) are equals; of one that needs more numbers for
+  it only the simpler one is said.
+- An effect below `LEAST_STRENGTH` (`posterior`) is not worth a word: it counts as nothing missing.
+- A name may leave the largest of `RELATIVE_ERRORS` (`scored_model`) of what it explains; more is a remainder.
+- The place of what has no name needs `LOCATED`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sloshlab.diagnosis.inference.places import block_of
+from sloshlab.diagnosis.inference.posterior import NONE, TOLD_APART, UNKNOWN, Posterior
+from sloshlab.diagnosis.inference.remainder import TEMPERING
+from sloshlab.diagnosis.inference.scored_model import ScoredModel, difference
+
+NAMED: Final = 0.9
+"""Posterior probability that a name, or a set of names, needs: a wrong name costs nine times as much as none."""
+LOCATED: Final = 0.8
+"""Probability of a block, given that something has no name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What is said.
+
+    Attributes
+    ----------
+    kind : {"nothing_missing", "named", "indistinguishable", "unknown"}
+    best : ScoredModel or None
+        What is named, or the nearest model with a name of what has none; None where nothing is missing.
+    alternatives : list of ScoredModel
+        All that cannot be told apart, the best first; it alone where one is named.
+    place : str
+        Of what has no name; empty where it is not located.
+    probabilities : dict
+        Of everything that might be said, the largest first.
+    """
+
+    kind: str
+    best: ScoredModel | None
+    alternatives: list[ScoredModel]
+    place: str
+    probabilities: dict[str, float]
+
+    @property
+    def block(self) -> str:
+        """Block of what has no name."""
+        return block_of(self.place)
+
+
+def decided(found: Posterior, tempering: float = TEMPERING) -> Decision:
+    """What is said of a posterior.
+
+    Parameters
+    ----------
+    found : Posterior
+    tempering : float, optional
+        As of the posterior.
+    """
+    labels = found.by_label()
+    named = {label: p for label, p in labels.items() if label not in (NONE, UNKNOWN)}
+    if labels.get(NONE, 0.0) >= max(sum(named.values()), labels.get(UNKNOWN, 0.0)):
+        return Decision("nothing_missing", None, [], "", labels)
+    chosen: list[str] = []
+    for label in named:
+        chosen.append(label)
+        if sum(named[each] for each in chosen) >= NAMED:
+            break
+    if sum(named[each] for each in chosen) < NAMED:
+        return _unknown(found, next(iter(named), ""), labels)
+    best = found.best(chosen[0]).model
+    models = [found.best(label).model for label in chosen]
+    models += [model for model in equals_of(best, found, tempering) if all(model.names != m.names for m in models)]
+    return Decision("named" if len(models) == 1 else "indistinguishable", best, models, "", labels)
+
+
+def _unknown(found: Posterior, nearest: str, labels: dict[str, float]) -> Decision:
+    blocks = found.by_block()
+    block, p = next(iter(blocks.items()), ("", 0.0))
+    places = [h.place for h in found.of_label(UNKNOWN) if block_of(h.place) == block]
+    best = found.best(nearest).model if nearest else None
+    return Decision("unknown", best, [], places[0] if p >= LOCATED and places else "", labels)
+
+
+def equals_of(best: ScoredModel, found: Posterior, tempering: float = TEMPERING) -> list[ScoredModel]:
+    """Models of no more numbers that predict the same as the best within what recordings tell apart.
+
+    Parameters
+    ----------
+    best : ScoredModel
+    found : Posterior
+    tempering : float
+    """
+    models = {id(h.model): h.model for h in found.hypotheses if not h.place and h.label not in (NONE, UNKNOWN)}
+    alike = [
+        model
+        for model in models.values()
+        if model.names != best.names
+        and model.n_numbers <= best.n_numbers
+        and not set(best.keys) < set(model.keys)
+        and difference(best, model) / tempering < TOLD_APART
+    ]
+    return sorted(alike, key=lambda model: -model.evidence)
+
+
+def standard_error_of_difference(first: ScoredModel, other: ScoredModel) -> float:
+    """Standard error of the difference of two log-likelihoods, by its scatter over cells of time.
+
+    Parameters
+    ----------
+    first, other : ScoredModel
+    """
+    by_cell = first.remainder.noise - other.remainder.noise
+    return float(np.sqrt(by_cell.size) * by_cell.std(ddof=1))

@@ -1,0 +1,75 @@
+"""Places of a remainder: how a force of structure or tank, or an error of a sensor, shows in all channels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.force_inversion import ORDERS, modal_weights, response
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.rig_model import RigModel, retuned_structure
+from sloshlab.twin.structure import Structure
+
+ComplexArray = NDArray[np.complex128]
+SENSOR: Final = "sensor"
+STRUCTURE, TANK = "structure", "tank"
+
+
+def block_of(place: str) -> str:
+    """Block to which a place belongs.
+
+    Examples
+    --------
+    >>> block_of("sensor force_cell_1"), block_of("tank")
+    ('sensor', 'tank')
+    """
+    return place.partition(" ")[0]
+
+
+def transfers_of(
+    model: DiagnosedModel, run: Sequence[Observation], values: Mapping[str, float]
+) -> dict[str, ComplexArray]:
+    """Readings of the channels per force at each place, shape (n_bands, n_channels).
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+        Of a user's own twin no transfer is known, and there is no such place.
+    run : sequence of Observation
+    values : mapping
+        Of the baseline.
+    """
+    if not isinstance(model, RigModel):
+        return {}
+    structure = None if model.twin.structure is None else retuned_structure(model.twin.structure, values)
+    carried_kg = model.twin.carried_mass_kg * values.get("carried mass", 1.0)
+    n_cells = sum(each.channel.startswith("force_cell") for each in run)
+    shares = np.array([1 / n_cells if each.channel.startswith("force_cell") else 1.0 for each in run])
+    return {
+        place: shares * np.stack([_transfer(model, structure, carried_kg, each, place) for each in run], axis=1)
+        for place in (STRUCTURE, TANK)
+    }
+
+
+def _transfer(
+    model: RigModel, structure: Structure | None, carried_kg: float, observation: Observation, place: str
+) -> ComplexArray:
+    """Reading of a channel per force at a place, shape (n_bands,)."""
+    frequency = observation.frequencies_hz
+    attributes, name = observation.run.recording[observation.channel].attrs, observation.channel
+    if name.startswith("force"):
+        # F = M ü − f between structure and tank: a force on the tank moves it and is itself seen by the cell, one
+        # on the structure only moves it.
+        moved = np.zeros(frequency.size, complex)
+        if structure is not None:
+            moved = carried_kg * response(structure, structure.mode_shape, 2, frequency)
+        sign = -1.0 if attributes.get("block_from") == "tank" else 1.0
+        return np.asarray(sign * (moved - (1.0 if place == TANK else 0.0)), np.complex128)
+    weights = None if structure is None else modal_weights(structure, model.rig, name, attributes.get("x_m"))
+    if structure is None or weights is None:
+        return np.zeros(frequency.size, np.complex128)
+    return np.asarray(response(structure, weights, ORDERS[name.partition("_")[0]], frequency), np.complex128)

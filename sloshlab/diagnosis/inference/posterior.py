@@ -1,0 +1,172 @@
+"""Posterior probabilities of models: evidence averaged over resampled recordings (pseudo-BMA+).
+
+The evidence of a model is a sum over stretches of the recordings, which scatters from stretch to stretch where no
+model is quite right. Weights are averaged over Bayesian bootstraps of the stretches, so that a lead that rests on
+few of them is no certainty (Yao, Vehtari, Simpson and Gelman 2018, doi:10.1214/17-BA1091).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+
+from sloshlab.diagnosis.inference.places import block_of
+from sloshlab.diagnosis.inference.remainder import PRIOR_OF_REMAINDER, SHARES, TEMPERING
+from sloshlab.diagnosis.inference.scored_model import ScoredModel, difference, strength
+
+FloatArray = NDArray[np.float64]
+NONE, UNKNOWN = "none", "unknown"
+LEAST_STRENGTH: Final = 0.5
+"""Noise floors of the channel that shows it most, below which an effect is not worth a word."""
+TOLD_APART: Final = 3.0
+"""Expected log-likelihood ratio from which recordings tell two models apart: twenty to one."""
+_N_DRAWS: Final = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A model, with noise alone or with a remainder at a place.
+
+    Attributes
+    ----------
+    model : ScoredModel
+    place : str
+        Empty where nothing remains.
+    label : str
+        What is said if it is true: names joined by " + ", none, or unknown.
+    log_prior : float
+    by_cell : ndarray, shape (n_cells_of_time,)
+        Log-likelihood.
+    """
+
+    model: ScoredModel
+    place: str
+    label: str
+    log_prior: float
+    by_cell: FloatArray
+
+    @property
+    def log_evidence(self) -> float:
+        """With its prior."""
+        return float(self.by_cell.sum()) - self.model.complexity + self.log_prior
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Probabilities of hypotheses.
+
+    Attributes
+    ----------
+    hypotheses : tuple of Hypothesis
+    probabilities : ndarray, shape (n_hypotheses,)
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    probabilities: FloatArray
+
+    def by_label(self) -> dict[str, float]:
+        """Probability of everything that may be said, the largest first."""
+        return self._summed([hypothesis.label for hypothesis in self.hypotheses])
+
+    def by_block(self) -> dict[str, float]:
+        """Probability of each block of what has no name, given that something has none."""
+        unknown = [h.label == UNKNOWN for h in self.hypotheses]
+        total = float(self.probabilities[unknown].sum())
+        if total <= 0:
+            return {}
+        blocks = [
+            block_of(h.place) if is_unknown else "" for h, is_unknown in zip(self.hypotheses, unknown, strict=True)
+        ]
+        return {block: p / total for block, p in self._summed(blocks).items() if block}
+
+    def best(self, label: str) -> Hypothesis:
+        """The hypothesis of a label with the fewest numbers of those that are as good, else the best."""
+        own = [h for h in self.of_label(label) if label in (NONE, UNKNOWN, " + ".join(h.model.names))]
+        return (own or self.of_label(label))[0]
+
+    def of_label(self, label: str) -> list[Hypothesis]:
+        """All hypotheses of a label, the largest evidence first."""
+        return sorted((h for h in self.hypotheses if h.label == label), key=lambda h: -h.log_evidence)
+
+    def _summed(self, labels: Sequence[str]) -> dict[str, float]:
+        sums: dict[str, float] = {}
+        for label, p in zip(labels, self.probabilities, strict=True):
+            sums[label] = sums.get(label, 0.0) + float(p)
+        return dict(sorted(sums.items(), key=lambda item: -item[1]))
+
+
+def posterior(
+    models: Sequence[ScoredModel], n_candidates: int, tempering: float = TEMPERING, seed: int = 0
+) -> Posterior:
+    """Posterior of all models, each with noise alone and with a remainder at every place.
+
+    Parameters
+    ----------
+    models : sequence of ScoredModel
+        The first one without effects.
+    n_candidates : int
+        Effects at all places that were tried as a single one.
+    tempering : float, optional
+        Log-likelihoods are divided by it.
+    seed : int
+    """
+    labels = _labels(models, tempering)
+    found = [
+        hypothesis
+        for model, label in zip(models, labels, strict=True)
+        for hypothesis in _hypotheses(model, label, n_candidates)
+    ]
+    n_cells = found[0].by_cell.size
+    weights = np.random.default_rng(seed).dirichlet(np.ones(n_cells), _N_DRAWS) * n_cells
+    fixed = np.array([h.log_prior - h.model.complexity for h in found])
+    scores = weights @ np.stack([h.by_cell for h in found], axis=1) / tempering + fixed
+    return Posterior(tuple(found), np.asarray(softmax(scores, axis=1).mean(axis=0)))
+
+
+def _labels(models: Sequence[ScoredModel], tempering: float) -> list[str]:
+    """What is said of each model: the names of the simplest one that it is no more than.
+
+    A model is no more than one of fewer numbers that predicts the same, nor than one to which its further effects
+    add nothing worth a word.
+    """
+    labels = []
+    for model in models:
+        simpler = [
+            other
+            for other in models
+            if other.n_numbers < model.n_numbers and _is_no_more_than(model, other, tempering)
+        ]
+        as_simple = min(simpler, key=lambda other: (other.n_numbers, -other.evidence), default=model)
+        labels.append(" + ".join(as_simple.names) or NONE)
+    return labels
+
+
+def _is_no_more_than(model: ScoredModel, other: ScoredModel, tempering: float) -> bool:
+    if difference(model, other) / tempering < TOLD_APART:
+        return True
+    return set(other.keys) < set(model.keys) and strength(other, model) < LEAST_STRENGTH
+
+
+def _hypotheses(model: ScoredModel, label: str, n_candidates: int) -> list[Hypothesis]:
+    n = len(model.fit.candidates)
+    # Half of all cases have no effect, a quarter one, an eighth two …; candidates are alike.
+    log_prior = -(n + 1) * np.log(2.0) - n * np.log(max(n_candidates, 1))
+    found = [Hypothesis(model, "", label, log_prior, model.remainder.noise)]
+    places = model.remainder.places
+    for place, by_share in places.items():
+        share = int(np.argmax(by_share.sum(axis=1)))
+        found.append(
+            Hypothesis(
+                model,
+                place,
+                UNKNOWN,
+                log_prior + np.log(PRIOR_OF_REMAINDER / len(places) / SHARES.size),
+                by_share[share],
+            )
+        )
+    return found

@@ -1,0 +1,144 @@
+r"""What a model leaves beside noise: *any force* of a block, *any error* of a sensor, as models of their own.
+
+Residual spectra of all channels of a run, in standard deviations of their noise, are vectors x. Noise makes them
+standard normal. A force f at a place of the structure adds g f to them, with the transfer g of the channels per
+force; f is a Gaussian process whose power s is constant within a cell of time and frequency and otherwise free, so
+that x has the covariance
+
+.. math:: I + s\, \mathrm{Re}(g g^H) / |g|^2
+
+(the transform is real and its phase runs, so that both quadratures of g count). An error of a sensor is the same
+with g along its channel. The power is integrated over a log-uniform prior, together with the share π of cells that
+have any. A burst, all bands of one sensor in a stretch of time, belongs to the noise.
+
+So *something is left* is a model with a marginal likelihood like any other, per place. Latent forces as Gaussian
+processes: Rogers and Friis (2022), doi:10.1016/j.ymssp.2022.109308; spike and slab: Mitchell and Beauchamp (1988),
+doi:10.1080/01621459.1988.10478694.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+from scipy.special import logsumexp
+
+from sloshlab.diagnosis.inference.places import SENSOR, block_of
+from sloshlab.diagnosis.inference.run_noise import sums_of_cells
+from sloshlab.diagnosis.inference.whitened import WhitenedRun
+
+FloatArray = NDArray[np.float64]
+_POWERS: Final = np.geomspace(4.0, 4e4, 13)
+"""In noise variances, three a decade: from twice the noise in amplitude, below which nothing is worth a word, to
+what hides every noise (log-uniform prior)."""
+SHARES: Final = np.array([0.01, 0.05, 0.2, 0.8])
+"""Of cells that have a remainder: from bursts to everywhere."""
+BURST: Final = 0.01
+"""Share of the stretches of time in which a sensor has a burst of noise, of any power."""
+
+PRIOR_OF_REMAINDER: Final = 0.1
+"""Probability that something is left that no effect of a model explains."""
+TEMPERING: Final = 10.0
+"""Factor by which log-likelihoods are too large: coefficients of a cell share what is wrong with their noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """Log-likelihood of one model, cell by cell of time, and with a remainder at each place.
+
+    Attributes
+    ----------
+    noise : ndarray, shape (n_cells_of_time,)
+        With noise and bursts alone.
+    places : dict
+        The same with any force, or any error of a sensor, at a place; shape (n_shares, n_cells_of_time).
+    """
+
+    noise: FloatArray
+    places: dict[str, FloatArray]
+
+    def gain(self, place: str) -> float:
+        """Log evidence ratio of a remainder at a place over noise alone."""
+        return float(logsumexp(self.places[place].sum(axis=1)) - np.log(SHARES.size) - self.noise.sum())
+
+    @property
+    def largest_gain(self) -> float:
+        """Over all places."""
+        return max((self.gain(place) for place in self.places), default=0.0)
+
+    @property
+    def is_probable(self) -> bool:
+        """Whether a remainder at some place is more probable than noise and bursts alone."""
+        return self.largest_gain / TEMPERING + float(np.log(PRIOR_OF_REMAINDER)) > 0
+
+
+def remainder(runs: Sequence[WhitenedRun], relative_error: float = 0.0) -> Remainder:
+    """What a model leaves.
+
+    Parameters
+    ----------
+    runs : sequence of WhitenedRun
+    relative_error : float
+        Of what the effects of the model contribute: a law is known no better than that.
+    """
+    noise: list[FloatArray] = []
+    per_run: list[dict[str, FloatArray]] = []
+    for run in runs:
+        variance = 1.0 + relative_error**2 * smoothed(run.contribution**2)
+        x = run.residual / np.sqrt(variance)
+        independent = run.noise.whitened(x)
+        plain = sums_of_cells((-0.5 * np.log(variance) - 0.5 * independent**2).sum(axis=0)).sum(axis=-1)
+        gains = {place: _gains(independent, *directions) for place, directions in run.noise.places.items()}
+        # A burst is noise of one sensor in all bands of a stretch of time.
+        bursts = [gain.sum(axis=-1) for place, gain in gains.items() if block_of(place) == SENSOR]
+        burst = np.log(BURST) + _log_mean(np.concatenate(bursts))
+        noise.append(plain + np.logaddexp(np.log1p(-BURST), burst))
+        per_run.append(
+            {
+                place: plain + np.logaddexp(np.log1p(-BURST) + _mixed(_log_mean(gain)).sum(axis=-1), burst)
+                for place, gain in gains.items()
+            }
+        )
+    places = dict.fromkeys(place for found in per_run for place in found)
+    return Remainder(
+        np.concatenate(noise),
+        {
+            place: np.concatenate(
+                [
+                    found.get(place, np.broadcast_to(own, (SHARES.size, own.size)))
+                    for found, own in zip(per_run, noise, strict=True)
+                ],
+                axis=1,
+            )
+            for place in places
+        },
+    )
+
+
+def smoothed(power: FloatArray) -> FloatArray:
+    """Power over three neighbouring blocks and five bands, as a law that is off a little shows beside it, too."""
+    return np.asarray(uniform_filter(power, (0, 3, 5), mode="nearest"))
+
+
+def _gains(x: FloatArray, projections: FloatArray, shares: FloatArray) -> FloatArray:
+    """Log-likelihood ratios of every power over none, shape (n_powers, cells of time, cells of frequency)."""
+    along = np.einsum("bkmc,cbk->bkm", projections, x) ** 2
+    gains = []
+    for power in _POWERS:
+        size = power * shares
+        gains.append(sums_of_cells((-0.5 * np.log1p(size) + 0.5 * along * (size / (1.0 + size))).sum(axis=-1)))
+    return np.array(gains)
+
+
+def _log_mean(gains: FloatArray) -> FloatArray:
+    return np.asarray(logsumexp(gains, axis=0) - np.log(gains.shape[0]))
+
+
+def _mixed(gain: FloatArray) -> FloatArray:
+    """Log-likelihood ratios where a share of the cells has a remainder, shape (n_shares, …)."""
+    shares = SHARES[:, None, None]
+    return np.asarray(np.logaddexp(np.log1p(-shares), np.log(shares) + gain))

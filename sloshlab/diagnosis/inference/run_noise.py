@@ -1,0 +1,134 @@
+r"""Noise of all channels of a run together, and the places at which something may show beside it.
+
+The noise of an accelerometer that drives shows in all channels at once. In standard deviations of their noise, the
+channels have the covariance
+
+.. math:: \Sigma = I - \mathrm{diag}(D) + D, \qquad D_{cd} = \langle d_c d_d \rangle
+
+with what draws d of that noise make of the channels, averaged over draws and a cell of time and frequency. The
+residuals are whitened by the inverse of its Cholesky root, and so is the transfer of every place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.inference.places import SENSOR, STRUCTURE, transfers_of
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.rig_model import RigModel
+
+FloatArray = NDArray[np.float64]
+BLOCKS_OF_A_CELL: Final = 4
+BANDS_OF_A_CELL: Final = 4
+"""Two seconds and four hertz of the transform, within which powers and correlations are constant."""
+_LARGEST_CORRELATION: Final = 0.95
+"""Of the noise of two channels: sensors have noise of their own, which draws of the drive's do not contain."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunNoise:
+    """Noise and places of one run.
+
+    Attributes
+    ----------
+    inverse_root : ndarray, shape (n_blocks, n_bands, n_channels, n_channels)
+        Of the covariance of the channels; identity where their noise is independent.
+    places : dict of str to (ndarray, ndarray)
+        Projections of whitened channels on the directions in which a place shows, shape (n_blocks, n_bands, m,
+        n_channels), and the share of its power in each, shape (n_blocks, n_bands, m).
+    """
+
+    inverse_root: FloatArray
+    places: dict[str, tuple[FloatArray, FloatArray]]
+
+    def whitened(self, x: FloatArray) -> FloatArray:
+        """Channels with independent noise.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n_channels, n_blocks, n_bands)
+            In standard deviations.
+        """
+        return np.asarray(np.einsum("bkcd,dbk->cbk", self.inverse_root, x))
+
+
+def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Mapping[str, float]) -> RunNoise:
+    """Noise and places of a run.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    observed : sequence of Observation
+    values : mapping
+        Of the baseline, for the transfers of its structure.
+    """
+    covariance = _covariance(observed)
+    inverse_root = np.linalg.inv(np.linalg.cholesky(covariance))
+    n = len(observed)
+    noise = np.sqrt(np.stack([each.variance for each in observed], axis=-1))
+    places = {}
+    for place, transfers in transfers_of(model, observed, values).items():
+        # Real and imaginary part as two directions: the transform is real, and its phase runs.
+        parts = np.stack([transfers.real, transfers.imag], axis=-1)
+        if parts.any():
+            places[place] = _projections(inverse_root @ (parts[None] / noise[..., None]))
+    if not isinstance(model, RigModel):
+        # Of a user's own twin no transfer is known: a force shows in any way in all channels.
+        places[STRUCTURE] = _projections(inverse_root)
+    for i, each in enumerate(observed):
+        places[f"{SENSOR} {each.channel}"] = _projections(inverse_root @ np.eye(n)[:, i : i + 1])
+    return RunNoise(inverse_root, places)
+
+
+def _covariance(observed: Sequence[Observation]) -> FloatArray:
+    """Correlation of the noise of the channels, shape (n_blocks, n_bands, n_channels, n_channels)."""
+    n, shape = len(observed), observed[0].spectra.shape
+    covariance = np.broadcast_to(np.eye(n), (*shape, n, n)).copy()
+    if any(each.of_drive is None for each in observed):
+        return covariance
+    drawn = np.stack([np.asarray(each.of_drive) / np.sqrt(each.variance) for each in observed])
+    for i in range(n):
+        for j in range(i):
+            product = averaged_over_cells(np.mean(drawn[i] * drawn[j], axis=0))
+            size = np.sqrt(
+                np.maximum(averaged_over_cells(np.mean(drawn[i] ** 2, axis=0)), 1.0)
+                * np.maximum(averaged_over_cells(np.mean(drawn[j] ** 2, axis=0)), 1.0)
+            )
+            # Draws larger than the noise of a channel say how it is shared, not how large it is.
+            shared = np.clip(product / size, -1.0, 1.0)
+            covariance[..., i, j] = covariance[..., j, i] = _LARGEST_CORRELATION * shared
+    return covariance
+
+
+def _projections(directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal directions of the columns of (…, n_channels, m) with the share of their power in each."""
+    gram = np.swapaxes(directions, -1, -2) @ directions
+    powers, vectors = np.linalg.eigh(gram)
+    powers = np.maximum(powers, 0.0)
+    largest = powers.max(axis=-1, keepdims=True)
+    safe = np.where(powers > 1e-9 * largest, powers, np.inf)
+    rows = np.swapaxes(directions @ vectors, -1, -2) / np.sqrt(safe)[..., None]
+    total = powers.sum(axis=-1, keepdims=True)
+    return rows, np.where(np.isfinite(safe), powers, 0.0) / np.where(total > 0, total, 1.0)
+
+
+def averaged_over_cells(values: FloatArray) -> FloatArray:
+    """Mean over every cell in the place of each value, shape (n_blocks, n_bands)."""
+    n_blocks, n_bands = values.shape
+    counts = sums_of_cells(np.ones_like(values))
+    means = sums_of_cells(values) / counts
+    rows = np.arange(n_blocks) // BLOCKS_OF_A_CELL
+    return np.asarray(means[rows][:, np.arange(n_bands) // BANDS_OF_A_CELL])
+
+
+def sums_of_cells(values: FloatArray) -> FloatArray:
+    """Sums over the cells of time and frequency; the last two axes are blocks and bands."""
+    n_blocks, n_bands = values.shape[-2:]
+    by_time = np.add.reduceat(values, np.arange(0, n_blocks, BLOCKS_OF_A_CELL), axis=-2)
+    return np.asarray(np.add.reduceat(by_time, np.arange(0, n_bands, BANDS_OF_A_CELL), axis=-1))

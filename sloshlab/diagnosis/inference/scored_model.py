@@ -1,0 +1,208 @@
+r"""Evidence of one model: its likelihood in every cell of time, less what its freedom costs.
+
+.. math:: \log Z_M = \log p(y | \hat\theta_M, M) - \tfrac12 |\hat\theta_\mathrm{baseline}|^2
+          + \log \pi(\hat\theta_\mathrm{effect}) + \tfrac12 \log\det(2\pi C_\mathrm{effect}) + \mathrm{const}
+
+Laplace's approximation about the maximum a posteriori fit, whose covariance C contains the correlation of the
+effect's numbers with those of the baseline; the constant is common to all models. Held-out runs are part of y:
+their likelihood given the fit is the predictive factor of the same evidence (chain rule).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.candidate import channels_of
+from sloshlab.diagnosis.free_run_problem import HUBER_LIMIT, FreeRunFit
+from sloshlab.diagnosis.inference.remainder import Remainder, remainder
+from sloshlab.diagnosis.inference.whitened import WhitenedRun
+from sloshlab.diagnosis.prior import ParameterPrior
+
+FloatArray = NDArray[np.float64]
+RELATIVE_ERRORS: Final = (0.0, 0.02, 0.05, 0.1, 0.2)
+"""Of what named effects contribute: a law in a laboratory is its formula to so much; the largest is how much a
+name may leave of what it explains."""
+_FEWEST_COEFFICIENTS: Final = 50
+"""Below it a mean square is too uncertain to be used: its standard error is a fifth."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredModel:
+    """A fitted model with its likelihood.
+
+    Attributes
+    ----------
+    fit : FreeRunFit
+    values : dict
+        Of the fit, and those of single runs that were not fitted.
+    runs : list of WhitenedRun
+        Fitted and held-out ones.
+    remainder : Remainder
+        With the relative error that describes the recordings best.
+    relative_error : float
+    held_out : frozenset of str
+        Names of the runs that chose nothing.
+    complexity : float
+        What its freedom costs: minus the logarithm of prior over posterior volume, and what moving the baseline
+        from what is believed costs.
+    """
+
+    fit: FreeRunFit
+    values: dict[str, float]
+    runs: list[WhitenedRun]
+    remainder: Remainder
+    relative_error: float
+    held_out: frozenset[str]
+    complexity: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its effects, sorted."""
+        return tuple(sorted(candidate.effect.known_as for candidate in self.fit.candidates))
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Blocks, names and channels of its effects."""
+        return tuple(candidate.key for candidate in self.fit.candidates)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels on which its effects act."""
+        return tuple(
+            name
+            for candidate in self.fit.candidates
+            if candidate.channel
+            for name in channels_of(candidate.channel)
+        )
+
+    @property
+    def held_out_rms(self) -> float:
+        """RMS of the residuals of held-out runs, in noise floors, where recordings stand out of the noise."""
+        return self._rms([run for run in self.runs if run.name in self.held_out])
+
+    @property
+    def fitted_rms(self) -> float:
+        """The same of the fitted runs."""
+        return self._rms([run for run in self.runs if run.name not in self.held_out])
+
+    @staticmethod
+    def _rms(runs: Sequence[WhitenedRun]) -> float:
+        squares = [
+            robust_squares(run.residual[i][observation.informative])
+            for run in runs
+            for i, observation in enumerate(run.observed)
+        ]
+        joined = np.concatenate([np.zeros(0), *squares])
+        return float(np.sqrt(joined.mean())) if joined.size else 0.0
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm, with noise alone beside the model."""
+        return float(self.remainder.noise.sum()) - self.complexity
+
+    @property
+    def n_numbers(self) -> int:
+        """Numbers of its effects."""
+        return sum(len(candidate.effect.parameters) for candidate in self.fit.candidates)
+
+
+def scored(
+    fit: FreeRunFit,
+    values: Mapping[str, float],
+    runs: Sequence[WhitenedRun],
+    held_out: Collection[str] = (),
+) -> ScoredModel:
+    """A model with its likelihood.
+
+    Parameters
+    ----------
+    fit : FreeRunFit
+    values : mapping
+    runs : sequence of WhitenedRun
+    held_out : collection of str
+        Names of the runs that chose nothing.
+    """
+    errors = RELATIVE_ERRORS if fit.candidates else RELATIVE_ERRORS[:1]
+    found = [remainder(runs, error) for error in errors]
+    best = int(np.argmax([each.noise.sum() for each in found]))
+    return ScoredModel(
+        fit,
+        dict(values),
+        list(runs),
+        found[best],
+        errors[best],
+        frozenset(held_out),
+        complexity(fit) + float(np.log(len(errors))),
+    )
+
+
+def complexity(fit: FreeRunFit) -> float:
+    """Minus the logarithm of posterior over prior volume of a fit, and the cost of its baseline's deviations.
+
+    Parameters
+    ----------
+    fit : FreeRunFit
+    """
+    of_belief = 0.5 * max(fit.cost - fit.misfit, 0.0)
+    priors = [prior for candidate in fit.candidates for prior in candidate.prior if prior.name in fit.names]
+    if not priors:
+        return of_belief
+    places = [fit.names.index(prior.name) for prior in priors]
+    # In units in which the prior is uniform from 0 to 1: by its density. A number beyond its range is at its end.
+    densities = [np.exp(prior.log_density(_within(fit.values[prior.name], prior))) for prior in priors]
+    errors = fit.scales[places] * np.array(densities)
+    variances = np.linalg.eigvalsh(fit.covariance[np.ix_(places, places)] * np.outer(errors, errors))
+    # A number that the recordings do not tell has its prior: no wider than that, and no gain by it.
+    return of_belief - 0.5 * float(np.log(np.clip(2 * np.pi * variances, 1e-300, 1.0)).sum())
+
+
+def _within(value: float, prior: ParameterPrior) -> float:
+    if prior.may_be_negative:
+        return float(np.copysign(min(max(abs(value), prior.low), prior.high), value))
+    return min(max(value, prior.low), prior.high)
+
+
+def difference(first: ScoredModel, other: ScoredModel) -> float:
+    """Expected log likelihood ratio by which the recordings tell two models apart: half the squared difference of
+    what they predict, in standard deviations of the noise.
+
+    Parameters
+    ----------
+    first, other : ScoredModel
+    """
+    return 0.5 * sum(
+        float(np.sum(one.noise.whitened(one.residual - two.residual) ** 2))
+        for one, two in zip(first.runs, other.runs, strict=True)
+    )
+
+
+def strength(before: ScoredModel, after: ScoredModel) -> float:
+    """Effect size: what a model removes from the channel of a run that shows it most, in noise floors.
+
+    √(before/after − 1) of the mean squares of informative residuals, neither below the noise floor; bursts count
+    linearly.
+
+    Parameters
+    ----------
+    before, after : ScoredModel
+    """
+    largest = 0.0
+    for one, two in zip(before.runs, after.runs, strict=True):
+        for i, observation in enumerate(one.observed):
+            shown = observation.informative
+            if shown.sum() >= _FEWEST_COEFFICIENTS:
+                left = [max(1.0, float(robust_squares(run.residual[i][shown]).mean())) for run in (one, two)]
+                largest = max(largest, left[0] / left[1] - 1.0)
+    return float(np.sqrt(largest))
+
+
+def robust_squares(residual: FloatArray) -> FloatArray:
+    """Huber's loss of every residual: its square, linear beyond the limit of the fits."""
+    size = np.abs(residual)
+    within = np.minimum(size, HUBER_LIMIT)
+    return np.asarray(within * (2 * size - within))

@@ -1,0 +1,86 @@
+"""Residuals of a model in standard deviations of the noise, and what its effects contribute in the same units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.free_run_problem import extension_of
+from sloshlab.diagnosis.inference.run_noise import RunNoise
+from sloshlab.diagnosis.observations import Observation
+from sloshlab.errors import SloshlabError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class WhitenedRun:
+    """One run under one model.
+
+    Attributes
+    ----------
+    observed : sequence of Observation
+        Its channels.
+    residual : ndarray, shape (n_channels, n_blocks, n_bands)
+        Recorded minus simulated spectra over the standard deviation of the noise.
+    contribution : ndarray of the same shape
+        What the effects of the model change in the simulated spectra, in the same units; zero without effects.
+    noise : RunNoise
+        Of its channels together.
+    """
+
+    observed: Sequence[Observation]
+    residual: FloatArray
+    contribution: FloatArray
+    noise: RunNoise
+
+    @property
+    def name(self) -> str:
+        """Of the run."""
+        return self.observed[0].run.name
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """In the order of the arrays."""
+        return tuple(observation.channel for observation in self.observed)
+
+
+def whitened(
+    model: DiagnosedModel,
+    runs: Sequence[Sequence[Observation]],
+    candidates: Sequence[Candidate],
+    values: Mapping[str, float],
+    noise: Sequence[RunNoise],
+) -> list[WhitenedRun] | None:
+    """Runs under a model; None where its simulation does not reach the end of each.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    runs : sequence of sequences of Observation
+    candidates : sequence of Candidate
+        Effects of the model.
+    values : mapping
+        All numbers, those of single runs too.
+    noise : sequence of RunNoise
+        Per run.
+    """
+    extension, found = extension_of(candidates, values), []
+    for observed, of_run in zip(runs, noise, strict=True):
+        run = observed[0].run
+        names = [observation.channel for observation in observed]
+        try:
+            readings = model.simulate(run, values, extension, names)
+            # The same numbers of the baseline without the effects: what they alone change.
+            plain = model.simulate(run, values, extension_of((), values), names) if candidates else readings
+        except SloshlabError:
+            return None
+        residual = np.stack([each.residual(readings[each.channel]) for each in observed])
+        without = np.stack([each.residual(plain[each.channel]) for each in observed]) if candidates else residual
+        found.append(WhitenedRun(observed, residual, without - residual, of_run))
+    return found

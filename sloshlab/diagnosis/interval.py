@@ -1,0 +1,69 @@
+"""Intervals of what is named: the posterior of the fit, at least as wide as stretches of the runs disagree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.cluster_robust_errors import cluster_robust_errors
+from sloshlab.diagnosis.findings import Findings
+from sloshlab.diagnosis.inference.scored_model import ScoredModel
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+
+LEVEL: Final = 0.90
+_NORMAL_90: Final = 1.6449
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate with its 90 % interval.
+
+    Attributes
+    ----------
+    estimate, low, high : float
+    """
+
+    estimate: float
+    low: float
+    high: float
+
+
+def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], Interval]:
+    """Intervals of all numbers of a model, per key of the effect and name of the number.
+
+    The covariance of the fit contains the priors of the baseline: where the recordings do not separate a gain or a
+    mass from an effect, its interval is as wide as what is believed of these. Its part by noise is widened by what
+    is left over the noise floor, or replaced by the cluster-robust error, whichever is more.
+
+    Parameters
+    ----------
+    found : Findings
+    best : ScoredModel
+    """
+    runs = FittedRuns(found.model, found.fitting, found.case.names_by_test())
+    problem = runs.problem_of(best.fit)
+    theta = problem.theta_of(best.fit.values)
+    jacobian = problem.jacobian(theta, problem.residual(theta), range(theta.size))
+    scatter = cluster_robust_errors(problem, best.fit, jacobian)
+    return {
+        (candidate.key, parameter.name): _interval(best, candidate, parameter.name, scatter)
+        for candidate in best.fit.candidates
+        for parameter in candidate.effect.parameters
+    }
+
+
+def _interval(best: ScoredModel, candidate: Candidate, parameter: str, scatter: dict[str, float]) -> Interval:
+    name = f"{candidate.key}.{parameter}"
+    estimate = best.fit.values[name]
+    if name not in best.fit.names:
+        return Interval(estimate, estimate, estimate)
+    of_noise, of_belief = best.fit.standard_errors(name)
+    of_noise = max(of_noise * max(1.0, best.fitted_rms), scatter.get(name, 0.0))
+    width = _NORMAL_90 * float(np.hypot(of_noise, of_belief))
+    lowest, highest = candidate.bounds(
+        next(each for each in candidate.effect.parameters if each.name == parameter)
+    )
+    return Interval(estimate, max(estimate - width, lowest), min(estimate + width, highest))

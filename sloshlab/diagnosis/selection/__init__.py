@@ -1,0 +1,1 @@
+"""Model selection: which effects beside the retuned baseline describe the recordings, by one search."""

@@ -1,0 +1,82 @@
+"""The runs that are fitted, as problems with any effects, and the parameters of runs that are only judged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
+from sloshlab.diagnosis.free_run_fit import fitted
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, run_of
+from sloshlab.diagnosis.observations import Observation
+
+Runs = Sequence[Sequence[Observation]]
+
+
+class FittedRuns:
+    """Runs that are fitted together.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    runs : sequence of sequences of Observation
+        Per run.
+    tests : sequence of sequences of str
+        Names of the runs of every test.
+    """
+
+    def __init__(self, model: DiagnosedModel, runs: Runs, tests: Sequence[Sequence[str]]) -> None:
+        self.model, self.runs, self.tests = model, list(runs), tests
+
+    @cached_property
+    def one_repeat_per_test(self) -> FittedRuns:
+        """The same with the first fitted run of every test alone; itself where no test has two of them.
+
+        Repeats have the same drive: one of them is enough to rank candidates.
+        """
+        test_of = {name: i for i, test in enumerate(self.tests) for name in test}
+        first: dict[object, Sequence[Observation]] = {}
+        for run in self.runs:
+            # A run of no known test is a test of its own.
+            first.setdefault(test_of.get(run[0].run.name, run[0].run.name), run)
+        if len(first) == len(self.runs):
+            return self
+        return FittedRuns(self.model, list(first.values()), self.tests)
+
+    @property
+    def n_coefficients(self) -> int:
+        """Of all runs and channels."""
+        return sum(observation.spectra.size for run in self.runs for observation in run)
+
+    def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
+        """These runs with some effects."""
+        return FreeRunProblem(self.model, self.runs, candidates)
+
+    def problem_of(self, fit: FreeRunFit) -> FreeRunProblem:
+        """These runs with the effects of a fit."""
+        return self.problem(fit.candidates)
+
+
+def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[str, float]:
+    """Values of a fit with the numbers that belong to single runs fitted to runs that it has not seen.
+
+    Releases, offsets and the fluctuation of a liquid are unknown in a run that was not fitted and are no part of
+    what is judged there; everything else stays as it is.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    runs : sequence of sequences of Observation
+        That were not fitted.
+    fit : FreeRunFit
+    """
+    shared = {name: value for name, value in fit.values.items() if not run_of(name, model)}
+    values = dict(fit.values)
+    for run in runs:
+        problem = FreeRunProblem(model, [run], fit.candidates, shared)
+        if problem.names:
+            start = problem.values(problem.theta_of(fit.values))
+            own, _ = fitted(problem, start, n_iterations=3)
+            values |= {name: value for name, value in own.values.items() if run_of(name, model)}
+    return values

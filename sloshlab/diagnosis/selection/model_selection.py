@@ -1,0 +1,214 @@
+"""The one search: forward selection with swaps and eliminations, every model refined from many starts.
+
+Nothing, single effects, pairs and triples are nested models of one likelihood; which of them is believed is
+decided elsewhere (`sloshlab.diagnosis.inference`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from scipy.stats import norm, qmc
+
+from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
+from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, costs_at, fitted, stages_for
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of
+from sloshlab.diagnosis.inference.remainder import remainder
+from sloshlab.diagnosis.inference.run_noise import run_noise
+from sloshlab.diagnosis.inference.whitened import whitened
+from sloshlab.diagnosis.rig_model import RELEASE
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
+from sloshlab.diagnosis.selection.proposals import Base, most_promising, proposals
+from sloshlab.diagnosis.selection.successive_halving import halved
+
+Said = Callable[[str, int, int], None]
+N_KEPT: Final = 4
+"""Models that are fitted to the end at every step of the search; two, four and eight times as many are begun."""
+_MOST_EFFECTS: Final = 2
+_BUDGET: Final = 6e8
+"""Coefficients that may be simulated, a minute on two cores; what is begun then is finished, no more is begun."""
+_EVALUATIONS_OF_FITS: Final = 800
+"""Simulations that the fits of one growth take, about: 56 of three steps and four to the end."""
+_DEVIATIONS: Final = (0.3, 0.1)
+"""Standard deviations of the logarithms of an effect's numbers about a fit, from which it is refined in turns."""
+
+
+class ModelSelection:
+    """The search of one case.
+
+    Parameters
+    ----------
+    runs : FittedRuns
+    at : Surroundings
+    said : callable
+        Told what is being done, how much of it is done, and how much there is.
+    """
+
+    def __init__(self, runs: FittedRuns, at: Surroundings, said: Said) -> None:
+        self.runs, self.at, self.said = runs, at, said
+        self.pool = candidates(at)
+        self.fits: dict[frozenset[str], FreeRunFit] = {}
+        self.failed: dict[str, str] = {}
+        self._swapped_models: set[frozenset[str]] = set()
+        self._promising: dict[str, list[dict[str, float]]] = {}
+        self._left = _BUDGET
+
+    def selected(self, retuned: FreeRunFit) -> list[FreeRunFit]:
+        """Fits of all models that were worth one, each at its best optimum; nothing first.
+
+        Parameters
+        ----------
+        retuned : FreeRunFit
+            Of the baseline.
+        """
+        self._keep([retuned])
+        if not self._remains(retuned):
+            return [retuned]
+        believed = self._as_believed()
+        self._grown([believed, retuned], "one effect")
+        self._swapped(1)
+        self._eliminated(1)
+        for n in range(1, _MOST_EFFECTS + 1):
+            best = self._best_of(n)
+            if best is None or not self._remains(best):
+                break
+            self._refined(best)
+            best = self._best_of(n)
+            if best is None or n == _MOST_EFFECTS or not self._remains(best):
+                break
+            self._grown(self._leading(n), "one more effect")
+            self._swapped(n + 1)
+            self._eliminated(n + 1)
+        # What was found beside other effects may be the best alone, and has look-alikes of its own.
+        for n in range(1, _MOST_EFFECTS + 1):
+            self._swapped(n)
+        return sorted(self.fits.values(), key=lambda fit: (len(fit.candidates), fit.cost))
+
+    def _as_believed(self) -> FreeRunFit:
+        """The baseline as believed, with numbers of single runs fitted: retuning may have hidden an effect."""
+        model = self.runs.model
+        plain = FreeRunFit((), dict(model.believed), np.inf, np.inf)
+        return FreeRunFit((), values_of_runs(model, self.runs.runs, plain), np.inf, np.inf)
+
+    def _remains(self, fit: FreeRunFit) -> bool:
+        """Whether something is left in the fitted runs that noise and bursts do not explain."""
+        model, runs = self.runs.model, self.runs.runs
+        noise = [run_noise(model, run, fit.values) for run in runs]
+        residuals = whitened(model, runs, fit.candidates, fit.values, noise)
+        return residuals is None or remainder(residuals).is_probable
+
+    def _keep(self, fits: Iterable[FreeRunFit]) -> None:
+        """Of every model the fit of the lowest cost."""
+        for fit in fits:
+            if fit.trouble:
+                self.failed[" + ".join(candidate.key for candidate in fit.candidates)] = fit.trouble
+                continue
+            keys = frozenset(candidate.key for candidate in fit.candidates)
+            if keys not in self.fits or fit.cost < self.fits[keys].cost:
+                self.fits[keys] = fit
+
+    def _best_of(self, n: int) -> FreeRunFit | None:
+        alike = [fit for keys, fit in self.fits.items() if len(keys) == n]
+        return min(alike, key=lambda fit: fit.cost, default=None)
+
+    def _leading(self, n: int) -> list[FreeRunFit]:
+        """The two best of so many effects: the best alone need not be one of the two that are there."""
+        alike = sorted((fit for keys, fit in self.fits.items() if len(keys) == n), key=lambda fit: fit.cost)
+        return alike[:2]
+
+    def _grown(self, bases: Sequence[FreeRunFit], what: str) -> None:
+        """Every candidate beside some fits; the best ones to the end."""
+        if self._left <= 0:
+            self.failed["search"] = "ended at its budget, with more effects to try"
+            return
+        few = self.runs.one_repeat_per_test
+        kept = [Base.of(few, base) for base in bases]
+        pool = [*self.pool, *self._candidates_beside(bases)]
+        stages = self._stages(bases[-1])
+        proposed = proposals(few, kept, pool, sorted({stages[0], stages[-1]}, reverse=True), self._promising)
+        self._left -= (len(proposed) + _EVALUATIONS_OF_FITS) * few.n_coefficients
+        ran = {proposal.candidates[-1].key for proposal in proposed}
+        tried = {candidate.key for candidate in pool} - {c.key for base in bases for c in base.candidates}
+        self.failed |= dict.fromkeys(tried - ran, "does not run from any start")
+        if not self._promising:
+            # Beside an effect the same places of a candidate are worth a look; to draw anew takes most time.
+            self._promising = most_promising(proposed)
+        coarse = halved(few, proposed, stages, N_KEPT, lambda name, i, n: self.said(f"{what}: {name}", i, n))
+        self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))
+
+    def _stages(self, base: FreeRunFit) -> tuple[float, ...]:
+        """Three rungs of noise inflation: from where the residuals show to where little is hidden."""
+        stages = stages_for(self.runs.problem_of(base), base)
+        return tuple(stages[min(k, len(stages) - 1)] for k in range(3))
+
+    def _to_the_end(self, coarse: FreeRunFit, base: FreeRunFit) -> FreeRunFit:
+        """A fit on all runs."""
+        self.said(f"fitting {' + '.join(candidate.key for candidate in coarse.candidates)}", 0, 1)
+        problem = self.runs.problem_of(coarse)
+        return fitted(problem, {**base.values, **coarse.values}, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]
+
+    def _swapped(self, n: int) -> None:
+        """Other effects in the place of each effect of the best model of so many, beside its baseline."""
+        best = self._best_of(n)
+        keys = frozenset(candidate.key for candidate in best.candidates) if best is not None else frozenset()
+        if best is None or keys in self._swapped_models:
+            return
+        self._swapped_models.add(keys)
+        for effect in best.candidates:
+            rest = tuple(candidate for candidate in best.candidates if candidate is not effect)
+            own = {f"{effect.key}.{parameter.name}" for parameter in effect.effect.parameters}
+            values = {name: value for name, value in best.values.items() if name not in own}
+            self._grown([FreeRunFit(rest, values, np.inf, np.inf)], f"in the place of {effect.key}")
+
+    def _eliminated(self, n: int) -> None:
+        """Models with one effect less than the leading ones of so many, from their numbers.
+
+        An effect without size would otherwise gain what is only a better optimum of what is nested in it.
+        """
+        for model in self._leading(n):
+            for effect in model.candidates:
+                rest = tuple(candidate for candidate in model.candidates if candidate is not effect)
+                problem = self.runs.problem(rest)
+                start = {name: value for name, value in model.values.items() if name in problem.names}
+                self._keep([fitted(problem, start, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]])
+
+    def _refined(self, best: FreeRunFit) -> None:
+        """The best model from places about it: friction and contacts make many local minima."""
+        problem = self.runs.problem_of(best)
+        own = [f"{c.key}.{parameter.name}" for c in best.candidates for parameter in c.effect.parameters]
+        releases = [name for name in problem.names if name.startswith(RELEASE)]
+        fit = best
+        for turn, deviation in enumerate(_DEVIATIONS):
+            self.said(f"refining {' + '.join(c.key for c in best.candidates)}", turn, len(_DEVIATIONS))
+            draws = norm.ppf(qmc.Halton(len(own) + len(releases), seed=turn).random(8 * N_KEPT))
+            starts = [
+                {
+                    **fit.values,
+                    **{name: fit.values[name] * np.exp(deviation * z) for name, z in zip(own, row, strict=False)},
+                    **{
+                        name: fit.values[name] * (1.0 + 0.03 * deviation * z)
+                        for name, z in zip(releases, row[len(own) :], strict=True)
+                    },
+                }
+                for row in draws
+            ]
+            costs = costs_at(problem, starts, INFLATION_STAGES[2])
+            other = fitted(problem, starts[int(np.argmin(costs))], n_iterations=6, stages=INFLATION_STAGES[2:])[0]
+            if not other.trouble and other.cost < fit.cost:
+                fit = other
+        self._keep([fit])
+
+    def _candidates_beside(self, bases: Sequence[FreeRunFit]) -> list[Candidate]:
+        """Effects that act on forces which only the effects of a fit have added, such as on a liquid's damping."""
+        found: dict[str, Candidate] = {}
+        known = {candidate.key for candidate in self.pool}
+        for base in bases:
+            forces = extension_of(base.candidates, base.values).terms
+            if forces:
+                twin = replace(self.at.twin, terms=(*self.at.twin.terms, *forces))
+                beside = candidates(replace(self.at, twin=twin))
+                found |= {candidate.key: candidate for candidate in beside if candidate.key not in known}
+        return list(found.values())

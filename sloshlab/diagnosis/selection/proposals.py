@@ -1,0 +1,256 @@
+"""Where candidates are fitted from: many starts of each beside a fit, ranked by the step that each promises."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.block_jacobian import BlockJacobian
+from sloshlab.diagnosis.candidate import Candidate, MissingForces
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost
+from sloshlab.diagnosis.latent_force import LatentForce, run_forces
+from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.score_test import ScoreTest
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
+from sloshlab.errors import SloshlabError
+
+FloatArray = NDArray[np.float64]
+NO_STARTS: Final[Mapping[str, Sequence[Mapping[str, float]]]] = {}
+_DRAWS_PER_NUMBER: Final = 6
+"""Quasi-random starts from the prior of an effect, for each of its numbers."""
+_MOST_STEP: Final = 3.0
+"""Factor up to which a size follows the linear step: about the spacing of the sizes that are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """What effects are added to: a fit, or the baseline as believed, with its derivatives.
+
+    Attributes
+    ----------
+    fit : FreeRunFit
+    jacobian : BlockJacobian
+        Of all parameters of the fit, where it is.
+    """
+
+    fit: FreeRunFit
+    jacobian: BlockJacobian
+
+    @classmethod
+    def of(cls, runs: FittedRuns, fit: FreeRunFit) -> Base:
+        """A fit with its derivatives on these runs."""
+        problem = runs.problem_of(fit)
+        theta = problem.theta_of(fit.values)
+        return cls(fit, problem.jacobian(theta, problem.residual(theta), range(theta.size)))
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A model and where its fit starts.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        All effects of the model; the last one is proposed.
+    start : dict
+    predicted : tuple of float
+        Cost after one step, at each noise inflation of the search, over the least cost of a base there; last the
+        cost of the start itself at the largest inflation.
+    jacobian : BlockJacobian
+        Of the base.
+    """
+
+    candidates: tuple[Candidate, ...]
+    start: dict[str, float]
+    predicted: tuple[float, ...]
+    jacobian: BlockJacobian
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """Keys of its effects."""
+        return frozenset(candidate.key for candidate in self.candidates)
+
+
+def proposals(
+    runs: FittedRuns,
+    bases: Sequence[Base],
+    pool: Sequence[Candidate],
+    inflations: Sequence[float],
+    promising: Mapping[str, Sequence[Mapping[str, float]]] = NO_STARTS,
+) -> list[Proposal]:
+    """Starts of all candidates beside all bases, each with what a first step promises.
+
+    A step is linear in the size of the effect and in all parameters of the base, which follow it within their
+    priors (`ScoreTest`). Beside a retuned baseline an effect shows little where retuning has taken its place;
+    beside the baseline as believed it shows whole.
+
+    Parameters
+    ----------
+    runs : FittedRuns
+    bases : sequence of Base
+        All with the same runs.
+    pool : sequence of Candidate
+    inflations : sequence of float
+        Shares of every channel's RMS that are added to its noise.
+    promising : mapping of key to sequence of mapping
+        Starts of candidates that promised most before, in the place of draws from their priors.
+    """
+    least = [min(_cost(runs, base, inflation) for base in bases) for inflation in inflations]
+    found: list[Proposal] = []
+    for base in bases:
+        # Where an effect shows beside the first base it is looked for beside the others.
+        places = promising or most_promising(found)
+        found += _beside(runs, base, pool, dict(zip(inflations, least, strict=True)), places)
+    return found
+
+
+def _cost(runs: FittedRuns, base: Base, inflation: float) -> float:
+    problem = runs.problem_of(base.fit)
+    residual = problem.residual(problem.theta_of(base.fit.values))
+    return huber_cost(problem.inflation_weights(inflation) * residual)
+
+
+def _beside(
+    runs: FittedRuns,
+    base: Base,
+    pool: Sequence[Candidate],
+    least: Mapping[float, float],
+    promising: Mapping[str, Sequence[Mapping[str, float]]],
+) -> list[Proposal]:
+    problem = runs.problem_of(base.fit)
+    theta = problem.theta_of(base.fit.values)
+    residual = problem.residual(theta)
+    if not np.isfinite(residual).all():
+        return []
+    tests = [
+        (inflation, ScoreTest(problem, theta, residual, base.jacobian, inflation), _cost(runs, base, inflation))
+        for inflation in least
+    ]
+    known = {candidate.key for candidate in base.fit.candidates}
+    missed_hz = residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND)
+    missing = _missing_forces(runs, base.fit)
+    found = []
+    for candidate in (candidate for candidate in pool if candidate.key not in known):
+        sets = [*starts_of(candidate, missed_hz, missing, promising.get(candidate.key))]
+        extended = runs.problem((*base.fit.candidates, candidate))
+        thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
+        # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
+        column = extended.names.index(f"{candidate.key}.{candidate.effect.parameters[0].name}")
+        moved = extended.residuals_moved(thetas, column, residual)
+        for start, at_start in zip(sets, moved, strict=True):
+            # A start that explodes is no reason to drop the candidate as long as another one runs.
+            if not np.isfinite(at_start).all():
+                continue
+            gains = [test.gain(at_start - residual) for _, test, _ in tests]
+            predicted = tuple(
+                (cost - gain) / max(least[inflation], 1e-300)
+                for (inflation, _, cost), (gain, _) in zip(tests, gains, strict=True)
+            )
+            # What no linear step reaches, such as a resonance that is off by many of its widths, shows as it is.
+            inflation = next(iter(least))
+            at_once = huber_cost(problem.inflation_weights(inflation) * at_start) / max(least[inflation], 1e-300)
+            factor = gains[int(np.argmin(predicted))][1]
+            sized = candidate.sized(start, min(max(factor, 1.0 / _MOST_STEP), _MOST_STEP))
+            found.append(
+                Proposal(
+                    (*base.fit.candidates, candidate),
+                    {**base.fit.values, **sized},
+                    (*predicted, at_once),
+                    base.jacobian,
+                )
+            )
+    return found
+
+
+def starts_of(
+    candidate: Candidate,
+    missed_hz: tuple[float, ...],
+    missing: MissingForces,
+    promising: Sequence[Mapping[str, float]] | None = None,
+) -> list[dict[str, float]]:
+    """Starts of a candidate: its own, what the missing force shows, and quasi-random ones from its prior.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    missed_hz : tuple of float
+        Frequencies of the largest residuals, where a mode may be missing.
+    missing : mapping
+        Force that each run lacks, where it is known.
+    promising : sequence of mapping, optional
+        In the place of draws from the prior.
+    """
+    # A mode has a narrow minimum: it starts where the residuals beside this base are largest.
+    here = replace(candidate, surroundings=replace(candidate.surroundings, missed_hz=missed_hz))
+    own = [*here.starts(), *candidate.proposed(missing)]
+    if promising is not None:
+        return [*own, *map(dict, promising)]
+    n = _DRAWS_PER_NUMBER * len(candidate.effect.parameters)
+    return [*own, *candidate.drawn(n)[1:], *candidate.sought_at()]
+
+
+def most_promising(proposed: Sequence[Proposal]) -> dict[str, list[dict[str, float]]]:
+    """Of every candidate that was proposed, the numbers of its best starts in each of the noises.
+
+    Parameters
+    ----------
+    proposed : sequence of Proposal
+    """
+    found: dict[str, list[dict[str, float]]] = {}
+    by_key: dict[str, list[Proposal]] = {}
+    for proposal in proposed:
+        by_key.setdefault(proposal.candidates[-1].key, []).append(proposal)
+    for key, own in by_key.items():
+        best = {int(np.argmin([proposal.predicted[k] for proposal in own])) for k in range(len(own[0].predicted))}
+        found[key] = [
+            {name: value for name, value in own[i].start.items() if name.startswith(f"{key}.")}
+            for i in sorted(best)
+        ]
+    return found
+
+
+def _missing_forces(runs: FittedRuns, fit: FreeRunFit) -> dict[str, FloatArray]:
+    """The latent force of every run beside a fit; none of a twin of a user's own, of which it is not known."""
+    found: dict[str, FloatArray] = {}
+    if isinstance(runs.model, RigModel):
+        for observed in runs.runs:
+            with suppress(SloshlabError):
+                extension = extension_of(fit.candidates, fit.values)
+                forces = run_forces(runs.model, observed, fit.values, extension=extension).forces
+                if forces:
+                    largest = max(forces, key=lambda force: force.power_n2)
+                    found[observed[0].run.name] = _of_whole_run(largest)
+    return found
+
+
+def _of_whole_run(force: LatentForce) -> FloatArray:
+    """A latent force with zeros where its run is tapered."""
+    run = force.run
+    series = np.zeros(int(run.recording.sizes["time"]))
+    start = float(run.recording["time"].values[0])
+    first = round((float(force.time_s[0]) - start) * run.attributes.sampling_rate_hz)
+    series[first : first + force.force_n.size] = force.force_n
+    return series
+
+
+def jacobian_beside(problem: FreeRunProblem, theta: FloatArray, known: BlockJacobian) -> BlockJacobian | None:
+    """Derivatives of a base with columns for the parameters that it lacks; None where it does not run.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+        With one effect more than the base.
+    theta : ndarray
+    known : BlockJacobian
+        Of the base.
+    """
+    at = problem.residual(theta)
+    if not np.isfinite(at).all():
+        return None
+    return known.beside(problem.jacobian(theta, at, range(known.n_columns, theta.size)))

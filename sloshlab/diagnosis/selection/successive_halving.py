@@ -1,0 +1,103 @@
+"""Successive halving: many fits are begun, the better half goes on at every stage, few are fitted to the end.
+
+Jamieson and Talwalkar (2016), arXiv:1502.07943, with the stages of noise inflation as rungs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sloshlab.diagnosis.free_run_fit import fitted, inflated_cost
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.proposals import Proposal, jacobian_beside
+
+_STEPS_OF_A_RUNG: Final = 3
+"""Of a fit before it is compared with the others."""
+_STARTS_OF_A_MODEL: Final = 2
+"""That may go on beside each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Running:
+    """A fit on its way."""
+
+    proposal: Proposal
+    values: Mapping[str, float]
+    fit: FreeRunFit | None
+    cost: float
+
+
+def halved(
+    runs: FittedRuns,
+    proposed: Sequence[Proposal],
+    stages: Sequence[float],
+    n_kept: int,
+    said: Callable[[str, int, int], None] = lambda what, done, of: None,
+) -> list[FreeRunFit]:
+    """The best models of those proposed, coarsely fitted.
+
+    Parameters
+    ----------
+    runs : FittedRuns
+    proposed : sequence of Proposal
+    stages : sequence of float
+        Noise inflation of each rung.
+    n_kept : int
+        Models that are left at the end.
+    said : callable, optional
+        Told model, number and number of all.
+    """
+    waiting = _best_starts(proposed, n_kept * 2 ** len(stages))
+    running = [_Running(proposal, proposal.start, None, np.inf) for proposal in waiting]
+    for rung, inflation in enumerate(stages):
+
+        def continued(i: int, begun: Sequence[_Running] = running, inflation: float = inflation) -> _Running:
+            said(" + ".join(sorted(begun[i].proposal.keys)), i, len(begun))
+            return _continued(runs, begun[i], inflation)
+
+        done = list(runs.model.executor.map(continued, range(len(running))))
+        is_last = rung == len(stages) - 1
+        running = _better(done, n_kept * 2 ** (len(stages) - 1 - rung), 1 if is_last else _STARTS_OF_A_MODEL)
+    return [each.fit for each in running if each.fit is not None]
+
+
+def _best_starts(proposed: Sequence[Proposal], n: int) -> list[Proposal]:
+    """Of every model its most promising starts, of all models the most promising."""
+    # Ranked in each of the noises by itself: a model that is far off shows with inflated noise, one near without.
+    rank = np.full(len(proposed), np.inf)
+    for k in range(len(proposed[0].predicted) if proposed else 0):
+        taken: dict[frozenset[str], int] = {}
+        for i in np.argsort([proposal.predicted[k] for proposal in proposed], kind="stable"):
+            keys = proposed[i].keys
+            taken[keys] = taken.get(keys, 0) + 1
+            if taken[keys] <= _STARTS_OF_A_MODEL:
+                rank[i] = min(rank[i], sum(min(number, _STARTS_OF_A_MODEL) for number in taken.values()))
+    return [proposed[i] for i in np.argsort(rank, kind="stable")[:n] if np.isfinite(rank[i])]
+
+
+def _continued(runs: FittedRuns, running: _Running, inflation: float) -> _Running:
+    """A few more steps, with the derivatives of the base and new ones by the effect's own numbers."""
+    # Derivatives are not kept from rung to rung: those of all models together would fill the memory.
+    problem = runs.problem(running.proposal.candidates)
+    known = jacobian_beside(problem, problem.theta_of(running.values), running.proposal.jacobian)
+    fit, _ = fitted(
+        problem, running.values, n_iterations=_STEPS_OF_A_RUNG, stages=(inflation,), known=known, is_last=False
+    )
+    cost = np.inf if fit.trouble else inflated_cost(problem, fit, inflation)
+    return _Running(running.proposal, fit.values, fit, cost)
+
+
+def _better(running: Sequence[_Running], n: int, of_a_model: int) -> list[_Running]:
+    """The lowest costs, with at most so many starts of one model."""
+    kept: list[_Running] = []
+    taken: dict[frozenset[str], int] = {}
+    for each in sorted(running, key=lambda each: each.cost):
+        taken[each.proposal.keys] = taken.get(each.proposal.keys, 0) + 1
+        if np.isfinite(each.cost) and taken[each.proposal.keys] <= of_a_model:
+            kept.append(each)
+    return kept[:n]

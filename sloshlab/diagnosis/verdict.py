@@ -1,0 +1,167 @@
+"""The verdict: the decision on the findings, in words and numbers, and the content of ``verdict.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from sloshlab.diagnosis.candidate import channels_of, known_effects
+from sloshlab.diagnosis.findings import Findings
+from sloshlab.diagnosis.inference.decision import Decision, decided
+from sloshlab.diagnosis.inference.scored_model import ScoredModel
+from sloshlab.diagnosis.interval import LEVEL, Interval, intervals_of
+from sloshlab.diagnosis.mismatch import mismatches, summary
+from sloshlab.diagnosis.separating_experiment import separating_experiment
+from sloshlab.diagnosis.wording import names_of_alternatives, separating_experiment_of, statement_of
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """The answer.
+
+    Attributes
+    ----------
+    kind : {"nothing_missing", "named", "indistinguishable", "unknown"}
+    best : ScoredModel or None
+        What is named, or the nearest model with a name of what has none; None where nothing is missing.
+    alternatives : list of tuple of str
+        Sets of names that cannot be told apart, the best first.
+    statement, separating_experiment : str
+    probabilities : dict
+    block : str
+        Of what has no name; empty where it is not located.
+    intervals : dict
+        Of the numbers of `best`, per key of the effect and name of the number.
+    """
+
+    kind: str
+    best: ScoredModel | None
+    alternatives: list[tuple[str, ...]]
+    statement: str
+    separating_experiment: str
+    probabilities: dict[str, float]
+    block: str = ""
+    intervals: dict[tuple[str, str], Interval] = field(default_factory=dict)
+
+    def seen(self, words: str) -> Verdict:
+        """The verdict with where in the cycle and at which levels it shows, such as "seen above 1.5 g"."""
+        if self.kind == "nothing_missing" or not words:
+            return self
+        return replace(self, statement=f"{self.statement.removesuffix('.')}; {words}.")
+
+
+def verdict_of(found: Findings) -> Verdict:
+    """Judge the findings.
+
+    Parameters
+    ----------
+    found : Findings
+    """
+    decision = decided(found.posterior)
+    if not found.split.has_held_out and decision.kind != "nothing_missing":
+        # No run chose nothing: a name would be judged by what it was fitted to.
+        decision = replace(decision, kind="unknown", alternatives=[])
+    intervals = {} if decision.best is None else intervals_of(found, decision.best)
+    alternatives = names_of_alternatives(decision)
+    is_set = len(alternatives) > 1
+    return Verdict(
+        "indistinguishable" if is_set else decision.kind,
+        decision.best,
+        alternatives,
+        statement_of(found, decision, intervals),
+        _separating(found, decision) if is_set else "",
+        decision.probabilities,
+        decision.block,
+        intervals,
+    )
+
+
+def _separating(found: Findings, decision: Decision) -> str:
+    """The experiment that was found, or what the effects themselves name where none of those simulated tells."""
+    experiment = separating_experiment(found, decision.alternatives)
+    if experiment is None:
+        return separating_experiment_of(decision)
+    channel, size = experiment.channel, experiment.noise_floors
+    return f"{experiment.description}: {channel} would differ by {size:.2g} noise floors"
+
+
+def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
+    """The content of ``verdict.json``.
+
+    Parameters
+    ----------
+    found : Findings
+    verdict : Verdict
+    """
+    # The nearest effect of an unknown is no answer.
+    after = verdict.best if verdict.best is not None and verdict.kind != "unknown" else found.retuned
+    return {
+        "format": 1,
+        "verdict": verdict.kind,
+        "effects": _effects(found, verdict),
+        "alternatives": [list(names) for names in verdict.alternatives],
+        "probabilities": {label: p for label, p in verdict.probabilities.items() if p > 1e-4},
+        "separating_experiment": verdict.separating_experiment,
+        "statement": verdict.statement,
+        "fit": {
+            "metric": "RMS of the residuals of short-time spectra over their noise, where the "
+            "recording stands out",
+            "noise_floor": 1.0,
+            "heldout_before": _judged(found, found.believed),
+            "heldout_retuned": _judged(found, found.retuned),
+            "heldout_after": _judged(found, after),
+            "heldout_ceiling": min(_judged(found, each) for each in (found.retuned, *found.explanations)),
+            "heldout_runs": [run.name for run in found.split.held_out],
+        },
+        "limits": list(found.split.limits),
+        "failed": _failed(found.failed),
+    }
+
+
+def _judged(found: Findings, model: ScoredModel) -> float:
+    """Error on held-out runs; on the fitted ones where there is no other run."""
+    return model.held_out_rms if found.split.has_held_out else model.fitted_rms
+
+
+def _failed(reasons: Mapping[str, str]) -> dict[str, str]:
+    """Why candidates could not be fitted; forms of one effect under its name, each with its reason."""
+    known: dict[str, list[str]] = {}
+    for key, why in reasons.items():
+        known.setdefault(_as_known(key), []).append(why)
+    return {key: "; ".join(dict.fromkeys(each)) for key, each in known.items()}
+
+
+def _as_known(key: str) -> str:
+    """Key of a candidate with the name that an answer has."""
+    for effect in known_effects():
+        if effect.variant_of:
+            key = key.replace(f"{effect.block}.{effect.name}", f"{effect.block}.{effect.variant_of}")
+    return key
+
+
+def _effects(found: Findings, verdict: Verdict) -> list[dict[str, Any]]:
+    if verdict.kind == "nothing_missing":
+        return []
+    if verdict.kind == "unknown" or verdict.best is None:
+        unnamed = {"name": "unknown", "block": verdict.block or "not located", "parameters": {}}
+        return [{**unnamed, "where": _where(found, ())}]
+    return [
+        {
+            "name": candidate.effect.known_as,
+            "block": candidate.effect.block,
+            "parameters": {
+                name: {"estimate": each.estimate, "low": each.low, "high": each.high, "level": LEVEL}
+                for (key, name), each in verdict.intervals.items()
+                if key == candidate.key
+            },
+            "where": _where(found, channels_of(candidate.channel) if candidate.channel else ()),
+        }
+        for candidate in verdict.best.fit.candidates
+    ]
+
+
+def _where(found: Findings, channels: Sequence[str]) -> dict[str, Any]:
+    """Where the retuned baseline misses the recordings most; the channel itself for an effect of a sensor."""
+    place = summary(mismatches(found.fitting, found.readings(found.retuned)))
+    return {**place, "channels": list(channels)} if channels else place

@@ -1,0 +1,153 @@
+"""Verdicts in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.findings import Findings
+from sloshlab.diagnosis.inference.decision import Decision
+from sloshlab.diagnosis.inference.places import SENSOR
+from sloshlab.diagnosis.inference.scored_model import ScoredModel
+from sloshlab.diagnosis.interval import Interval
+from sloshlab.diagnosis.units import named_and_units
+
+_EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
+"""Explanations that are the same force in the structure, whatever is recorded."""
+
+
+def statement_of(found: Findings, decision: Decision, intervals: Mapping[tuple[str, str], Interval]) -> str:
+    """What is said, in one sentence.
+
+    Parameters
+    ----------
+    found : Findings
+    decision : Decision
+    intervals : mapping
+        Of the numbers of what is named.
+    """
+    if decision.kind == "nothing_missing":
+        return (
+            "Nothing is missing: with its own parameters retuned the simulation describes the held-out runs to "
+            f"{found.retuned.held_out_rms:.2f} of the noise floor."
+        )
+    if decision.kind == "unknown":
+        return _unknown(found, decision)
+    assert decision.best is not None
+    named = " and ".join(_described(candidate, intervals) for candidate in decision.best.fit.candidates)
+    text = f"Left out: {named}; {_remaining(found, decision.best)}"
+    if decision.kind == "indistinguishable":
+        others = [" + ".join(names).replace("_", " ") for names in names_of_alternatives(decision)[1:]]
+        text += f"; cannot be told from {' or '.join(others)}"
+    return text + "."
+
+
+def _remaining(found: Findings, best: ScoredModel) -> str:
+    """What the held-out runs show before and after."""
+    return (
+        f"of {found.retuned.held_out_rms:.2f} noise floors on runs that chose nothing "
+        f"{best.held_out_rms:.2f} are left"
+    )
+
+
+def _unknown(found: Findings, decision: Decision) -> str:
+    where = {
+        "": "and its place cannot be located",
+        SENSOR: f"in a sensor ({_channel(decision.place)})",
+    }.get(decision.block, f"in the {decision.block}")
+    nearest = ""
+    if decision.best is not None:
+        named = " and ".join(named_and_placed(candidate) for candidate in decision.best.fit.candidates)
+        nearest = f"; the nearest known effect is {named}: {_remaining(found, decision.best)}"
+    why = "that has no name here" if found.split.has_held_out else "that one run alone does not tell"
+    return f"Something is missing {why}, {where}{nearest}."
+
+
+def _channel(place: str) -> str:
+    return place.removeprefix(f"{SENSOR} ")
+
+
+def names_of_alternatives(decision: Decision) -> list[tuple[str, ...]]:
+    """Every set of names once, the best first, with those that are the same force."""
+    sets = [alternative.names for alternative in decision.alternatives]
+    sets += [names for alternative in decision.alternatives for names in equivalents_of(alternative)]
+    return list(dict.fromkeys(sets))
+
+
+def equivalents_of(model: ScoredModel) -> list[tuple[str, ...]]:
+    """Names of explanations that are the same force, alone or beside other effects.
+
+    Parameters
+    ----------
+    model : ScoredModel
+    """
+    in_structure = {c.effect.name for c in model.fit.candidates if c.effect.block == "structure"}
+    found = []
+    for single, pair in _EQUIVALENT_FORCES.items():
+        for this, other in ((single, pair), (pair, single)):
+            if set(this) <= in_structure:
+                found.append(tuple(sorted((*(name for name in model.names if name not in this), *other))))
+    return found
+
+
+def separating_experiment_of(decision: Decision) -> str:
+    """Experiments that would tell explanations apart."""
+    effects = [
+        candidate.effect for alternative in decision.alternatives for candidate in alternative.fit.candidates
+    ]
+    return "; or ".join(dict.fromkeys(effect.separated_by for effect in effects if effect.separated_by))
+
+
+def named_and_placed(candidate: Candidate) -> str:
+    """Words for an effect and for where it acts.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    """
+    return _placed(candidate.effect.known_as, candidate)
+
+
+def form_and_place(candidate: Candidate) -> str:
+    """The same, with the form of an effect that has several.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    """
+    effect = candidate.effect
+    return _placed(f"{effect.known_as} ({effect.name})" if effect.variant_of else effect.name, candidate)
+
+
+def _placed(name: str, candidate: Candidate) -> str:
+    words = name.replace("_", " ")
+    place = candidate.channel.replace("+", " and ").replace("<", " from ")
+    return f"{words} of {place}" if place else f"{words} in the {candidate.effect.block}"
+
+
+def _described(candidate: Candidate, intervals: Mapping[tuple[str, str], Interval]) -> str:
+    numbers = []
+    for parameter in candidate.effect.parameters:
+        words, units = named_and_units(parameter.name)
+        its = intervals[candidate.key, parameter.name]
+        estimate, low, high = _with_digits(its.estimate, its.low, its.high)
+        label = f"{words} " if len(candidate.effect.parameters) > 1 else ""
+        numbers.append(f"{label}{estimate}{units and ' ' + units} ({low} to {high})")
+    return f"{named_and_placed(candidate)}, {', '.join(numbers)}"
+
+
+def _with_digits(estimate: float, low: float, high: float) -> tuple[str, str, str]:
+    """Three digits, or as many as tell the interval from its middle.
+
+    Examples
+    --------
+    >>> _with_digits(39.0343, 39.0126, 39.056), _with_digits(-0.37, -0.41, -0.33)
+    (('39.03', '39.01', '39.06'), ('−0.37', '−0.41', '−0.33'))
+    """
+    width, size = high - low, max(abs(low), abs(high))
+    digits = 3 if width <= 0 or size <= 0 else min(max(3, 1 + int(np.ceil(np.log10(size / width)))), 8)
+    first, second, third = (f"{value:.{digits}g}".replace("-", "−") for value in (estimate, low, high))
+    return first, second, third

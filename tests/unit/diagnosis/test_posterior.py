@@ -1,0 +1,138 @@
+"""Evidence, posterior and decision on likelihoods that are written by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate, known_effects
+from sloshlab.diagnosis.free_run_problem import FreeRunFit
+from sloshlab.diagnosis.inference import posterior as posterior_module
+from sloshlab.diagnosis.inference.decision import decided
+from sloshlab.diagnosis.inference.posterior import posterior
+from sloshlab.diagnosis.inference.remainder import Remainder
+from sloshlab.diagnosis.inference.run_noise import RunNoise
+from sloshlab.diagnosis.inference.scored_model import ScoredModel, complexity
+from sloshlab.diagnosis.inference.whitened import WhitenedRun
+from sloshlab.diagnosis.prior import ParameterPrior
+
+assert effects.__all__
+N_CELLS = 40
+
+
+def candidate(key: str) -> Candidate:
+    block, name, *channel = key.split(".")
+    effect = next(each for each in known_effects() if (each.block, each.name) == (block, name))
+    return Candidate(effect, cast(Any, None), *channel)
+
+
+def model(
+    total: float, *keys: str, places: dict[str, float] | None = None, cells: Sequence[float] | None = None
+) -> ScoredModel:
+    """A model with a log-likelihood, all cells alike unless they are given, and that of remainders."""
+    candidates = tuple(candidate(key) for key in keys)
+    values = {f"{c.key}.{parameter.name}": 1.0 for c in candidates for parameter in c.effect.parameters}
+    fit = FreeRunFit(candidates, values, 0.0, 0.0)
+    by_cell = np.full(N_CELLS, total / N_CELLS) if cells is None else np.asarray(cells, np.float64)
+    of_places = {
+        place: np.broadcast_to(np.full(N_CELLS, all_of_it / N_CELLS), (4, N_CELLS))
+        for place, all_of_it in (places or {}).items()
+    }
+    alone = RunNoise(np.ones((1, 4, 1, 1)), {})
+    runs = [WhitenedRun([], np.full((1, 1, 4), -total), np.zeros((1, 1, 4)), alone)]
+    return ScoredModel(fit, values, runs, Remainder(by_cell, of_places), 0.0, frozenset(), 0.0)
+
+
+@pytest.fixture(autouse=True)
+def worth_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(posterior_module, "strength", lambda before, after: 10.0)
+
+
+FRICTION, DRAG, DAMPER = "structure.coulomb_friction", "structure.quadratic_drag", "structure.viscous_damping"
+
+
+def test_models_whose_cells_agree_have_probabilities_by_bayes_theorem() -> None:
+    found = posterior([model(0.0), model(5.0, FRICTION)], n_candidates=10, tempering=1.0).by_label()
+    # Prior 1/2 for nothing, 1/4 over ten candidates for one of them; e^5 by the recordings.
+    odds = np.exp(5.0) * (1 / 40) / (1 / 2)
+    assert found["coulomb_friction"] == pytest.approx(odds / (1 + odds), rel=1e-9)
+    assert sum(found.values()) == pytest.approx(1.0)
+
+
+def test_a_lead_that_rests_on_one_cell_is_no_certainty() -> None:
+    one, all_ = np.zeros(N_CELLS), np.full(N_CELLS, 20.0 / N_CELLS)
+    one[3] = 20.0
+    sure = posterior([model(0.0), model(20.0, FRICTION, cells=all_)], 10, 1.0).by_label()["coulomb_friction"]
+    unsure = posterior([model(0.0), model(20.0, FRICTION, cells=one)], 10, 1.0).by_label()["coulomb_friction"]
+    assert sure > 0.999
+    # Its weight is exponential with mean one: it wins where 20 w exceeds the logarithm of the prior odds of 20.
+    assert unsure == pytest.approx(np.exp(-np.log(20.0) / 20.0), abs=0.05)
+
+
+def test_what_adds_little_to_one_effect_is_that_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    def added(before: ScoredModel, after: ScoredModel) -> float:
+        return 0.3 if before.names and len(after.names) == 2 else 10.0
+
+    monkeypatch.setattr(posterior_module, "strength", added)
+    found = posterior([model(0.0), model(50.0, FRICTION), model(90.0, FRICTION, DRAG)], 10, 1.0).by_label()
+    assert found["coulomb_friction"] > 0.99
+    assert "coulomb_friction + quadratic_drag" not in found
+
+
+def test_a_wider_model_that_predicts_the_same_is_the_simple_one() -> None:
+    wider = model(51.0, "structure.stribeck_friction")
+    found = posterior([model(0.0), model(50.0, FRICTION), wider], 10, 1.0).by_label()
+    # Predictions of these models differ by ½ 4 (51 − 50)².
+    assert found["coulomb_friction"] > 0.99
+
+
+def test_the_occam_factor_is_the_integral_over_the_prior() -> None:
+    # y = a x + noise with Σx² = 1: the likelihood of a is normal about its estimate with standard error one.
+    estimate, key = 40.0, "structure.coulomb_friction.force_n"
+    prior = ParameterPrior(key, 0.1, 1000.0, is_log=True, may_be_negative=False)
+    alone = cast(Any, SimpleNamespace(prior=(prior,)))
+    fit = FreeRunFit((alone,), {key: estimate}, 0.0, 0.0, np.eye(1), (key,), np.ones(1))
+    integral, _ = quad(lambda a: norm.pdf(a, estimate, 1.0) / a / np.log(1e4), 30.0, 50.0)
+    # Laplace takes 1/a at the estimate; the integral differs by (σ/a)².
+    assert complexity(fit) == pytest.approx(-np.log(integral / norm.pdf(0.0)), abs=2e-3)
+
+
+def test_a_number_that_nothing_tells_costs_nothing() -> None:
+    key = "structure.coulomb_friction.force_n"
+    prior = ParameterPrior(key, 0.1, 1000.0, is_log=True, may_be_negative=False)
+    alone = cast(Any, SimpleNamespace(prior=(prior,)))
+    fit = FreeRunFit((alone,), {key: 1.0}, 0.0, 0.0, 1e6 * np.eye(1), (key,), np.ones(1))
+    assert complexity(fit) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("models", "kind", "names"),
+    [
+        ([model(0.0)], "nothing_missing", set()),
+        ([model(0.0), model(1.0, FRICTION)], "nothing_missing", set()),
+        ([model(0.0), model(50.0, FRICTION), model(20.0, DRAG)], "named", {"coulomb_friction"}),
+        (
+            [model(0.0), model(50.0, FRICTION), model(50.0, DRAG)],
+            "indistinguishable",
+            {"coulomb_friction", "quadratic_drag"},
+        ),
+        ([model(0.0, places={"tank": 80.0}), model(50.0, FRICTION)], "unknown", set()),
+    ],
+)  # fmt: skip
+def test_decisions(models: list[ScoredModel], kind: str, names: set[str]) -> None:
+    decision = decided(posterior(models, 10, 1.0), 1.0)
+    assert decision.kind == kind
+    assert {name for each in decision.alternatives for name in each.names} == names
+
+
+def test_what_has_no_name_is_placed_only_where_one_block_has_the_evidence() -> None:
+    both = {"tank": 80.0, "structure": 79.5, "sensor acceleration_tip": 10.0}
+    assert decided(posterior([model(0.0, places=both)], 10, 1.0)).block == ""
+    assert decided(posterior([model(0.0, places={**both, "tank": 90.0})], 10, 1.0)).block == "tank"

@@ -1,0 +1,129 @@
+"""Remainders: marginal likelihoods by direct integration over multivariate normals, and what noise alone does."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from sloshlab.diagnosis.inference.remainder import remainder, smoothed
+from sloshlab.diagnosis.inference.run_noise import RunNoise
+from sloshlab.diagnosis.inference.whitened import WhitenedRun
+
+BURST = 0.01
+SHARES = (0.01, 0.05, 0.2, 0.8)
+POWERS = np.geomspace(4.0, 4e4, 13)
+CHANNELS = ("acceleration_tip", "displacement_tank")
+
+
+def run(
+    residual: np.ndarray,
+    contribution: np.ndarray | None = None,
+    directions: dict[str, np.ndarray] | None = None,
+    correlation: float = 0.0,
+) -> WhitenedRun:
+    """A run with places that all channels see in phase, and noise with a correlation of its two channels."""
+    observed = [SimpleNamespace(channel=name, run=SimpleNamespace(name="run_1")) for name in CHANNELS]
+    covariance = np.array([[1.0, correlation], [correlation, 1.0]])
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    shape = residual.shape[1:]
+    along = {f"sensor {name}": np.eye(2)[i] for i, name in enumerate(CHANNELS)} | (directions or {})
+    places = {}
+    for place, vector in along.items():
+        shown = root @ vector
+        rows = np.broadcast_to((shown / np.linalg.norm(shown))[None], (*shape, 1, 2))
+        places[place] = (rows, np.ones((*shape, 1)))
+    noise = RunNoise(np.broadcast_to(root, (*shape, 2, 2)), places)
+    return WhitenedRun(
+        cast(Any, observed), residual, np.zeros_like(residual) if contribution is None else contribution, noise
+    )
+
+
+def log_normal(x: np.ndarray, covariance: np.ndarray) -> float:
+    return float(
+        multivariate_normal(np.zeros(len(covariance)), covariance).logpdf(x.reshape(len(covariance), -1).T).sum()
+    )
+
+
+def test_the_marginal_likelihood_of_one_cell_is_that_of_multivariate_normals() -> None:
+    x = np.random.default_rng(1).normal(size=(2, 4, 4)) * 1.7
+    weights = np.array([0.6, 0.8])
+    found = remainder([run(x, directions={"structure": weights})])
+
+    def mean_over_powers(along: np.ndarray) -> float:
+        return float(np.mean([np.exp(log_normal(x, np.eye(2) + s * np.outer(along, along))) for s in POWERS]))
+
+    weights = weights / np.linalg.norm(weights)
+    burst = np.mean([mean_over_powers(along) for along in np.eye(2)])
+    plain = np.exp(log_normal(x, np.eye(2)))
+    constant = 0.5 * x.size * np.log(2 * np.pi)  # left out of all likelihoods alike
+    assert found.noise.sum() == pytest.approx(np.log((1 - BURST) * plain + BURST * burst) + constant, rel=1e-9)
+    for i, share in enumerate(SHARES):
+        whole = (1 - BURST) * ((1 - share) * plain + share * mean_over_powers(weights)) + BURST * burst
+        assert found.places["structure"][i].sum() == pytest.approx(np.log(whole) + constant, rel=1e-9)
+        of_sensor = (1 - BURST) * ((1 - share) * plain + share * mean_over_powers(np.eye(2)[1])) + BURST * burst
+        assert found.places["sensor displacement_tank"][i].sum() == pytest.approx(
+            np.log(of_sensor) + constant, rel=1e-9
+        )
+
+
+def test_noise_that_the_channels_share_is_no_force() -> None:
+    """Coefficients with a correlation of 0.95, as the noise of a drive makes of two force cells."""
+    generator = np.random.default_rng(7)
+    root = np.linalg.cholesky(np.array([[1.0, 0.95], [0.95, 1.0]]))
+    x = np.einsum("cd,dbk->cbk", root, generator.normal(size=(2, 32, 40)) * 1.2)
+    told, untold = (
+        remainder([run(x, directions={"tank": np.ones(2)}, correlation=correlation)]).largest_gain
+        for correlation in (0.95, 0.0)
+    )
+    assert told < 0.0 < untold
+
+
+def test_noise_alone_has_no_remainder() -> None:
+    generator, along = np.random.default_rng(2), {"structure": np.ones(2)}
+    gains = [
+        remainder([run(generator.normal(size=(2, 16, 40)), directions=along)]).largest_gain for _ in range(200)
+    ]
+    # A ratio of marginal likelihoods of e^3 for the wrong model has a probability below e^-3 (Markov).
+    assert np.mean(np.array(gains) > 3.0) < 3 * np.exp(-3.0)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (1.0, -1.0), (1.0, 0.0)])
+def test_the_place_that_made_it_has_the_largest_evidence(weights: tuple[float, float]) -> None:
+    generator, at = np.random.default_rng(3), np.array(weights)
+    x = generator.normal(size=(2, 16, 40))
+    x[:, :, 8:12] += 3.0 * at[:, None, None] * generator.normal(size=(16, 4))
+    places = {"structure": np.array([1.0, 1.0]), "tank": np.array([1.0, -1.0])}
+    found = remainder([run(x, directions=places)])
+    expected = {(1.0, 1.0): "structure", (1.0, -1.0): "tank", (1.0, 0.0): "sensor acceleration_tip"}[weights]
+    assert max(found.places, key=found.gain) == expected
+    assert found.gain(expected) > 20.0
+
+
+def test_a_burst_of_one_channel_is_noise() -> None:
+    x = np.random.default_rng(4).normal(size=(2, 32, 40))
+    x[0, 9] *= 15.0
+    assert remainder([run(x, directions={"structure": np.ones(2)})]).largest_gain < 3.0
+
+
+def test_a_law_that_is_known_to_a_tenth_explains_a_residual_of_a_tenth() -> None:
+    generator = np.random.default_rng(5)
+    contribution = 50.0 * generator.normal(size=(2, 32, 40))
+    x = generator.normal(size=(2, 32, 40)) + 0.1 * contribution
+    exact, loose = (remainder([run(x, contribution)], error) for error in (0.0, 0.1))
+    assert loose.noise.sum() - exact.noise.sum() > 100.0
+    assert loose.largest_gain < 3.0
+    # Per coefficient ½ (x² − x²/v − ln v) with the variance v = 1 + 0.1² times the power of what is contributed.
+    variance = 1.0 + 0.01 * smoothed(contribution**2)
+    gaussian = float((-0.5 * np.log(variance) - 0.5 * x**2 / variance).sum())
+    assert loose.noise.sum() == pytest.approx(gaussian, abs=2.0)
+
+
+def test_a_run_without_the_place_leaves_its_likelihood_alone() -> None:
+    x = np.random.default_rng(6).normal(size=(2, 8, 8))
+    found = remainder([run(x, directions={"tank": np.ones(2)}), run(x)])
+    n = found.noise.size // 2
+    np.testing.assert_allclose(found.places["tank"][:, n:], np.broadcast_to(found.noise[n:], (4, n)))
