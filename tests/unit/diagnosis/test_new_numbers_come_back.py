@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recorded_oscillators import (
+    fitted_from,
     DAMPING,
     MASS_KG,
     NOISE,
@@ -26,7 +27,7 @@ from scipy.interpolate import make_interp_spline
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, candidates
 from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.free_run_fit import fitted_from
+
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
