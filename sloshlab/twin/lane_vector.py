@@ -23,6 +23,8 @@ _BYTES: Final = 8
 
 
 class _LaneVector(types.Type):  # type: ignore[misc]
+    """Eight numbers, one of every lane."""
+
     def __init__(self) -> None:
         super().__init__(name="LaneVector")
 
@@ -80,6 +82,8 @@ def alike(typing: Any, number: Any) -> Any:
 
 
 class _LaneColumns(types.Type):  # type: ignore[misc]
+    """Rows of eight numbers."""
+
     def __init__(self) -> None:
         super().__init__(name="LaneColumns")
 

@@ -237,6 +237,7 @@ def _check_size(n_rows: int, n_kept: int) -> None:
 
 
 def stretches(n_rows: int, n_substeps: int) -> Iterator[tuple[int, int]]:
+    """First row, and the row after the last, of every stretch that is integrated at once."""
     at_once = max(1, _HALF_STEPS_AT_ONCE // (2 * n_substeps))
     for first in range(1, n_rows, at_once):
         yield first, min(first + at_once, n_rows)
@@ -283,6 +284,7 @@ def bounds_of_states(n_modes: int, n_memory: int) -> FloatArray:
 
 
 def most_event_functions(terms: Sequence[Term]) -> int:
+    """Largest number of event functions of a term."""
     return max((term.kind.n_switches + len(term.kind.limits) for term in terms), default=0)
 
 

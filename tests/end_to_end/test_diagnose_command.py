@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from short_runs import DONE_BUT_FLAGGED, contents, leftovers, refusal
 
 from pipelines.command_line import run
+from sloshlab.diagnosis.candidate import known_effects, withdraw
 from sloshlab.twin.storage import load_twin
 
 MASS_KG, LIQUID_KG, STIFFNESS, DAMPING, RATE_HZ = 2.117, 0.124, 3808.8, 0.9, 200.0
@@ -90,6 +91,16 @@ def case(folder: Path, *runs: xr.Dataset, rig: str = RIG) -> Path:
     for i, recording in enumerate(runs):
         recording.to_netcdf(folder / "recordings" / f"run_{i}.nc")
     return folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_effects_are_left() -> Iterator[None]:
+    """Effects of a user are known to the whole process: tests that come later must not meet them."""
+    before = known_effects()
+    yield
+    for effect in known_effects():
+        if effect not in before:
+            withdraw(effect)
 
 
 @pytest.fixture(scope="module")

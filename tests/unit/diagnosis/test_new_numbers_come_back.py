@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recorded_oscillators import (
-    fitted_from,
     DAMPING,
     MASS_KG,
     NOISE,
@@ -17,6 +16,7 @@ from recorded_oscillators import (
     STIFFNESS,
     base_motion,
     decays,
+    fitted_from,
     motion,
     rig,
     run_of,
@@ -27,7 +27,6 @@ from scipy.interpolate import make_interp_spline
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, candidates
 from sloshlab.diagnosis.case import CaseRun
-
 from sloshlab.diagnosis.free_run_problem import FreeRunProblem
 from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
