@@ -29,7 +29,7 @@ from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.split import Split, split
 from sloshlab.diagnosis.surroundings import surroundings_of
-from sloshlab.errors import InputError
+from sloshlab.errors import AnalysisError, InputError
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
 
 assert effects.__all__  # importing the vocabulary makes it known
@@ -135,10 +135,10 @@ def findings_of(
     fits = selection.selected(retuned_fit)
     nothing = next(fit for fit in fits if not fit.candidates)
     with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)
-    believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), np.inf, np.inf)
-    believed, *models = _scored(
-        model, fitting, held_out, [believed_fit, nothing, *with_effects[:_MOST_SCORED]], nothing
-    )
+    believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), 0.0, 0.0)
+    score = _Scoring(model, fitting, held_out, nothing)
+    believed, retuned = score.required(believed_fit, "as believed"), score.required(nothing, "retuned")
+    explanations = [found for fit in with_effects[:_MOST_SCORED] if (found := score.of(fit)) is not None]
     return Findings(
         case,
         model,
@@ -147,28 +147,40 @@ def findings_of(
         fitting,
         held_out,
         believed,
-        models[0],
-        sorted(models[1:], key=lambda scored_model: -scored_model.evidence),
-        posterior(models, len(selection.pool)),
+        retuned,
+        sorted(explanations, key=lambda explanation: -explanation.evidence),
+        posterior([retuned, *explanations], len(selection.pool)),
         selection.failed,
         len(selection.pool),
     )
 
 
-def _scored(
-    model: DiagnosedModel,
-    fitting: Sequence[Sequence[Observation]],
-    held_out: Sequence[Sequence[Observation]],
-    fits: Sequence[FreeRunFit],
-    nothing: FreeRunFit,
-) -> list[ScoredModel]:
-    """Models with their likelihood over fitted and held-out runs, without those that do not run on the latter."""
-    everything = [*fitting, *held_out]
-    noise = [run_noise(model, run, nothing.values) for run in everything]
-    names, found = {run[0].run.name for run in held_out}, []
-    for fit in fits:
-        values = values_of_runs(model, held_out, fit)
-        runs = whitened(model, everything, fit.candidates, values, noise)
-        if runs is not None:
-            found.append(scored(fit, values, runs, names))
-    return found
+class _Scoring:
+    """Models with their likelihood over fitted and held-out runs."""
+
+    def __init__(
+        self,
+        model: DiagnosedModel,
+        fitting: Sequence[Sequence[Observation]],
+        held_out: Sequence[Sequence[Observation]],
+        nothing: FreeRunFit,
+    ) -> None:
+        self.model, self.held_out, self.everything = model, held_out, [*fitting, *held_out]
+        self.noise = [run_noise(model, run, nothing.values) for run in self.everything]
+
+    def of(self, fit: FreeRunFit) -> ScoredModel | None:
+        """A model; None where it does not reach the end of a run that it was not fitted to."""
+        values = values_of_runs(self.model, self.held_out, fit)
+        runs = whitened(self.model, self.everything, fit.candidates, values, self.noise)
+        return None if runs is None else scored(fit, values, runs, {run[0].run.name for run in self.held_out})
+
+    def required(self, fit: FreeRunFit, which: str) -> ScoredModel:
+        """The same of the baseline, without which nothing can be compared."""
+        found = self.of(fit)
+        if found is None:
+            raise AnalysisError(
+                f"the twin {which}",
+                got="does not reach the end of every held-out run",
+                remedy="leave that run out",
+            )
+        return found

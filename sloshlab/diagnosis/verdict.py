@@ -13,7 +13,12 @@ from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.interval import LEVEL, Interval, intervals_of
 from sloshlab.diagnosis.mismatch import mismatches, summary
 from sloshlab.diagnosis.separating_experiment import separating_experiment
-from sloshlab.diagnosis.wording import names_of_alternatives, separating_experiment_of, statement_of
+from sloshlab.diagnosis.wording import (
+    names_of_alternatives,
+    refuted_statement,
+    separating_experiment_of,
+    statement_of,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +68,14 @@ def verdict_of(found: Findings) -> Verdict:
         # No run chose nothing: a name would be judged by what it was fitted to.
         decision = replace(decision, kind="unknown", alternatives=[])
     intervals = {} if decision.best is None else intervals_of(found, decision.best)
+    refuted = refuted_statement(found, decision.best or found.retuned)
     alternatives = names_of_alternatives(decision)
     is_set = len(alternatives) > 1
     return Verdict(
         "indistinguishable" if is_set else decision.kind,
         decision.best,
         alternatives,
-        statement_of(found, decision, intervals),
+        f"{statement_of(found, decision, intervals).removesuffix('.')}{refuted}.",
         _separating(found, decision) if is_set else "",
         decision.probabilities,
         decision.block,

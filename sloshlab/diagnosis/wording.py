@@ -9,12 +9,16 @@ import numpy as np
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.findings import Findings
+from sloshlab.diagnosis.free_run_problem import run_of
 from sloshlab.diagnosis.inference.decision import Decision
 from sloshlab.diagnosis.inference.places import SENSOR
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.interval import Interval
+from sloshlab.diagnosis.readiness import refuted_beliefs
 from sloshlab.diagnosis.units import named_and_units
 
+_REFUTED_TOLERANCES: Final = 3.0
+"""Standard deviations of a prior: a number held closer to what is believed may only be a narrow bound."""
 _EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure, whatever is recorded."""
 
@@ -68,6 +72,28 @@ def _unknown(found: Findings, decision: Decision) -> str:
 
 def _channel(place: str) -> str:
     return place.removeprefix(f"{SENSOR} ")
+
+
+def refuted_statement(found: Findings, model: ScoredModel) -> str:
+    """What is said of believed numbers that a model moves as far as they may go, if that is far; empty of none.
+
+    Parameters
+    ----------
+    found : Findings
+    model : ScoredModel
+        What is named, or nothing missing.
+    """
+    shared = [known for known in found.model.parameters if not run_of(known.name, found.model)]
+    refuted = [
+        belief
+        for belief in refuted_beliefs(model.fit.values, shared)
+        if abs(belief.deviation_tolerances) >= _REFUTED_TOLERANCES
+    ]
+    return "".join(
+        f"; what is believed of the {belief.name} is refuted: {belief.believed:.4g} ± {belief.tolerance:.2g}"
+        f"{'' if belief.units == '1' else f' {belief.units}'}, while {belief.found:.4g} is as far as it may go"
+        for belief in refuted
+    )
 
 
 def names_of_alternatives(decision: Decision) -> list[tuple[str, ...]]:

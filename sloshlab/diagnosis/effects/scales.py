@@ -95,11 +95,6 @@ def sampling_rate(at: Surroundings) -> float:
     return at.sampling_rate_hz
 
 
-def sampling_interval(at: Surroundings) -> float:
-    """Of the recordings [s]."""
-    return 1.0 / at.sampling_rate_hz
-
-
 def cycle_in_a_run(at: Surroundings) -> float:
     """One over the longest run [Hz]: by as much a frequency slips by one cycle."""
     return 1.0 / at.longest_run_s

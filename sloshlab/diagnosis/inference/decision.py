@@ -17,7 +17,6 @@ import numpy as np
 
 from sloshlab.diagnosis.inference.places import block_of
 from sloshlab.diagnosis.inference.posterior import NONE, TOLD_APART, UNKNOWN, Posterior
-from sloshlab.diagnosis.inference.remainder import TEMPERING
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, difference
 
 NAMED: Final = 0.9
@@ -55,14 +54,12 @@ class Decision:
         return block_of(self.place)
 
 
-def decided(found: Posterior, tempering: float = TEMPERING) -> Decision:
+def decided(found: Posterior) -> Decision:
     """What is said of a posterior.
 
     Parameters
     ----------
     found : Posterior
-    tempering : float, optional
-        As of the posterior.
     """
     labels = found.by_label()
     named = {label: p for label, p in labels.items() if label not in (NONE, UNKNOWN)}
@@ -77,7 +74,7 @@ def decided(found: Posterior, tempering: float = TEMPERING) -> Decision:
         return _unknown(found, next(iter(named), ""), labels)
     best = found.best(chosen[0]).model
     models = [found.best(label).model for label in chosen]
-    models += [model for model in equals_of(best, found, tempering) if all(model.names != m.names for m in models)]
+    models += [model for model in equals_of(best, found) if all(model.names != m.names for m in models)]
     return Decision("named" if len(models) == 1 else "indistinguishable", best, models, "", labels)
 
 
@@ -89,14 +86,13 @@ def _unknown(found: Posterior, nearest: str, labels: dict[str, float]) -> Decisi
     return Decision("unknown", best, [], places[0] if p >= LOCATED and places else "", labels)
 
 
-def equals_of(best: ScoredModel, found: Posterior, tempering: float = TEMPERING) -> list[ScoredModel]:
+def equals_of(best: ScoredModel, found: Posterior) -> list[ScoredModel]:
     """Models of no more numbers that predict the same as the best within what recordings tell apart.
 
     Parameters
     ----------
     best : ScoredModel
     found : Posterior
-    tempering : float
     """
     models = {id(h.model): h.model for h in found.hypotheses if not h.place and h.label not in (NONE, UNKNOWN)}
     alike = [
@@ -105,7 +101,7 @@ def equals_of(best: ScoredModel, found: Posterior, tempering: float = TEMPERING)
         if model.names != best.names
         and model.n_numbers <= best.n_numbers
         and not set(best.keys) < set(model.keys)
-        and difference(best, model) / tempering < TOLD_APART
+        and difference(best, model) / found.tempering < TOLD_APART
     ]
     return sorted(alike, key=lambda model: -model.evidence)
 

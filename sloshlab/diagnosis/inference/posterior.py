@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
+from sloshlab.diagnosis.candidate import BLOCKS
 from sloshlab.diagnosis.inference.places import block_of
 from sloshlab.diagnosis.inference.remainder import PRIOR_OF_REMAINDER, SHARES, TEMPERING
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, difference, strength
@@ -64,10 +65,13 @@ class Posterior:
     ----------
     hypotheses : tuple of Hypothesis
     probabilities : ndarray, shape (n_hypotheses,)
+    tempering : float
+        By which log-likelihoods were divided.
     """
 
     hypotheses: tuple[Hypothesis, ...]
     probabilities: FloatArray
+    tempering: float
 
     def by_label(self) -> dict[str, float]:
         """Probability of everything that may be said, the largest first."""
@@ -85,9 +89,20 @@ class Posterior:
         return {block: p / total for block, p in self._summed(blocks).items() if block}
 
     def best(self, label: str) -> Hypothesis:
-        """The hypothesis of a label with the fewest numbers of those that are as good, else the best."""
-        own = [h for h in self.of_label(label) if label in (NONE, UNKNOWN, " + ".join(h.model.names))]
-        return (own or self.of_label(label))[0]
+        """The best hypothesis of a label; of those that predict the same, the one that comes first in the chain.
+
+        A force on a tank of frozen liquid is one on the structure, which comes first, unless the force between
+        them is recorded.
+        """
+        alike = self.of_label(label)
+        own = [h for h in alike if label in (NONE, UNKNOWN, " + ".join(h.model.names))] or alike
+        same = [
+            h
+            for h in own
+            if h.model.n_numbers == own[0].model.n_numbers
+            and difference(h.model, own[0].model) / self.tempering < TOLD_APART
+        ]
+        return min(same, key=lambda h: sorted(BLOCKS.index(c.effect.block) for c in h.model.fit.candidates))
 
     def of_label(self, label: str) -> list[Hypothesis]:
         """All hypotheses of a label, the largest evidence first."""
@@ -125,7 +140,7 @@ def posterior(
     weights = np.random.default_rng(seed).dirichlet(np.ones(n_cells), _N_DRAWS) * n_cells
     fixed = np.array([h.log_prior - h.model.complexity for h in found])
     scores = weights @ np.stack([h.by_cell for h in found], axis=1) / tempering + fixed
-    return Posterior(tuple(found), np.asarray(softmax(scores, axis=1).mean(axis=0)))
+    return Posterior(tuple(found), np.asarray(softmax(scores, axis=1).mean(axis=0)), tempering)
 
 
 def _labels(models: Sequence[ScoredModel], tempering: float) -> list[str]:
@@ -159,6 +174,7 @@ def _hypotheses(model: ScoredModel, label: str, n_candidates: int) -> list[Hypot
     found = [Hypothesis(model, "", label, log_prior, model.remainder.noise)]
     places = model.remainder.places
     for place, by_share in places.items():
+        # The share of cells that describes best stands for all; the others are paid for by its prior.
         share = int(np.argmax(by_share.sum(axis=1)))
         found.append(
             Hypothesis(

@@ -90,8 +90,8 @@ class ModelSelection:
     def _as_believed(self) -> FreeRunFit:
         """The baseline as believed, with numbers of single runs fitted: retuning may have hidden an effect."""
         model = self.runs.model
-        plain = FreeRunFit((), dict(model.believed), np.inf, np.inf)
-        return FreeRunFit((), values_of_runs(model, self.runs.runs, plain), np.inf, np.inf)
+        plain = FreeRunFit((), dict(model.believed), 0.0, 0.0)
+        return FreeRunFit((), values_of_runs(model, self.runs.runs, plain), 0.0, 0.0)
 
     def _remains(self, fit: FreeRunFit) -> bool:
         """Whether something is left in the fitted runs that noise and bursts do not explain."""
@@ -161,7 +161,7 @@ class ModelSelection:
             rest = tuple(candidate for candidate in best.candidates if candidate is not effect)
             own = {f"{effect.key}.{parameter.name}" for parameter in effect.effect.parameters}
             values = {name: value for name, value in best.values.items() if name not in own}
-            self._grown([FreeRunFit(rest, values, np.inf, np.inf)], f"in the place of {effect.key}")
+            self._grown([FreeRunFit(rest, values, 0.0, 0.0)], f"in the place of {effect.key}")
 
     def _eliminated(self, n: int) -> None:
         """Models with one effect less than the leading ones of so many, from their numbers.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -34,7 +33,7 @@ def candidate(key: str) -> Candidate:
 
 
 def model(
-    total: float, *keys: str, places: dict[str, float] | None = None, cells: Sequence[float] | None = None
+    total: float, *keys: str, places: dict[str, float] | None = None, cells: np.ndarray | None = None
 ) -> ScoredModel:
     """A model with a log-likelihood, all cells alike unless they are given, and that of remainders."""
     candidates = tuple(candidate(key) for key in keys)
@@ -127,9 +126,19 @@ def test_a_number_that_nothing_tells_costs_nothing() -> None:
     ],
 )  # fmt: skip
 def test_decisions(models: list[ScoredModel], kind: str, names: set[str]) -> None:
-    decision = decided(posterior(models, 10, 1.0), 1.0)
+    decision = decided(posterior(models, 10, 1.0))
     assert decision.kind == kind
     assert {name for each in decision.alternatives for name in each.names} == names
+
+
+def test_of_equals_in_two_blocks_the_structure_is_said() -> None:
+    # The tank is better by what chance makes of two fits of one force.
+    models = [model(0.0), model(50.01, "tank.coulomb_friction"), model(50.0, FRICTION)]
+    best = decided(posterior(models, 10, 1.0)).best
+    assert best is not None
+    assert best.keys == (FRICTION,)
+    apart = [model(0.0), model(60.0, "tank.coulomb_friction"), model(50.0, FRICTION)]
+    assert decided(posterior(apart, 10, 1.0)).best is apart[1]
 
 
 def test_what_has_no_name_is_placed_only_where_one_block_has_the_evidence() -> None:

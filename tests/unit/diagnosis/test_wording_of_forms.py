@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.candidate import Candidate, known_effects
-from sloshlab.diagnosis.wording import form_and_place, named_and_placed
+from sloshlab.diagnosis.wording import form_and_place, named_and_placed, refuted_statement
 
 assert effects.__all__
 
@@ -34,3 +38,16 @@ def test_a_form_is_said_where_forms_are_compared(key: str, channel: str, answer:
     candidate = Candidate(effect, None, channel)  # type: ignore[arg-type]
     assert named_and_placed(candidate) == answer
     assert form_and_place(candidate) == compared
+
+
+@pytest.mark.parametrize(("most_tolerances", "said"), [(4.0, True), (1.25, False)])
+def test_a_believed_number_is_refuted_where_it_is_held_far_away(most_tolerances: float, said: bool) -> None:
+    spring = BaselineParameter("stiffness", 1e5, 1e4, "N m-1", most_tolerances=most_tolerances)
+    found: Any = SimpleNamespace(model=SimpleNamespace(parameters=(spring,), runs=()))
+    held: Any = SimpleNamespace(fit=SimpleNamespace(values={"stiffness": 1e5 - most_tolerances * 1e4}))
+    words = refuted_statement(found, held)
+    assert words == (
+        "; what is believed of the stiffness is refuted: 1e+05 ± 1e+04 N m-1, while 6e+04 is as far as it may go"
+        if said
+        else ""
+    )
