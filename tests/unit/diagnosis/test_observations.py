@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -129,6 +130,31 @@ def test_what_does_not_repeat_is_not_believed() -> None:
     half = shape[1] // 2
     assert np.median(variance[:, : half - 9]) == pytest.approx(0.25, rel=0.05)
     np.testing.assert_allclose(variance[:, half + 9 :], group[0][0].variance.min())
+
+
+@pytest.mark.parametrize("n_repeats", [2, 12])
+def test_steady_noise_of_the_lowest_bands_is_not_smeared(n_repeats: int) -> None:
+    """Noise with a hundred times the variance in the lowest band alone, at all times alike."""
+    generator = np.random.default_rng(9)
+    group = [observations(run(TONE, noise=0.02), ["acceleration_tip"]) for _ in range(n_repeats)]
+    shape = group[0][0].spectra.shape
+    size = np.where(np.arange(shape[1]) < 1, 10.0, 1.0)
+    lowest = [
+        with_scatter(group, [{"acceleration_tip": size * generator.normal(size=shape)} for _ in group])[0][
+            0
+        ].variance
+        for _ in range(60)
+    ]
+    # The mean of sixty medians over the blocks of the runs.
+    assert np.mean([np.median(variance[:, 0]) for variance in lowest]) == pytest.approx(100.0, rel=0.25)
+
+
+def test_a_channel_that_shows_nothing_has_its_noise_where_no_test_was_repeated_too() -> None:
+    group = [observations(repeat, ["acceleration_tip"]) for repeat in repeats(2, 0.0)]
+    loud = [replace(each, variance=np.full(each.spectra.shape, 1e6)) for repeat in group for each in repeat]
+    assert not any(each.informative.any() for each in loud)
+    [target] = with_typical_scatter(observations(run(TONE, noise=0.02), ["acceleration_tip"]), loud)
+    np.testing.assert_allclose(target.variance, 1e6)
 
 
 def test_an_equal_error_in_all_repeats_is_no_scatter() -> None:

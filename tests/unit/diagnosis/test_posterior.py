@@ -65,6 +65,12 @@ def test_models_whose_cells_agree_have_probabilities_by_bayes_theorem() -> None:
     assert sum(found.values()) == pytest.approx(1.0)
 
 
+def test_log_likelihoods_are_divided_before_they_are_compared() -> None:
+    found = posterior([model(0.0), model(50.0, FRICTION)], n_candidates=10, tempering=10.0).by_label()
+    odds = np.exp(50.0 / 10.0) * (1 / 40) / (1 / 2)
+    assert found["coulomb_friction"] == pytest.approx(odds / (1 + odds), rel=1e-9)
+
+
 def test_a_lead_that_rests_on_one_cell_is_no_certainty() -> None:
     one, all_ = np.zeros(N_CELLS), np.full(N_CELLS, 20.0 / N_CELLS)
     one[3] = 20.0
