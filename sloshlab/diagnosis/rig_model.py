@@ -212,6 +212,10 @@ class RigModel:
             and self._has_counterpart(run, name)
         ]
 
+    def liquid_fluctuates(self, run: CaseRun) -> bool:
+        """Whether a liquid moves in a run whose damping, believed as a number, never is the same twice."""
+        return run.attributes.configuration == "sloshing" and any(map(_damps_as_liquid, self.twin.terms))
+
     def driving(self, run: CaseRun) -> tuple[str, ...]:
         """Channels that drive the twin in a run."""
         return self._drive(run, ()).channels
@@ -483,11 +487,10 @@ class RigModel:
             for name, shapes in self._shapes.items()
             for shape in shapes
         ]
-        fluctuates = any(_damps_as_liquid(term) for term in self.twin.terms)
         for run in self.runs:
             # Liquid that moves chaotically never damps twice alike. One number for all runs would make the
             # difference physics.
-            if fluctuates and run.attributes.configuration == "sloshing":
+            if self.liquid_fluctuates(run):
                 found.append(BaselineParameter(_FLUCTUATION + run.name, 1.0, _TOLERANCE_OF_FLUCTUATION))
             if run.is_free:
                 start = self._drive(run, ()).initial_displacement_m

@@ -9,7 +9,8 @@ that x has the covariance
 
 (the transform is real and its phase runs, so that both quadratures of g count). An error of a sensor is the same
 with g along its channel. The power is integrated over a log-uniform prior, together with the share π of cells that
-have any. A burst, all bands of one sensor in a stretch of time, belongs to the noise.
+have any. What is less of the simulated motion in a cell than a simulation is exact to (`RunNoise`) belongs to the
+noise. A burst, all bands of one sensor in a stretch of time, belongs to the noise.
 
 So *something is left* is a model with a marginal likelihood like any other, per place. Latent forces as Gaussian
 processes: Rogers and Friis (2022), doi:10.1016/j.ymssp.2022.109308; spike and slab: Mitchell and Beauchamp (1988),
@@ -89,19 +90,24 @@ def remainder(runs: Sequence[WhitenedRun], relative_error: float = 0.0) -> Remai
     per_run: list[dict[str, FloatArray]] = []
     for run in runs:
         variance = 1.0 + relative_error**2 * smoothed(run.contribution**2)
-        x = run.residual / np.sqrt(variance)
-        independent = run.noise.whitened(x)
+        independent = run.noise.whitened(run.residual / np.sqrt(variance))
         plain = sums_of_cells((-0.5 * np.log(variance) - 0.5 * independent**2).sum(axis=0)).sum(axis=-1)
+        signal = run.noise.whitened(run.simulated / np.sqrt(variance))
         gains = {place: _gains(independent, *directions) for place, directions in run.noise.places.items()}
+        small = {
+            place: _POWERS[:, None, None] < run.noise.exactness**2 * _power_of_motion(signal, projections)
+            for place, (projections, _) in run.noise.places.items()
+        }
+        # Noise, and what a simulation that is as exact as it can be leaves at any place.
+        inexact = _log_mean(np.stack([_log_mean_of(gains[place], small[place]) for place in gains]))
+        usual = np.logaddexp(np.log(0.5), np.log(0.5) + inexact)
         # A burst is noise of one sensor in all bands of a stretch of time.
         bursts = [gain.sum(axis=-1) for place, gain in gains.items() if block_of(place) == SENSOR]
         burst = np.log(BURST) + _log_mean(np.concatenate(bursts))
-        noise.append(plain + np.logaddexp(np.log1p(-BURST), burst))
+        noise.append(plain + np.logaddexp(np.log1p(-BURST) + usual.sum(axis=-1), burst))
+        mixed = {place: _mixed(usual, _log_mean_of(gains[place], ~small[place])) for place in gains}
         per_run.append(
-            {
-                place: plain + np.logaddexp(np.log1p(-BURST) + _mixed(_log_mean(gain)).sum(axis=-1), burst)
-                for place, gain in gains.items()
-            }
+            {place: plain + np.logaddexp(np.log1p(-BURST) + mixed[place].sum(axis=-1), burst) for place in gains}
         )
     places = dict.fromkeys(place for found in per_run for place in found)
     return Remainder(
@@ -134,11 +140,25 @@ def _gains(x: FloatArray, projections: FloatArray, shares: FloatArray) -> FloatA
     return np.array(gains)
 
 
+def _power_of_motion(signal: FloatArray, projections: FloatArray) -> FloatArray:
+    """Power of the simulated motion at a place, in noise variances, per cell of time and frequency."""
+    along = np.einsum("bkmc,cbk->bkm", projections, signal) ** 2
+    power = sums_of_cells(along.sum(axis=-1)) / sums_of_cells(np.ones(along.shape[:2]))
+    return np.asarray(power)
+
+
 def _log_mean(gains: FloatArray) -> FloatArray:
     return np.asarray(logsumexp(gains, axis=0) - np.log(gains.shape[0]))
 
 
-def _mixed(gain: FloatArray) -> FloatArray:
+def _log_mean_of(gains: FloatArray, chosen: NDArray[np.bool_]) -> FloatArray:
+    """Over the chosen powers alone; that of no power at all where none is chosen."""
+    n = chosen.sum(axis=0)
+    total = logsumexp(np.where(chosen, gains, -np.inf), axis=0)
+    return np.asarray(np.where(n > 0, total - np.log(np.maximum(n, 1)), 0.0))
+
+
+def _mixed(usual: FloatArray, gain: FloatArray) -> FloatArray:
     """Log-likelihood ratios where a share of the cells has a remainder, shape (n_shares, …)."""
     shares = SHARES[:, None, None]
-    return np.asarray(np.logaddexp(np.log1p(-shares), np.log(shares) + gain))
+    return np.asarray(np.logaddexp(np.log1p(-shares) + usual, np.log(shares) + gain))

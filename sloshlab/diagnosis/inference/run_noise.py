@@ -5,7 +5,7 @@ channels have the covariance
 
 .. math:: \Sigma = I - \mathrm{diag}(D) + D, \qquad D_{cd} = \langle d_c d_d \rangle
 
-with what draws d of that noise make of the channels, averaged over draws and a cell of time and frequency. The
+with what draws d of that noise make of the channels, averaged over draws and neighbouring blocks of time. The
 residuals are whitened by the inverse of its Cholesky root, and so is the transfer of every place.
 """
 
@@ -17,6 +17,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.inference.places import SENSOR, STRUCTURE, transfers_of
@@ -27,6 +28,12 @@ FloatArray = NDArray[np.float64]
 BLOCKS_OF_A_CELL: Final = 4
 BANDS_OF_A_CELL: Final = 4
 """Two seconds and four hertz of the transform, within which powers and correlations are constant."""
+_EXACT: Final = 0.01
+"""Of the motion, to which a simulation describes a rig: as gains are known. Less is no physics of its own."""
+_EXACT_BESIDE_CHAOS: Final = 0.05
+"""The same where a liquid moves chaotically: to this its damping is believed to be that of the run's mean."""
+_STEADY_BLOCKS: Final = 9
+"""Over which products of draws are averaged, as their squares are in the noise floor."""
 _LARGEST_CORRELATION: Final = 0.95
 """Of the noise of two channels: sensors have noise of their own, which draws of the drive's do not contain."""
 
@@ -42,10 +49,13 @@ class RunNoise:
     places : dict of str to (ndarray, ndarray)
         Projections of whitened channels on the directions in which a place shows, shape (n_blocks, n_bands, m,
         n_channels), and the share of its power in each, shape (n_blocks, n_bands, m).
+    exactness : float
+        Of the simulated motion, to which a simulation can describe the run.
     """
 
     inverse_root: FloatArray
     places: dict[str, tuple[FloatArray, FloatArray]]
+    exactness: float = _EXACT
 
     def whitened(self, x: FloatArray) -> FloatArray:
         """Channels with independent noise.
@@ -83,7 +93,8 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
         places[STRUCTURE] = _projections(inverse_root)
     for i, each in enumerate(observed):
         places[f"{SENSOR} {each.channel}"] = _projections(inverse_root @ np.eye(n)[:, i : i + 1])
-    return RunNoise(inverse_root, places)
+    is_chaotic = isinstance(model, RigModel) and model.liquid_fluctuates(observed[0].run)
+    return RunNoise(inverse_root, places, _EXACT_BESIDE_CHAOS if is_chaotic else _EXACT)
 
 
 def _covariance(observed: Sequence[Observation]) -> FloatArray:
@@ -93,17 +104,19 @@ def _covariance(observed: Sequence[Observation]) -> FloatArray:
     if any(each.of_drive is None for each in observed):
         return covariance
     drawn = np.stack([np.asarray(each.of_drive) / np.sqrt(each.variance) for each in observed])
+    powers = [_steady(each**2) for each in drawn]
     for i in range(n):
         for j in range(i):
-            product = averaged_over_cells(np.mean(drawn[i] * drawn[j], axis=0))
-            size = np.sqrt(
-                np.maximum(averaged_over_cells(np.mean(drawn[i] ** 2, axis=0)), 1.0)
-                * np.maximum(averaged_over_cells(np.mean(drawn[j] ** 2, axis=0)), 1.0)
-            )
             # Draws larger than the noise of a channel say how it is shared, not how large it is.
-            shared = np.clip(product / size, -1.0, 1.0)
+            size = np.sqrt(np.maximum(powers[i], 1.0) * np.maximum(powers[j], 1.0))
+            shared = np.clip(_steady(drawn[i] * drawn[j]) / size, -1.0, 1.0)
             covariance[..., i, j] = covariance[..., j, i] = _LARGEST_CORRELATION * shared
     return covariance
+
+
+def _steady(drawn: FloatArray) -> FloatArray:
+    """Mean over draws and neighbouring blocks, band by band: noise through a resonance is steady and narrow."""
+    return np.asarray(uniform_filter1d(drawn.mean(axis=0), _STEADY_BLOCKS, axis=0, mode="nearest"))
 
 
 def _projections(directions: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -116,15 +129,6 @@ def _projections(directions: FloatArray) -> tuple[FloatArray, FloatArray]:
     rows = np.swapaxes(directions @ vectors, -1, -2) / np.sqrt(safe)[..., None]
     total = powers.sum(axis=-1, keepdims=True)
     return rows, np.where(np.isfinite(safe), powers, 0.0) / np.where(total > 0, total, 1.0)
-
-
-def averaged_over_cells(values: FloatArray) -> FloatArray:
-    """Mean over every cell in the place of each value, shape (n_blocks, n_bands)."""
-    n_blocks, n_bands = values.shape
-    counts = sums_of_cells(np.ones_like(values))
-    means = sums_of_cells(values) / counts
-    rows = np.arange(n_blocks) // BLOCKS_OF_A_CELL
-    return np.asarray(means[rows][:, np.arange(n_bands) // BANDS_OF_A_CELL])
 
 
 def sums_of_cells(values: FloatArray) -> FloatArray:

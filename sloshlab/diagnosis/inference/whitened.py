@@ -40,6 +40,12 @@ class WhitenedRun:
     noise: RunNoise
 
     @property
+    def simulated(self) -> FloatArray:
+        """Simulated spectra in standard deviations of the noise, of the shape of `residual`."""
+        recorded = np.stack([each.spectra / np.sqrt(each.variance) for each in self.observed])
+        return np.asarray(recorded - self.residual)
+
+    @property
     def name(self) -> str:
         """Of the run."""
         return self.observed[0].run.name

@@ -24,9 +24,15 @@ def run(
     contribution: np.ndarray | None = None,
     directions: dict[str, np.ndarray] | None = None,
     correlation: float = 0.0,
+    simulated: np.ndarray | None = None,
 ) -> WhitenedRun:
     """A run with places that all channels see in phase, and noise with a correlation of its two channels."""
-    observed = [SimpleNamespace(channel=name, run=SimpleNamespace(name="run_1")) for name in CHANNELS]
+    observed = [
+        SimpleNamespace(
+            channel=name, run=SimpleNamespace(name="run_1"), spectra=values, variance=np.ones_like(values)
+        )
+        for name, values in zip(CHANNELS, residual if simulated is None else residual + simulated, strict=True)
+    ]
     covariance = np.array([[1.0, correlation], [correlation, 1.0]])
     root = np.linalg.inv(np.linalg.cholesky(covariance))
     shape = residual.shape[1:]
@@ -120,6 +126,15 @@ def test_a_law_that_is_known_to_a_tenth_explains_a_residual_of_a_tenth() -> None
     variance = 1.0 + 0.01 * smoothed(contribution**2)
     gaussian = float((-0.5 * np.log(variance) - 0.5 * x**2 / variance).sum())
     assert loose.noise.sum() == pytest.approx(gaussian, abs=2.0)
+
+
+@pytest.mark.parametrize(("size", "remains"), [(0.005, False), (0.1, True)])
+def test_less_than_a_hundredth_of_the_motion_is_how_exact_a_simulation_is(size: float, remains: bool) -> None:
+    generator = np.random.default_rng(8)
+    simulated = 1500.0 * generator.normal(size=(16, 40)) * np.ones((2, 1, 1))
+    x = generator.normal(size=(2, 16, 40)) + size * simulated[:, :, ::-1]
+    found = remainder([run(x, directions={"structure": np.ones(2)}, simulated=simulated)])
+    assert (found.gain("structure") > 100.0) == remains
 
 
 def test_a_run_without_the_place_leaves_its_likelihood_alone() -> None:

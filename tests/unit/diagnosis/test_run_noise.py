@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from sloshlab.diagnosis.inference.run_noise import averaged_over_cells, run_noise, sums_of_cells
+from sloshlab.diagnosis.inference.run_noise import run_noise, sums_of_cells
 
 SHAPE = (8, 12)
 
@@ -30,10 +30,19 @@ def test_what_a_drive_shares_is_the_correlation(share: float) -> None:
     np.testing.assert_allclose(covariance, [[1.0, -0.95 * share], [-0.95 * share, 1.0]], atol=0.01)
 
 
+def test_noise_through_a_narrow_resonance_is_shared_in_its_band_alone() -> None:
+    drawn = np.random.default_rng(3).normal(size=(4000, *SHAPE)) * (np.arange(SHAPE[1]) == 5)
+    found = run_noise(cast(Any, None), [observed(drawn, "a"), observed(drawn, "b")], {})
+    covariance = np.linalg.inv(np.swapaxes(found.inverse_root, -1, -2) @ found.inverse_root).mean(axis=0)
+    np.testing.assert_allclose(covariance[5, 0, 1], 0.95, atol=0.01)
+    np.testing.assert_allclose(np.delete(covariance[:, 0, 1], 5), 0.0, atol=1e-12)
+
+
 def test_whitened_noise_of_the_drive_is_independent() -> None:
     generator = np.random.default_rng(2)
     root = np.linalg.cholesky(np.array([[1.0, 0.95], [0.95, 1.0]]))
-    drawn = generator.normal(size=(4000, *SHAPE))
+    # Draws of exactly the size of the noise: what is left of one channel beside the other is a tenth of it.
+    drawn = generator.choice([-1.0, 1.0], size=(40, *SHAPE))
     found = run_noise(cast(Any, None), [observed(drawn, "a"), observed(drawn, "b")], {})
     x = np.stack([np.einsum("cd,dbk->cbk", root, generator.normal(size=(2, *SHAPE))) for _ in range(2000)])
     white = np.stack([found.whitened(each) for each in x])
@@ -54,4 +63,3 @@ def test_an_error_of_a_sensor_shows_along_its_channel() -> None:
 def test_cells_at_the_ends_are_smaller() -> None:
     values = np.ones((6, 5))
     np.testing.assert_array_equal(sums_of_cells(values), [[16.0, 4.0], [8.0, 2.0]])
-    np.testing.assert_array_equal(averaged_over_cells(3.0 * values), 3.0 * values)
