@@ -22,7 +22,7 @@ from sloshlab.diagnosis.inference.scored_model import ScoredModel, difference
 NAMED: Final = 0.9
 """Posterior probability that a name, or a set of names, needs: a wrong name costs nine times as much as none."""
 LOCATED: Final = 0.8
-"""Probability of a block, given that something has no name."""
+"""Probability of a block, given that something is missing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def _unknown(found: Posterior, nearest: str, labels: dict[str, float]) -> Decisi
     block, p = next(iter(blocks.items()), ("", 0.0))
     places = [h.place for h in found.of_label(UNKNOWN) if block_of(h.place) == block]
     best = found.best(nearest).model if nearest else None
-    return Decision("unknown", best, [], places[0] if p >= LOCATED and places else "", labels)
+    return Decision("unknown", best, [], next(iter(places), block) if p >= LOCATED else "", labels)
 
 
 def equals_of(best: ScoredModel, found: Posterior) -> list[ScoredModel]:

@@ -78,15 +78,14 @@ class Posterior:
         return self._summed([hypothesis.label for hypothesis in self.hypotheses])
 
     def by_block(self) -> dict[str, float]:
-        """Probability of each block of what has no name, given that something has none."""
-        unknown = [h.label == UNKNOWN for h in self.hypotheses]
-        total = float(self.probabilities[unknown].sum())
-        if total <= 0:
-            return {}
-        blocks = [
-            block_of(h.place) if is_unknown else "" for h, is_unknown in zip(self.hypotheses, unknown, strict=True)
-        ]
-        return {block: p / total for block, p in self._summed(blocks).items() if block}
+        """Probability of each block of what is missing, given that something is; the largest first.
+
+        Of a remainder it is the block of its place, of names alone that of all of them; effects of several blocks
+        count for none.
+        """
+        blocks = [_block_of_hypothesis(h) for h in self.hypotheses]
+        total = float(sum(p for h, p in zip(self.hypotheses, self.probabilities, strict=True) if h.label != NONE))
+        return {} if total <= 0 else {block: p / total for block, p in self._summed(blocks).items() if block}
 
     def best(self, label: str) -> Hypothesis:
         """The best hypothesis of a label; of those that predict the same, the one that comes first in the chain.
@@ -113,6 +112,15 @@ class Posterior:
         for label, p in zip(labels, self.probabilities, strict=True):
             sums[label] = sums.get(label, 0.0) + float(p)
         return dict(sorted(sums.items(), key=lambda item: -item[1]))
+
+
+def _block_of_hypothesis(hypothesis: Hypothesis) -> str:
+    if hypothesis.label == NONE:
+        return ""
+    if hypothesis.place:
+        return block_of(hypothesis.place)
+    blocks = {candidate.effect.block for candidate in hypothesis.model.fit.candidates}
+    return blocks.pop() if len(blocks) == 1 else ""
 
 
 def posterior(

@@ -137,6 +137,20 @@ def test_decisions(models: list[ScoredModel], kind: str, names: set[str]) -> Non
     assert {name for each in decision.alternatives for name in each.names} == names
 
 
+def test_names_that_are_not_sure_enough_tell_the_block_too() -> None:
+    # A remainder at either place is an eighth as probable as the name, which so has 0.8 and is not said.
+    remainders = 50.0 - np.log(8.0) - np.log(0.1 / 2 / 4)
+    models = [
+        model(0.0),
+        model(50.0, "tank.quadratic_drag", places=dict.fromkeys(("tank", "structure"), remainders)),
+    ]
+    found = posterior(models, 10, 1.0)
+    assert found.by_label()["quadratic_drag"] == pytest.approx(0.8)
+    assert found.by_block() == pytest.approx({"tank": 0.9, "structure": 0.1})
+    decision = decided(found)
+    assert (decision.kind, decision.block) == ("unknown", "tank")
+
+
 def test_of_equals_in_two_blocks_the_structure_is_said() -> None:
     # The tank is better by what chance makes of two fits of one force.
     models = [model(0.0), model(50.01, "tank.coulomb_friction"), model(50.0, FRICTION)]
