@@ -19,8 +19,8 @@ class BaselineParameter:
     units : str
     is_reading : bool
         Whether it changes only what a channel reads, not the motion.
-    most_tolerances : float
-        Bound of its deviation in tolerances; beyond it something else is wrong.
+    most_below, most_above : float
+        Bounds of its deviation below and above in tolerances; beyond them something else is wrong.
     channel : str
         The only one whose reading it changes; empty where it may change several.
     """
@@ -30,7 +30,12 @@ class BaselineParameter:
     tolerance: float
     units: str = "1"
     is_reading: bool = False
-    # What belongs to one run or one sensor may be far off; masses, frequencies, losses and gains have a closer
-    # bound.
-    most_tolerances: float = 4.0
+    most_below: float = 4.0
+    most_above: float = 4.0
     channel: str = ""
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest value."""
+        low = self.believed - self.most_below * self.tolerance
+        return low, self.believed + self.most_above * self.tolerance

@@ -228,6 +228,8 @@ class Effect:
         Terms of `evidence.TERMS` that hold for the latent force, or the sensor, where it is missing.
     variant_of : str
         Name of the effect of which this is another form; answers have that name.
+    reduces_to : tuple of str
+        Names of the effects of its block that it becomes with numbers of its own range: nested models.
     size : tuple of str
         Numbers that grow with it and without which it is nothing; if none, the first and all of its unit.
     sought_at : callable
@@ -250,6 +252,7 @@ class Effect:
     spoken_for_by: tuple[str, ...] = ()
     limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = _no_other_limits
     variant_of: str = ""
+    reduces_to: tuple[str, ...] = ()
     size: tuple[str, ...] = ()
     sought_at: Callable[[Surroundings], Iterable[Numbers]] = _no_further_starts
     proposes: Callable[[Surroundings, MissingForces], Iterable[Numbers]] = _no_proposals

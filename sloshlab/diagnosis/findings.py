@@ -18,6 +18,7 @@ from sloshlab.diagnosis.free_run_fit import fitted_baseline
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of
 from sloshlab.diagnosis.inference.posterior import Posterior, posterior
 from sloshlab.diagnosis.inference.run_noise import run_noise
+from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.noise_floor import weighted_observations
@@ -133,6 +134,7 @@ def findings_of(
     retuned_fit, _ = fitted_baseline(problem)
     selection = ModelSelection(runs, surroundings_of(problem, retuned_fit, case.rig), progress)
     fits = selection.selected(retuned_fit)
+    fitting, held_out = (with_sampled_jumps(model, some, selection.jumping) for some in (fitting, held_out))
     nothing = next(fit for fit in fits if not fit.candidates)
     with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)
     believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), 0.0, 0.0)

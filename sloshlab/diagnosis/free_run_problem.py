@@ -365,13 +365,11 @@ def weighted_residuals(
 
 
 def _of_baseline(known: BaselineParameter) -> _Number:
-    reach = known.most_tolerances * known.tolerance
     return _Number(
         known.name,
         known.believed,
         known.tolerance,
-        known.believed - reach,
-        known.believed + reach,
+        *known.bounds,
         (known.channel,) if known.channel else (),
         known.is_reading,
     )

@@ -206,7 +206,8 @@ def _missed(
         # The mean of a channel whose zero means nothing would be asked for as a constant force.
         difference[:n][known] -= difference[:n][known].mean()
     if is_free:
-        difference[0] = 2 * difference[1] - difference[2]  # the first sample may still be held
+        first = int(np.argmax(observation.known))
+        difference[:first] = difference[first]  # the first samples may still be held
     # Divided by the gain: forces are in true newtons, not in those of a sensor that reads too much.
     return difference * _taper(recorded_.size, is_free) / values.get(f"gain of {observation.channel}", 1.0)
 

@@ -18,6 +18,7 @@ from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import DRIFT_CORNER_HZ
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.lapped_transform import band_frequencies_hz, block_times_s, lapped_spectra
+from sloshlab.diagnosis.release import samples_disturbed
 
 FloatArray = NDArray[np.float64]
 BLOCK_S: Final = 0.5
@@ -134,7 +135,7 @@ class Observation:
 
     @cached_property
     def _taper(self) -> FloatArray:
-        return _taper(self.known.size, self.n_bands, is_free=self.run.is_free)
+        return _taper(self.run, self.known.size, self.n_bands)
 
 
 def observations(
@@ -166,6 +167,9 @@ def observations(
         values = np.asarray(variable.values, np.float64)
         # Samples at the end of a stated range are known to be beyond it only, which no residual can say.
         known = np.isfinite(values) & ~clipped_samples(variable)
+        if run.is_free:
+            # Before its release, wherever it is among these, nothing moves.
+            known[: samples_disturbed(run.attributes.sampling_rate_hz)] = False
         # Less than two blocks have no spectrum to compare.
         if known.sum() < 2 * n_bands:
             continue
@@ -376,7 +380,7 @@ def _weighted(observation: Observation, variance: FloatArray) -> Observation:
 def _spectra_of(variable: xr.DataArray, known: NDArray[np.bool_], keeps_mean: bool, run: CaseRun) -> FloatArray:
     """Spectra of the known samples of a recorded channel."""
     n_bands = _n_bands(run)
-    taper = _taper(known.size, n_bands, is_free=run.is_free)
+    taper = _taper(run, known.size, n_bands)
     found = _spectra([np.asarray(variable.values, np.float64)], known, taper, keeps_mean, n_bands)
     return np.asarray(found[0])
 
@@ -391,16 +395,19 @@ def _spectra(
     return lapped_spectra(masked, n_bands)
 
 
-def _taper(n: int, n_bands: int, *, is_free: bool) -> FloatArray:
+def _taper(run: CaseRun, n: int, n_bands: int) -> FloatArray:
     """Weights of the samples.
 
     An abrupt end leaks the scatter of strong bands into weak ones, where it would count far too much. A release
-    has a short taper at its start: its first cycles hold most of the information.
+    has a short taper at its start, after the samples in which it may be: its first cycles hold most of the
+    information.
     """
     weights = np.ones(n)
-    n_in, n_out = max(1, n_bands // (32 if is_free else 2)), max(1, n_bands // 2)
-    if n_in + n_out <= n:
-        weights[:n_in] = np.sin(0.5 * np.pi * np.arange(n_in) / n_in) ** 2
+    first = samples_disturbed(run.attributes.sampling_rate_hz) if run.is_free else 0
+    n_in, n_out = max(1, n_bands // (32 if run.is_free else 2)), max(1, n_bands // 2)
+    if first + n_in + n_out <= n:
+        weights[:first] = 0.0
+        weights[first : first + n_in] = np.sin(0.5 * np.pi * np.arange(n_in) / n_in) ** 2
         weights[-n_out:] = np.cos(0.5 * np.pi * (np.arange(n_out) + 1) / n_out) ** 2
     return weights
 

@@ -28,8 +28,8 @@ LARGEST_RATIO: Final = 30.0
 _MASSES_AGREE: Final = 0.05
 """Relative difference, up to which two statements of a mass agree."""
 _FEWEST_SAMPLES: Final = 64
-_AT_BOUND: Final = 0.99
-"""Of the way to a bound: a step of a fit stays a little inside of it."""
+_REFUTED: Final = 3.0
+"""Tolerances from what is believed: three standard deviations of its prior."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class RefutedBelief:
 def refuted_beliefs(
     values: Mapping[str, float], parameters: Sequence[BaselineParameter]
 ) -> tuple[RefutedBelief, ...]:
-    """Believed numbers at whose bounds a fit ends: the recordings want them further away than they may be.
+    """Believed numbers that the recordings want further away than their tolerances allow.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def refuted_beliefs(
     >>> spring = BaselineParameter("stiffness", 1e5, 1e4, "N m-1")
     >>> [belief.deviation_tolerances for belief in refuted_beliefs({"stiffness": 6e4}, [spring])]
     [-4.0]
-    >>> refuted_beliefs({"stiffness": 7e4}, [spring])
+    >>> refuted_beliefs({"stiffness": 7.5e4}, [spring])
     ()
     """
     found = [
@@ -93,10 +93,7 @@ def refuted_beliefs(
         )
         for parameter in parameters
     ]
-    bounds = [_AT_BOUND * parameter.most_tolerances for parameter in parameters]
-    refuted = [
-        belief for belief, bound in zip(found, bounds, strict=True) if abs(belief.deviation_tolerances) >= bound
-    ]
+    refuted = [belief for belief in found if abs(belief.deviation_tolerances) >= _REFUTED]
     return tuple(sorted(refuted, key=lambda belief: -abs(belief.deviation_tolerances)))
 
 

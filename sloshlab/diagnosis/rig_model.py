@@ -20,6 +20,7 @@ from sloshlab.diagnosis.candidate import BLOCKS
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.diagnosed_model import Readings, Request
 from sloshlab.diagnosis.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
+from sloshlab.diagnosis.release import AVERAGING, INSTANT, averaging_of_recorder, late_by, tolerance_s
 from sloshlab.errors import AnalysisError, SloshlabError
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
@@ -62,8 +63,8 @@ _FLUCTUATION: Final = "damping of the liquid in "
 _TOLERANCE_OF_FLUCTUATION: Final = 0.05
 """Of the damping of a chaotic liquid in one run, over its mean."""
 _DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
-_BOUND_TOLERANCES: Final = 1.25
-"""Bound, in tolerances, of masses, frequencies, losses and gains; beyond it something else is wrong."""
+_CLOSE_TOLERANCES: Final = 1.25
+"""Bound of gains, and upper one of losses: a gain that is further off, or more loss, is an effect with a name."""
 _TOLERANCE_OF_SHAPE: Final = 0.01
 """Of the value at the tip: position of a sensor, and a beam that is not quite uniform.
 
@@ -119,7 +120,7 @@ class RigModel:
 
     def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun], *, executor: Executor = IN_TURN) -> None:
         self.rig, self.executor = rig, executor
-        self.blocks = BLOCKS
+        self.blocks: tuple[str, ...] = BLOCKS
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}
@@ -170,6 +171,29 @@ class RigModel:
         """
         lane = self._lane(request)
         return simulated(lane.twin, lane.excitation, lane.start, lane.n_substeps).require_done()
+
+    def sampled_jumps(self, request: Request) -> dict[str, FloatArray]:
+        """How uncertain forces that jump are as they are sampled, per place, shape (n,); none without such forces.
+
+        A force that jumps by J between two samples may be anything between at one of them, so that it is known to
+        J/√3. Halved second differences have about that power, J²/2, and next to none where a force is smooth.
+
+        Raises
+        ------
+        AnalysisError
+            If the simulation does not reach its end.
+        """
+        lane = self._lane(request)
+        which = [i for i, t in enumerate(lane.twin.terms) if t.kind.dry_friction or t.kind.events is not None]
+        if not which:
+            return {}
+        forces = self.whole_simulation(request).forces_n
+        found: dict[str, FloatArray] = {}
+        for i in which:
+            place, uncertain = lane.twin.terms[i].place, np.zeros(forces.shape[0])
+            uncertain[1:-1] = forces[1:-1, i] - 0.5 * (forces[:-2, i] + forces[2:, i])
+            found[place] = found.get(place, 0.0) + uncertain
+        return found
 
     def _belongs(self, parameter: str, run: CaseRun) -> bool:
         """Whether a parameter of the motion belongs to this run or to all."""
@@ -251,6 +275,9 @@ class RigModel:
     def _readings(self, request: Request, truth: _Truth) -> Readings:
         run, values, faults = request.run, request.values, request.extension.faults
         known, readings = self._channels[run.name], {}
+        late = values.get(f"{INSTANT}{run.name}", 0.0) * run.attributes.sampling_rate_hz
+        # What drives went through the same recorder, which a linear twin passes on.
+        averaging = values.get(AVERAGING, 0.0) if run.is_free else 0.0
         others = {**known.driving, **{name: truth.channel(name) for name in truth.weights}} if faults else {}
         for name in truth.weights:
             if request.only and name not in request.only:
@@ -261,6 +288,8 @@ class RigModel:
             for fault in faults:
                 if fault.channel == name:
                     reading = fault.reading(reading, run.attributes.sampling_rate_hz, others, known.recorded[name])
+            if late or averaging:
+                reading = late_by(reading, late, averaging)
             zero = values.get(f"offset of {name} in {run.name}", 0.0)
             readings[name] = reading + zero if zero else reading
         return readings
@@ -453,13 +482,11 @@ class RigModel:
                 # A force that is zero in the rig file is absent, and a tolerance of 20 % of zero would be none.
                 if name in _TUNED_NUMBERS and value:
                     number = f"{term.name}.{name}"
-                    found.append(
-                        BaselineParameter(number, value, 0.2 * abs(value), most_tolerances=_BOUND_TOLERANCES)
-                    )
+                    found.append(BaselineParameter(number, value, 0.2 * abs(value), most_above=_CLOSE_TOLERANCES))
         names = sorted({name for run in self.runs for name in self.compared(run)})
         # Without a measured force nothing tells the carried mass from the modal masses.
         if any(name.startswith("force") for name in names):
-            found.append(BaselineParameter("carried mass", 1.0, 0.01, most_tolerances=_BOUND_TOLERANCES))
+            found.append(BaselineParameter("carried mass", 1.0, 0.01))
         # Several accelerometers drive the tank by their mean, over the mean of their gains: these gains change
         # the motion.
         moving = {name for run in self.runs for name in self._compared_drives(run)}
@@ -469,7 +496,8 @@ class RigModel:
                 1.0,
                 0.01,
                 is_reading=name not in moving,
-                most_tolerances=_BOUND_TOLERANCES,
+                most_below=_CLOSE_TOLERANCES,
+                most_above=_CLOSE_TOLERANCES,
                 channel="" if name in moving else name,
             )
             for name in names
@@ -487,6 +515,8 @@ class RigModel:
             for name, shapes in self._shapes.items()
             for shape in shapes
         ]
+        if any(run.is_free for run in self.runs):
+            found.append(averaging_of_recorder())
         for run in self.runs:
             # Liquid that moves chaotically never damps twice alike. One number for all runs would make the
             # difference physics.
@@ -495,6 +525,8 @@ class RigModel:
             if run.is_free:
                 start = self._drive(run, ()).initial_displacement_m
                 found.append(BaselineParameter(f"{RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
+                uncertain_s = tolerance_s(run.attributes.sampling_rate_hz)
+                found.append(BaselineParameter(f"{INSTANT}{run.name}", 0.0, uncertain_s, "s", is_reading=True))
             for name in self.compared(run):
                 if name.startswith("displacement"):
                     size = float(np.nanmax(np.abs(run.recording[name].values)))
@@ -541,19 +573,13 @@ def _structure_parameters(structure: Structure, *, moves: bool) -> list[Baseline
     found = []
     for i in range(n):
         label = f"mode {i + 1}"
-        found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02, most_tolerances=_BOUND_TOLERANCES))
-        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2, most_tolerances=_BOUND_TOLERANCES))
-    found += [
-        BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01, most_tolerances=_BOUND_TOLERANCES)
-        for i in range(n)
-    ]
+        found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02))
+        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2, most_above=_CLOSE_TOLERANCES))
+    found += [BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01) for i in range(n)]
     # The gain of the sensor at the base is in these. Without them leaks into it and gains of others stood in for
     # it, a false alarm and a wrong name of the second sealed trial.
     if moves:
-        found += [
-            BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02, most_tolerances=_BOUND_TOLERANCES)
-            for i in range(n)
-        ]
+        found += [BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02) for i in range(n)]
     return found
 
 

@@ -17,8 +17,6 @@ from sloshlab.diagnosis.interval import Interval
 from sloshlab.diagnosis.readiness import refuted_beliefs
 from sloshlab.diagnosis.units import named_and_units
 
-_REFUTED_TOLERANCES: Final = 3.0
-"""Standard deviations of a prior: a number held closer to what is believed may only be a narrow bound."""
 _EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure, whatever is recorded."""
 
@@ -75,7 +73,7 @@ def _channel(place: str) -> str:
 
 
 def refuted_statement(found: Findings, model: ScoredModel) -> str:
-    """What is said of believed numbers that a model moves as far as they may go, if that is far; empty of none.
+    """What is said of believed numbers that the recordings refute; empty of none.
 
     Parameters
     ----------
@@ -84,14 +82,10 @@ def refuted_statement(found: Findings, model: ScoredModel) -> str:
         What is named, or nothing missing.
     """
     shared = [known for known in found.model.parameters if not run_of(known.name, found.model)]
-    refuted = [
-        belief
-        for belief in refuted_beliefs(model.fit.values, shared)
-        if abs(belief.deviation_tolerances) >= _REFUTED_TOLERANCES
-    ]
+    refuted = refuted_beliefs(model.fit.values, shared)
     return "".join(
         f"; what is believed of the {belief.name} is refuted: {belief.believed:.4g} ± {belief.tolerance:.2g}"
-        f"{'' if belief.units == '1' else f' {belief.units}'}, while {belief.found:.4g} is as far as it may go"
+        f"{'' if belief.units == '1' else f' {belief.units}'}, while the recordings ask for {belief.found:.4g}"
         for belief in refuted
     )
 

@@ -75,6 +75,7 @@ def force_effect(
     needs: Callable[[Surroundings], bool] | None = None,
     spoken_for_by: tuple[str, ...] = (),
     variant_of: str = "",
+    reduces_to: tuple[str, ...] = (),
     size: tuple[str, ...] = (),
 ) -> Effect:
     """Register a force of the twin as an effect.
@@ -95,7 +96,7 @@ def force_effect(
         That of the kind by default.
     bounds : mapping, optional
         Narrower ones than those of the kind.
-    separated_by, needs, spoken_for_by, variant_of, size
+    separated_by, needs, spoken_for_by, variant_of, reduces_to, size
         As of `Effect`.
 
     Examples
@@ -133,6 +134,7 @@ def force_effect(
             needs or (has_structure if block == "structure" else lambda surroundings: True),
             spoken_for_by=spoken_for_by,
             variant_of=variant_of,
+            reduces_to=reduces_to,
             size=size,
         )
     )

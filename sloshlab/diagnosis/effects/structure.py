@@ -93,6 +93,7 @@ ASYMMETRIC = force_effect(
     ranges={"force_up_n": _FRICTION, "force_down_n": _FRICTION},
     separated_by="none: the two are the same force; measure the static rest position with the friction taken off",
     spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, RATE_INDEPENDENT, WORK_1, NO_ONSET, CONSTANT),
+    reduces_to=("coulomb_friction",),
 )
 # Where friction falls with the speed over all of the motion, what it takes away is what a damper adds: then it
 # cannot be told from Coulomb friction and a damper.
@@ -108,6 +109,7 @@ STRIBECK = force_effect(
     bounds={"stribeck_velocity_m_per_s": (1e-3, 1e3)},
     separated_by="slow motion about the Stribeck velocity",
     spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, NO_ONSET, THIRD_ORDER),
+    reduces_to=("coulomb_friction",),
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,
@@ -189,6 +191,7 @@ BEHIND_PLAY = force_effect(
     ranges={"force_n": _FRICTION, "play_m": _PLAY, "stiffness_n_per_m": _BEHIND_PLAY},
     separated_by="slow reversals at several amplitudes, with the force read while it is low",
     spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT),
+    reduces_to=("coulomb_friction",),
 )
 # A constant force is nested in it: it moves the middle of the loop by (F₋ − F₊)/2 as long as the slider follows.
 BEHIND_PLAY_BY_DIRECTION = force_effect(
@@ -207,6 +210,7 @@ BEHIND_PLAY_BY_DIRECTION = force_effect(
     separated_by="slow reversals at several amplitudes, with the force read while it is low",
     spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT, CONSTANT),
     variant_of="friction_behind_play",
+    reduces_to=("friction_behind_play", "asymmetric_friction", "coulomb_friction"),
 )
 CUBIC = force_effect(
     CUBIC_STIFFNESS,

@@ -172,7 +172,23 @@ def _labels(models: Sequence[ScoredModel], tempering: float) -> list[str]:
 def _is_no_more_than(model: ScoredModel, other: ScoredModel, tempering: float) -> bool:
     if difference(model, other) / tempering < TOLD_APART:
         return True
-    return set(other.keys) < set(model.keys) and strength(other, model) < LEAST_STRENGTH
+    return _is_nested(other, model) and strength(other, model) < LEAST_STRENGTH
+
+
+def _is_nested(other: ScoredModel, model: ScoredModel) -> bool:
+    """Whether every effect of one model is one of another model, or what one of its effects reduces to."""
+    left = list(model.fit.candidates)
+    for effect in other.fit.candidates:
+        within = [c for c in left if c.key == effect.key] or [
+            c
+            for c in left
+            if (c.effect.block, c.channel) == (effect.effect.block, effect.channel)
+            and effect.effect.name in c.effect.reduces_to
+        ]
+        if not within:
+            return False
+        left.remove(within[0])
+    return True
 
 
 def _hypotheses(model: ScoredModel, label: str, n_candidates: int) -> list[Hypothesis]:

@@ -15,9 +15,10 @@ from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
 from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, costs_at, fitted, stages_for
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_cost
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
+from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
@@ -48,7 +49,7 @@ class ModelSelection:
     """
 
     def __init__(self, runs: FittedRuns, at: Surroundings, said: Said) -> None:
-        self.runs, self.at, self.said = runs, at, said
+        self._quiet, self.runs, self.at, self.said = runs, runs, at, said
         self.pool = candidates(at)
         self.fits: dict[frozenset[str], FreeRunFit] = {}
         self.failed: dict[str, str] = {}
@@ -65,10 +66,12 @@ class ModelSelection:
             Of the baseline.
         """
         self._keep([retuned])
+        self._renew_sampling()
         if not self._remains(retuned):
             return [retuned]
         believed = self._as_believed()
         self._grown([believed, retuned], "one effect")
+        self._renew_sampling()
         self._swapped(1)
         self._eliminated(1)
         for n in range(1, _MOST_EFFECTS + 1):
@@ -80,12 +83,29 @@ class ModelSelection:
             if best is None or n == _MOST_EFFECTS or not self._remains(best):
                 break
             self._grown(self._leading(n), "one more effect")
+            self._renew_sampling()
             self._swapped(n + 1)
             self._eliminated(n + 1)
         # What was found beside other effects may be the best alone, and has look-alikes of its own.
         for n in range(1, _MOST_EFFECTS + 1):
             self._swapped(n)
         return sorted(self.fits.values(), key=lambda fit: (len(fit.candidates), fit.cost))
+
+    @property
+    def jumping(self) -> list[FreeRunFit]:
+        """Fits whose jumps between samples are noise for all: nothing missing, and the best that are better."""
+        nothing = self.fits[frozenset()]
+        better = sorted((fit for fit in self.fits.values() if fit.cost < nothing.cost), key=lambda fit: fit.cost)
+        return [nothing, *better[:N_KEPT]]
+
+    def _renew_sampling(self) -> None:
+        """Noise by jumps of what has been found, and the costs of all fits with it."""
+        quiet = self._quiet
+        self.runs = FittedRuns(quiet.model, with_sampled_jumps(quiet.model, quiet.runs, self.jumping), quiet.tests)
+        for keys, fit in self.fits.items():
+            problem = self.runs.problem_of(fit)
+            misfit = huber_cost(problem.residual(problem.theta_of(fit.values)))
+            self.fits[keys] = replace(fit, misfit=misfit, cost=misfit + fit.cost - fit.misfit)
 
     def _as_believed(self) -> FreeRunFit:
         """The baseline as believed, with numbers of single runs fitted: retuning may have hidden an effect."""

@@ -14,6 +14,8 @@ from sloshlab.diagnosis.lapped_transform import lapped_spectra
 from sloshlab.diagnosis.observations import Observation, observations, with_scatter, with_typical_scatter
 
 N = 3000
+HELD = 16
+"""Samples in which a release may be: four times four."""
 TIME = np.arange(N) / RATE_HZ
 TONE = 2.0 * np.cos(2 * np.pi * 6.0 * TIME)
 
@@ -65,7 +67,8 @@ def test_lost_and_clipped_samples_are_masked_on_both_sides() -> None:
     values[500:520] = np.nan
     clipped = np.clip(values, -1.9, 1.9)
     [observation] = observations(run(clipped, range_min=-1.9, range_max=1.9), ["acceleration_tip"])
-    np.testing.assert_array_equal(observation.known, np.isfinite(values) & (np.abs(values) < 1.9))
+    released = np.arange(N) >= HELD
+    np.testing.assert_array_equal(observation.known, np.isfinite(values) & (np.abs(values) < 1.9) & released)
     assert np.isfinite(observation.spectra).all()
     # what a simulation shows in the masked samples does not matter
     wild = np.where(observation.known, clipped, 1e6)
@@ -90,19 +93,20 @@ def test_the_end_of_a_shorter_simulation_is_taken_as_zero() -> None:
     [observation] = observations(run(TONE), ["acceleration_tip"])
     short, padded = TONE[:2000], np.where(np.arange(N) < 2000, TONE, 0.0)
     mean_free = padded.copy()
-    mean_free[:2000] -= short.mean()
+    mean_free[:2000] -= short[HELD:].mean()
+    mean_free[:HELD] = 0.0
     np.testing.assert_allclose(
         observation.of(short), lapped_spectra(faded(mean_free, observation), observation.n_bands), atol=1e-9
     )
 
 
 def faded(values: np.ndarray, observation: Observation) -> np.ndarray:
-    """Raised cosines: half a block in and out, a release comes in sixteen times faster."""
+    """Raised cosines: half a block in and out, a release comes in sixteen times faster once it has happened."""
     n = observation.n_bands // 2
-    n_in = n // 16 if observation.run.is_free else n
+    n_held, n_in = (HELD, n // 16) if observation.run.is_free else (0, n)
     rising = 0.5 - 0.5 * np.cos(np.pi * np.arange(n_in) / n_in)
     falling = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, n + 1) / n)
-    return values * np.concatenate([rising, np.ones(values.size - n_in - n), falling])
+    return values * np.concatenate([np.zeros(n_held), rising, np.ones(values.size - n_held - n_in - n), falling])
 
 
 def test_an_abrupt_end_does_not_spread_over_all_bands() -> None:

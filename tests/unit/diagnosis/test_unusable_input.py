@@ -134,15 +134,21 @@ def test_a_twin_that_fails_says_in_which_run_and_sample(changed: dict[str, Any],
     assert "\n" not in str(refused.value)
 
 
-def test_believed_numbers_at_their_bounds_are_refuted() -> None:
-    """Four tolerances down, one and a quarter up where that is the bound; what is inside is not."""
+def test_believed_numbers_beyond_three_tolerances_are_refuted() -> None:
     parameters = [
         BaselineParameter("stiffness", 1e5, 1e4, "N m-1"),
         BaselineParameter("damping", 10.0, 4.0, "N s m-1"),
-        BaselineParameter("mass", 2.0, 0.04, "kg", most_tolerances=1.25),
+        BaselineParameter("mass", 2.0, 0.04, "kg", most_above=1.25),
     ]
-    found = refuted_beliefs({"stiffness": 6.001e4, "damping": -5.0, "mass": 2.05}, parameters)
-    assert [belief.name for belief in found] == ["stiffness", "mass"]
+    found = refuted_beliefs({"stiffness": 6.001e4, "damping": -2.1, "mass": 2.05}, parameters)
+    assert [belief.name for belief in found] == ["stiffness", "damping"]
     assert found[0] == RefutedBelief("stiffness", 1e5, 1e4, 6.001e4, "N m-1")
-    assert [belief.deviation_tolerances for belief in found] == pytest.approx([-3.999, 1.25])
+    assert [belief.deviation_tolerances for belief in found] == pytest.approx([-3.999, -3.025])
     assert refuted_beliefs({}, parameters) == ()
+
+
+def test_a_loss_may_be_less_than_believed_but_not_more() -> None:
+    assert BaselineParameter("damping", 10.0, 2.0, most_above=1.25).bounds == (2.0, 12.5)
+    assert BaselineParameter("gain", 1.0, 0.01, most_below=1.25, most_above=1.25).bounds == pytest.approx(
+        (0.9875, 1.0125)
+    )
