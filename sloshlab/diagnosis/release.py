@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
@@ -68,18 +69,28 @@ def late_by(values: FloatArray, samples: float, averaging: float = 0.0) -> Float
     >>> late_by(np.array([0.0, 0.0, 1.0, 0.0, 0.0]), 1.0).tolist()
     [0.0, 0.0, 0.0, 1.0, 0.0]
     """
+    return np.asarray(_interpolated(np.ascontiguousarray(values, np.float64), samples, averaging))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _interpolated(values: FloatArray, samples: float, averaging: float) -> FloatArray:
     whole = int(np.floor(samples))
-    part = samples - whole
-    nodes = np.arange(_N_POINTS) - (_N_POINTS // 2 - 1)
-    weights = [
-        np.prod([(1.0 - part - other) / (node - other) for other in nodes if other != node]) for node in nodes
-    ]
-    if averaging:
-        values = values.copy()
-        values[1:-1] += 0.5 * averaging * np.diff(values, 2)
-    # Between the samples i − 1 − whole and i − whole, at the share 1 − part of the way.
-    at = np.arange(values.size) - whole - 1
-    last = values.size - 1
-    return np.asarray(
-        sum(weight * values[np.clip(at + node, 0, last)] for weight, node in zip(weights, nodes, strict=True))
-    )
+    # Between the samples i − 1 − whole and i − whole, at this share of the way.
+    share = 1.0 - (samples - whole)
+    weights = np.ones(_N_POINTS)
+    for k in range(_N_POINTS):
+        for other in range(_N_POINTS):
+            if other != k:
+                weights[k] *= (share + _N_POINTS // 2 - 1 - other) / (k - other)
+    n, before = values.size, _N_POINTS // 2 + abs(whole)
+    padded = np.empty(n + 2 * before)
+    padded[:before], padded[before + n :] = values[0], values[-1]
+    padded[before : before + n] = values
+    for i in range(1, n - 1):
+        padded[before + i] += 0.5 * averaging * (values[i - 1] - 2.0 * values[i] + values[i + 1])
+    sums, first = np.zeros(n), before - whole - _N_POINTS // 2
+    for k in range(_N_POINTS):
+        weight = weights[k]
+        for i in range(n):
+            sums[i] += weight * padded[first + k + i]
+    return sums
