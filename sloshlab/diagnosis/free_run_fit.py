@@ -267,15 +267,13 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
     if problem.is_down_to_noise(best[0]):
         return best
     inflation = INFLATION_STAGES[1]
-    inflation_weights, reached = problem.inflation_weights(inflation), inflated_cost(problem, best[0], inflation)
+    reached = inflated_cost(problem, best[0], inflation)
     # parameters that change only readings are linear and have no local minima: they are not drawn
     # A quasi-random sequence covers the prior more evenly than 32 random draws; its fixed seed gives the same
     # case the same answer.
     draws = norm.ppf(qmc.Halton(problem.n_baseline, seed=0).random(_N_DRAWN))
     draws = np.clip(draws, -2.0, 2.0) * problem.changes_motion
-    costs = [
-        huber_cost(inflation_weights * r) if np.isfinite(r).all() else np.inf for r in map(problem.residual, draws)
-    ]
+    costs = costs_at(problem, [problem.values(draw) for draw in draws], inflation)
     for place in np.argsort(costs)[:_N_REFINED]:
         other = fitted(problem, problem.values(draws[place]), n_iterations=n_iterations, stages=(inflation,))
         if other[0].trouble or inflated_cost(problem, other[0], inflation) > _ABANDON_COST_RATIO * reached:

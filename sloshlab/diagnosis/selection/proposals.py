@@ -135,27 +135,31 @@ def _beside(
     known = {candidate.key for candidate in base.fit.candidates}
     missed_hz = residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND)
     missing = _missing_forces(runs, base.fit)
-    found = []
-    for candidate in (candidate for candidate in pool if candidate.key not in known):
+    first = next(iter(least))
+    first_weights = problem.inflation_weights(first)
+
+    def of_candidate(candidate: Candidate) -> list[Proposal]:
         sets = [*starts_of(candidate, missed_hz, missing, promising.get(candidate.key))]
         extended = runs.problem((*base.fit.candidates, candidate))
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
         column = extended.names.index(f"{candidate.key}.{candidate.effect.parameters[0].name}")
         moved = extended.residuals_moved(thetas, column, residual)
-        for start, at_start in zip(sets, moved, strict=True):
-            # A start that explodes is no reason to drop the candidate as long as another one runs.
-            if not np.isfinite(at_start).all():
-                continue
-            gains = [test.gain(at_start - residual) for _, test, _ in tests]
+        # A start that explodes is no reason to drop the candidate as long as another one runs.
+        running = [(start, at) for start, at in zip(sets, moved, strict=True) if np.isfinite(at).all()]
+        if not running:
+            return []
+        changes = [at_start - residual for _, at_start in running]
+        gains = [test.gains(changes) for _, test, _ in tests]
+        found = []
+        for i, (start, at_start) in enumerate(running):
             predicted = tuple(
-                (cost - gain) / max(least[inflation], 1e-300)
-                for (inflation, _, cost), (gain, _) in zip(tests, gains, strict=True)
+                (cost - of_test[i][0]) / max(least[inflation], 1e-300)
+                for (inflation, _, cost), of_test in zip(tests, gains, strict=True)
             )
             # What no linear step reaches, such as a resonance that is off by many of its widths, shows as it is.
-            inflation = next(iter(least))
-            at_once = huber_cost(problem.inflation_weights(inflation) * at_start) / max(least[inflation], 1e-300)
-            factor = gains[int(np.argmin(predicted))][1]
+            at_once = huber_cost(first_weights * at_start) / max(least[first], 1e-300)
+            factor = gains[int(np.argmin(predicted))][i][1]
             sized = candidate.sized(start, min(max(factor, 1.0 / _MOST_STEP), _MOST_STEP))
             found.append(
                 Proposal(
@@ -165,7 +169,10 @@ def _beside(
                     base.jacobian,
                 )
             )
-    return found
+        return found
+
+    others = [candidate for candidate in pool if candidate.key not in known]
+    return [proposal for found in runs.model.executor.map(of_candidate, others) for proposal in found]
 
 
 def starts_of(

@@ -20,6 +20,8 @@ _STEPS_OF_A_RUNG: Final = 3
 """Of a fit before it is compared with the others."""
 _STARTS_OF_A_MODEL: Final = 2
 """That may go on beside each other."""
+_HOPELESS_COST_RATIO: Final = 3.0
+"""Cost over the lowest one at the same noise: what is its equal is no further behind after three steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +95,12 @@ def _continued(runs: FittedRuns, running: _Running, inflation: float) -> _Runnin
 
 
 def _better(running: Sequence[_Running], n: int, of_a_model: int) -> list[_Running]:
-    """The lowest costs, with at most so many starts of one model."""
+    """The lowest costs, with at most so many starts of one model; none that is hopeless."""
+    most = _HOPELESS_COST_RATIO * min((each.cost for each in running), default=0.0)
     kept: list[_Running] = []
     taken: dict[frozenset[str], int] = {}
     for each in sorted(running, key=lambda each: each.cost):
         taken[each.proposal.keys] = taken.get(each.proposal.keys, 0) + 1
-        if np.isfinite(each.cost) and taken[each.proposal.keys] <= of_a_model:
+        if np.isfinite(each.cost) and each.cost <= most and taken[each.proposal.keys] <= of_a_model:
             kept.append(each)
     return kept[:n]

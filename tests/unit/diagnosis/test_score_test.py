@@ -51,13 +51,13 @@ def test_the_gain_does_not_depend_on_the_size_of_a_change_however_large() -> Non
     jacobian, residual, change = (generator.standard_normal(shape) for shape in ((2, N), (N,), (N,)))
     problem = cast(FreeRunProblem, cast(Any, Linear(np.zeros(2, bool))))
     look = ScoreTest(problem, np.zeros(2), 1e4 * residual, BlockJacobian.of_columns(list(jacobian), [N]), 0.1)
-    gain, factor = look.gain(change)
-    large, small = look.gain(1e153 * change)
+    gain, factor = look.gains([change])[0]
+    large, small = look.gains([1e153 * change])[0]
     assert large == pytest.approx(gain, rel=1e-9)
     assert small * 1e153 == pytest.approx(factor, rel=1e-9)
     with np.errstate(over="ignore", invalid="ignore"):
         for size in (0.0, 1e200):
-            assert look.gain(size * change)[0] == 0.0
+            assert look.gains([size * change])[0][0] == 0.0
 
 
 @pytest.mark.parametrize("soft", [1.0, 0.3])
@@ -70,7 +70,7 @@ def test_the_gain_is_that_of_least_squares_with_the_numbers_that_can_follow(
     theta = np.array([0.4, -0.7, 0.2, 0.1])
     problem = cast(FreeRunProblem, cast(Any, Linear(np.array(fixed), soft)))
     known = BlockJacobian.of_columns(list(jacobian.T), [25, N - 25])
-    gain, size = ScoreTest(problem, theta, residual, known, 0.1).gain(change)
+    gain, size = ScoreTest(problem, theta, residual, known, 0.1).gains([change])[0]
     free = ~np.array(fixed)
     prior, place = np.array([1.0, 1.0, 0.0, 0.0])[free], theta[free]
     without = least(soft * jacobian[:, free], soft * residual, prior, place)
@@ -86,7 +86,7 @@ def test_a_change_that_the_baseline_can_follow_predicts_no_gain() -> None:
     jacobian, residual = generator.standard_normal((N, N_NUMBERS)), generator.standard_normal(N)
     problem = cast(FreeRunProblem, cast(Any, Linear(np.zeros(N_NUMBERS, bool), n_baseline=0)))
     look = ScoreTest(problem, np.zeros(N_NUMBERS), residual, BlockJacobian.of_columns(list(jacobian.T), [N]), 0.1)
-    assert look.gain(jacobian @ [1.0, -2.0, 0.5, 3.0])[0] < 1e-9
+    assert look.gains([jacobian @ [1.0, -2.0, 0.5, 3.0]])[0][0] < 1e-9
 
 
 @dataclass
