@@ -62,9 +62,8 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
     header: tuple[str, ...] = ("parameter", "believed", "tolerance", "retuned", "moved, in tolerances")
     header += () if best is None else ("moved with the effect, in tolerances",)
     caption = (
-        "A number that wants to move by more than its tolerance asks for a second look at the rig file; at 1.25 "
-        "tolerances, four of what belongs to one run or sensor, it is held. One of a mode that no run excites "
-        "means nothing."
+        "A number that wants to move by more than its tolerance asks for a second look at the rig file; at four "
+        "tolerances, 1.25 of gains and of more loss, it is held. One of a mode that no run excites means nothing."
     )
     return Table("The baseline's own parameters", header, tuple(rows), caption)
 
@@ -72,7 +71,7 @@ def baseline_table(diagnosis: Diagnosis) -> Table:
 def _moved(parameter: BaselineParameter, value: float) -> str:
     """How far a number is from what is believed, and whether it is held there."""
     tolerances = (value - parameter.believed) / parameter.tolerance
-    held = " (held)" if abs(tolerances) > parameter.most_tolerances - 1e-3 else ""
+    held = " (held)" if not -parameter.most_below + 1e-3 < tolerances < parameter.most_above - 1e-3 else ""
     return signed(tolerances if abs(tolerances) >= 0.005 else 0.0, 2) + held
 
 
@@ -91,7 +90,6 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
                 _named(model) or "baseline retuned",
                 "0" if model is best else f"{signed(model.evidence - best.evidence, 0)} ± {text(error, 2)}",
                 text(model.complexity, 3),
-                f"{100 * model.relative_error:.0f} %" if model.fit.candidates else MISSING,
                 text(model.held_out_rms, 3),
                 f"{place} ({text(left, 3)})" if left > 0 else "nothing",
             )
@@ -100,7 +98,6 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
         "model",
         "log evidence beside the best",
         "of it cost of its freedom",
-        "law known to",
         "held-out error / noise floor",
         "what remains, and its log evidence",
     )

@@ -140,7 +140,7 @@ def findings_of(
     believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), 0.0, 0.0)
     score = _Scoring(model, fitting, held_out, nothing)
     believed, retuned = score.required(believed_fit, "as believed"), score.required(nothing, "retuned")
-    explanations = [found for fit in with_effects[:_MOST_SCORED] if (found := score.of(fit)) is not None]
+    explanations = [found for fit in with_effects[:_MOST_SCORED] if (found := score.of(fit, retuned)) is not None]
     return Findings(
         case,
         model,
@@ -170,11 +170,13 @@ class _Scoring:
         self.model, self.held_out, self.everything = model, held_out, [*fitting, *held_out]
         self.noise = [run_noise(model, run, nothing.values) for run in self.everything]
 
-    def of(self, fit: FreeRunFit) -> ScoredModel | None:
+    def of(self, fit: FreeRunFit, nothing: ScoredModel | None = None) -> ScoredModel | None:
         """A model; None where it does not reach the end of a run that it was not fitted to."""
         values = values_of_runs(self.model, self.held_out, fit)
         runs = whitened(self.model, self.everything, fit.candidates, values, self.noise)
-        return None if runs is None else scored(fit, values, runs, {run[0].run.name for run in self.held_out})
+        if runs is None:
+            return None
+        return scored(fit, values, runs, {run[0].run.name for run in self.held_out}, nothing)
 
     def required(self, fit: FreeRunFit, which: str) -> ScoredModel:
         """The same of the baseline, without which nothing can be compared."""

@@ -7,6 +7,7 @@ acts on the structure. Without a measured force the place stays undetermined.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -30,6 +31,7 @@ from sloshlab.diagnosis.force_inversion import (
     wiener_gain,
 )
 from sloshlab.diagnosis.observations import Observation
+from sloshlab.diagnosis.release import INSTANT
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.rig import Rig
 from sloshlab.twin.blocks import Blocks
@@ -200,14 +202,19 @@ def _missed(
     recorded_ = np.asarray(observation.run.recording[observation.channel].values, np.float64)
     n = min(recorded_.size, reading.size)
     difference = np.zeros(recorded_.size)
-    known = observation.known[:n]
+    known = observation.known[:n].copy()
+    first = 0
+    if is_free:
+        # From the release on, which a fit has found; the sample before may still be held.
+        instant = values.get(f"{INSTANT}{observation.run.name}", 0.0)
+        first = 1 + max(0, math.ceil(instant * observation.run.attributes.sampling_rate_hz))
+        n_disturbed = int(np.argmax(known))
+        known[first:n_disturbed] = np.isfinite(recorded_[first:n_disturbed])
     difference[:n][known] = (recorded_[:n] - reading[:n])[known]
     if not observation.keeps_mean:
         # The mean of a channel whose zero means nothing would be asked for as a constant force.
         difference[:n][known] -= difference[:n][known].mean()
-    if is_free:
-        first = int(np.argmax(observation.known))
-        difference[:first] = difference[first]  # the first samples may still be held
+    difference[:first] = difference[first] - np.arange(first, 0, -1) * (difference[first + 1] - difference[first])
     # Divided by the gain: forces are in true newtons, not in those of a sensor that reads too much.
     return difference * _taper(recorded_.size, is_free) / values.get(f"gain of {observation.channel}", 1.0)
 

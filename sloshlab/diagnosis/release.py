@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+import xarray as xr
 from numba import njit
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
+from sloshlab.recording import channels, run_attributes
 
 FloatArray = NDArray[np.float64]
 INSTANT: Final = "instant of release in "
@@ -41,6 +43,36 @@ def samples_disturbed(sampling_rate_hz: float) -> int:
     sampling_rate_hz : float
     """
     return round(_MOST_TOLERANCES * tolerance_s(sampling_rate_hz) * sampling_rate_hz)
+
+
+def instant_s(recording: xr.Dataset) -> float:
+    """When accelerations leap, from the first sample [s]; zero where they are there from the beginning.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Of a free run, in SI units.
+
+    Notes
+    -----
+    Half of the leap is passed, between two samples, when a filter without overshoot has had half of its effect.
+    A start from there is needed: with every period of a fast mode the fit has another minimum.
+    """
+    rate_hz = run_attributes(recording).sampling_rate_hz
+    n = 2 * samples_disturbed(rate_hz)
+    found = []
+    for name in channels(recording, "acceleration"):
+        values = np.asarray(recording[name].values, np.float64)
+        first = np.abs(values[:n] - np.nanmedian(values))
+        if name.endswith("_root") or not np.isfinite(first).all() or first.size < 2:
+            continue
+        half = 0.5 * float(first.max())
+        after = int(np.argmax(first > half))
+        if after > 0:
+            found.append((after - (first[after] - half) / (first[after] - first[after - 1])) / rate_hz)
+        else:
+            found.append(0.0)
+    return float(np.median(found)) if found else 0.0
 
 
 def averaging_of_recorder() -> BaselineParameter:

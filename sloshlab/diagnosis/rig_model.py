@@ -20,7 +20,7 @@ from sloshlab.diagnosis.candidate import BLOCKS
 from sloshlab.diagnosis.case import CaseRun
 from sloshlab.diagnosis.diagnosed_model import Readings, Request
 from sloshlab.diagnosis.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
-from sloshlab.diagnosis.release import AVERAGING, INSTANT, averaging_of_recorder, late_by, tolerance_s
+from sloshlab.diagnosis.release import AVERAGING, INSTANT, averaging_of_recorder, instant_s, late_by, tolerance_s
 from sloshlab.errors import AnalysisError, SloshlabError
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
@@ -526,7 +526,8 @@ class RigModel:
                 start = self._drive(run, ()).initial_displacement_m
                 found.append(BaselineParameter(f"{RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
                 uncertain_s = tolerance_s(run.attributes.sampling_rate_hz)
-                found.append(BaselineParameter(f"{INSTANT}{run.name}", 0.0, uncertain_s, "s", is_reading=True))
+                instant = instant_s(run.recording)
+                found.append(BaselineParameter(f"{INSTANT}{run.name}", instant, uncertain_s, "s", is_reading=True))
             for name in self.compared(run):
                 if name.startswith("displacement"):
                     size = float(np.nanmax(np.abs(run.recording[name].values)))

@@ -4,7 +4,7 @@
 - Two models that predict the same within `TOLD_APART` (`posterior`) are equals; of one that needs more numbers for
   it only the simpler one is said.
 - An effect below `LEAST_STRENGTH` (`posterior`) is not worth a word: it counts as nothing missing.
-- A name may leave the largest of `RELATIVE_ERRORS` (`scored_model`) of what it explains; more is a remainder.
+- A name may leave `LAW` (`remainder`) of the amplitude that lacks without it; more is a remainder.
 - The place of what has no name needs `LOCATED`.
 """
 

@@ -9,8 +9,8 @@ that x has the covariance
 
 (the transform is real and its phase runs, so that both quadratures of g count). An error of a sensor is the same
 with g along its channel. The power is integrated over a log-uniform prior, together with the share π of cells that
-have any. What is less of the simulated motion in a cell than a simulation is exact to (`RunNoise`) belongs to the
-noise. A burst, all bands of one sensor in a stretch of time, belongs to the noise.
+have any. What is less of the simulated motion in a cell than a simulation is exact to (`RunNoise`), or than a law
+is (`LAW`), belongs to the noise, and so does a burst, all bands of one sensor in a stretch of time.
 
 So *something is left* is a model with a marginal likelihood like any other, per place. Latent forces as Gaussian
 processes: Rogers and Friis (2022), doi:10.1016/j.ymssp.2022.109308; spike and slab: Mitchell and Beauchamp (1988),
@@ -25,7 +25,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
+from scipy.ndimage import maximum_filter1d
 from scipy.special import logsumexp
 
 from sloshlab.diagnosis.inference.places import SENSOR, block_of
@@ -33,14 +33,16 @@ from sloshlab.diagnosis.inference.run_noise import sums_of_cells
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
 
 FloatArray = NDArray[np.float64]
-_POWERS: Final = np.geomspace(4.0, 4e4, 13)
-"""In noise variances, three a decade: from twice the noise in amplitude, below which nothing is worth a word, to
+_POWERS: Final = np.geomspace(4.0, 4e6, 13)
+"""In noise variances, two a decade: from twice the noise in amplitude, below which nothing is worth a word, to
 what hides every noise (log-uniform prior)."""
 SHARES: Final = np.array([0.01, 0.05, 0.2, 0.8])
 """Of cells that have a remainder: from bursts to everywhere."""
 BURST: Final = 0.01
 """Share of the stretches of time in which a sensor has a burst of noise, of any power."""
 
+LAW: Final = 0.1
+"""Of the amplitude that lacks where nothing is added, which a law may leave: a formula is not the physics."""
 PRIOR_OF_REMAINDER: Final = 0.1
 """Probability that something is left that no effect of a model explains."""
 TEMPERING: Final = 10.0
@@ -77,27 +79,23 @@ class Remainder:
         return self.largest_gain / TEMPERING + float(np.log(PRIOR_OF_REMAINDER)) > 0
 
 
-def remainder(runs: Sequence[WhitenedRun], relative_error: float = 0.0) -> Remainder:
+def remainder(runs: Sequence[WhitenedRun], missing: Sequence[WhitenedRun] = ()) -> Remainder:
     """What a model leaves.
 
     Parameters
     ----------
     runs : sequence of WhitenedRun
-    relative_error : float
-        Of what the effects of the model contribute: a law is known no better than that.
+    missing : sequence of WhitenedRun, optional
+        The same runs with nothing added, of which laws explain most; none for the baseline itself.
     """
     noise: list[FloatArray] = []
     per_run: list[dict[str, FloatArray]] = []
-    for run in runs:
-        variance = 1.0 + relative_error**2 * smoothed(run.contribution**2)
-        independent = run.noise.whitened(run.residual / np.sqrt(variance))
-        plain = sums_of_cells((-0.5 * np.log(variance) - 0.5 * independent**2).sum(axis=0)).sum(axis=-1)
-        signal = run.noise.whitened(run.simulated / np.sqrt(variance))
+    for number, run in enumerate(runs):
+        independent = run.noise.whitened(run.residual)
+        plain = sums_of_cells((-0.5 * independent**2).sum(axis=0)).sum(axis=-1)
         gains = {place: _gains(independent, *directions) for place, directions in run.noise.places.items()}
-        small = {
-            place: _POWERS[:, None, None] < run.noise.exactness**2 * _power_of_motion(signal, projections)
-            for place, (projections, _) in run.noise.places.items()
-        }
+        inexact_powers = _powers_of_inexactness(run, missing[number] if missing else None)
+        small = {place: _POWERS[:, None, None] < powers for place, powers in inexact_powers.items()}
         # Noise, and what a simulation that is as exact as it can be leaves at any place.
         inexact = _log_mean(np.stack([_log_mean_of(gains[place], small[place]) for place in gains]))
         usual = np.logaddexp(np.log(0.5), np.log(0.5) + inexact)
@@ -125,9 +123,19 @@ def remainder(runs: Sequence[WhitenedRun], relative_error: float = 0.0) -> Remai
     )
 
 
-def smoothed(power: FloatArray) -> FloatArray:
-    """Power over three neighbouring blocks and five bands, as a law that is off a little shows beside it, too."""
-    return np.asarray(uniform_filter(power, (0, 3, 5), mode="nearest"))
+def _powers_of_inexactness(run: WhitenedRun, missing: WhitenedRun | None) -> dict[str, FloatArray]:
+    """Power that a simulation may leave at each place, in noise variances, per cell of time and frequency."""
+    signal = run.noise.whitened(run.simulated)
+    lacking = None if missing is None else run.noise.whitened(missing.residual)
+    shown = np.any([each.informative for each in run.observed], axis=0)
+    found = {}
+    for place, (projections, _) in run.noise.places.items():
+        found[place] = run.noise.exactness**2 * _power_of_cells(signal, projections)
+        if lacking is not None:
+            # A law that is off by a little leaves it elsewhere, too, such as at multiples of a frequency.
+            everywhere = float(_power(lacking, projections)[shown].mean()) if shown.any() else 0.0
+            found[place] = found[place] + LAW**2 * np.maximum(_power_of_cells(lacking, projections), everywhere)
+    return found
 
 
 def _gains(x: FloatArray, projections: FloatArray, shares: FloatArray) -> FloatArray:
@@ -140,11 +148,18 @@ def _gains(x: FloatArray, projections: FloatArray, shares: FloatArray) -> FloatA
     return np.array(gains)
 
 
-def _power_of_motion(signal: FloatArray, projections: FloatArray) -> FloatArray:
-    """Power of the simulated motion at a place, in noise variances, per cell of time and frequency."""
-    along = np.einsum("bkmc,cbk->bkm", projections, signal) ** 2
-    power = sums_of_cells(along.sum(axis=-1)) / sums_of_cells(np.ones(along.shape[:2]))
-    return np.asarray(power)
+def _power(signal: FloatArray, projections: FloatArray) -> FloatArray:
+    """Power of a signal at a place, shape (n_blocks, n_bands)."""
+    return np.asarray((np.einsum("bkmc,cbk->bkm", projections, signal) ** 2).sum(axis=-1))
+
+
+def _power_of_cells(signal: FloatArray, projections: FloatArray) -> FloatArray:
+    """Mean power of a signal at a place, per cell of time and frequency.
+
+    That of the neighbours in time counts, too: an error of a motion that decays is more of what is left of it.
+    """
+    power = _power(signal, projections)
+    return np.asarray(maximum_filter1d(sums_of_cells(power) / sums_of_cells(np.ones(power.shape)), 3, axis=0))
 
 
 def _log_mean(gains: FloatArray) -> FloatArray:

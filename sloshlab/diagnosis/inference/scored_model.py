@@ -24,9 +24,6 @@ from sloshlab.diagnosis.inference.whitened import WhitenedRun
 from sloshlab.diagnosis.prior import ParameterPrior
 
 FloatArray = NDArray[np.float64]
-RELATIVE_ERRORS: Final = (0.0, 0.02, 0.05, 0.1, 0.2)
-"""Of what named effects contribute: a law in a laboratory is its formula to so much; the largest is how much a
-name may leave of what it explains."""
 _FEWEST_COEFFICIENTS: Final = 50
 """Below it a mean square is too uncertain to be used: its standard error is a fifth."""
 
@@ -43,8 +40,6 @@ class ScoredModel:
     runs : list of WhitenedRun
         Fitted and held-out ones.
     remainder : Remainder
-        With the relative error that describes the recordings best.
-    relative_error : float
     held_out : frozenset of str
         Names of the runs that chose nothing.
     complexity : float
@@ -56,7 +51,6 @@ class ScoredModel:
     values: dict[str, float]
     runs: list[WhitenedRun]
     remainder: Remainder
-    relative_error: float
     held_out: frozenset[str]
     complexity: float
 
@@ -116,6 +110,7 @@ def scored(
     values: Mapping[str, float],
     runs: Sequence[WhitenedRun],
     held_out: Collection[str] = (),
+    nothing: ScoredModel | None = None,
 ) -> ScoredModel:
     """A model with its likelihood.
 
@@ -126,18 +121,12 @@ def scored(
     runs : sequence of WhitenedRun
     held_out : collection of str
         Names of the runs that chose nothing.
+    nothing : ScoredModel, optional
+        Nothing missing: of what it leaves a model with effects may leave a little (`LAW`).
     """
-    errors = RELATIVE_ERRORS if fit.candidates else RELATIVE_ERRORS[:1]
-    found = [remainder(runs, error) for error in errors]
-    best = int(np.argmax([each.noise.sum() for each in found]))
+    missing = nothing.runs if nothing is not None and fit.candidates else ()
     return ScoredModel(
-        fit,
-        dict(values),
-        list(runs),
-        found[best],
-        errors[best],
-        frozenset(held_out),
-        complexity(fit) + float(np.log(len(errors))),
+        fit, dict(values), list(runs), remainder(runs, missing), frozenset(held_out), complexity(fit)
     )
 
 

@@ -1,4 +1,4 @@
-"""Residuals of a model in standard deviations of the noise, and what its effects contribute in the same units."""
+"""Residuals of a model in standard deviations of the noise."""
 
 from __future__ import annotations
 
@@ -28,15 +28,12 @@ class WhitenedRun:
         Its channels.
     residual : ndarray, shape (n_channels, n_blocks, n_bands)
         Recorded minus simulated spectra over the standard deviation of the noise.
-    contribution : ndarray of the same shape
-        What the effects of the model change in the simulated spectra, in the same units; zero without effects.
     noise : RunNoise
         Of its channels together.
     """
 
     observed: Sequence[Observation]
     residual: FloatArray
-    contribution: FloatArray
     noise: RunNoise
 
     @property
@@ -82,11 +79,8 @@ def whitened(
         names = [observation.channel for observation in observed]
         try:
             readings = model.simulate(run, values, extension, names)
-            # The same numbers of the baseline without the effects: what they alone change.
-            plain = model.simulate(run, values, extension_of((), values), names) if candidates else readings
         except SloshlabError:
             return None
         residual = np.stack([each.residual(readings[each.channel]) for each in observed])
-        without = np.stack([each.residual(plain[each.channel]) for each in observed]) if candidates else residual
-        found.append(WhitenedRun(observed, residual, without - residual, of_run))
+        found.append(WhitenedRun(observed, residual, of_run))
     return found

@@ -18,7 +18,7 @@ assert effects.__all__
 def explained_by(*keys: str) -> ScoredModel:
     pool = {f"{effect.block}.{effect.name}": effect for effect in known_effects()}
     chosen = tuple(Candidate(pool[key], None) for key in keys)  # type: ignore[arg-type]
-    return ScoredModel(FreeRunFit(chosen, {}, 0.0, 0.0), {}, [], Remainder(np.zeros(1), {}), 0.0, frozenset(), 0.0)
+    return ScoredModel(FreeRunFit(chosen, {}, 0.0, 0.0), {}, [], Remainder(np.zeros(1), {}), frozenset(), 0.0)
 
 
 @pytest.mark.parametrize(

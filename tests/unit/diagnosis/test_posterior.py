@@ -45,8 +45,8 @@ def model(
         for place, all_of_it in (places or {}).items()
     }
     alone = RunNoise(np.ones((1, 4, 1, 1)), {})
-    runs = [WhitenedRun([], np.full((1, 1, 4), -total), np.zeros((1, 1, 4)), alone)]
-    return ScoredModel(fit, values, runs, Remainder(by_cell, of_places), 0.0, frozenset(), 0.0)
+    runs = [WhitenedRun([], np.full((1, 1, 4), -total), alone)]
+    return ScoredModel(fit, values, runs, Remainder(by_cell, of_places), frozenset(), 0.0)
 
 
 @pytest.fixture(autouse=True)
