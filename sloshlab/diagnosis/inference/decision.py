@@ -3,7 +3,7 @@
 - What is named has the posterior `NAMED`; a set of names that has it together is said as a set.
 - Two models that predict the same within `TOLD_APART` (`posterior`) are equals; of one that needs more numbers for
   it only the simpler one is said.
-- An effect below `LEAST_STRENGTH` (`posterior`) is not worth a word: it counts as nothing missing.
+- An effect or a remainder below `LEAST_STRENGTH` (`scored_model`) is not worth a word: it counts as nothing.
 - A name may leave `LAW` (`remainder`) of the amplitude that lacks without it; more is a remainder.
 - The place of what has no name needs `LOCATED`.
 """

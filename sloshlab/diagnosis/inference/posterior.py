@@ -18,12 +18,16 @@ from scipy.special import softmax
 from sloshlab.diagnosis.candidate import BLOCKS
 from sloshlab.diagnosis.inference.places import block_of
 from sloshlab.diagnosis.inference.remainder import PRIOR_OF_REMAINDER, SHARES, TEMPERING
-from sloshlab.diagnosis.inference.scored_model import ScoredModel, difference, strength
+from sloshlab.diagnosis.inference.scored_model import (
+    LEAST_STRENGTH,
+    ScoredModel,
+    difference,
+    is_worth_a_word,
+    strength,
+)
 
 FloatArray = NDArray[np.float64]
 NONE, UNKNOWN = "none", "unknown"
-LEAST_STRENGTH: Final = 0.5
-"""Noise floors of the channel that shows it most, below which an effect is not worth a word."""
 TOLD_APART: Final = 3.0
 """Expected log-likelihood ratio from which recordings tell two models apart: twenty to one."""
 _N_DRAWS: Final = 1000
@@ -197,6 +201,8 @@ def _hypotheses(model: ScoredModel, label: str, n_candidates: int) -> list[Hypot
     log_prior = -(n + 1) * np.log(2.0) - n * np.log(max(n_candidates, 1))
     found = [Hypothesis(model, "", label, log_prior, model.remainder.noise)]
     places = model.remainder.places
+    # A remainder of a size that is not worth a word leaves the model what it is.
+    of_remainder = UNKNOWN if is_worth_a_word(model.runs) else label
     for place, by_share in places.items():
         # The share of cells that describes best stands for all; the others are paid for by its prior.
         share = int(np.argmax(by_share.sum(axis=1)))
@@ -204,7 +210,7 @@ def _hypotheses(model: ScoredModel, label: str, n_candidates: int) -> list[Hypot
             Hypothesis(
                 model,
                 place,
-                UNKNOWN,
+                of_remainder,
                 log_prior + np.log(PRIOR_OF_REMAINDER / len(places) / SHARES.size),
                 by_share[share],
             )

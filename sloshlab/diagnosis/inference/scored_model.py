@@ -24,6 +24,8 @@ from sloshlab.diagnosis.inference.whitened import WhitenedRun
 from sloshlab.diagnosis.prior import ParameterPrior
 
 FloatArray = NDArray[np.float64]
+LEAST_STRENGTH: Final = 0.5
+"""Noise floors of the channel that shows it most, below which an effect, or a remainder, is not worth a word."""
 _FEWEST_COEFFICIENTS: Final = 50
 """Below it a mean square is too uncertain to be used: its standard error is a fifth."""
 
@@ -188,6 +190,21 @@ def strength(before: ScoredModel, after: ScoredModel) -> float:
                 left = [max(1.0, float(robust_squares(run.residual[i][shown]).mean())) for run in (one, two)]
                 largest = max(largest, left[0] / left[1] - 1.0)
     return float(np.sqrt(largest))
+
+
+def is_worth_a_word(runs: Sequence[WhitenedRun]) -> bool:
+    """Whether residuals of the channel of a run that shows most exceed the noise floor by `LEAST_STRENGTH`.
+
+    Parameters
+    ----------
+    runs : sequence of WhitenedRun
+    """
+    return any(
+        shown.sum() >= _FEWEST_COEFFICIENTS
+        and float(robust_squares(run.residual[i][shown]).mean()) > 1.0 + LEAST_STRENGTH**2
+        for run in runs
+        for i, shown in enumerate(observation.informative for observation in run.observed)
+    )
 
 
 def robust_squares(residual: FloatArray) -> FloatArray:

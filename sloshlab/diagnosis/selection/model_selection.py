@@ -19,6 +19,7 @@ from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
+from sloshlab.diagnosis.inference.scored_model import is_worth_a_word
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
@@ -118,7 +119,7 @@ class ModelSelection:
         model, runs = self.runs.model, self.runs.runs
         noise = [run_noise(model, run, fit.values) for run in runs]
         residuals = whitened(model, runs, fit.candidates, fit.values, noise)
-        return residuals is None or remainder(residuals).is_probable
+        return residuals is None or (is_worth_a_word(residuals) and remainder(residuals).is_probable)
 
     def _keep(self, fits: Iterable[FreeRunFit]) -> None:
         """Of every model the fit of the lowest cost."""

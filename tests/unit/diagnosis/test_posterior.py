@@ -52,6 +52,7 @@ def model(
 @pytest.fixture(autouse=True)
 def worth_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(posterior_module, "strength", lambda before, after: 10.0)
+    monkeypatch.setattr(posterior_module, "is_worth_a_word", lambda runs: True)
 
 
 FRICTION, DRAG, DAMPER = "structure.coulomb_friction", "structure.quadratic_drag", "structure.viscous_damping"
@@ -165,3 +166,10 @@ def test_what_has_no_name_is_placed_only_where_one_block_has_the_evidence() -> N
     both = {"tank": 80.0, "structure": 79.5, "sensor acceleration_tip": 10.0}
     assert decided(posterior([model(0.0, places=both)], 10, 1.0)).block == ""
     assert decided(posterior([model(0.0, places={**both, "tank": 90.0})], 10, 1.0)).block == "tank"
+
+
+def test_a_remainder_that_is_not_worth_a_word_leaves_the_name_what_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    models = [model(0.0), model(200.0, FRICTION, places={"tank": 300.0})]
+    assert posterior(models, 10, 1.0).by_label()["unknown"] > 0.99
+    monkeypatch.setattr(posterior_module, "is_worth_a_word", lambda runs: False)
+    assert posterior(models, 10, 1.0).by_label()["coulomb_friction"] > 0.99

@@ -11,6 +11,7 @@ from scipy.stats import multivariate_normal
 
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import RunNoise
+from sloshlab.diagnosis.inference.scored_model import is_worth_a_word
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
 
 BURST = 0.01
@@ -144,3 +145,11 @@ def test_a_run_without_the_place_leaves_its_likelihood_alone() -> None:
     found = remainder([run(x, directions={"tank": np.ones(2)}), run(x)])
     n = found.noise.size // 2
     np.testing.assert_allclose(found.places["tank"][:, n:], np.broadcast_to(found.noise[n:], (4, n)))
+
+
+@pytest.mark.parametrize(("size", "worth"), [(1.0, False), (1.08, False), (1.2, True)])
+def test_a_channel_a_tenth_above_its_noise_is_not_worth_a_word(size: float, worth: bool) -> None:
+    """Half a noise floor beside the noise makes √1.25 = 1.12 of it; of normal numbers Huber's loss is the square."""
+    x = np.random.default_rng(9).normal(size=(2, 64, 200))
+    x[1] *= size
+    assert is_worth_a_word([run(x)]) == worth
