@@ -64,7 +64,8 @@ _TOLERANCE_OF_FLUCTUATION: Final = 0.05
 """Of the damping of a chaotic liquid in one run, over its mean."""
 _DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
 _CLOSE_TOLERANCES: Final = 1.25
-"""Bound of gains, and upper one of losses: a gain that is further off, or more loss, is an effect with a name."""
+"""Bound of gains, that of the base's sensor in the participations among them, and upper one of losses: a gain that
+is further off, or more loss, is an effect with a name."""
 _TOLERANCE_OF_SHAPE: Final = 0.01
 """Of the value at the tip: position of a sensor, and a beam that is not quite uniform.
 
@@ -580,7 +581,16 @@ def _structure_parameters(structure: Structure, *, moves: bool) -> list[Baseline
     # The gain of the sensor at the base is in these. Without them leaks into it and gains of others stood in for
     # it, a false alarm and a wrong name of the second sealed trial.
     if moves:
-        found += [BaselineParameter(f"base participation of mode {i + 1}", 1.0, 0.02) for i in range(n)]
+        found += [
+            BaselineParameter(
+                f"base participation of mode {i + 1}",
+                1.0,
+                0.02,
+                most_below=_CLOSE_TOLERANCES,
+                most_above=_CLOSE_TOLERANCES,
+            )
+            for i in range(n)
+        ]
     return found
 
 

@@ -142,7 +142,7 @@ def posterior(
         Log-likelihoods are divided by it.
     seed : int
     """
-    labels = _labels(models, tempering)
+    labels = _labels(models, n_candidates, tempering)
     found = [
         hypothesis
         for model, label in zip(models, labels, strict=True)
@@ -155,28 +155,35 @@ def posterior(
     return Posterior(tuple(found), np.asarray(softmax(scores, axis=1).mean(axis=0)), tempering)
 
 
-def _labels(models: Sequence[ScoredModel], tempering: float) -> list[str]:
+def _labels(models: Sequence[ScoredModel], n_candidates: int, tempering: float) -> list[str]:
     """What is said of each model: the names of the simplest one that it is no more than.
 
-    A model is no more than one of fewer numbers that predicts the same, nor than one to which its further effects
-    add nothing worth a word.
+    A model is no more than one of fewer numbers that predicts the same and needs no less probable baseline for it,
+    nor than one to which its further effects add nothing worth a word.
     """
     labels = []
     for model in models:
         simpler = [
             other
             for other in models
-            if other.n_numbers < model.n_numbers and _is_no_more_than(model, other, tempering)
+            if other.n_numbers < model.n_numbers and _is_no_more_than(model, other, n_candidates, tempering)
         ]
         as_simple = min(simpler, key=lambda other: (other.n_numbers, -other.evidence), default=model)
         labels.append(" + ".join(as_simple.names) or NONE)
     return labels
 
 
-def _is_no_more_than(model: ScoredModel, other: ScoredModel, tempering: float) -> bool:
-    if difference(model, other) / tempering < TOLD_APART:
+def _is_no_more_than(model: ScoredModel, other: ScoredModel, n_candidates: int, tempering: float) -> bool:
+    costs = [each.complexity - _log_prior(each, n_candidates) for each in (model, other)]
+    if difference(model, other) / tempering < TOLD_APART and costs[1] <= costs[0]:
         return True
     return _is_nested(other, model) and strength(other, model) < LEAST_STRENGTH
+
+
+def _log_prior(model: ScoredModel, n_candidates: int) -> float:
+    """Half of all cases have no effect, a quarter one, an eighth two …; candidates are alike."""
+    n = len(model.fit.candidates)
+    return float(-(n + 1) * np.log(2.0) - n * np.log(max(n_candidates, 1)))
 
 
 def _is_nested(other: ScoredModel, model: ScoredModel) -> bool:
@@ -196,9 +203,7 @@ def _is_nested(other: ScoredModel, model: ScoredModel) -> bool:
 
 
 def _hypotheses(model: ScoredModel, label: str, n_candidates: int) -> list[Hypothesis]:
-    n = len(model.fit.candidates)
-    # Half of all cases have no effect, a quarter one, an eighth two …; candidates are alike.
-    log_prior = -(n + 1) * np.log(2.0) - n * np.log(max(n_candidates, 1))
+    log_prior = _log_prior(model, n_candidates)
     found = [Hypothesis(model, "", label, log_prior, model.remainder.noise)]
     places = model.remainder.places
     # A remainder of a size that is not worth a word leaves the model what it is.

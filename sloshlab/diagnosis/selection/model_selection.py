@@ -15,12 +15,13 @@ from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
 from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, costs_at, fitted, stages_for
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_cost
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_cost, run_of
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import is_worth_a_word
 from sloshlab.diagnosis.inference.whitened import whitened
+from sloshlab.diagnosis.readiness import refuted_beliefs
 from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.proposals import Base, most_promising, proposals
@@ -68,7 +69,7 @@ class ModelSelection:
         """
         self._keep([retuned])
         self._renew_sampling()
-        if not self._remains(retuned):
+        if not self._remains(retuned) and not self._refuted(retuned):
             return [retuned]
         believed = self._as_believed()
         self._grown([believed, retuned], "one effect")
@@ -120,6 +121,11 @@ class ModelSelection:
         noise = [run_noise(model, run, fit.values) for run in runs]
         residuals = whitened(model, runs, fit.candidates, fit.values, noise)
         return residuals is None or (is_worth_a_word(residuals) and remainder(residuals).is_probable)
+
+    def _refuted(self, fit: FreeRunFit) -> bool:
+        """Whether a fit of the baseline needs numbers that are not believed: an effect may be more probable."""
+        shared = [known for known in self.runs.model.parameters if not run_of(known.name, self.runs.model)]
+        return bool(refuted_beliefs(fit.values, shared))
 
     def _keep(self, fits: Iterable[FreeRunFit]) -> None:
         """Of every model the fit of the lowest cost."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -173,3 +174,12 @@ def test_a_remainder_that_is_not_worth_a_word_leaves_the_name_what_it_is(monkeyp
     assert posterior(models, 10, 1.0).by_label()["unknown"] > 0.99
     monkeypatch.setattr(posterior_module, "is_worth_a_word", lambda runs: False)
     assert posterior(models, 10, 1.0).by_label()["coulomb_friction"] > 0.99
+
+
+@pytest.mark.parametrize(("cost", "named"), [(1.0, False), (30.0, True)])
+def test_a_baseline_that_nobody_believes_is_no_simpler_than_an_effect(cost: float, named: bool) -> None:
+    """Both predict the same: the baseline by numbers that cost so much of its prior, the effect by one more."""
+    found = posterior([replace(model(0.0), complexity=cost), model(0.0, DRAG)], n_candidates=10, tempering=1.0)
+    odds = np.exp(cost) * (1 / 40) / (1 / 2)
+    expected = odds / (1 + odds) if named else 0.0
+    assert found.by_label().get("quadratic_drag", 0.0) == pytest.approx(expected, rel=1e-6)

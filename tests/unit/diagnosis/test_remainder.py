@@ -149,7 +149,7 @@ def test_a_run_without_the_place_leaves_its_likelihood_alone() -> None:
 
 @pytest.mark.parametrize(("size", "worth"), [(1.0, False), (1.08, False), (1.2, True)])
 def test_a_channel_a_tenth_above_its_noise_is_not_worth_a_word(size: float, worth: bool) -> None:
-    """Half a noise floor beside the noise makes √1.25 = 1.12 of it; of normal numbers Huber's loss is the square."""
+    """Half a noise floor beside the noise makes 1.12 of it; Huber's loss of normal numbers is the square."""
     x = np.random.default_rng(9).normal(size=(2, 64, 200))
     x[1] *= size
     assert is_worth_a_word([run(x)]) == worth
