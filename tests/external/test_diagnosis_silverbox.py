@@ -18,9 +18,6 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis.user_twin import load_extended
 
 pytestmark = [pytest.mark.external, pytest.mark.slow]
-UNEXPLAINED = pytest.mark.xfail(
-    reason="how exact a law is on real recordings is not modelled yet: what is left beyond the noise has no name"
-)
 
 
 @pytest.fixture(scope="module")
@@ -60,15 +57,19 @@ def found(case: Path, example: ModuleType) -> dict[str, Any]:
     return example.diagnosed(case, report=False)
 
 
-@UNEXPLAINED
 def test_a_hardening_spring_is_found(found: dict[str, Any]) -> None:
     assert found["verdict"] in ("named", "indistinguishable")
     effects = {effect["name"]: effect["parameters"] for effect in found["effects"]}
     assert effects["cubic_stiffness"]["stiffness_n_per_m3"]["low"] > 0
 
 
-@UNEXPLAINED
-def test_a_small_quadratic_part_is_found(found: dict[str, Any]) -> None:
+def test_a_small_quadratic_part_is_among_the_equals(found: dict[str, Any]) -> None:
+    """A cubic spring about an offset, which a constant force makes, is a cubic and a quadratic one."""
+    assert ["cubic_stiffness", "quadratic_stiffness"] in [sorted(names) for names in found["alternatives"]]
+
+
+@pytest.mark.xfail(reason="the best of the equals is the constant force, whose numbers alone are stated")
+def test_the_quadratic_part_is_small(found: dict[str, Any]) -> None:
     effects = {effect["name"]: effect["parameters"] for effect in found["effects"]}
     assert "quadratic_stiffness" in effects
     largest_v = 0.3
