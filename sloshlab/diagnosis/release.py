@@ -63,9 +63,9 @@ def instant_s(recording: xr.Dataset) -> float:
     found = []
     for name in channels(recording, "acceleration"):
         values = np.asarray(recording[name].values, np.float64)
-        first = np.abs(values[:n] - np.nanmedian(values))
-        if name.endswith("_root") or not np.isfinite(first).all() or first.size < 2:
+        if name.endswith("_root") or not np.isfinite(values[:n]).all() or values.size < 2:
             continue
+        first = np.abs(values[:n] - np.nanmedian(values))
         half = 0.5 * float(first.max())
         after = int(np.argmax(first > half))
         if after > 0:

@@ -173,29 +173,6 @@ class RigModel:
         lane = self._lane(request)
         return simulated(lane.twin, lane.excitation, lane.start, lane.n_substeps).require_done()
 
-    def sampled_jumps(self, request: Request) -> dict[str, FloatArray]:
-        """How uncertain forces that jump are as they are sampled, per place, shape (n,); none without such forces.
-
-        A force that jumps by J between two samples may be anything between at one of them, so that it is known to
-        J/√3. Halved second differences have about that power, J²/2, and next to none where a force is smooth.
-
-        Raises
-        ------
-        AnalysisError
-            If the simulation does not reach its end.
-        """
-        lane = self._lane(request)
-        which = [i for i, t in enumerate(lane.twin.terms) if t.kind.dry_friction or t.kind.events is not None]
-        if not which:
-            return {}
-        forces = self.whole_simulation(request).forces_n
-        found: dict[str, FloatArray] = {}
-        for i in which:
-            place, uncertain = lane.twin.terms[i].place, np.zeros(forces.shape[0])
-            uncertain[1:-1] = forces[1:-1, i] - 0.5 * (forces[:-2, i] + forces[2:, i])
-            found[place] = found.get(place, 0.0) + uncertain
-        return found
-
     def _belongs(self, parameter: str, run: CaseRun) -> bool:
         """Whether a parameter of the motion belongs to this run or to all."""
         for beginning in (RELEASE, _FLUCTUATION):

