@@ -358,7 +358,12 @@ class Candidate:
 
     @property
     def sizes(self) -> tuple[str, ...]:
-        """Numbers that grow with the effect, as the effect says or the first and all of its unit."""
+        """Numbers that grow with the effect, as the effect says or the first and all of its unit.
+
+        None where the first is a place, which has steps of its own: a place that follows a linear step is lost.
+        """
+        if self.effect.parameters[0].tolerance is not None:
+            return self.effect.size
         names = [parameter.name for parameter in self.effect.parameters]
         unit = named_and_units(names[0])[1]
         return self.effect.size or tuple(name for name in names if named_and_units(name)[1] == unit)

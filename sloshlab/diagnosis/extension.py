@@ -31,12 +31,19 @@ class SensorFault:
         From what is recorded to the truth, for channels that drive the simulation; None where that is impossible.
     key : tuple
         Identifies the fault, for caches.
+    run : str
+        In which alone it acts; empty where it acts in all.
     """
 
     channel: str
     reading: Reading
     undone: Reading | None
     key: tuple[Any, ...]
+    run: str = ""
+
+    def acts_on(self, channel: str, run: str) -> bool:
+        """Whether it changes a channel of a run."""
+        return self.channel == channel and self.run in ("", run)
 
 
 @dataclass(frozen=True)

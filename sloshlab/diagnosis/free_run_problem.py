@@ -241,7 +241,7 @@ class FreeRunProblem:
             moved[column] += step if physical <= self.high[column] else -step
             places.append(moved)
 
-        changed = [self._changed_by(column) for column in columns]
+        changed = [self._changed_by([column]) for column in columns]
         parts = [
             (chosen, self.values(place))
             for place, (_, by_run) in zip(places, changed, strict=True)
@@ -262,20 +262,22 @@ class FreeRunProblem:
             derivatives, [observation.spectra.size for run in self.runs for observation in run]
         )
 
-    def residuals_moved(self, thetas: Sequence[FloatArray], column: int, at: FloatArray) -> list[FloatArray]:
-        """Residuals after one parameter, or others that change the same channels, were moved.
+    def residuals_moved(
+        self, thetas: Sequence[FloatArray], columns: Sequence[int], at: FloatArray
+    ) -> list[FloatArray]:
+        """Residuals after some parameters were moved.
 
-        Unchanged in other runs and channels where the parameter has its own.
+        Unchanged in other runs and channels where the parameters have their own.
 
         Parameters
         ----------
         thetas : sequence of ndarray
-        column : int
-            Of the parameter.
+        columns : sequence of int
+            Of the parameters.
         at : ndarray
             Residuals where nothing is moved.
         """
-        blocks, by_run = self._changed_by(column)
+        blocks, by_run = self._changed_by(columns)
         weighted = iter(self._weighted([(chosen, self.values(theta)) for theta in thetas for chosen in by_run]))
         found = []
         for _ in thetas:
@@ -285,19 +287,25 @@ class FreeRunProblem:
             found.append(moved)
         return found
 
-    def _changed_by(self, column: int) -> tuple[list[int], list[list[Observation]]]:
-        """Blocks that a parameter changes, and their observations run by run."""
+    def _changed_by(self, columns: Sequence[int]) -> tuple[list[int], list[list[Observation]]]:
+        """Blocks that any of some parameters changes, and their observations run by run."""
         # The sparsity of the Jacobian: a release or an offset is simulated for its run alone, a gain for its
         # channel alone.
-        owner, seen_by = run_of(self.names[column], self.model), self._channels_changed[column]
+        seen = [(run_of(self.names[column], self.model), self._channels_changed[column]) for column in columns]
         blocks: list[int] = []
         runs: list[list[Observation]] = []
         n_before = 0
         for run in self.runs:
-            if not owner or run[0].run.name == owner:
-                chosen = [i for i, observation in enumerate(run) if not seen_by or observation.channel in seen_by]
-                runs += [[run[i] for i in chosen]] if chosen else []
-                blocks += [n_before + i for i in chosen]
+            chosen = [
+                i
+                for i, observation in enumerate(run)
+                if any(
+                    owner in ("", observation.run.name) and (not by or observation.channel in by)
+                    for owner, by in seen
+                )
+            ]
+            runs += [[run[i] for i in chosen]] if chosen else []
+            blocks += [n_before + i for i in chosen]
             n_before += len(run)
         return blocks, runs
 

@@ -32,7 +32,7 @@ class Interval:
 
 
 def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], Interval]:
-    """Intervals of all numbers of a model, per key of the effect and name of the number.
+    """Intervals of all fitted numbers of a model, per key of the effect and name of the number.
 
     The covariance of the fit contains the priors of the baseline: where the recordings do not separate a gain or a
     mass from an effect, its interval is as wide as what is believed of these. Its part by noise is widened by what
@@ -52,14 +52,14 @@ def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], In
         (candidate.key, parameter.name): _interval(best, candidate, parameter.name, scatter)
         for candidate in best.fit.candidates
         for parameter in candidate.effect.parameters
+        # Numbers of runs that were not fitted have none.
+        if f"{candidate.key}.{parameter.name}" in best.fit.names
     }
 
 
 def _interval(best: ScoredModel, candidate: Candidate, parameter: str, scatter: dict[str, float]) -> Interval:
     name = f"{candidate.key}.{parameter}"
     estimate = best.fit.values[name]
-    if name not in best.fit.names:
-        return Interval(estimate, estimate, estimate)
     of_noise, of_belief = best.fit.standard_errors(name)
     of_noise = max(of_noise * max(1.0, best.fitted_rms), scatter.get(name, 0.0))
     width = _NORMAL_90 * float(np.hypot(of_noise, of_belief))

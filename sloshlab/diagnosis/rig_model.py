@@ -264,7 +264,7 @@ class RigModel:
             # A fault acts on what the sensor would read, gain included; the zero of the channel is added last
             # and is not delayed, filtered or clipped.
             for fault in faults:
-                if fault.channel == name:
+                if fault.acts_on(name, run.name):
                     reading = fault.reading(reading, run.attributes.sampling_rate_hz, others, known.recorded[name])
             if late or averaging:
                 reading = late_by(reading, late, averaging)
@@ -308,7 +308,9 @@ class RigModel:
         return (run.name, physical, tuple(others), tuple(fault.key for fault in self._undone(request)))
 
     def _undone(self, request: Request) -> tuple[SensorFault, ...]:
-        return tuple(fault for fault in request.extension.faults if fault.channel in self.driving(request.run))
+        run, driving = request.run, self.driving(request.run)
+        faults = request.extension.faults
+        return tuple(fault for fault in faults if any(fault.acts_on(name, run.name) for name in driving))
 
     def _parts(self, requests: Mapping[tuple[Any, ...], Request]) -> Iterator[dict[tuple[Any, ...], Request]]:
         """Requests whose motions together take no more memory than they may."""

@@ -149,13 +149,21 @@ def _placed(name: str, candidate: Candidate) -> str:
 
 
 def _described(candidate: Candidate, intervals: Mapping[tuple[str, str], Interval]) -> str:
+    own = {name: its for (key, name), its in intervals.items() if key == candidate.key}
+    shared = [name for name in own if " in " not in name]
     numbers = []
-    for parameter in candidate.effect.parameters:
-        words, units = named_and_units(parameter.name)
-        its = intervals[candidate.key, parameter.name]
-        estimate, low, high = _with_digits(its.estimate, its.low, its.high)
-        label = f"{words} " if len(candidate.effect.parameters) > 1 else ""
+    for name in shared:
+        words, units = named_and_units(name)
+        estimate, low, high = _with_digits(own[name].estimate, own[name].low, own[name].high)
+        label = f"{words} " if len(own) > 1 else ""
         numbers.append(f"{label}{estimate}{units and ' ' + units} ({low} to {high})")
+    for kind in dict.fromkeys(name.partition(" in ")[0] for name in own if name not in shared):
+        words, units = named_and_units(kind)
+        every = [its.estimate for name, its in own.items() if name.startswith(f"{kind} in ")]
+        low, _, high = _with_digits(min(every), 0.0, max(every))
+        numbers.append(
+            f"{words} {low} to {high}{units and ' ' + units} in {len(every)} run{'s' if len(every) > 1 else ''}"
+        )
     return f"{named_and_placed(candidate)}, {', '.join(numbers)}"
 
 

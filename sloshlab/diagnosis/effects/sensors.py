@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from sloshlab.diagnosis.candidate import (
     Numbers,
     Surroundings,
     channels_of,
+    in_run,
     joined_channels,
     multiples,
     register,
@@ -243,14 +245,41 @@ def _drifted(numbers: Numbers) -> Reading:
     return reading
 
 
+_RATE: Final = EffectParameter("rate", -1e6, 1e6, range=Range(3e-3, 30.0, scales.drift, may_be_negative=True))
+_RATES: Final = ({"rate": 0.3}, {"rate": -0.3})
+_DRIFT: Final = "y → y + rate · t, in the unit of the channel per second"
+
 DRIFT = _sensor_effect(
-    "sensor_drift",
-    "y → y + rate · t, in the unit of the channel per second",
-    (EffectParameter("rate", -1e6, 1e6, range=Range(3e-3, 30.0, scales.drift, may_be_negative=True)),),
-    [{"rate": share} for share in (0.3, -0.3)],
-    _drifted,
-    undone=None,
-    spoken_for_by=(SINGLE_CHANNEL, TREND),
+    "sensor_drift", _DRIFT, (_RATE,), _RATES, _drifted, undone=None, spoken_for_by=(SINGLE_CHANNEL, TREND)
+)
+
+
+def _drifted_in_runs(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
+    rates = {run: numbers.get(in_run("rate", run), 0.0) for run in at.runs}
+    return Extension(
+        faults=tuple(
+            SensorFault(channel, _drifted({"rate": rate}), None, (f"sensor.drift_of_runs.{channel}", rate), run)
+            for run, rate in rates.items()
+        )
+    )
+
+
+# A sensor that drifts with its temperature does so differently in every run.
+DRIFT_OF_RUNS = register(
+    Effect(
+        "drift_of_runs",
+        "sensor",
+        f"{_DRIFT}, of a rate of its own in every run",
+        (replace(_RATE, each_run=True),),
+        multiples((_RATE,), *_RATES),
+        _drifted_in_runs,
+        places=_compared_channels,
+        needs=lambda at: bool(at.runs),
+        spoken_for_by=DRIFT.spoken_for_by,
+        separated_by=DRIFT.separated_by,
+        variant_of=DRIFT.name,
+        reduces_to=(DRIFT.name,),
+    )
 )
 
 

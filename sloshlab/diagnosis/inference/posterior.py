@@ -46,7 +46,7 @@ class Hypothesis:
         What is said if it is true: names joined by " + ", none, or unknown.
     log_prior : float
     by_cell : ndarray, shape (n_cells_of_time,)
-        Log-likelihood.
+        Tempered log-likelihood.
     """
 
     model: ScoredModel
@@ -146,12 +146,12 @@ def posterior(
     found = [
         hypothesis
         for model, label in zip(models, labels, strict=True)
-        for hypothesis in _hypotheses(model, label, n_candidates)
+        for hypothesis in _hypotheses(model, label, n_candidates, tempering)
     ]
     n_cells = found[0].by_cell.size
     weights = np.random.default_rng(seed).dirichlet(np.ones(n_cells), _N_DRAWS) * n_cells
     fixed = np.array([h.log_prior - h.model.complexity for h in found])
-    scores = weights @ np.stack([h.by_cell for h in found], axis=1) / tempering + fixed
+    scores = weights @ np.stack([h.by_cell for h in found], axis=1) + fixed
     return Posterior(tuple(found), np.asarray(softmax(scores, axis=1).mean(axis=0)), tempering)
 
 
@@ -202,9 +202,9 @@ def _is_nested(other: ScoredModel, model: ScoredModel) -> bool:
     return True
 
 
-def _hypotheses(model: ScoredModel, label: str, n_candidates: int) -> list[Hypothesis]:
+def _hypotheses(model: ScoredModel, label: str, n_candidates: int, tempering: float) -> list[Hypothesis]:
     log_prior = _log_prior(model, n_candidates)
-    found = [Hypothesis(model, "", label, log_prior, model.remainder.noise)]
+    found = [Hypothesis(model, "", label, log_prior, model.remainder.noise / tempering)]
     places = model.remainder.places
     # A remainder of a size that is not worth a word leaves the model what it is.
     of_remainder = UNKNOWN if is_worth_a_word(model.runs) else label
@@ -217,7 +217,7 @@ def _hypotheses(model: ScoredModel, label: str, n_candidates: int) -> list[Hypot
                 place,
                 of_remainder,
                 log_prior + np.log(PRIOR_OF_REMAINDER / len(places) / SHARES.size),
-                by_share[share],
+                by_share[share] / tempering,
             )
         )
     return found

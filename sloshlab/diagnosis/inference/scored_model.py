@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.candidate import channels_of
 from sloshlab.diagnosis.free_run_problem import HUBER_LIMIT, FreeRunFit
-from sloshlab.diagnosis.inference.remainder import Remainder, remainder
+from sloshlab.diagnosis.inference.remainder import TEMPERING, Remainder, remainder
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
 from sloshlab.diagnosis.prior import ParameterPrior
 
@@ -98,8 +98,8 @@ class ScoredModel:
 
     @property
     def evidence(self) -> float:
-        """Logarithm, with noise alone beside the model."""
-        return float(self.remainder.noise.sum()) - self.complexity
+        """Logarithm of the tempered evidence, with noise alone beside the model."""
+        return float(self.remainder.noise.sum()) / TEMPERING - self.complexity
 
     @property
     def n_numbers(self) -> int:

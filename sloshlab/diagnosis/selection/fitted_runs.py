@@ -78,5 +78,7 @@ def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[s
         if problem.names:
             start = problem.values(problem.theta_of(fit.values))
             own, _ = fitted(problem, start, n_iterations=3)
-            values |= {name: value for name, value in own.values.items() if run_of(name, model)}
+            # In this problem the numbers of other runs rest where they start, not where the fit has them.
+            here = run[0].run.name
+            values |= {name: value for name, value in own.values.items() if run_of(name, model) == here}
     return values

@@ -143,8 +143,8 @@ def _beside(
         extended = runs.problem((*base.fit.candidates, candidate))
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
-        column = extended.names.index(f"{candidate.key}.{candidate.effect.parameters[0].name}")
-        moved = extended.residuals_moved(thetas, column, residual)
+        own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
+        moved = extended.residuals_moved(thetas, own, residual)
         # A start that explodes is no reason to drop the candidate as long as another one runs.
         running = [(start, at) for start, at in zip(sets, moved, strict=True) if np.isfinite(at).all()]
         if not running:

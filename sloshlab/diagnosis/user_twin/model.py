@@ -120,7 +120,7 @@ class UserTwinModel:
                 continue
             reading = true * values.get(f"gain of {name}", 1.0)
             for fault in extension.faults:
-                if fault.channel == name:
+                if fault.acts_on(name, run.name):
                     reading = fault.reading(reading, rate, others, self._views[run.name].channels[name])
             readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
         return readings
@@ -150,7 +150,10 @@ class UserTwinModel:
         own = self._own(run, values)
         # A fault of a driving channel changes the motion and is part of the key, others are read from the same
         # motion.
-        undone = tuple(fault for fault in extension.faults if fault.channel in self.described.driving)
+        driving = self.described.driving
+        undone = tuple(
+            fault for fault in extension.faults if any(fault.acts_on(name, run.name) for name in driving)
+        )
         forces = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
         key = (run.name, *own.values(), tuple(forces), tuple(fault.key for fault in undone))
         with self._lock:

@@ -17,7 +17,10 @@ from recorded_oscillators import (
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
+from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
+from sloshlab.diagnosis.observations import observations
 from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.diagnosis.selection.fitted_runs import values_of_runs
 from sloshlab.twin.excitation import free
 from sloshlab.twin.external_forces import HARMONIC_FORCE, PULSE_TRAIN
 from sloshlab.twin.structure import single_degree_of_freedom
@@ -151,3 +154,29 @@ def test_a_missing_force_shows_the_line_that_is_in_it(pulsed: RigModel) -> None:
 
 def test_forces_of_runs_are_not_sought_where_runs_have_no_names(pulsed: RigModel) -> None:
     assert not [found for found in candidates(surroundings(pulsed)) if found.effect.known_as == "external_force"]
+
+
+def test_numbers_of_runs_that_were_not_fitted_leave_those_of_the_fitted_alone(pulsed: RigModel) -> None:
+    line = Candidate(effect("structure.harmonic_force").of_runs(("first", "second")), of_runs(pulsed))
+    key = line.key
+    _, second = (observations(run, pulsed.compared(run)) for run in pulsed.runs)
+    numbers = {f"{key}.size_n": 0.4, f"{key}.frequency_hz": 9.4, f"{key}.phase in first": 0.37}
+    fit = FreeRunFit((line,), {**pulsed.believed, **numbers}, 0.0, 0.0)
+    found = values_of_runs(pulsed, [second], fit)
+    assert found[f"{key}.phase in first"] == 0.37
+    assert f"{key}.phase in second" in found
+    assert found[f"{key}.size_n"] == 0.4
+
+
+def test_all_runs_show_an_effect_that_has_a_number_in_each_of_them(pulsed: RigModel) -> None:
+    line = Candidate(effect("structure.harmonic_force").of_runs(("first", "second")), of_runs(pulsed))
+    problem = FreeRunProblem(pulsed, [observations(run, pulsed.compared(run)) for run in pulsed.runs], [line])
+    theta = problem.theta_of({**pulsed.believed, f"{line.key}.size_n": 0.4})
+    at = problem.residual(theta)
+    own = [i for i, name in enumerate(problem.names) if name.startswith(f"{line.key}.phase")]
+    moved = theta.copy()
+    moved[own] += 0.1
+    [found] = problem.residuals_moved([moved], own, at)
+    np.testing.assert_array_equal(found, problem.residual(moved))
+    [one] = problem.residuals_moved([moved], own[:1], at)
+    assert not np.array_equal(one, found)

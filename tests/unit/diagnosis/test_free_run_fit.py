@@ -325,7 +325,7 @@ def test_what_one_channel_or_run_alone_shows_is_as_if_all_were_simulated(tmp_pat
     for column, name in enumerate(problem.names):
         moved = theta.copy()
         moved[column] += 0.3
-        [found] = problem.residuals_moved([moved], column, at)
+        [found] = problem.residuals_moved([moved], [column], at)
         np.testing.assert_array_equal(found, problem.residual(moved), err_msg=name)
         touched += int(0 < np.count_nonzero(found != at) < at.size)
     assert touched >= 5  # two gains, two releases and this one

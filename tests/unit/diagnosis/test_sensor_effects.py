@@ -120,6 +120,30 @@ def test_drift_adds_its_rate_every_second(model: RigModel) -> None:
     assert reading[0] == SIGNAL[0]
 
 
+def test_a_drift_of_runs_adds_to_every_run_its_own(tmp_path: Path) -> None:
+    pair = RigModel(rig(tmp_path), tmp_path, decays(duration_s=1.5))
+    runs = tuple(run.name for run in pair.runs)
+    drift = effect("sensor.drift_of_runs").of_runs(runs)
+    candidate = Candidate(drift, replace(surroundings(pair), runs=runs), CHANNEL)
+    rates = {"rate in decay_0": 0.7, "rate in decay_1": -0.2}
+    for run, rate in zip(pair.runs, rates.values(), strict=True):
+        plain = pair.simulate(run, pair.believed, candidate.extension(dict.fromkeys(rates, 0.0)))
+        drifted = pair.simulate(run, pair.believed, candidate.extension(rates))
+        expected = rate * np.arange(plain[CHANNEL].size) / run.attributes.sampling_rate_hz
+        np.testing.assert_allclose(drifted[CHANNEL] - plain[CHANNEL], expected, atol=1e-12)
+        np.testing.assert_array_equal(drifted["displacement_tank"], plain["displacement_tank"])
+
+
+def test_a_rate_of_updates_does_not_grow_with_the_size_of_a_step(model: RigModel) -> None:
+    """A hold is met within a cycle over the run; a step of its size would leave that place."""
+    at = replace(surroundings(model), update_rates_hz={CHANNEL: (61.7,)})
+    hold = Candidate(effect("sensor.sample_and_hold"), at, CHANNEL)
+    [start] = hold.starts()
+    assert hold.sized(start, 1.5) == start
+    gain = Candidate(effect("sensor.sensor_gain"), at, CHANNEL)
+    assert list(gain.sized(gain.starts()[0], 1.5).values()) == [1.5 * v for v in gain.starts()[0].values()]
+
+
 @pytest.mark.parametrize(
     ("name", "line_hz"), [("mains_hum", 50.04), ("mains_hum", 49.93), ("mains_hum_60", 60.02)]
 )
@@ -319,6 +343,8 @@ def test_a_channel_that_alone_drives_is_offered_only_faults_that_can_be_undone(m
             continue
         if known_effect.name == "sample_and_hold":  # see the test of its places
             continue
+        if any(parameter.each_run for parameter in known_effect.parameters) and not at.runs:
+            continue
         [made] = Candidate(known_effect, at, CHANNEL).extension(dict(known_effect.starts(at)[0])).faults
         assert ("acceleration_root" in known_effect.places(at)) == (made.undone is not None), known_effect.name
 
@@ -334,7 +360,7 @@ def test_a_fault_of_the_base_accelerometer_changes_what_drives(model: RigModel) 
 
 def test_a_fault_changes_its_own_channel_and_no_other(tmp_path: Path) -> None:
     pair = RigModel(rig(tmp_path), tmp_path, decays((0.01,), 1.0))
-    at = surroundings(pair)
+    at = replace(surroundings(pair), runs=("decay_0",))
     [run] = pair.runs
     before = pair.simulate(
         run, pair.believed, Candidate(effect("sensor.sensor_gain"), at, CHANNEL).extension({"ratio": 0.0})
@@ -346,7 +372,7 @@ def test_a_fault_changes_its_own_channel_and_no_other(tmp_path: Path) -> None:
             or not known_effect.extension.__module__.startswith("sloshlab.")
         ):
             continue
-        candidate = Candidate(known_effect, at, CHANNEL)
+        candidate = Candidate(known_effect.of_runs(at.runs), at, CHANNEL)
         numbers = {name.rpartition(".")[2]: value for name, value in candidate.starts()[-1].items()}
         if known_effect.name == "sensor_clipping":
             numbers = {"limit": 0.5 * at.peaks[CHANNEL]}
