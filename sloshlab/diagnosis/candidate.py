@@ -230,6 +230,8 @@ class Effect:
         Name of the effect of which this is another form; answers have that name.
     reduces_to : tuple of str
         Names of the effects of its block that it becomes with numbers of its own range: nested models.
+    corrects : str
+        What the twin has already and it changes by a number: its being there refutes what is believed of that.
     size : tuple of str
         Numbers that grow with it and without which it is nothing; if none, the first and all of its unit.
     sought_at : callable
@@ -253,6 +255,7 @@ class Effect:
     limits: Callable[[Surroundings], Mapping[str, tuple[float, float]]] = _no_other_limits
     variant_of: str = ""
     reduces_to: tuple[str, ...] = ()
+    corrects: str = ""
     size: tuple[str, ...] = ()
     sought_at: Callable[[Surroundings], Iterable[Numbers]] = _no_further_starts
     proposes: Callable[[Surroundings, MissingForces], Iterable[Numbers]] = _no_proposals
@@ -266,6 +269,11 @@ class Effect:
     def known_as(self) -> str:
         """The name that an answer has."""
         return self.variant_of or self.name
+
+    @property
+    def kinds_of_numbers(self) -> tuple[str, ...]:
+        """Names of its numbers, those that each run has of its own once."""
+        return tuple(dict.fromkeys(known.name.partition(in_run("", ""))[0] for known in self.parameters))
 
     def prior(self, surroundings: Surroundings) -> tuple[ParameterPrior, ...]:
         """What is believed of its numbers there, in their order."""
@@ -327,6 +335,11 @@ class Candidate:
     def key(self) -> str:
         """Name that tells candidates of one case apart."""
         return ".".join(part for part in (self.effect.block, self.effect.name, self.channel) if part)
+
+    def reduces_to(self, other: Candidate) -> bool:
+        """Whether another effect at the same place is nested in this one."""
+        here, there = (self.effect.block, self.channel), (other.effect.block, other.channel)
+        return here == there and other.effect.name in self.effect.reduces_to
 
     def starts(self) -> list[dict[str, float]]:
         """Sets of numbers to start from, named as in a fit."""

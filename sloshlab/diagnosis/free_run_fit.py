@@ -245,7 +245,9 @@ def inflated_cost(problem: FreeRunProblem, fit: FreeRunFit, inflation: float) ->
     return huber_cost(problem.inflation_weights(inflation) * residual) + fit.cost - fit.misfit
 
 
-def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple[FreeRunFit, BlockJacobian]:
+def fitted_baseline(
+    problem: FreeRunProblem, *, start: Mapping[str, float] | None = None, n_iterations: int = 10
+) -> tuple[FreeRunFit, BlockJacobian]:
     """Multi-start fit of the baseline's own parameters, from starts drawn from their priors.
 
     Dry friction and stops give the cost local minima, in which a retuned baseline would look worse than it is.
@@ -253,7 +255,8 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
     Parameters
     ----------
     problem : FreeRunProblem
-        Without candidates.
+    start : mapping, optional
+        Where the first fit starts, and the numbers of effects in all of them; as believed without it.
     n_iterations : int
         At most, per stage.
 
@@ -262,17 +265,19 @@ def fitted_baseline(problem: FreeRunProblem, *, n_iterations: int = 10) -> tuple
     fit : FreeRunFit
     jacobian : BlockJacobian, shape (n_residuals, n)
     """
-    best = fitted(problem, problem.model.believed, n_iterations=n_iterations)
+    first = problem.theta_of(problem.model.believed if start is None else start)
+    best = fitted(problem, problem.values(first), n_iterations=n_iterations)
     # Other minima can leave no less than noise.
     if problem.is_down_to_noise(best[0]):
         return best
     inflation = INFLATION_STAGES[1]
     reached = inflated_cost(problem, best[0], inflation)
-    # parameters that change only readings are linear and have no local minima: they are not drawn
+    # Parameters that change only readings have no local minima: they stay where the first fit has them.
     # A quasi-random sequence covers the prior more evenly than 32 random draws; its fixed seed gives the same
     # case the same answer.
-    draws = norm.ppf(qmc.Halton(problem.n_baseline, seed=0).random(_N_DRAWN))
-    draws = np.clip(draws, -2.0, 2.0) * problem.changes_motion
+    drawn = np.clip(norm.ppf(qmc.Halton(problem.n_baseline, seed=0).random(_N_DRAWN)), -2.0, 2.0)
+    draws = np.tile(problem.theta_of(best[0].values), (_N_DRAWN, 1))
+    draws[:, : problem.n_baseline][:, problem.changes_motion] = drawn[:, problem.changes_motion]
     costs = costs_at(problem, [problem.values(draw) for draw in draws], inflation)
     for place in np.argsort(costs)[:_N_REFINED]:
         other = fitted(problem, problem.values(draws[place]), n_iterations=n_iterations, stages=(inflation,))

@@ -83,7 +83,8 @@ def refuted_statement(found: Findings, model: ScoredModel) -> str:
     """
     shared = [known for known in found.model.parameters if not run_of(known.name, found.model)]
     refuted = refuted_beliefs(model.fit.values, shared)
-    return "".join(
+    corrected = dict.fromkeys(c.effect.corrects for c in model.fit.candidates if c.effect.corrects)
+    return "".join(f"; what is believed of the {number} is refuted" for number in corrected) + "".join(
         f"; what is believed of the {belief.name} is refuted: {belief.believed:.4g} ± {belief.tolerance:.2g}"
         f"{'' if belief.units == '1' else f' {belief.units}'}, while the recordings ask for {belief.found:.4g}"
         for belief in refuted

@@ -76,6 +76,7 @@ def force_effect(
     spoken_for_by: tuple[str, ...] = (),
     variant_of: str = "",
     reduces_to: tuple[str, ...] = (),
+    corrects: str = "",
     size: tuple[str, ...] = (),
 ) -> Effect:
     """Register a force of the twin as an effect.
@@ -96,7 +97,7 @@ def force_effect(
         That of the kind by default.
     bounds : mapping, optional
         Narrower ones than those of the kind.
-    separated_by, needs, spoken_for_by, variant_of, reduces_to, size
+    separated_by, needs, spoken_for_by, variant_of, reduces_to, corrects, size
         As of `Effect`.
 
     Examples
@@ -135,6 +136,7 @@ def force_effect(
             spoken_for_by=spoken_for_by,
             variant_of=variant_of,
             reduces_to=reduces_to,
+            corrects=corrects,
             size=size,
         )
     )

@@ -236,6 +236,7 @@ STIFFNESS = force_effect(
     ranges={"stiffness_n_per_m": Range(1e-3, 1.0, scales.stiffness, may_be_negative=True)},
     separated_by="a known mass added to the tank",
     spoken_for_by=INERTIAL_CHARACTER,
+    corrects="stiffness of the structure",
 )
 # Its size is the stiffness: a larger gap is less of it.
 GAP = force_effect(
@@ -281,6 +282,7 @@ MASS = force_effect(
     bounds={"mass_kg": (-10.0, 10.0)},
     separated_by="a known mass added to the tank",
     spoken_for_by=INERTIAL_CHARACTER,
+    corrects="mass of the structure",
 )
 # It shows in the static part of a displacement, where the zero of the sensor may be off by as much.
 OFFSET = force_effect(

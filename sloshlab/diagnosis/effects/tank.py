@@ -93,6 +93,7 @@ MASS = force_effect(
     bounds={"mass_kg": (-10.0, 10.0)},
     separated_by="a known mass added to the tank, and a run with frozen liquid",
     spoken_for_by=INERTIAL_CHARACTER,
+    corrects="mass of tank and liquid",
 )
 # A share β of the liquid's mass that does not follow is a mass of the tank: the two are always listed together.
 EFFECTIVE = force_effect(

@@ -190,12 +190,7 @@ def _is_nested(other: ScoredModel, model: ScoredModel) -> bool:
     """Whether every effect of one model is one of another model, or what one of its effects reduces to."""
     left = list(model.fit.candidates)
     for effect in other.fit.candidates:
-        within = [c for c in left if c.key == effect.key] or [
-            c
-            for c in left
-            if (c.effect.block, c.channel) == (effect.effect.block, effect.channel)
-            and effect.effect.name in c.effect.reduces_to
-        ]
+        within = [c for c in left if c.key == effect.key] or [c for c in left if c.reduces_to(effect)]
         if not within:
             return False
         left.remove(within[0])

@@ -7,7 +7,7 @@ from functools import cached_property
 
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.free_run_fit import fitted
+from sloshlab.diagnosis.free_run_fit import fitted, fitted_baseline
 from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, run_of
 from sloshlab.diagnosis.observations import Observation
 
@@ -59,16 +59,16 @@ class FittedRuns:
 
 
 def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[str, float]:
-    """Values of a fit with the numbers that belong to single runs fitted to runs that it has not seen.
+    """Values of a fit with the numbers that belong to single runs fitted to these runs, one by one.
 
     Releases, offsets and the fluctuation of a liquid are unknown in a run that was not fitted and are no part of
-    what is judged there; everything else stays as it is.
+    what is judged there; everything else stays as it is. Where a release comes to rest after another number of
+    half cycles is another minimum, so that releases are fitted from many starts.
 
     Parameters
     ----------
     model : DiagnosedModel
     runs : sequence of sequences of Observation
-        That were not fitted.
     fit : FreeRunFit
     """
     shared = {name: value for name, value in fit.values.items() if not run_of(name, model)}
@@ -76,8 +76,8 @@ def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[s
     for run in runs:
         problem = FreeRunProblem(model, [run], fit.candidates, shared)
         if problem.names:
-            start = problem.values(problem.theta_of(fit.values))
-            own, _ = fitted(problem, start, n_iterations=3)
+            fits = fitted_baseline if run[0].run.is_free else fitted
+            own, _ = fits(problem, start=problem.values(problem.theta_of(fit.values)), n_iterations=3)
             # In this problem the numbers of other runs rest where they start, not where the fit has them.
             here = run[0].run.name
             values |= {name: value for name, value in own.values.items() if run_of(name, model) == here}

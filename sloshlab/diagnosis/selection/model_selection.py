@@ -35,6 +35,11 @@ _BUDGET: Final = 6e8
 """Coefficients that may be simulated, a minute on two cores; what is begun then is finished, no more is begun."""
 _EVALUATIONS_OF_FITS: Final = 800
 """Simulations that the fits of one growth take, about: 56 of three steps and four to the end."""
+_LEAST_EXPLAINED: Final = 0.1
+"""Of what is left beyond noise, that the last effect of the best model explains if the search is to add others.
+
+Two effects that explain all of it together, and neither a tenth of it alone, would act only together.
+"""
 _DEVIATIONS: Final = (0.3, 0.1)
 """Standard deviations of the logarithms of an effect's numbers about a fit, from which it is refined in turns."""
 
@@ -75,19 +80,19 @@ class ModelSelection:
         self._grown([believed, retuned], "one effect")
         self._renew_sampling()
         self._swapped(1)
-        self._eliminated(1)
+        self._simplified(1)
         for n in range(1, _MOST_EFFECTS + 1):
             best = self._best_of(n)
             if best is None or not self._remains(best):
                 break
             self._refined(best)
             best = self._best_of(n)
-            if best is None or n == _MOST_EFFECTS or not self._remains(best):
+            if best is None or n == _MOST_EFFECTS or not self._remains(best) or self._explains_little(n):
                 break
             self._grown(self._leading(n), "one more effect")
             self._renew_sampling()
             self._swapped(n + 1)
-            self._eliminated(n + 1)
+            self._simplified(n + 1)
         # What was found beside other effects may be the best alone, and has look-alikes of its own.
         for n in range(1, _MOST_EFFECTS + 1):
             self._swapped(n)
@@ -130,6 +135,14 @@ class ModelSelection:
         residuals = whitened(model, runs, fit.candidates, fit.values, noise)
         return residuals is None or (is_worth_a_word(residuals) and remainder(residuals).is_probable)
 
+    def _explains_little(self, n: int) -> bool:
+        """Whether the best model of so many effects leaves nearly what the best one of an effect less leaves."""
+        before, after = self._best_of(n - 1), self._best_of(n)
+        if before is None or after is None:
+            return False
+        left = before.misfit - self.runs.n_coefficients
+        return left > 0 and before.misfit - after.misfit < _LEAST_EXPLAINED * left
+
     def _refuted(self, fit: FreeRunFit) -> bool:
         """Whether a fit of the baseline needs numbers that are not believed: an effect may be more probable."""
         shared = [known for known in self.runs.model.parameters if not run_of(known.name, self.runs.model)]
@@ -154,14 +167,14 @@ class ModelSelection:
         alike = sorted((fit for keys, fit in self.fits.items() if len(keys) == n), key=lambda fit: fit.cost)
         return alike[:2]
 
-    def _grown(self, bases: Sequence[FreeRunFit], what: str) -> None:
-        """Every candidate beside some fits; the best ones to the end."""
+    def _grown(self, bases: Sequence[FreeRunFit], what: str, only: Sequence[Candidate] = ()) -> None:
+        """Every candidate, or some alone, beside some fits; the best ones to the end."""
         if self._left <= 0:
             self.failed["search"] = "ended at its budget, with more effects to try"
             return
         few = self.runs.one_repeat_per_test
         kept = [Base.of(few, base) for base in bases]
-        pool = [*self.pool, *self._candidates_beside(bases)]
+        pool = only or [*self.pool, *self._candidates_beside(bases)]
         stages = self._stages(bases[-1])
         proposed = proposals(few, kept, pool, sorted({stages[0], stages[-1]}, reverse=True), self._promising)
         self._left -= (len(proposed) + _EVALUATIONS_OF_FITS) * few.n_coefficients
@@ -183,7 +196,14 @@ class ModelSelection:
         """A fit on all runs."""
         self.said(f"fitting {' + '.join(candidate.key for candidate in coarse.candidates)}", 0, 1)
         problem = self.runs.problem_of(coarse)
-        return fitted(problem, {**base.values, **coarse.values}, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]
+        fit = fitted(problem, {**base.values, **coarse.values}, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]
+        released = [run for run in self.runs.runs if run[0].run.is_free]
+        if fit.trouble or not released or problem.is_down_to_noise(fit):
+            return fit
+        # Each release by itself, from many starts: one that comes to rest elsewhere holds all other numbers back.
+        values = values_of_runs(self.runs.model, released, fit)
+        other = fitted(problem, values, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]
+        return other if other.cost < fit.cost else fit
 
     def _swapped(self, n: int) -> None:
         """Other effects in the place of each effect of the best model of so many, beside its baseline."""
@@ -193,22 +213,26 @@ class ModelSelection:
             return
         self._swapped_models.add(keys)
         for effect in best.candidates:
-            rest = tuple(candidate for candidate in best.candidates if candidate is not effect)
-            own = {f"{effect.key}.{parameter.name}" for parameter in effect.effect.parameters}
-            values = {name: value for name, value in best.values.items() if name not in own}
-            self._grown([FreeRunFit(rest, values, 0.0, 0.0)], f"in the place of {effect.key}")
+            self._grown([_without(best, effect)], f"in the place of {effect.key}")
 
-    def _eliminated(self, n: int) -> None:
-        """Models with one effect less than the leading ones of so many, from their numbers.
+    def _simplified(self, n: int) -> None:
+        """Models nested in the leading ones of so many: with one effect less, or with what one reduces to.
 
-        An effect without size would otherwise gain what is only a better optimum of what is nested in it.
+        An effect without size would otherwise gain what is only a better optimum of what is nested in it, and the
+        simpler of two forms may have been hopeless beside the other one on its way.
         """
         for model in self._leading(n):
             for effect in model.candidates:
-                rest = tuple(candidate for candidate in model.candidates if candidate is not effect)
-                problem = self.runs.problem(rest)
-                start = {name: value for name, value in model.values.items() if name in problem.names}
+                rest = _without(model, effect)
+                problem = self.runs.problem_of(rest)
+                start = {name: value for name, value in rest.values.items() if name in problem.names}
                 self._keep([fitted(problem, start, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]])
+                others = frozenset(candidate.key for candidate in rest.candidates)
+                simpler = [
+                    each for each in self.pool if effect.reduces_to(each) and others | {each.key} not in self.fits
+                ]
+                if simpler:
+                    self._grown([rest], f"in the place of {effect.key}", simpler)
 
     def _refined(self, best: FreeRunFit) -> None:
         """The best model from places about it: friction and contacts make many local minima."""
@@ -247,3 +271,10 @@ class ModelSelection:
                 beside = candidates(replace(self.at, twin=twin))
                 found |= {candidate.key: candidate for candidate in beside if candidate.key not in known}
         return list(found.values())
+
+
+def _without(fit: FreeRunFit, effect: Candidate) -> FreeRunFit:
+    """A fit without one of its effects, at the numbers of the others."""
+    rest = tuple(candidate for candidate in fit.candidates if candidate is not effect)
+    own = {f"{effect.key}.{parameter.name}" for parameter in effect.effect.parameters}
+    return FreeRunFit(rest, {name: value for name, value in fit.values.items() if name not in own}, 0.0, 0.0)

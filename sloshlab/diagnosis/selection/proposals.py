@@ -23,7 +23,7 @@ from sloshlab.errors import SloshlabError
 FloatArray = NDArray[np.float64]
 NO_STARTS: Final[Mapping[str, Sequence[Mapping[str, float]]]] = {}
 _DRAWS_PER_NUMBER: Final = 6
-"""Quasi-random starts from the prior of an effect, for each of its numbers."""
+"""Quasi-random starts from the prior of an effect, for each of its numbers; those of single runs count once."""
 _MOST_STEP: Final = 3.0
 """Factor up to which a size follows the linear step: about the spacing of the sizes that are tried."""
 
@@ -198,7 +198,7 @@ def starts_of(
     own = [*here.starts(), *candidate.proposed(missing)]
     if promising is not None:
         return [*own, *map(dict, promising)]
-    n = _DRAWS_PER_NUMBER * len(candidate.effect.parameters)
+    n = _DRAWS_PER_NUMBER * len(candidate.effect.kinds_of_numbers)
     return [*own, *candidate.drawn(n)[1:], *candidate.sought_at()]
 
 

@@ -44,10 +44,25 @@ def test_a_form_is_said_where_forms_are_compared(key: str, channel: str, answer:
 def test_a_believed_number_is_refuted_where_it_is_held_far_away(tolerances: float, said: bool) -> None:
     spring = BaselineParameter("stiffness", 1e5, 1e4, "N m-1")
     found: Any = SimpleNamespace(model=SimpleNamespace(parameters=(spring,), runs=()))
-    held: Any = SimpleNamespace(fit=SimpleNamespace(values={"stiffness": 1e5 - tolerances * 1e4}))
+    held: Any = SimpleNamespace(fit=SimpleNamespace(values={"stiffness": 1e5 - tolerances * 1e4}, candidates=()))
     words = refuted_statement(found, held)
     assert words == (
         "; what is believed of the stiffness is refuted: 1e+05 ± 1e+04 N m-1, while the recordings ask for 6e+04"
         if said
         else ""
     )
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("structure.stiffness_change", "; what is believed of the stiffness of the structure is refuted"),
+        ("tank.mass_error", "; what is believed of the mass of tank and liquid is refuted"),
+        ("structure.cubic_stiffness", ""),
+    ],
+)
+def test_an_effect_that_corrects_a_number_of_the_twin_refutes_it(key: str, words: str) -> None:
+    [effect] = [effect for effect in known_effects() if f"{effect.block}.{effect.name}" == key]
+    found: Any = SimpleNamespace(model=SimpleNamespace(parameters=(), runs=()))
+    named: Any = SimpleNamespace(fit=SimpleNamespace(values={}, candidates=(SimpleNamespace(effect=effect),)))
+    assert refuted_statement(found, named) == words

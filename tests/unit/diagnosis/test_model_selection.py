@@ -1,0 +1,47 @@
+"""When the search goes on, and which effects are nested in others."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+from recorded_oscillators import effect
+
+from sloshlab.diagnosis import effects
+from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.selection.model_selection import ModelSelection
+
+assert effects.__all__
+
+
+@pytest.mark.parametrize(
+    ("misfits", "is_little"),
+    [
+        ((3000.0, 2900.0), True),  # a twentieth of the 2000 beyond the noise of 1000 coefficients
+        ((3000.0, 2700.0), False),
+        ((1100.0, 1050.0), False),  # half of the little that is left
+        ((900.0, 899.0), False),  # noise was stated too large: nothing can be said of shares
+    ],
+)
+def test_the_search_ends_where_the_last_effect_explains_little(
+    misfits: tuple[float, float], is_little: bool
+) -> None:
+    fits = [SimpleNamespace(misfit=misfit) for misfit in misfits]
+    search: Any = SimpleNamespace(_best_of=lambda n: fits[n], runs=SimpleNamespace(n_coefficients=1000))
+    assert ModelSelection._explains_little(search, 1) is is_little
+
+
+@pytest.mark.parametrize(
+    ("larger", "smaller", "nested"),
+    [
+        ("structure.stribeck_friction", "structure.coulomb_friction", True),
+        ("structure.coulomb_friction", "structure.stribeck_friction", False),
+        ("structure.stribeck_friction", "tank.coulomb_friction", False),
+        ("sensor.drift_of_runs", "sensor.sensor_drift", True),
+    ],
+)
+def test_what_an_effect_reduces_to_acts_at_its_place(larger: str, smaller: str, nested: bool) -> None:
+    first, second = (Candidate(effect(key), cast(Any, None)) for key in (larger, smaller))
+    assert first.reduces_to(second) is nested
+    assert not Candidate(effect(larger), cast(Any, None), "one").reduces_to(second)
