@@ -5,6 +5,7 @@ Jamieson and Talwalkar (2016), arXiv:1502.07943, with the stages of noise inflat
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -20,6 +21,8 @@ _STEPS_OF_A_RUNG: Final = 3
 """Of a fit before it is compared with the others."""
 _STARTS_OF_A_MODEL: Final = 2
 """That may go on beside each other."""
+_STARTS_OF_A_NAME: Final = 4
+"""That are begun: two of one model and two of another. Forms and places of one effect predict nearly the same."""
 _HOPELESS_COST_RATIO: Final = 3.0
 """Cost over the lowest one at the same noise: what is its equal is no further behind after three steps."""
 
@@ -73,12 +76,12 @@ def _best_starts(proposed: Sequence[Proposal], n: int) -> list[Proposal]:
     # Ranked in each of the noises by itself: a model that is far off shows with inflated noise, one near without.
     rank = np.full(len(proposed), np.inf)
     for k in range(len(proposed[0].predicted) if proposed else 0):
-        taken: dict[frozenset[str], int] = {}
+        n_ranked, of_model, of_name = 0, Counter[frozenset[str]](), Counter[str]()
         for i in np.argsort([proposal.predicted[k] for proposal in proposed], kind="stable"):
-            keys = proposed[i].keys
-            taken[keys] = taken.get(keys, 0) + 1
-            if taken[keys] <= _STARTS_OF_A_MODEL:
-                rank[i] = min(rank[i], sum(min(number, _STARTS_OF_A_MODEL) for number in taken.values()))
+            keys, name = proposed[i].keys, proposed[i].candidates[-1].effect.known_as
+            if of_model[keys] < _STARTS_OF_A_MODEL and of_name[name] < _STARTS_OF_A_NAME:
+                n_ranked, of_model[keys], of_name[name] = n_ranked + 1, of_model[keys] + 1, of_name[name] + 1
+                rank[i] = min(rank[i], n_ranked)
     return [proposed[i] for i in np.argsort(rank, kind="stable")[:n] if np.isfinite(rank[i])]
 
 

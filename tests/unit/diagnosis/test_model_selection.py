@@ -11,6 +11,7 @@ from recorded_oscillators import effect
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
+from sloshlab.diagnosis.selection.successive_halving import _best_starts
 
 assert effects.__all__
 
@@ -45,3 +46,27 @@ def test_what_an_effect_reduces_to_acts_at_its_place(larger: str, smaller: str, 
     first, second = (Candidate(effect(key), cast(Any, None)) for key in (larger, smaller))
     assert first.reduces_to(second) is nested
     assert not Candidate(effect(larger), cast(Any, None), "one").reduces_to(second)
+
+
+def test_forms_and_places_of_one_effect_leave_room_for_others() -> None:
+    """Six models of one name promise most; the best start of another name is begun all the same."""
+
+    def proposal(key: str, name: str, predicted: float) -> Any:
+        last = SimpleNamespace(effect=SimpleNamespace(known_as=name))
+        return SimpleNamespace(candidates=(last,), keys=frozenset({key}), predicted=(predicted, 2.0 * predicted))
+
+    forms = [
+        proposal(f"form_{i}", "external_force", 0.1 + 0.01 * i + 0.001 * start)
+        for i in range(6)
+        for start in range(3)
+    ]
+    others = [proposal("friction", "coulomb_friction", 0.5), proposal("drag", "quadratic_drag", 0.6)]
+    begun = _best_starts([*forms, *others], 6)
+    assert [sorted(each.keys) for each in begun] == [
+        ["form_0"],
+        ["form_0"],
+        ["form_1"],
+        ["form_1"],
+        ["friction"],
+        ["drag"],
+    ]
