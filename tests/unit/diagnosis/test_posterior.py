@@ -183,3 +183,19 @@ def test_a_baseline_that_nobody_believes_is_no_simpler_than_an_effect(cost: floa
     odds = np.exp(cost) * (1 / 40) / (1 / 2)
     expected = odds / (1 + odds) if named else 0.0
     assert found.by_label().get("quadratic_drag", 0.0) == pytest.approx(expected, rel=1e-6)
+
+
+def test_models_are_ranked_by_the_evidence_that_their_probabilities_have() -> None:
+    """A lead of 50 is one of 5 in the posterior, and does not pay for 8 more of complexity."""
+    simple, wide = model(0.0, FRICTION), replace(model(50.0, DRAG), complexity=8.0)
+    assert wide.evidence - simple.evidence == pytest.approx(50.0 / 10.0 - 8.0)
+    found = posterior([model(-1000.0), simple, wide], n_candidates=10)
+    best, second = sorted((found.best(label) for label in ("coulomb_friction", "quadratic_drag")), key=_rank)
+    assert best.model is simple
+    assert best.log_evidence - second.log_evidence == pytest.approx(3.0)
+    labels = found.by_label()
+    assert np.log(labels["coulomb_friction"] / labels["quadratic_drag"]) == pytest.approx(3.0, abs=1e-6)
+
+
+def _rank(hypothesis: posterior_module.Hypothesis) -> float:
+    return -hypothesis.log_evidence
