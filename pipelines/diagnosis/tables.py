@@ -29,10 +29,11 @@ def effect_parameter_table(diagnosis: Diagnosis) -> Table | None:
         return None
     rows: list[tuple[str, ...]] = []
     for candidate in best.fit.candidates:
-        for parameter in candidate.effect.parameters:
-            its = diagnosis.verdict.intervals[candidate.key, parameter.name]
-            words, units = named_and_units(parameter.name)
-            unit = units or ("of the channel" if parameter.name in _OF_THE_CHANNEL else "1")
+        # Numbers of runs that were not fitted have no interval.
+        of_effect = {name: its for (key, name), its in diagnosis.verdict.intervals.items() if key == candidate.key}
+        for name, its in of_effect.items():
+            words, units = named_and_units(name)
+            unit = units or ("of the channel" if name in _OF_THE_CHANNEL else "1")
             bounds = f"{text(its.low, 4)} … {text(its.high, 4)}"
             rows.append((named_and_placed(candidate), words, text(its.estimate, 4), bounds, unit))
     is_named = diagnosis.verdict.kind != "unknown"
