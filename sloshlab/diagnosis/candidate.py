@@ -140,6 +140,17 @@ def in_run(name: str, run: str) -> str:
     return f"{name} in {run}"
 
 
+def without_run(name: str) -> str:
+    """Name of a number without the run to which it belongs.
+
+    Examples
+    --------
+    >>> without_run("phase in run_02"), without_run("size_n")
+    ('phase', 'size_n')
+    """
+    return name.partition(in_run("", ""))[0]
+
+
 def multiples(
     parameters: Sequence[EffectParameter], *sets: Numbers
 ) -> Callable[[Surroundings], Iterable[Numbers]]:
@@ -273,7 +284,7 @@ class Effect:
     @property
     def kinds_of_numbers(self) -> tuple[str, ...]:
         """Names of its numbers, those that each run has of its own once."""
-        return tuple(dict.fromkeys(known.name.partition(in_run("", ""))[0] for known in self.parameters))
+        return tuple(dict.fromkeys(without_run(known.name) for known in self.parameters))
 
     def prior(self, surroundings: Surroundings) -> tuple[ParameterPrior, ...]:
         """What is believed of its numbers there, in their order."""

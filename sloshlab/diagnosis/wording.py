@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.candidate import Candidate
+from sloshlab.diagnosis.candidate import Candidate, without_run
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.free_run_problem import run_of
 from sloshlab.diagnosis.inference.decision import Decision
@@ -151,20 +151,20 @@ def _placed(name: str, candidate: Candidate) -> str:
 
 def _described(candidate: Candidate, intervals: Mapping[tuple[str, str], Interval]) -> str:
     own = {name: its for (key, name), its in intervals.items() if key == candidate.key}
-    shared = [name for name in own if " in " not in name]
     numbers = []
-    for name in shared:
-        words, units = named_and_units(name)
-        estimate, low, high = _with_digits(own[name].estimate, own[name].low, own[name].high)
-        label = f"{words} " if len(own) > 1 else ""
-        numbers.append(f"{label}{estimate}{units and ' ' + units} ({low} to {high})")
-    for kind in dict.fromkeys(name.partition(" in ")[0] for name in own if name not in shared):
-        words, units = named_and_units(kind)
-        every = [its.estimate for name, its in own.items() if name.startswith(f"{kind} in ")]
-        low, _, high = _with_digits(min(every), 0.0, max(every))
-        numbers.append(
-            f"{words} {low} to {high}{units and ' ' + units} in {len(every)} run{'s' if len(every) > 1 else ''}"
-        )
+    for kind in dict.fromkeys(map(without_run, own)):
+        name, *others = (name for name in own if without_run(name) == kind)
+        words, units = named_and_units(kind if others else name)
+        unit = f" {units}" if units else ""
+        if others:
+            every = [own[each].estimate for each in (name, *others)]
+            numbers.append(
+                f"{words} {_rounded(min(every), 3)} to {_rounded(max(every), 3)}{unit} in {len(every)} runs"
+            )
+        else:
+            estimate, low, high = _with_digits(own[name].estimate, own[name].low, own[name].high)
+            label = f"{words} " if len(own) > 1 else ""
+            numbers.append(f"{label}{estimate}{unit} ({low} to {high})")
     return f"{named_and_placed(candidate)}, {', '.join(numbers)}"
 
 
@@ -178,5 +178,8 @@ def _with_digits(estimate: float, low: float, high: float) -> tuple[str, str, st
     """
     width, size = high - low, max(abs(low), abs(high))
     digits = 3 if width <= 0 or size <= 0 else min(max(3, 1 + int(np.ceil(np.log10(size / width)))), 8)
-    first, second, third = (f"{value:.{digits}g}".replace("-", "−") for value in (estimate, low, high))
-    return first, second, third
+    return _rounded(estimate, digits), _rounded(low, digits), _rounded(high, digits)
+
+
+def _rounded(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}".replace("-", "−")

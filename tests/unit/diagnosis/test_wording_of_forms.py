@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from sloshlab.diagnosis import effects
 from sloshlab.diagnosis.baseline_parameter import BaselineParameter
 from sloshlab.diagnosis.candidate import Candidate, known_effects
-from sloshlab.diagnosis.wording import form_and_place, named_and_placed, refuted_statement
+from sloshlab.diagnosis.interval import Interval
+from sloshlab.diagnosis.wording import _described, form_and_place, named_and_placed, refuted_statement
 
 assert effects.__all__
 
@@ -66,3 +67,30 @@ def test_an_effect_that_corrects_a_number_of_the_twin_refutes_it(key: str, words
     found: Any = SimpleNamespace(model=SimpleNamespace(parameters=(), runs=()))
     named: Any = SimpleNamespace(fit=SimpleNamespace(values={}, candidates=(SimpleNamespace(effect=effect),)))
     assert refuted_statement(found, named) == words
+
+
+@pytest.mark.parametrize(
+    ("rates", "words"),
+    [
+        ({"first": (0.2, 0.1, 0.3), "second": (-0.1, -0.2, 0.0)}, "rate −0.1 to 0.2 in 2 runs"),
+        ({"first": (0.2, 0.1, 0.3)}, "0.2 (0.1 to 0.3)"),
+    ],
+)
+def test_numbers_of_several_runs_are_said_as_a_span(
+    rates: dict[str, tuple[float, float, float]], words: str
+) -> None:
+    [drift] = [effect for effect in known_effects() if effect.name == "drift_of_runs"]
+    candidate = Candidate(drift.of_runs(("first", "second")), cast(Any, None), "acceleration_tip")
+    intervals = {(candidate.key, f"rate in {run}"): Interval(*its) for run, its in rates.items()}
+    assert _described(candidate, intervals) == f"sensor drift of acceleration_tip, {words}"
+
+
+def test_numbers_that_all_runs_share_stand_beside_those_of_runs() -> None:
+    [line] = [effect for effect in known_effects() if effect.key == "tank.harmonic_force"]
+    candidate = Candidate(line.of_runs(("first", "second")), cast(Any, None))
+    numbers = {"size_n": 2.0, "frequency_hz": 9.0, "phase in first": 0.25, "phase in second": 0.75}
+    intervals = {(candidate.key, name): Interval(size, 0.9 * size, 1.1 * size) for name, size in numbers.items()}
+    assert _described(candidate, intervals) == (
+        "external force in the tank, size 2 N (1.8 to 2.2), frequency 9 Hz (8.1 to 9.9), "
+        "phase 0.25 to 0.75 in 2 runs"
+    )
