@@ -6,7 +6,7 @@ decided elsewhere (`sloshlab.diagnosis.inference`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -24,7 +24,7 @@ from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.readiness import refuted_beliefs
 from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
-from sloshlab.diagnosis.selection.proposals import Base, most_promising, proposals
+from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
 from sloshlab.diagnosis.selection.successive_halving import halved
 
 Said = Callable[[str, int, int], None]
@@ -89,7 +89,10 @@ class ModelSelection:
             best = self._best_of(n)
             if best is None or n == _MOST_EFFECTS or not self._remains(best) or self._explains_little(n):
                 break
-            self._grown(self._leading(n), "one more effect")
+            self._joined(n)
+            joined = self._best_of(n + 1)
+            if joined is None or self._remains(joined):
+                self._grown(self._leading(n), "one more effect")
             self._renew_sampling()
             self._swapped(n + 1)
             self._simplified(n + 1)
@@ -159,15 +162,19 @@ class ModelSelection:
                 self.fits[keys] = fit
 
     def _best_of(self, n: int) -> FreeRunFit | None:
-        alike = [fit for keys, fit in self.fits.items() if len(keys) == n]
-        return min(alike, key=lambda fit: fit.cost, default=None)
+        return next(iter(self._of(n)), None)
 
     def _leading(self, n: int) -> list[FreeRunFit]:
         """The two best of so many effects: the best alone need not be one of the two that are there."""
-        alike = sorted((fit for keys, fit in self.fits.items() if len(keys) == n), key=lambda fit: fit.cost)
-        return alike[:2]
+        return self._of(n)[:2]
 
-    def _grown(self, bases: Sequence[FreeRunFit], what: str, only: Sequence[Candidate] = ()) -> None:
+    def _grown(
+        self,
+        bases: Sequence[FreeRunFit],
+        what: str,
+        only: Sequence[Candidate] = (),
+        promising: Mapping[str, Sequence[Mapping[str, float]]] = NO_STARTS,
+    ) -> None:
         """Every candidate, or some alone, beside some fits; the best ones to the end."""
         # A simpler form costs a hundredth of all candidates, and decides what is said of a wider one.
         if self._left <= 0 and not only:
@@ -177,7 +184,8 @@ class ModelSelection:
         kept = [Base.of(few, base) for base in bases]
         pool = only or [*self.pool, *self._candidates_beside(bases)]
         stages = self._stages(bases[-1])
-        proposed = proposals(few, kept, pool, sorted({stages[0], stages[-1]}, reverse=True), self._promising)
+        inflations = sorted({stages[0], stages[-1]}, reverse=True)
+        proposed = proposals(few, kept, pool, inflations, promising or self._promising)
         self._left -= (len(proposed) + _EVALUATIONS_OF_FITS) * few.n_coefficients
         ran = {proposal.candidates[-1].key for proposal in proposed}
         tried = {candidate.key for candidate in pool} - {c.key for base in bases for c in base.candidates}
@@ -187,6 +195,23 @@ class ModelSelection:
             self._promising = most_promising(proposed)
         coarse = halved(few, proposed, stages, N_KEPT, lambda name, i, n: self.said(f"{what}: {name}", i, n))
         self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))
+
+    def _joined(self, n: int) -> None:
+        """The leading models of so many effects with one more of those that lead alone, each at its own numbers.
+
+        Two effects of which both show alone need no search beside each other.
+        """
+        alone = self._of(1)[: 2 * N_KEPT]
+        effects = [fit.candidates[0] for fit in alone]
+        starts = {
+            effect.key: [*self._promising.get(effect.key, ()), _own_numbers(fit, effect)]
+            for effect, fit in zip(effects, alone, strict=True)
+        }
+        self._grown(self._of(n)[: 2 * N_KEPT], "effects together", effects, starts)
+
+    def _of(self, n: int) -> list[FreeRunFit]:
+        """Fits of so many effects, the best first."""
+        return sorted((fit for keys, fit in self.fits.items() if len(keys) == n), key=lambda fit: fit.cost)
 
     def _stages(self, base: FreeRunFit) -> tuple[float, ...]:
         """Three rungs of noise inflation: from where the residuals show to where little is hidden."""
@@ -277,5 +302,11 @@ class ModelSelection:
 def _without(fit: FreeRunFit, effect: Candidate) -> FreeRunFit:
     """A fit without one of its effects, at the numbers of the others."""
     rest = tuple(candidate for candidate in fit.candidates if candidate is not effect)
-    own = {f"{effect.key}.{parameter.name}" for parameter in effect.effect.parameters}
+    own = _own_numbers(fit, effect)
     return FreeRunFit(rest, {name: value for name, value in fit.values.items() if name not in own}, 0.0, 0.0)
+
+
+def _own_numbers(fit: FreeRunFit, effect: Candidate) -> dict[str, float]:
+    """Numbers of one effect of a fit."""
+    own = {f"{effect.key}.{parameter.name}" for parameter in effect.effect.parameters}
+    return {name: value for name, value in fit.values.items() if name in own}
