@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sloshlab.diagnosis.user_twin import Compared, MechanicalTwin, Mechanism, Parameter, Reading, TwinRun
+from sloshlab.user_twin import Compared, MechanicalTwin, Mechanism, Parameter, Reading, TwinRun
 
 
 def joint(run: TwinRun, values: Mapping[str, float]) -> Mechanism:

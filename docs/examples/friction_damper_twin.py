@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from sloshlab.diagnosis.user_twin import AddedForce, Compared, FreeTwin, Parameter, Response, TwinRun
+from sloshlab.user_twin import AddedForce, Compared, FreeTwin, Parameter, Response, TwinRun
 
 STEPS_PER_SAMPLE = 4  # of forces with memory: between two samples the actuator moves as far as a play is wide
 

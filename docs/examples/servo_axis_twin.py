@@ -14,7 +14,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sloshlab.diagnosis.user_twin import Compared, MechanicalTwin, Mechanism, Parameter, Reading, TwinRun
+from sloshlab.user_twin import Compared, MechanicalTwin, Mechanism, Parameter, Reading, TwinRun
 
 FORCE_PER_VOLT = 35.150652
 POSITION_GAIN_PER_S = 160.18

@@ -16,10 +16,10 @@ import numpy as np
 import xarray as xr
 from scipy.io import loadmat
 
-from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.extension import NOTHING, Extension
-from sloshlab.diagnosis.user_twin import UserTwinModel, load_extended, load_user_twin
+from sloshlab.identification.case import CaseRun
+from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.recording import run_attributes, write_recording
+from sloshlab.user_twin import UserTwinModel, load_extended, load_user_twin
 
 TWIN = Path(__file__).with_name("silverbox_twin.py")
 RATE_HZ = 1e7 / 2**14

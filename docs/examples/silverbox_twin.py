@@ -8,7 +8,7 @@ The circuit's input stands for the force (1 V for 1 N), its output for the displ
 from collections.abc import Mapping
 from math import pi
 
-from sloshlab.diagnosis.user_twin import Compared, MechanicalTwin, Mechanism, Parameter, Reading, TwinRun
+from sloshlab.user_twin import Compared, MechanicalTwin, Mechanism, Parameter, Reading, TwinRun
 
 
 def oscillator(run: TwinRun, values: Mapping[str, float]) -> Mechanism:

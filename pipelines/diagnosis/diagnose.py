@@ -16,13 +16,13 @@ from pipelines.report.result_folder import require_result_folder, result_folder
 from sloshlab import atomic_file
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.consistency.samples import examined_samples
-from sloshlab.diagnosis.case import Case, read_case
 from sloshlab.diagnosis.examination import examination_facts, examined, seen_at
-from sloshlab.diagnosis.extension import NOTHING
 from sloshlab.diagnosis.findings import explained_extension, findings_of
-from sloshlab.diagnosis.user_effects import load_user_effects
-from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
+from sloshlab.identification.case import Case, read_case
+from sloshlab.missing_physics.extension import NOTHING
+from sloshlab.missing_physics.user_effects import load_user_effects
+from sloshlab.user_twin import UserTwinModel, load_user_twin
 
 
 def files_of(*, report: bool) -> tuple[str, ...]:

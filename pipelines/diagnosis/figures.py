@@ -12,9 +12,9 @@ from pipelines.report.axes import power_of_ten
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, WORK_COLOURS, new_figure, plain, png_bytes
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
-from sloshlab.diagnosis.mismatch import ChannelMismatch, mismatches
-from sloshlab.diagnosis.observations import Observation
 from sloshlab.diagnosis.wording import form_and_place
+from sloshlab.identification.mismatch import ChannelMismatch, mismatches
+from sloshlab.identification.observations import Observation
 
 FloatArray = NDArray[np.float64]
 _MOST_ROWS = 14

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, new_figure, plain, png_bytes
-from sloshlab.diagnosis.force_character import ForceCharacter
-from sloshlab.diagnosis.latent_force import LatentForce
+from sloshlab.missing_force.force_character import ForceCharacter
+from sloshlab.missing_force.latent_force import LatentForce
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

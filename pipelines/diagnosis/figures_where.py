@@ -19,7 +19,7 @@ from pipelines.report.style import (
     plain,
     png_bytes,
 )
-from sloshlab.diagnosis.residual_maps import Profile, ResidualMaps, residual_maps
+from sloshlab.missing_force.residual_maps import Profile, ResidualMaps, residual_maps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

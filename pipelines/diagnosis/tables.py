@@ -11,12 +11,12 @@ from pipelines.diagnosis.figures import extended_label
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.numbers import MISSING, signed, text
 from pipelines.report.tables import Table
-from sloshlab.diagnosis.baseline_parameter import BaselineParameter
-from sloshlab.diagnosis.evidence import CANNOT_TELL, SINGLE_CHANNEL
 from sloshlab.diagnosis.inference.decision import standard_error_of_difference
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
-from sloshlab.diagnosis.units import named_and_units
 from sloshlab.diagnosis.wording import form_and_place, named_and_placed
+from sloshlab.identification.baseline_parameter import BaselineParameter
+from sloshlab.missing_physics.evidence import CANNOT_TELL, SINGLE_CHANNEL
+from sloshlab.missing_physics.units import named_and_units
 
 _MOST_EXPLANATIONS: Final = 14
 _OF_THE_CHANNEL: Final = ("limit", "amplitude")

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.candidate import Effect
-from sloshlab.diagnosis.evidence import CANNOT_TELL, Evidence, evidence
 from sloshlab.diagnosis.findings import Findings
-from sloshlab.diagnosis.force_character import Answer, ForceCharacter, force_character
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
-from sloshlab.diagnosis.interface_cut import InterfaceCut, interface_cut, own_tolerances
-from sloshlab.diagnosis.latent_force import EITHER, RunForces
-from sloshlab.diagnosis.mismatch import mismatches, summary
-from sloshlab.diagnosis.residual_maps import ResidualMaps, residual_maps
-from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.sensor_character import SensorAnswer, decided_terms, sensor_character
+from sloshlab.identification.mismatch import mismatches, summary
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_force.force_character import Answer, ForceCharacter, force_character
+from sloshlab.missing_force.interface_cut import InterfaceCut, interface_cut, own_tolerances
+from sloshlab.missing_force.latent_force import EITHER, RunForces
+from sloshlab.missing_force.residual_maps import ResidualMaps, residual_maps
+from sloshlab.missing_force.sensor_character import SensorAnswer, decided_terms, sensor_character
+from sloshlab.missing_physics.candidate import Effect
+from sloshlab.missing_physics.evidence import CANNOT_TELL, Evidence, evidence
 
 FloatArray = NDArray[np.float64]
 _LEAST_RATIO_WITHIN_CYCLE = 1.5

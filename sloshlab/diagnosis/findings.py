@@ -9,28 +9,28 @@ from typing import Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Surroundings
-from sloshlab.diagnosis.case import Case
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.extension import Extension
-from sloshlab.diagnosis.free_run_fit import fitted_baseline
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of
 from sloshlab.diagnosis.inference.posterior import Posterior, posterior
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
 from sloshlab.diagnosis.inference.whitened import whitened
-from sloshlab.diagnosis.noise_floor import weighted_observations
-from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.readiness import require_comparable, require_one_rig
-from sloshlab.diagnosis.repeats import require_repeats
-from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
-from sloshlab.diagnosis.split import Split, split
 from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import AnalysisError, InputError
+from sloshlab.identification.case import Case
+from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.free_run_fit import fitted_baseline
+from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
+from sloshlab.identification.noise_floor import weighted_observations
+from sloshlab.identification.observations import Observation
+from sloshlab.identification.readiness import require_comparable, require_one_rig
+from sloshlab.identification.repeats import require_repeats
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.identification.split import Split, split
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Surroundings
+from sloshlab.missing_physics.extension import Extension
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
 
 assert effects.__all__  # importing the vocabulary makes it known

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.cluster_robust_errors import cluster_robust_errors
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.identification.cluster_robust_errors import cluster_robust_errors
+from sloshlab.missing_physics.candidate import Candidate
 
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449

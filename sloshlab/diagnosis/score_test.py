@@ -12,8 +12,8 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.free_run_problem import FreeRunProblem, robust_weights
+from sloshlab.identification.block_jacobian import BlockJacobian
+from sloshlab.identification.free_run_problem import FreeRunProblem, robust_weights
 
 FloatArray = NDArray[np.float64]
 

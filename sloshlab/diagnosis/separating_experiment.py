@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.case import CaseRun, level
-from sloshlab.diagnosis.extension import NOTHING, Extension
 from sloshlab.diagnosis.findings import Findings, explained_extension
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
-from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.rig_model import RELEASE, RigModel
 from sloshlab.errors import SloshlabError
+from sloshlab.identification.case import CaseRun, level
+from sloshlab.identification.observations import Observation
+from sloshlab.identification.rig_model import RELEASE, RigModel
+from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.twin.structure_forces import MASS_ERROR
 
 _FACTORS: Final = (1 / 3, 3.0)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.signal import hilbert
 
 from sloshlab.channel_names import ACCELERATION_ROOT
-from sloshlab.diagnosis.candidate import Surroundings
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
-from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.update_rates import update_rates_hz
+from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
+from sloshlab.identification.observations import Observation
+from sloshlab.missing_physics.candidate import Surroundings
+from sloshlab.missing_physics.update_rates import update_rates_hz
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
 

@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sloshlab.diagnosis.candidate import channels_of, known_effects
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.decision import Decision, decided
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.interval import LEVEL, Interval, intervals_of
-from sloshlab.diagnosis.mismatch import mismatches, summary
 from sloshlab.diagnosis.separating_experiment import separating_experiment
 from sloshlab.diagnosis.wording import (
     names_of_alternatives,
@@ -19,6 +17,8 @@ from sloshlab.diagnosis.wording import (
     separating_experiment_of,
     statement_of,
 )
+from sloshlab.identification.mismatch import mismatches, summary
+from sloshlab.missing_physics.candidate import channels_of, known_effects
 
 
 @dataclass(frozen=True, eq=False)

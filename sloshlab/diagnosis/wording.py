@@ -7,15 +7,15 @@ from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.candidate import Candidate, without_run
 from sloshlab.diagnosis.findings import Findings
-from sloshlab.diagnosis.free_run_problem import run_of
 from sloshlab.diagnosis.inference.decision import Decision
 from sloshlab.diagnosis.inference.places import SENSOR
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.interval import Interval
-from sloshlab.diagnosis.readiness import refuted_beliefs
-from sloshlab.diagnosis.units import named_and_units
+from sloshlab.identification.free_run_problem import run_of
+from sloshlab.identification.readiness import refuted_beliefs
+from sloshlab.missing_physics.candidate import Candidate, without_run
+from sloshlab.missing_physics.units import named_and_units
 
 _EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure, whatever is recorded."""

@@ -13,7 +13,7 @@ SAMPLING: Final = Sampling(500.0, 2000, 8)
 
 _SHAKING_TABLE: Final = '''"""A table on springs under a drive that is told a force; only its speed is measured."""
 
-from sloshlab.diagnosis.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
+from sloshlab.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
 
 
 def table(run, values):
@@ -85,7 +85,7 @@ _TWO_MASSES: Final = '''"""Two masses on springs, driven at the first by a rando
 
 import numpy as np
 
-from sloshlab.diagnosis.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
+from sloshlab.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
 
 
 def structure(run, values):
@@ -196,7 +196,7 @@ def _pulsed_runs(*, synchronised: bool) -> list[Run]:
 
 _RELEASED: Final = '''"""A mass on a spring, let go."""
 
-from sloshlab.diagnosis.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
+from sloshlab.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
 
 
 def oscillator(run, values):
@@ -222,7 +222,7 @@ TWIN = MechanicalTwin(
 '''
 _DRIVEN: Final = '''"""A mass on a spring, driven by a known force."""
 
-from sloshlab.diagnosis.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
+from sloshlab.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
 
 
 def oscillator(run, values):

@@ -18,7 +18,7 @@ FORCE_RMS_N: Final = (10.0, 25.0, 50.0)
 
 _SINGLE_MASS: Final = Template('''"""$title"""
 
-from sloshlab.diagnosis.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
+from sloshlab.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
 
 
 def oscillator(run, values):
@@ -175,7 +175,7 @@ _TWO_BEAMS: Final = '''"""The first modes of two beams, coupled by what is taken
 
 import numpy as np
 
-from sloshlab.diagnosis.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
+from sloshlab.user_twin import Mechanism, MechanicalTwin, Parameter, Reading
 
 JOINT = np.array([1.0, -1.0])
 ACROSS = np.outer(JOINT, JOINT)

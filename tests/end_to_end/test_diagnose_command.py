@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from short_runs import DONE_BUT_FLAGGED, contents, leftovers, refusal
 
 from pipelines.command_line import run
-from sloshlab.diagnosis.candidate import known_effects, withdraw
+from sloshlab.missing_physics.candidate import known_effects, withdraw
 from sloshlab.twin.storage import load_twin
 
 MASS_KG, LIQUID_KG, STIFFNESS, DAMPING, RATE_HZ = 2.117, 0.124, 3808.8, 0.9, 200.0
@@ -37,8 +37,8 @@ damping_kg_per_s = {DAMPING}
 tank_model = "frozen"
 """
 RUNAWAY = """
-from sloshlab.diagnosis.candidate import Effect, EffectParameter, register
-from sloshlab.diagnosis.extension import Extension
+from sloshlab.missing_physics.candidate import Effect, EffectParameter, register
+from sloshlab.missing_physics.extension import Extension
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING
 
 EFFECT = register(

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, Surroundings, known_effects
-from sloshlab.diagnosis.case import read_case
-from sloshlab.diagnosis.free_run_fit import fitted
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
-from sloshlab.diagnosis.observations import observations
-from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
+from sloshlab.identification.case import read_case
+from sloshlab.identification.free_run_fit import fitted
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
+from sloshlab.identification.observations import observations
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, Surroundings, known_effects
+from sloshlab.user_twin import UserTwinModel, load_user_twin
 
 pytestmark = [pytest.mark.external, pytest.mark.slow]
 UNEXPLAINED = pytest.mark.xfail(

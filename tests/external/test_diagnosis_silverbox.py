@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.user_twin import load_extended
+from sloshlab.user_twin import load_extended
 
 pytestmark = [pytest.mark.external, pytest.mark.slow]
 

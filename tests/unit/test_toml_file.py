@@ -17,11 +17,11 @@ from acquisition.files.channel_map import read_channel_map
 from pipelines.recording.run_attributes import checked_run_attributes
 from pipelines.structure.twins import tank_models
 from sealed_trial.scoring.rivals import metadata_features
-from sloshlab.diagnosis.user_twin.extended import load_extended
 from sloshlab.errors import InputError, RigError
 from sloshlab.rig import Rig
 from sloshlab.toml_file import DEEPEST, LARGEST_BYTES, parse_toml, read_toml
 from sloshlab.twin.storage import load_twin
+from sloshlab.user_twin.extended import load_extended
 
 READERS: dict[str, Callable[[Path], Any]] = {
     "rig": Rig.from_toml,

@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.force_inversion import ORDERS, modal_weights, response
-from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.rig_model import RigModel, retuned_structure
+from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.observations import Observation
+from sloshlab.identification.rig_model import RigModel, retuned_structure
+from sloshlab.missing_force.force_inversion import ORDERS, modal_weights, response
 from sloshlab.twin.structure import Structure
 
 ComplexArray = NDArray[np.complex128]

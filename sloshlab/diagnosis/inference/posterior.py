@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from sloshlab.diagnosis.candidate import BLOCKS
 from sloshlab.diagnosis.inference.places import block_of
 from sloshlab.diagnosis.inference.remainder import PRIOR_OF_REMAINDER, SHARES, TEMPERING
 from sloshlab.diagnosis.inference.scored_model import (
@@ -25,6 +24,7 @@ from sloshlab.diagnosis.inference.scored_model import (
     is_worth_a_word,
     strength,
 )
+from sloshlab.missing_physics.candidate import BLOCKS
 
 FloatArray = NDArray[np.float64]
 NONE, UNKNOWN = "none", "unknown"

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
 from sloshlab.diagnosis.inference.places import SENSOR, STRUCTURE, transfers_of
-from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.observations import Observation
+from sloshlab.identification.rig_model import RigModel
 
 FloatArray = NDArray[np.float64]
 BLOCKS_OF_A_CELL: Final = 4

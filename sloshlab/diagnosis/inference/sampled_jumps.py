@@ -15,12 +15,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel, Request
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of
 from sloshlab.diagnosis.inference.places import transfers_of
-from sloshlab.diagnosis.observations import Observation
-from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.errors import SloshlabError
+from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
+from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
+from sloshlab.identification.observations import Observation
+from sloshlab.identification.rig_model import RigModel
 from sloshlab.twin.terms import Term
 
 FloatArray = NDArray[np.float64]

@@ -17,11 +17,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.candidate import channels_of
-from sloshlab.diagnosis.free_run_problem import HUBER_LIMIT, FreeRunFit
 from sloshlab.diagnosis.inference.remainder import TEMPERING, Remainder, remainder
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
-from sloshlab.diagnosis.prior import ParameterPrior
+from sloshlab.identification.free_run_problem import HUBER_LIMIT, FreeRunFit
+from sloshlab.missing_physics.candidate import channels_of
+from sloshlab.missing_physics.prior import ParameterPrior
 
 FloatArray = NDArray[np.float64]
 LEAST_STRENGTH: Final = 0.5

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.free_run_problem import extension_of
 from sloshlab.diagnosis.inference.run_noise import RunNoise
-from sloshlab.diagnosis.observations import Observation
 from sloshlab.errors import SloshlabError
+from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.free_run_problem import extension_of
+from sloshlab.identification.observations import Observation
+from sloshlab.missing_physics.candidate import Candidate
 
 FloatArray = NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-from sloshlab.diagnosis.candidate import Candidate
-from sloshlab.diagnosis.diagnosed_model import DiagnosedModel
-from sloshlab.diagnosis.free_run_fit import fitted, fitted_baseline
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, run_of
-from sloshlab.diagnosis.observations import Observation
+from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.free_run_fit import fitted, fitted_baseline
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, run_of
+from sloshlab.identification.observations import Observation
+from sloshlab.missing_physics.candidate import Candidate
 
 Runs = Sequence[Sequence[Observation]]
 

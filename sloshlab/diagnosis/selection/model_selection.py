@@ -13,19 +13,19 @@ from typing import Final
 import numpy as np
 from scipy.stats import norm, qmc
 
-from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
-from sloshlab.diagnosis.free_run_fit import INFLATION_STAGES, costs_at, fitted, stages_for
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, extension_of, huber_cost, run_of
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import is_worth_a_word
 from sloshlab.diagnosis.inference.whitened import whitened
-from sloshlab.diagnosis.readiness import refuted_beliefs
-from sloshlab.diagnosis.rig_model import RELEASE
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
 from sloshlab.diagnosis.selection.successive_halving import halved
+from sloshlab.identification.free_run_fit import INFLATION_STAGES, costs_at, fitted, stages_for
+from sloshlab.identification.free_run_problem import FreeRunFit, extension_of, huber_cost, run_of
+from sloshlab.identification.readiness import refuted_beliefs
+from sloshlab.identification.rig_model import RELEASE
+from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
 
 Said = Callable[[str, int, int], None]
 N_KEPT: Final = 4

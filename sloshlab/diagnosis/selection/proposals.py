@@ -10,15 +10,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.candidate import Candidate, MissingForces
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost
-from sloshlab.diagnosis.latent_force import LatentForce, run_forces
-from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.score_test import ScoreTest
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
 from sloshlab.errors import SloshlabError
+from sloshlab.identification.block_jacobian import BlockJacobian
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_force.latent_force import LatentForce, run_forces
+from sloshlab.missing_physics.candidate import Candidate, MissingForces
 
 FloatArray = NDArray[np.float64]
 NO_STARTS: Final[Mapping[str, Sequence[Mapping[str, float]]]] = {}

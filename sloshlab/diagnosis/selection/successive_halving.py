@@ -12,10 +12,10 @@ from typing import Final
 
 import numpy as np
 
-from sloshlab.diagnosis.free_run_fit import fitted, inflated_cost
-from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.proposals import Proposal, jacobian_beside
+from sloshlab.identification.free_run_fit import fitted, inflated_cost
+from sloshlab.identification.free_run_problem import FreeRunFit
 
 _STEPS_OF_A_RUNG: Final = 3
 """Of a fit before it is compared with the others."""

@@ -10,11 +10,11 @@ import pytest
 from recorded_oscillators import effect, fitted_from, run_of, surroundings
 from scipy.signal import lsim
 
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, candidates
-from sloshlab.diagnosis.free_run_problem import FreeRunProblem
-from sloshlab.diagnosis.observations import observations
-from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.identification.free_run_problem import FreeRunProblem
+from sloshlab.identification.observations import observations
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, candidates
 from sloshlab.modal.cantilever import Cantilever, cantilever_modes
 from sloshlab.rig import Rig
 

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from recorded_oscillators import MASS_KG, NOISE, effect, motion, rig, run_of
 
-from sloshlab.diagnosis.candidate import known_effects
-from sloshlab.diagnosis.evidence import DISSIPATIVE, FORCE_TERMS, SENSOR_TERMS
 from sloshlab.diagnosis.examination import Examination, examination_facts, examined, seen_at
-from sloshlab.diagnosis.extension import NOTHING
-from sloshlab.diagnosis.observations import observations
-from sloshlab.diagnosis.residual_maps import Profile, ResidualMaps
-from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.units import named_and_units
 from sloshlab.diagnosis.verdict import Verdict
+from sloshlab.identification.observations import observations
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_force.residual_maps import Profile, ResidualMaps
+from sloshlab.missing_physics.candidate import known_effects
+from sloshlab.missing_physics.evidence import DISSIPATIVE, FORCE_TERMS, SENSOR_TERMS
+from sloshlab.missing_physics.extension import NOTHING
+from sloshlab.missing_physics.units import named_and_units
 
 
 @pytest.fixture(scope="module")

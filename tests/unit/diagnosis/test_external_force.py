@@ -15,12 +15,12 @@ from recorded_oscillators import (
     surroundings,
 )
 
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, Surroundings, candidates
-from sloshlab.diagnosis.free_run_problem import FreeRunFit, FreeRunProblem
-from sloshlab.diagnosis.observations import observations
-from sloshlab.diagnosis.rig_model import RigModel
 from sloshlab.diagnosis.selection.fitted_runs import values_of_runs
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
+from sloshlab.identification.observations import observations
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
 from sloshlab.twin.excitation import free
 from sloshlab.twin.external_forces import HARMONIC_FORCE, PULSE_TRAIN
 from sloshlab.twin.structure import single_degree_of_freedom

@@ -8,10 +8,10 @@ from typing import Any, cast
 import pytest
 from recorded_oscillators import effect
 
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.selection.successive_halving import _best_starts
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate
 
 assert effects.__all__
 

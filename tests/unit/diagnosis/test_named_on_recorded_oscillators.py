@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from recorded_oscillators import MASS_KG, decays, rig
 
-from sloshlab.diagnosis.case import Case, CaseRun
 from sloshlab.diagnosis.findings import findings_of
 from sloshlab.diagnosis.verdict import Verdict, verdict_of
+from sloshlab.identification.case import Case, CaseRun
 
 LEVELS_M = (0.006, 0.010, 0.018)
 

@@ -24,13 +24,13 @@ from recorded_oscillators import (
 )
 from scipy.interpolate import make_interp_spline
 
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, candidates
-from sloshlab.diagnosis.case import CaseRun
-from sloshlab.diagnosis.free_run_problem import FreeRunProblem
-from sloshlab.diagnosis.observations import observations
-from sloshlab.diagnosis.rig_model import RigModel
-from sloshlab.diagnosis.update_rates import update_rates_hz
+from sloshlab.identification.case import CaseRun
+from sloshlab.identification.free_run_problem import FreeRunProblem
+from sloshlab.identification.observations import observations
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, candidates
+from sloshlab.missing_physics.update_rates import update_rates_hz
 
 assert effects.__all__
 FREQUENCY, LOSS = "frequency of mode 1", "damping of mode 1"

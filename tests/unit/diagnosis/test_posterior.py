@@ -11,9 +11,6 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, known_effects
-from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.inference import posterior as posterior_module
 from sloshlab.diagnosis.inference.decision import decided
 from sloshlab.diagnosis.inference.posterior import posterior
@@ -21,7 +18,10 @@ from sloshlab.diagnosis.inference.remainder import Remainder
 from sloshlab.diagnosis.inference.run_noise import RunNoise
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, complexity
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
-from sloshlab.diagnosis.prior import ParameterPrior
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, known_effects
+from sloshlab.missing_physics.prior import ParameterPrior
 
 assert effects.__all__
 N_CELLS = 40

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from recorded_oscillators import MASS_KG, motion, rig, run_of
 
-from sloshlab.diagnosis.diagnosed_model import Request
-from sloshlab.diagnosis.extension import NOTHING, Extension
-from sloshlab.diagnosis.free_run_problem import FreeRunFit
 from sloshlab.diagnosis.inference import sampled_jumps
 from sloshlab.diagnosis.inference.sampled_jumps import jumps_of, with_sampled_jumps
-from sloshlab.diagnosis.observations import observations
-from sloshlab.diagnosis.rig_model import RigModel
+from sloshlab.identification.diagnosed_model import Request
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.observations import observations
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.rig import Rig
 from sloshlab.twin.structure_forces import COULOMB_FRICTION
 

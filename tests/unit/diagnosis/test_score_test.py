@@ -11,9 +11,9 @@ import pytest
 from recorded_oscillators import RATE_HZ, run_of
 
 from sloshlab.diagnosis import surroundings
-from sloshlab.diagnosis.block_jacobian import BlockJacobian
-from sloshlab.diagnosis.free_run_problem import FreeRunProblem
 from sloshlab.diagnosis.score_test import ScoreTest
+from sloshlab.identification.block_jacobian import BlockJacobian
+from sloshlab.identification.free_run_problem import FreeRunProblem
 
 N, N_NUMBERS = 60, 4
 

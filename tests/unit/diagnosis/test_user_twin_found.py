@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 
 from pipelines.command_line import run as command
-from sloshlab.diagnosis.user_twin import load_extended
 from sloshlab.recording import write_recording
+from sloshlab.user_twin import load_extended
 
 pytestmark = pytest.mark.slow
 
@@ -20,7 +20,7 @@ MASS_KG, STIFFNESS, FRICTION_N = 2.0, 3000.0, 0.6
 LEVELS_M = (0.004, 0.006, 0.009)
 
 MODULE = """
-from sloshlab.diagnosis.user_twin import Compared, Mechanism, MechanicalTwin, Parameter, Reading
+from sloshlab.user_twin import Compared, Mechanism, MechanicalTwin, Parameter, Reading
 
 
 def cart(run, values):

@@ -7,11 +7,11 @@ from typing import Any, cast
 
 import pytest
 
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.baseline_parameter import BaselineParameter
-from sloshlab.diagnosis.candidate import Candidate, known_effects
 from sloshlab.diagnosis.interval import Interval
 from sloshlab.diagnosis.wording import _described, form_and_place, named_and_placed, refuted_statement
+from sloshlab.identification.baseline_parameter import BaselineParameter
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, known_effects
 
 assert effects.__all__
 

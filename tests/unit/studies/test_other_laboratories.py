@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sloshlab.diagnosis.case import read_case
-from sloshlab.diagnosis.user_twin import UserTwinModel, load_user_twin
+from sloshlab.identification.case import read_case
+from sloshlab.user_twin import UserTwinModel, load_user_twin
 from studies.other_laboratories.answers import RECORD, is_right, table
 from studies.other_laboratories.case_files import LaboratoryCase, RightAnswer, Run, write_case
 from studies.other_laboratories.driven_structures import PULSE_N, RIGS_HZ, not_repeats, pulses

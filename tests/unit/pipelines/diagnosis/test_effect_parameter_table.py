@@ -6,9 +6,9 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from pipelines.diagnosis.tables import effect_parameter_table
-from sloshlab.diagnosis import effects
-from sloshlab.diagnosis.candidate import Candidate, known_effects
 from sloshlab.diagnosis.interval import Interval
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, known_effects
 
 assert effects.__all__
 

@@ -1,0 +1,472 @@
+"""Weighted residuals of free-running simulations as a function of scaled parameters, and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.errors import SloshlabError
+from sloshlab.identification.baseline_parameter import BaselineParameter
+from sloshlab.identification.block_jacobian import BlockJacobian
+from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
+from sloshlab.identification.observations import Observation
+from sloshlab.missing_physics.candidate import Candidate, channels_of
+from sloshlab.missing_physics.extension import NOTHING, Extension
+
+FloatArray = NDArray[np.float64]
+_Label = TypeVar("_Label")
+_STEP: Final = 0.005
+"""Of a finite difference, in tolerances: a frequency must not move by much of a cycle over a run."""
+_COARSE_STEP: Final = 0.03
+"""The same in stages with inflated noise, past the small-scale roughness that friction and contacts cause."""
+_TOLERANCES_OF_DAMPING: Final = 3.0
+"""Factor of the coarse step of dampings of the baseline."""
+_Part = tuple[Sequence[Observation], Mapping[str, float]]
+"""Observations of one run, and parameters with which it is simulated."""
+HUBER_LIMIT: Final = 4.0
+"""Standard deviations beyond which Huber's loss is linear: bursts of noise and lost blocks are outliers."""
+DOWN_TO_NOISE: Final = 1.15
+"""Mean square of the weighted residuals of a channel up to which nothing but noise is left."""
+_MOST_BYTES_AT_ONCE: Final = 1e8
+"""Of the readings of simulations that are weighted together; results do not depend on it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRunFit:
+    """A fitted simulation.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        Effects beyond the baseline.
+    values : dict
+        Baseline parameters by name, and ``key.parameter`` of every candidate.
+    cost : float
+        Huber loss of the weighted residuals plus squares of the deviations from the prior means, in tolerances.
+    misfit : float
+        The part of the cost that the residuals have.
+    covariance : ndarray, shape (n, n)
+        Of the free parameters in scaled values, in the order of `names`.
+    names : tuple of str
+    scales : ndarray, shape (n,)
+    n_simulations : int
+    trouble : str
+        Why there is no result; empty where there is one.
+    """
+
+    candidates: tuple[Candidate, ...]
+    values: dict[str, float]
+    cost: float
+    misfit: float
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    names: tuple[str, ...] = ()
+    scales: FloatArray = field(default_factory=lambda: np.zeros(0))
+    n_simulations: int = 0
+    trouble: str = ""
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of a parameter in its own unit."""
+        return float(np.hypot(*self.standard_errors(name)))
+
+    def standard_errors(self, name: str) -> tuple[float, float]:
+        """Standard errors of a parameter in its own unit: by noise, and by the prior of the baseline.
+
+        The covariance C = (JᵀJ + P)⁻¹, with P one for each baseline parameter, is C JᵀJ C + C P C.
+        """
+        i = self.names.index(name)
+        own = tuple(f"{candidate.key}." for candidate in self.candidates)
+        n_baseline = sum(not own or not name.startswith(own) for name in self.names)
+        of_belief = float((self.covariance[i, :n_baseline] ** 2).sum())
+        of_noise = max(float(self.covariance[i, i]) - of_belief, 0.0)
+        return float(np.sqrt(of_noise) * self.scales[i]), float(np.sqrt(of_belief) * self.scales[i])
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A free number: counted from its centre in units of its scale, within its bounds.
+
+    Numbers of the baseline are counted in tolerances from what is believed, so that the negative logarithm of
+    their prior is half the sum of squares of theta; those of effects by their starts, from zero, where an effect
+    is absent. `channels` are those that it alone changes, none where it changes the motion.
+    """
+
+    name: str
+    centre: float
+    scale: float
+    low: float
+    high: float
+    channels: tuple[str, ...]
+    is_reading: bool
+
+
+class FreeRunProblem:
+    """Weighted residuals of one set of observations as a function of scaled parameters.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    runs : sequence of sequences of Observation
+        Per run.
+    candidates : sequence of Candidate
+    fixed : mapping, optional
+        Parameters that are not free.
+    """
+
+    def __init__(
+        self,
+        model: DiagnosedModel,
+        runs: Sequence[Sequence[Observation]],
+        candidates: Sequence[Candidate] = (),
+        fixed: Mapping[str, float] | None = None,
+    ) -> None:
+        self.model, self.runs, self.candidates = model, [run for run in runs if run], tuple(candidates)
+        self.fixed = dict(fixed or {})
+        present = {observation.run.name for run in self.runs for observation in run}
+
+        def is_free(name: str) -> bool:
+            return name not in self.fixed and run_of(name, model) in ("", *present)
+
+        baseline = [_of_baseline(known) for known in model.parameters if is_free(known.name)]
+        # An effect on a sensor that drives changes the motion and with it every channel.
+        driving = {name for run in self.runs for name in model.driving(run[0].run)}
+        of_effects = [number for candidate in self.candidates for number in _of_effect(candidate, driving)]
+        # Numbers of runs that are not there rest where they start.
+        absent = {n.name: n.scale for n in of_effects if n.name not in self.fixed and not is_free(n.name)}
+        self.fixed |= absent
+        free = [*baseline, *(number for number in of_effects if is_free(number.name))]
+        self.n_baseline = len(baseline)
+        self.names = tuple(number.name for number in free)
+        self.centres, self.scales, self.low, self.high = (
+            np.array([getattr(number, of) for number in free], np.float64)
+            for of in ("centre", "scale", "low", "high")
+        )
+        self._channels_changed = [number.channels for number in free]
+        self._is_reading = np.array([number.is_reading for number in baseline], bool)
+        ends = np.cumsum([0] + [observation.spectra.size for run in self.runs for observation in run])
+        self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
+        self.n_simulations = 0
+
+    @property
+    def prior(self) -> FloatArray:
+        """Weights of the squares of scaled parameters: one with a prior, zero without."""
+        return np.array([1.0] * self.n_baseline + [0.0] * (len(self.names) - self.n_baseline))
+
+    @property
+    def changes_motion(self) -> NDArray[np.bool_]:
+        """Which of the baseline's parameters change the motion, not only what a channel reads."""
+        return ~self._is_reading
+
+    def is_down_to_noise(self, fit: FreeRunFit) -> bool:
+        """Whether a fit leaves no more than the noise in any channel."""
+        residual = self.residual(self.theta_of(fit.values))
+        left = mean_squares([observation for run in self.runs for observation in run], residual)
+        return max(left.values(), default=0.0) < DOWN_TO_NOISE
+
+    def values(self, theta: FloatArray) -> dict[str, float]:
+        """Parameters by name in their own units."""
+        # Starts and finite differences may lie outside the bounds; the simulation never does.
+        physical = np.clip(self.centres + theta * self.scales, self.low, self.high)
+        return {**self.fixed, **dict(zip(self.names, physical.tolist(), strict=True))}
+
+    def theta_of(self, values: Mapping[str, float]) -> FloatArray:
+        """Scaled parameters; those that are not given are as believed."""
+        known = np.array([values.get(name, centre) for name, centre in zip(self.names, self.centres, strict=True)])
+        return np.asarray((known - self.centres) / self.scales)
+
+    def at_bounds(self, theta: FloatArray) -> NDArray[np.bool_]:
+        """Which parameters are as large or as small as they may be."""
+        physical = self.centres + theta * self.scales
+        # To a relative tolerance: scaled values reach a bound only to rounding.
+        near = 1e-6 * (self.high - self.low)
+        return np.asarray((physical <= self.low + near) | (physical >= self.high - near))
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Weighted residuals of all runs; infinite where the simulation does not reach its end."""
+        return self.residuals([theta])[0]
+
+    def residuals(self, thetas: Sequence[FloatArray]) -> list[FloatArray]:
+        """Residuals of several sets of parameters, all runs of all sets simulated together."""
+        parts = [(run, values) for values in map(self.values, thetas) for run in self.runs]
+        found = iter(self._weighted(parts))
+        return [np.concatenate([next(found) for run in self.runs for _ in run]) for _ in thetas]
+
+    def _weighted(self, parts: Sequence[_Part]) -> Iterator[FloatArray]:
+        """Weighted residuals of every observation of every part, one after the other."""
+        self.n_simulations += len(parts)
+        for some in _at_once(parts):
+            yield from weighted_residuals(self.model, some, self.candidates)
+
+    def inflation_weights(self, inflation: float) -> FloatArray:
+        """Factors of the residuals with inflated noise: every channel known only to a share of its RMS.
+
+        √(σ²/(σ² + share² ⟨y²⟩)) for the variance σ² of a coefficient of the channel y.
+        """
+        return np.concatenate(
+            [
+                np.sqrt(
+                    observation.variance
+                    / (observation.variance + inflation**2 * float(np.mean(observation.spectra**2)))
+                ).ravel()
+                for run in self.runs
+                for observation in run
+            ]
+        )
+
+    def jacobian(
+        self, theta: FloatArray, at: FloatArray, columns: Sequence[int], *, coarse: bool = False
+    ) -> BlockJacobian:
+        """Derivatives of the residuals by some scaled parameters, by finite differences.
+
+        Coarse differences are wider: the residual is rough on a small scale with dry friction and contacts.
+        """
+        places = []
+        for column in columns:
+            is_effect, is_damping = column >= self.n_baseline, self.names[column].startswith("damping")
+            step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
+            if is_effect:
+                # Relative to the parameter, which may have moved far from the start that scales it; an effect of
+                # size nothing still needs a step.
+                step *= max(abs(theta[column]), 0.05)
+            elif is_damping and coarse:
+                # Only in coarse stages: the optimum itself is sought with the fine step.
+                step *= _TOLERANCES_OF_DAMPING
+            moved = theta.copy()
+            physical = self.centres[column] + (theta[column] + step) * self.scales[column]
+            # Away from the bound, where the values would be clipped and the difference zero.
+            moved[column] += step if physical <= self.high[column] else -step
+            places.append(moved)
+
+        changed = [self._changed_by([column]) for column in columns]
+        parts = [
+            (chosen, self.values(place))
+            for place, (_, by_run) in zip(places, changed, strict=True)
+            for chosen in by_run
+        ]
+        residuals = self._weighted(parts)
+        derivatives = []
+        for place, column, (blocks, _) in zip(places, columns, changed, strict=True):
+            found = {block: next(residuals) for block in blocks}
+            # In place, as a column is as large as all recordings that it changes.
+            for block, derivative in found.items():
+                derivative -= at[self._rows[block]]
+                derivative /= place[column] - theta[column]
+            # A parameter whose simulation fails has no derivative, and the step does not use it.
+            good = all(np.isfinite(derivative).all() for derivative in found.values())
+            derivatives.append(found if good else {})
+        return BlockJacobian.of_blocks(
+            derivatives, [observation.spectra.size for run in self.runs for observation in run]
+        )
+
+    def residuals_moved(
+        self, thetas: Sequence[FloatArray], columns: Sequence[int], at: FloatArray
+    ) -> list[FloatArray]:
+        """Residuals after some parameters were moved.
+
+        Unchanged in other runs and channels where the parameters have their own.
+
+        Parameters
+        ----------
+        thetas : sequence of ndarray
+        columns : sequence of int
+            Of the parameters.
+        at : ndarray
+            Residuals where nothing is moved.
+        """
+        blocks, by_run = self._changed_by(columns)
+        weighted = iter(self._weighted([(chosen, self.values(theta)) for theta in thetas for chosen in by_run]))
+        found = []
+        for _ in thetas:
+            moved = at.copy()
+            for block in blocks:
+                moved[self._rows[block]] = next(weighted)
+            found.append(moved)
+        return found
+
+    def _changed_by(self, columns: Sequence[int]) -> tuple[list[int], list[list[Observation]]]:
+        """Blocks that any of some parameters changes, and their observations run by run."""
+        # The sparsity of the Jacobian: a release or an offset is simulated for its run alone, a gain for its
+        # channel alone.
+        seen = [(run_of(self.names[column], self.model), self._channels_changed[column]) for column in columns]
+        blocks: list[int] = []
+        runs: list[list[Observation]] = []
+        n_before = 0
+        for run in self.runs:
+            chosen = [
+                i
+                for i, observation in enumerate(run)
+                if any(
+                    owner in ("", observation.run.name) and (not by or observation.channel in by)
+                    for owner, by in seen
+                )
+            ]
+            runs += [[run[i] for i in chosen]] if chosen else []
+            blocks += [n_before + i for i in chosen]
+            n_before += len(run)
+        return blocks, runs
+
+
+def _at_once(parts: Sequence[_Part]) -> Iterator[Sequence[_Part]]:
+    """Parts whose readings together take no more memory than they may."""
+    first, n_bytes = 0, 0
+    for i, (run, _) in enumerate(parts):
+        n_bytes += 8 * sum(observation.known.size for observation in run)
+        if n_bytes > _MOST_BYTES_AT_ONCE:
+            yield parts[first : i + 1]
+            first, n_bytes = i + 1, 0
+    yield parts[first:]
+
+
+def weighted_residuals(
+    model: DiagnosedModel, parts: Sequence[_Part], candidates: Sequence[Candidate]
+) -> list[FloatArray]:
+    """Weighted residuals; infinite of a run whose simulation does not reach its end.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    parts : sequence of (observations of one run, values)
+        Values of the baseline, and ``key.parameter`` of every candidate.
+    candidates : sequence of Candidate
+
+    Returns
+    -------
+    list of ndarray, shape (size of the observation,)
+        Of every observation of every part, one after the other.
+    """
+    # of each observation, where its residuals go and what was simulated
+    simulated: dict[int, tuple[Observation, list[int], list[FloatArray]]] = {}
+    requests: list[Request | None] = []
+    for run, values in parts:
+        # Numbers with which an effect cannot be said describe nothing, like those of a simulation that fails.
+        try:
+            extension = extension_of(candidates, values)
+        except SloshlabError:
+            requests.append(None)
+        else:
+            requests.append(Request(run[0].run, values, extension, [observation.channel for observation in run]))
+    readings = iter(model.simulate_many([request for request in requests if request is not None]))
+    sizes: list[int] = []
+    for (run, _), request in zip(parts, requests, strict=True):
+        of_run = None if request is None else next(readings)
+        for observation in run:
+            # A simulation that fails describes nothing. It must not end the search, which tries many parameters
+            # that do not run.
+            if isinstance(of_run, dict):
+                _, places, series = simulated.setdefault(id(observation), (observation, [], []))
+                places.append(len(sizes))
+                series.append(of_run[observation.channel])
+            sizes.append(observation.spectra.size)
+    found: dict[int, FloatArray] = {}
+
+    def weigh(item: tuple[Observation, list[int], list[FloatArray]]) -> None:
+        observation, places, series = item
+        for place, residual in zip(places, observation.residuals(series), strict=True):
+            found[place] = residual.ravel()
+
+    list(model.executor.map(weigh, simulated.values()))
+    return [found[i] if i in found else np.full(size, np.inf) for i, size in enumerate(sizes)]
+
+
+def _of_baseline(known: BaselineParameter) -> _Number:
+    return _Number(
+        known.name,
+        known.believed,
+        known.tolerance,
+        *known.bounds,
+        (known.channel,) if known.channel else (),
+        known.is_reading,
+    )
+
+
+def _of_effect(candidate: Candidate, driving: Collection[str]) -> list[_Number]:
+    channels = _only_channels(candidate, driving)
+    return [
+        _Number(
+            f"{candidate.key}.{known.name}",
+            0.0,
+            candidate.scale(known.name),
+            *candidate.bounds(known),
+            channels,
+            False,
+        )
+        for known in candidate.effect.parameters
+    ]
+
+
+def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str, ...]:
+    """Channels that alone an effect changes; none given where it changes the motion."""
+    changed = channels_of(candidate.channel) if candidate.effect.block == "sensor" else ()
+    return () if any(name in driving for name in changed) else changed
+
+
+def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:
+    """What the candidates add, with their parameters taken from the values."""
+    total = NOTHING
+    for candidate in candidates:
+        numbers = {
+            parameter.name: values[f"{candidate.key}.{parameter.name}"]
+            for parameter in candidate.effect.parameters
+        }
+        total = total + candidate.extension(numbers)
+    return total
+
+
+def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[str, float]:
+    """Mean Huber loss of the informative residuals of each channel over all runs.
+
+    Parameters
+    ----------
+    observed : sequence of Observation
+    residual : ndarray
+        Of all of them, one after another.
+    """
+    return _means(observed, residual, lambda observation: observation.channel)
+
+
+def _means(
+    observed: Sequence[Observation], residual: FloatArray, label: Callable[[Observation], _Label], least: int = 1
+) -> dict[_Label, float]:
+    sums: dict[_Label, list[float]] = {}
+    first = 0
+    for observation in observed:
+        own = residual[first : first + observation.spectra.size]
+        first += observation.spectra.size
+        chosen = own[observation.informative.ravel()]
+        total = sums.setdefault(label(observation), [0.0, 0.0])
+        total[0] += huber_cost(chosen)
+        total[1] += chosen.size
+    return {name: squares / n for name, (squares, n) in sums.items() if n >= least}
+
+
+def robust_weights(residual: FloatArray, limit: float = HUBER_LIMIT) -> FloatArray:
+    """Square roots of Huber's weights, for iteratively reweighted least squares."""
+    size = np.abs(residual)
+    # Square roots, since they multiply rows of the Jacobian and the residual, of which products are summed.
+    return np.asarray(np.where(size > limit, np.sqrt(limit / np.maximum(size, 1e-300)), 1.0))
+
+
+def huber_cost(residual: FloatArray, limit: float = HUBER_LIMIT) -> float:
+    """Huber loss: a sum of squares that grows linearly beyond some standard deviations, four by default."""
+    size = np.abs(residual)
+    within = np.minimum(size, limit)
+    return float((within * (2 * size - within)).sum())
+
+
+def run_of(name: str, model: DiagnosedModel) -> str:
+    """The run to which a parameter belongs alone; empty where it belongs to all.
+
+    Parameters
+    ----------
+    name : str
+        Of the parameter.
+    model : DiagnosedModel
+    """
+    for run in model.runs:
+        if name.endswith((f"release of {run.name}", f" in {run.name}")):
+            return run.name
+    return ""

@@ -1,0 +1,459 @@
+"""Latent forces: those that would make a simulation follow its recording, at structure and tank.
+
+The residuals of all motion channels are the response to one force at the tank's place (`force_inversion`),
+whatever made it. A force measured between structure and tank separates the liquid's part: Δf = M ü − F. The rest
+acts on the structure. Without a measured force the place stays undetermined.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.identification.case import CaseRun
+from sloshlab.identification.diagnosed_model import Request
+from sloshlab.identification.observations import Observation
+from sloshlab.identification.release import INSTANT
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_force.force_inversion import (
+    ORDERS,
+    InvertedForce,
+    frequencies_hz,
+    in_frequency,
+    in_time,
+    inverted_force,
+    modal_weights,
+    response,
+    sample_variance,
+    wiener_gain,
+)
+from sloshlab.missing_physics.extension import NOTHING, Extension
+from sloshlab.rig import Rig
+from sloshlab.twin.blocks import Blocks
+from sloshlab.twin.excitation import recorded
+from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.structure import Structure
+from sloshlab.twin.terms import Term
+from sloshlab.twin.twin import Twin
+
+FloatArray = NDArray[np.float64]
+Found = tuple[tuple["LatentForce", ...], dict[str, FloatArray]]
+STRUCTURE, TANK, EITHER = "structure", "tank", "structure or tank"
+_END_SHARE: Final = 0.04
+"""Of a run: length of the tapers."""
+_SLOW_HZ: Final = 1.5
+"""Below it offsets and drift of accelerometers hide the motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class LatentForce:
+    """A force that the baseline lacks in one run, at one place.
+
+    Attributes
+    ----------
+    run : CaseRun
+    place : {"structure", "tank", "structure or tank"}
+    force_n : ndarray, shape (n,)
+        Upward positive, away from the ends of the run.
+    standard_error_n : float
+        Of one sample, by the noise of the sensors.
+    time_s : ndarray, shape (n,)
+    motion : ndarray, shape (n, 3)
+        Displacement, velocity, acceleration there: relative to the base for the structure, absolute for the tank.
+    """
+
+    run: CaseRun
+    place: str
+    force_n: FloatArray
+    standard_error_n: float
+    time_s: FloatArray
+    motion: FloatArray
+
+    @property
+    def power_n2(self) -> float:
+        """Mean square beyond noise, not below zero [N²]."""
+        return max(float(np.mean(self.force_n**2)) - self.standard_error_n**2, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class RunForces:
+    """Latent forces of one run, and the residuals that they were computed from.
+
+    Attributes
+    ----------
+    forces : tuple of LatentForce
+        At structure and tank, or at either of them; at the tank alone on a shaker.
+    missed : dict of str to ndarray, shape (n,)
+        Residual of each channel in true units, tapered at the ends.
+    left : dict of str to ndarray, shape (n,)
+        What each motion channel shows beyond the response to the latent force, in true units; of force cells the
+        difference from an equal share of their sum.
+    structure : Structure or None
+        As retuned.
+    carried_mass_kg : float
+    """
+
+    forces: tuple[LatentForce, ...]
+    missed: dict[str, FloatArray]
+    left: dict[str, FloatArray]
+    structure: Structure | None
+    carried_mass_kg: float
+
+    def at(self, place: str) -> LatentForce | None:
+        """The force at a place, if it can be told there."""
+        return next((force for force in self.forces if force.place == place), None)
+
+
+def run_forces(
+    model: RigModel,
+    observed: Sequence[Observation],
+    values: Mapping[str, float],
+    without: Collection[str] = (),
+    extension: Extension = NOTHING,
+) -> RunForces:
+    """Latent forces of one run.
+
+    Parameters
+    ----------
+    model : RigModel
+    observed : sequence of Observation
+        Of one run.
+    values : mapping
+        Of the baseline's parameters.
+    without : collection of str
+        Channels that are left out of the inversion.
+    extension : Extension, optional
+        Effects that the simulation has beyond the baseline.
+
+    Raises
+    ------
+    AnalysisError
+        If the baseline does not reach the end of the run.
+    """
+    run = observed[0].run
+    simulation = model.whole_simulation(Request(run, values, extension))
+    readings = model.simulate(run, values, extension)
+    missed = {
+        observation.channel: _missed(observation, readings[observation.channel], values, run.is_free)
+        for observation in observed
+    }
+    believed = [observation for observation in observed if observation.channel not in without]
+    if simulation.twin.structure is None:
+        forces, left = _on_shaker(simulation, run, observed, believed, missed)
+    else:
+        forces, left = _on_structure(simulation, model.rig, observed, believed, missed)
+    left |= _cell_disagreements(observed, believed, missed)
+    return RunForces(forces, missed, left, simulation.twin.structure, simulation.twin.carried_mass_kg)
+
+
+def channel_responses(
+    forces: RunForces, observed: Sequence[Observation], rig: Rig, force: LatentForce
+) -> dict[str, FloatArray]:
+    """What a force at its place adds to every channel of the run, in true units, shape (n,) each.
+
+    Parameters
+    ----------
+    forces : RunForces
+    observed : sequence of Observation
+        Of the same run.
+    rig : Rig
+    force : LatentForce
+    """
+    run = force.run
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    first = round((force.time_s[0] - float(run.recording["time"].values[0])) * rate)
+    series = np.zeros(n)
+    series[first : first + force.force_n.size] = force.force_n
+    frequency = frequencies_hz(n, rate)
+    spectrum = in_frequency(series)
+    structure = forces.structure
+    n_cells = max(1, sum(observation.channel.startswith("force_cell") for observation in observed))
+    moved = np.zeros(frequency.size, complex)
+    if structure is not None:
+        moved = forces.carried_mass_kg * response(structure, structure.mode_shape, 2, frequency)
+    # F = M ü − f between structure and tank: a force on the tank moves it and is itself seen by the cell, one on
+    # the structure only moves it.
+    of_force = moved - (1.0 if force.place == TANK else 0.0)
+    shown = {}
+    for observation in observed:
+        attributes = run.recording[observation.channel].attrs
+        transfer = np.zeros(frequency.size, complex)
+        if observation.channel.startswith("force"):
+            transfer = (
+                _sign(observation) * of_force / (n_cells if observation.channel.startswith("force_cell") else 1)
+            )
+        elif structure is not None:
+            weights = modal_weights(structure, rig, observation.channel, attributes.get("x_m"))
+            if weights is not None:
+                transfer = response(structure, weights, _order(observation.channel), frequency)
+        shown[observation.channel] = in_time(transfer * spectrum, n)
+    return shown
+
+
+def _missed(
+    observation: Observation, reading: FloatArray, values: Mapping[str, float], is_free: bool
+) -> FloatArray:
+    """Recorded minus simulated in true units, zero where lost, tapered at the ends."""
+    recorded_ = np.asarray(observation.run.recording[observation.channel].values, np.float64)
+    n = min(recorded_.size, reading.size)
+    difference = np.zeros(recorded_.size)
+    known = observation.known[:n].copy()
+    first = 0
+    if is_free:
+        # From the release on, which a fit has found; the sample before may still be held.
+        instant = values.get(f"{INSTANT}{observation.run.name}", 0.0)
+        first = 1 + max(0, math.ceil(instant * observation.run.attributes.sampling_rate_hz))
+        n_disturbed = int(np.argmax(known))
+        known[first:n_disturbed] = np.isfinite(recorded_[first:n_disturbed])
+    difference[:n][known] = (recorded_[:n] - reading[:n])[known]
+    if not observation.keeps_mean:
+        # The mean of a channel whose zero means nothing would be asked for as a constant force.
+        difference[:n][known] -= difference[:n][known].mean()
+    difference[:first] = difference[first] - np.arange(first, 0, -1) * (difference[first + 1] - difference[first])
+    # Divided by the gain: forces are in true newtons, not in those of a sensor that reads too much.
+    return difference * _taper(recorded_.size, is_free) / values.get(f"gain of {observation.channel}", 1.0)
+
+
+def _taper(n: int, is_free: bool) -> FloatArray:
+    """Cosine taper at the end, and at the start of a run that was not released."""
+    m = max(2, int(_END_SHARE * n))
+    ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(m) + 0.5) / m)
+    window = np.ones(n)
+    window[n - m :] = ramp[::-1]
+    # The first cycles of a release hold most of its information.
+    if not is_free:
+        window[:m] = ramp
+    return window
+
+
+def _untapered(n: int, is_free: bool) -> slice:
+    m = max(2, int(_END_SHARE * n))
+    return slice(m // 4 if is_free else m, n - m)
+
+
+def _noise_power(observation: Observation, frequency_hz: FloatArray) -> FloatArray:
+    """E|FFT|² of the noise of a channel, by its variance per coefficient.
+
+    It grows below 1.5 Hz: accelerometers drift, and displacements of a base are integrated from accelerometers.
+    """
+    variance = np.interp(frequency_hz, observation.frequencies_hz, np.median(observation.variance, axis=0))
+    # Without this a driven base that is slowly off asks for a force which is not there. Displacements of a decay
+    # are read by a sensor of their own.
+    if _order(observation.channel) == 2 or (_order(observation.channel) == 0 and not observation.run.is_free):
+        variance = variance * (1 + (_SLOW_HZ / np.maximum(frequency_hz, 1e-3 * _SLOW_HZ)) ** 4)
+    return np.asarray(variance * observation.known.size)
+
+
+def _on_structure(
+    simulation: Simulation,
+    rig: Rig,
+    observed: Sequence[Observation],
+    believed: Sequence[Observation],
+    missed: Mapping[str, FloatArray],
+) -> Found:
+    inverted, at_release, left = _inverted_force_at_tank(simulation, rig, observed, believed, missed)
+    run, structure = observed[0].run, simulation.twin.structure
+    assert structure is not None
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    frequency = inverted.frequency_hz
+    sampled = min(n, simulation.places.shape[0])
+    orders = [response(structure, structure.mode_shape, order, frequency) for order in range(3)]
+    moved = np.stack([in_time(transfer * inverted.spectrum, n) for transfer in orders], axis=-1)[:sampled]
+    started = np.stack([_release(structure, structure.mode_shape, order, n, rate) for order in range(3)], axis=-1)
+    # The force acts along the motion that was recorded, not along the one that was simulated without it.
+    moved = moved + at_release * started[:sampled]
+    relative, absolute = simulation.places[:sampled, 0] + moved, simulation.places[:sampled, 1] + moved
+    force = in_time(inverted.spectrum, n)[:sampled]
+    # The baseline's own springs and dampers are other forces along another motion. What they change by is not
+    # missing.
+    on_structure = _change_of_baseline_force(simulation, simulation.twin, STRUCTURE, relative, rate)
+    in_tank = _change_of_baseline_force(simulation, simulation.twin, TANK, absolute, rate)
+    kept = _untapered(n, run.is_free)
+    kept = slice(kept.start, min(kept.stop, sampled))
+    time = np.asarray(run.recording["time"].values, np.float64)
+
+    def latent(place: str, series: FloatArray, expected: FloatArray, motion: FloatArray) -> LatentForce:
+        error = float(np.sqrt(sample_variance(expected, n)))
+        return LatentForce(run, place, series[kept], error, time[kept], motion[kept])
+
+    measured = _measured(observed, believed, missed)
+    # Simulation alone tells the sum of both forces only.
+    if measured is None:
+        return (latent(EITHER, force - on_structure - in_tank, inverted.noise, relative),), left
+    missed_force, force_noise = measured
+    inertia = simulation.twin.carried_mass_kg * orders[2]
+    # What a wrong release adds to the force between structure and tank is inertia, no missing force of the
+    # liquid.
+    of_release = at_release * simulation.twin.carried_mass_kg * started[:, 2] * _taper(n, run.is_free)
+    liquid = (
+        inertia * inverted.spectrum - in_frequency(missed_force - of_release) - in_frequency(_padded(in_tank, n))
+    )
+    noise = np.abs(inertia) ** 2 * inverted.noise + np.interp(frequency, *force_noise)
+    # The division between structure and liquid is regularised once more: a difference of two large forces is
+    # noisy.
+    kept_share = wiener_gain(np.abs(liquid) ** 2, noise, frequency, rate)
+    in_liquid = in_time(kept_share * liquid, n)[:sampled]
+    # The remainder, so that both parts add up to the inverted force whatever the regularisation took.
+    of_structure = force - in_tank - in_liquid - on_structure
+    return (
+        latent(STRUCTURE, of_structure, inverted.noise + kept_share * noise, relative),
+        latent(TANK, in_liquid, kept_share * noise, absolute),
+    ), left
+
+
+def _inverted_force_at_tank(
+    simulation: Simulation,
+    rig: Rig,
+    observed: Sequence[Observation],
+    believed: Sequence[Observation],
+    missed: Mapping[str, FloatArray],
+) -> tuple[InvertedForce, float, dict[str, FloatArray]]:
+    """The force at the tank by inversion of the trusted motion channels, the error of the release, and what every
+    channel has left.
+    """
+    run, structure = observed[0].run, simulation.twin.structure
+    assert structure is not None
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    frequency = frequencies_hz(n, rate)
+    receptances, released = {}, {}
+    for observation in observed:
+        weights = modal_weights(
+            structure, rig, observation.channel, run.recording[observation.channel].attrs.get("x_m")
+        )
+        if weights is not None:
+            receptances[observation.channel] = response(structure, weights, _order(observation.channel), frequency)
+            if run.is_free:
+                released[observation.channel] = in_frequency(
+                    _release(structure, weights, _order(observation.channel), n, rate) * _taper(n, True)
+                )
+    # All channels have a residual after the inversion, also those that were left out of it: that is what tests
+    # them.
+    spectra = {name: in_frequency(missed[name]) for name in receptances}
+    seen = {
+        observation.channel: (receptances[observation.channel], _noise_power(observation, frequency))
+        for observation in believed
+        if observation.channel in receptances
+    }
+    inverted, at_release = inverted_force(seen, spectra, frequency, rate, released or None)
+    left = {}
+    for name, spectrum in spectra.items():
+        start = at_release * released[name] if released else 0.0
+        left[name] = in_time(spectrum - receptances[name] * inverted.spectrum - start, n)
+    return inverted, at_release, left
+
+
+def _release(structure: Structure, weights: FloatArray, order: int, n: int, rate_hz: float) -> FloatArray:
+    """Free decay of a channel after a release of the tank from one metre."""
+    omega = np.sqrt(structure.stiffnesses_n_per_m / structure.masses_kg)
+    decay = 0.5 * structure.dampings_kg_per_s / structure.masses_kg
+    pole = -decay + 1j * np.sqrt(np.maximum(omega**2 - decay**2, 0.0))
+    start = structure.static_deflection(1.0)
+    turning = np.where(pole.imag > 0, pole.imag, np.inf)
+    # Released from rest: with this factor the velocity at the start is zero. A mode that does not turn has none.
+    factor = start * (1 - 1j * decay / turning) * weights
+    time = np.arange(n) / rate_hz
+    return np.asarray((np.exp(np.outer(time, pole)) * pole**order @ factor).real)
+
+
+def _padded(series: FloatArray, n: int) -> FloatArray:
+    return np.concatenate([series, np.zeros(n - series.size)])
+
+
+def _on_shaker(
+    simulation: Simulation,
+    run: CaseRun,
+    observed: Sequence[Observation],
+    believed: Sequence[Observation],
+    missed: Mapping[str, FloatArray],
+) -> Found:
+    rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
+    frequency = frequencies_hz(n, rate)
+    sampled = min(n, simulation.places.shape[0])
+    motions = [observation for observation in observed if _order(observation.channel) == 2]
+    # The tank's own motion is measured: the mean of the accelerometers that are believed is the input, and their
+    # differences from it are left to the sensors.
+    good = [motion for motion in motions if motion in believed] or motions
+    mean = np.mean([missed[observation.channel] for observation in good], axis=0) if good else np.zeros(n)
+    left = {motion.channel: missed[motion.channel] - mean for motion in motions}
+    measured = _measured(observed, believed, missed)
+    if measured is None:
+        return (), left
+    missed_force, force_noise = measured
+    carried = simulation.twin.carried_mass_kg
+    of_noise = np.interp(frequency, *force_noise)
+    # The mean of n accelerometers has 1/n² of the sum of their noise powers.
+    for observation in good:
+        of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(observation, frequency)
+    wanted = in_frequency(carried * mean - missed_force)
+    share = wiener_gain(np.abs(wanted) ** 2, of_noise, frequency, rate)
+    force = in_time(share * wanted, n)[:sampled]
+    motion = simulation.places[:sampled, 1].copy()
+    motion[:, 2] += mean[:sampled]
+    kept = _untapered(n, run.is_free)
+    kept = slice(kept.start, min(kept.stop, sampled))
+    time = np.asarray(run.recording["time"].values, np.float64)
+    error = float(np.sqrt(sample_variance(share * of_noise, n)))
+    return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept]),), left
+
+
+def _order(name: str) -> int:
+    return ORDERS.get(name.partition("_")[0], -1)
+
+
+def _measured(
+    observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
+) -> tuple[FloatArray, tuple[FloatArray, FloatArray]] | None:
+    """Residual of the force of the structure on the tank, and the power of its noise over frequency."""
+    forces = [force for force in believed if force.channel.startswith("force")]
+    cells = [force for force in forces if force.channel.startswith("force_cell")]
+    chosen = cells or forces[:1]
+    if not chosen:
+        return None
+    n_cells = sum(observation.channel.startswith("force_cell") for observation in observed)
+    # Cells that are left out are taken to carry as much as the others do.
+    scale = n_cells / len(cells) if cells else 1.0
+    total = scale * np.sum([_sign(observation) * missed[observation.channel] for observation in chosen], axis=0)
+    frequency = chosen[0].frequencies_hz
+    noise = scale**2 * np.sum([_noise_power(observation, frequency) for observation in chosen], axis=0)
+    return total, (frequency, noise)
+
+
+def _sign(observation: Observation) -> float:
+    return -1.0 if observation.run.recording[observation.channel].attrs.get("block_from") == "tank" else 1.0
+
+
+def _cell_disagreements(
+    observed: Sequence[Observation], believed: Sequence[Observation], missed: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    cells = [observation.channel for observation in observed if observation.channel.startswith("force_cell")]
+    good = [observation.channel for observation in believed if observation.channel in cells]
+    if len(cells) < 2 or not good:
+        return {}
+    mean = np.mean([missed[name] for name in good], axis=0)
+    return {name: missed[name] - mean for name in cells}
+
+
+def _change_of_baseline_force(
+    simulation: Simulation, twin: Blocks, place: str, motion: FloatArray, rate_hz: float
+) -> FloatArray:
+    """Baseline forces of a place along the measured motion, less those of the simulation."""
+    chosen = [i for i, term in enumerate(twin.terms) if term.place == place]
+    if not chosen:
+        return np.zeros(motion.shape[0])
+    # The forces alone, on a prescribed motion: contacts and forces with memory are integrated by the same
+    # engine.
+    simulated = simulation.forces_n[: motion.shape[0], chosen].sum(axis=1)
+    alone = Twin(None, tuple(_moved_to_tank(twin.terms[i]) for i in chosen))
+    drive = recorded(rate_hz, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])
+    forces = alone.simulate(drive).require_done().forces_n.sum(axis=1)
+    return np.asarray(forces - simulated)
+
+
+def _moved_to_tank(term: Term) -> Term:
+    """A force on a motion that is prescribed: where it acts no longer matters."""
+    return replace(term, place="tank")

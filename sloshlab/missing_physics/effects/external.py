@@ -1,0 +1,269 @@
+"""Forces that do not depend on the motion: pulses, and a machine that runs by itself, at structure or tank.
+
+What repeats from run to run is size, period and frequency; instants and phases are numbers of every run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from math import pi
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.missing_physics.candidate import (
+    Effect,
+    EffectParameter,
+    MissingForces,
+    Numbers,
+    Surroundings,
+    in_run,
+    multiples,
+    register,
+)
+from sloshlab.missing_physics.effects import scales
+from sloshlab.missing_physics.effects.force_effect import has_structure
+from sloshlab.missing_physics.evidence import IMPULSIVE, MEMORY, TIME_VARYING
+from sloshlab.missing_physics.extension import Extension
+from sloshlab.missing_physics.prior import Range
+from sloshlab.twin.external_forces import HARMONIC_FORCE, PULSE_TRAIN
+from sloshlab.twin.terms import Term
+
+FloatArray = NDArray[np.float64]
+_WIDTHS: Final = (0.1, 0.25, 0.5, 1.0, 2.0)
+"""Of pulses that are sought in a missing force, in periods of the motion; wider ones are a slow force."""
+_MOST_LINES: Final = 3
+"""Of a missing force, that are proposed."""
+
+
+def _of_run(numbers: Numbers, name: str, run: str) -> float:
+    """A number that every run has of its own, or all have alike."""
+    return numbers.get(in_run(name, run), numbers.get(name, 0.0))
+
+
+def _in_every_run(term: Callable[[Numbers, str, Surroundings], Term]) -> Callable[..., Extension]:
+    def extension(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
+        del channel
+        return Extension(run_terms={run: (term(numbers, run, at),) for run in at.runs})
+
+    return extension
+
+
+def _can_act(block: str) -> Callable[[Surroundings], bool]:
+    """In runs that are known by their names, at a block that is there."""
+    return lambda at: bool(at.runs) and (block == "tank" or has_structure(at))
+
+
+# --- pulses ----------------------------------------------------------------------------------------------------
+
+
+_PULSES: Final = (
+    EffectParameter("size_n", -1e7, 1e7, range=Range(1e-3, 10.0, scales.force, may_be_negative=True)),
+    EffectParameter("period_s", 1e-3, 1e5, range=Range(0.02, 1.0, scales.duration), tolerance=scales.period),
+    EffectParameter("width_s", 1e-4, 1e4, range=Range(0.03, 3.0, scales.period)),
+    EffectParameter(
+        "start_s",
+        0.0,
+        1e5,
+        range=Range(0.0, 1.0, scales.duration, is_log=False),
+        each_run=True,
+        tolerance=scales.period,
+    ),
+)
+
+
+def _pulses(block: str, *, alternates: bool) -> Callable[[Numbers, str, Surroundings], Term]:
+    def term(numbers: Numbers, run: str, at: Surroundings) -> Term:
+        del at
+        return PULSE_TRAIN(
+            place=block,
+            size_n=numbers["size_n"],
+            start_s=_of_run(numbers, "start_s", run),
+            period_s=numbers["period_s"],
+            # pulses that run into each other would end in a jump
+            width_s=min(numbers["width_s"], numbers["period_s"]),
+            alternates=float(alternates),
+        )
+
+    return term
+
+
+def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], list[Numbers]]:
+    """The train that explains most of a missing force, for pulses upward and downward."""
+
+    def proposed(at: Surroundings, missing: MissingForces) -> list[Numbers]:
+        best: dict[float, tuple[float, Numbers]] = {}
+        for width in _WIDTHS:
+            n = max(4, round(width / at.frequency_hz * at.sampling_rate_hz))
+            shape = 0.5 * (1 - np.cos(2 * pi * np.arange(n) / n))
+            longest = min((force.size for force in missing.values()), default=0)
+            if longest <= 4 * n:
+                continue
+            # force along the shape of a pulse that begins at each sample
+            along = {run: np.correlate(force, shape, "valid") / (shape @ shape) for run, force in missing.items()}
+            for period in _periods(n, longest):
+                for score, size, first in _folded(along, period, alternate=alternate):
+                    explained = score * float(shape @ shape)
+                    if explained > best.get(np.sign(size), (0.0,))[0]:
+                        rate = at.sampling_rate_hz
+                        starts = {in_run("start_s", run): place / rate for run, place in first.items()}
+                        train = {"size_n": size, "period_s": period / rate, "width_s": n / rate, **starts}
+                        best[np.sign(size)] = (explained, train)
+        return [train for _, train in sorted(best.values(), key=lambda found: -found[0])]
+
+    return proposed
+
+
+def _periods(width: int, longest: int) -> list[int]:
+    """Periods [samples], so near to each other that the last pulse slips by half a width at most."""
+    found, period = [], 2.0 * width
+    while period <= longest:
+        found.append(round(period))
+        period += max(1.0, 0.5 * width * period / longest)
+    return found
+
+
+def _folded(
+    along: Mapping[str, FloatArray], period: int, *, alternate: bool
+) -> list[tuple[float, float, dict[str, int]]]:
+    """Of trains of one period, upward and downward: what they explain, their size, their first samples."""
+    folded = {run: _mean_over_periods(values, period, alternate=alternate) for run, values in along.items()}
+    found = []
+    for sign in (1.0, -1.0):
+        total, weight, force, first = 0.0, 0.0, 0.0, {}
+        for run, (mean, counts) in folded.items():
+            sizes = np.maximum(sign * mean, 0.0)
+            place = int(np.argmax(sizes**2 * counts))
+            first[run] = place
+            total += float(sizes[place] ** 2 * counts[place])
+            force += float(sizes[place] * counts[place])
+            weight += float(counts[place])
+        found.append((total, sign * force / weight, first))
+    return found
+
+
+def _mean_over_periods(values: FloatArray, period: int, *, alternate: bool) -> tuple[FloatArray, FloatArray]:
+    """Mean of the values that are whole periods apart, and of how many, shape (period,)."""
+    n_rows = -(-values.size // period)
+    rows = np.zeros((n_rows, period))
+    rows.ravel()[: values.size] = values
+    counts = np.full(period, float(n_rows))
+    counts[values.size - (n_rows - 1) * period :] -= 1.0
+    if alternate:
+        rows[1::2] *= -1.0
+    return rows.sum(axis=0) / np.maximum(counts, 1.0), np.maximum(counts, 1.0)
+
+
+# --- a machine that runs by itself -----------------------------------------------------------------------------
+
+
+_LINE: Final = (
+    EffectParameter("size_n", 0.0, 1e7, range=Range(1e-4, 1.0, scales.force)),
+    EffectParameter(
+        "frequency_hz", 1e-2, 1e5, range=Range(0.05, 20.0, scales.frequency), tolerance=scales.cycle_in_a_run
+    ),
+    EffectParameter("phase", -1.0, 2.0, range=Range(0.0, 1.0, is_log=False), each_run=True),
+)
+
+
+def _line(block: str) -> Callable[[Numbers, str, Surroundings], Term]:
+    def term(numbers: Numbers, run: str, at: Surroundings) -> Term:
+        return HARMONIC_FORCE(
+            place=block,
+            frequency_hz=numbers["frequency_hz"],
+            size_n=numbers["size_n"],
+            phase=_of_run(numbers, "phase", run),
+            reference_s=0.5 * at.longest_run_s,
+        )
+
+    return term
+
+
+def _line_starts(at: Surroundings) -> Iterable[Numbers]:
+    frequencies = at.missed_hz or (1.3 * at.frequency_hz,)
+    return [
+        {"size_n": 0.01 * at.force_n, "frequency_hz": frequency, "phase": phase}
+        for frequency in frequencies
+        for phase in (0.25, 0.75)
+    ]
+
+
+def _lines_in(at: Surroundings, missing: MissingForces) -> list[Numbers]:
+    """The strongest lines of the missing force of all runs, each with its phase in every run."""
+    if not missing:
+        return []
+    n = 4 * max(force.size for force in missing.values())
+    power = sum(np.abs(np.fft.rfft(force - force.mean(), n)) ** 2 for force in missing.values())
+    spectrum = np.asarray(power)
+    inner = np.flatnonzero((spectrum[1:-1] > spectrum[:-2]) & (spectrum[1:-1] >= spectrum[2:])) + 1
+    found: list[Numbers] = []
+    for k in inner[np.argsort(-spectrum[inner])][:_MOST_LINES]:
+        frequency = float(k) * at.sampling_rate_hz / n
+        amplitudes = {run: _amplitude(force, frequency, at) for run, force in missing.items()}
+        phases = {
+            # F sin 2π(f t + φ) is the real part of −i F e^(2πi(f t + φ))
+            in_run("phase", run): float(np.angle(1j * value) / (2 * pi) % 1.0)
+            for run, value in amplitudes.items()
+        }
+        size = float(np.mean([abs(value) for value in amplitudes.values()]))
+        found.append({"size_n": size, "frequency_hz": frequency, **phases})
+    return found
+
+
+def _amplitude(force: FloatArray, frequency_hz: float, at: Surroundings) -> complex:
+    """Complex amplitude of a line about the instant to which phases refer."""
+    time = np.arange(force.size) / at.sampling_rate_hz - 0.5 * at.longest_run_s
+    return complex(2.0 * np.mean((force - force.mean()) * np.exp(-2j * pi * frequency_hz * time)))
+
+
+_SEPARATED_BY: Final = "a run in which nothing is driven or released; a run when the machines around are off"
+
+
+def _registered(block: str) -> tuple[Effect, Effect, Effect]:
+    """Pulses, pulses of alternating sign, and a line, at one block."""
+    train = multiples(
+        _PULSES,
+        *({"size_n": sign, "period_s": 0.25, "width_s": 0.5, "start_s": 0.1} for sign in (0.05, -0.05)),
+    )
+    pulses, alternating = (
+        register(
+            Effect(
+                name,
+                block,
+                PULSE_TRAIN.equation + after,
+                _PULSES,
+                train,
+                _in_every_run(_pulses(block, alternates=alternates)),
+                _SEPARATED_BY,
+                _can_act(block),
+                spoken_for_by=(IMPULSIVE, MEMORY, TIME_VARYING),
+                variant_of=variant_of,
+                size=("size_n",),
+                proposes=_pulses_in(alternate=alternates),
+            )
+        )
+        for name, after, alternates, variant_of in (
+            ("external_force", "", False, ""),
+            ("alternating_pulses", ", up and down in turn", True, "external_force"),
+        )
+    )
+    line = Effect(
+        "harmonic_force",
+        block,
+        HARMONIC_FORCE.equation,
+        _LINE,
+        _line_starts,
+        _in_every_run(_line(block)),
+        _SEPARATED_BY,
+        _can_act(block),
+        spoken_for_by=(MEMORY, TIME_VARYING),
+        variant_of="external_force",
+        size=("size_n",),
+        proposes=_lines_in,
+    )
+    return pulses, alternating, register(line)
+
+
+STRUCTURE = _registered("structure")
+TANK = _registered("tank")

@@ -1,0 +1,35 @@
+"""A user's own twin, given as a Python module that defines ``TWIN``.
+
+Two forms: `MechanicalTwin` only describes masses, springs, dampers, what drives and what is read, and runs in this
+package's own engine, which finds every contact and every turn of dry friction; `FreeTwin` simulates by itself and
+adds the force that it is handed.
+"""
+
+from sloshlab.user_twin.added_force import AddedForce
+from sloshlab.user_twin.description import (
+    Compared,
+    FreeTwin,
+    MechanicalTwin,
+    Parameter,
+    Response,
+    TwinRun,
+)
+from sloshlab.user_twin.extended import load_extended
+from sloshlab.user_twin.loading import load_user_twin
+from sloshlab.user_twin.mechanism import Mechanism, Reading
+from sloshlab.user_twin.model import UserTwinModel
+
+__all__ = [
+    "AddedForce",
+    "Compared",
+    "FreeTwin",
+    "MechanicalTwin",
+    "Mechanism",
+    "Parameter",
+    "Reading",
+    "Response",
+    "TwinRun",
+    "UserTwinModel",
+    "load_extended",
+    "load_user_twin",
+]

@@ -1,0 +1,254 @@
+"""What a user's module says about its twin: parameters, channels, and how a run is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sloshlab.errors import InputError, UnitsError
+from sloshlab.units import SI_UNITS
+from sloshlab.user_twin.added_force import AddedForce
+from sloshlab.user_twin.mechanism import Mechanism
+
+FloatArray = NDArray[np.float64]
+_LONGEST_NAME: Final = 100
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of the baseline.
+
+    Attributes
+    ----------
+    name : str
+    believed : float
+    tolerance : float
+        Standard deviation of what it may be. Retuning goes up to four tolerances away.
+    units : str
+        UDUNITS text; ``"1"`` where it has none.
+    each_run : bool
+        Whether every run has one of its own, such as an offset; ``values["name"]`` is that of the run.
+
+    Raises
+    ------
+    InputError
+        If a number or its units mean nothing.
+
+    Examples
+    --------
+    >>> Parameter("mass", 95.0, 10.0, "kg").units
+    'kg'
+    """
+
+    name: str
+    believed: float
+    tolerance: float
+    units: str = "1"
+    each_run: bool = False
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and 0 < len(self.name) <= _LONGEST_NAME and self.name.isprintable()):
+            raise InputError(
+                "parameter of a twin", got=f"the name {self.name!r}"[:120], allowed="a printable text"
+            )
+        for what, value in (("believed", self.believed), ("tolerance", self.tolerance)):
+            if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+                raise InputError(f"parameter {self.name}: {what}", got=repr(value)[:80], allowed="a finite number")
+        if not self.tolerance > 0:
+            raise InputError(
+                f"parameter {self.name}: tolerance",
+                got=f"{self.tolerance:g}",
+                allowed="> 0",
+                remedy="leave out what is known exactly",
+            )
+        _require_units(self.units, f"parameter {self.name}")
+
+
+def _require_units(units: str, what: str) -> None:
+    import cf_units
+
+    try:
+        good = isinstance(units, str) and bool(units.strip()) and not cf_units.Unit(units).is_unknown()
+    except ValueError:
+        good = False
+    if not good:
+        raise UnitsError(
+            f"{what}: units", got=repr(units)[:80], allowed="UDUNITS text", remedy="for example 'N s m-1', or '1'"
+        )
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A channel that the twin shows as it is recorded.
+
+    Attributes
+    ----------
+    units : str
+        In which the twin gives it: N, m, m s-1, m s-2 or V.
+    gain_tolerance : float
+        Of the sensor; a parameter of the baseline unless it is zero.
+    offset_tolerance : float
+        Of its zero, for each run, in `units`; a parameter of the baseline unless it is zero.
+    """
+
+    units: str
+    gain_tolerance: float = 0.01
+    offset_tolerance: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.units not in SI_UNITS.values():
+            raise UnitsError("compared channel", got=repr(self.units)[:80], allowed=", ".join(SI_UNITS.values()))
+        for tolerance in (self.gain_tolerance, self.offset_tolerance):
+            if not (isfinite(tolerance) and tolerance >= 0):
+                raise InputError("compared channel: tolerance", got=f"{tolerance}", allowed="≥ 0")
+
+
+@dataclass(frozen=True, eq=False)
+class TwinRun:
+    """What a twin may know of a run.
+
+    Attributes
+    ----------
+    name : str
+        File name without its ending.
+    sampling_rate_hz : float
+    n_samples : int
+    channels : mapping of str to ndarray
+        Recorded channels in SI units. The driving ones are meant as inputs; of the compared ones only their first
+        samples, for the start.
+    attributes : mapping
+        Of the recording.
+    """
+
+    name: str
+    sampling_rate_hz: float
+    n_samples: int
+    channels: Mapping[str, FloatArray]
+    attributes: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the samples."""
+        return np.arange(self.n_samples) / self.sampling_rate_hz
+
+    def start(self, channel: str, n_samples: int = 6) -> tuple[float, float]:
+        """Value and slope per second at the first sample, by a cubic through the first ones that are not lost.
+
+        Raises
+        ------
+        InputError
+            If more samples are lost at the beginning than the cubic passes through.
+        """
+        values = self.channels[channel]
+        known = np.flatnonzero(np.isfinite(values))[:n_samples]
+        if not known.size or known[0] > n_samples:
+            raise InputError(
+                f"{channel}: beginning",
+                got=f"{known[0] if known.size else values.size} lost samples",
+                allowed=f"at most {n_samples} before the start is read from it",
+                remedy="make the start a parameter with each_run=True, or cut the run",
+            )
+        # A cubic through some samples: a difference of the first two would carry the noise of both.
+        *_, slope, value = np.polyfit(known, values[known], min(3, known.size - 1))
+        return float(value), float(slope) * self.sampling_rate_hz
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What a twin that simulates by itself gives back.
+
+    Attributes
+    ----------
+    readings : mapping of str to array_like, shape (n_samples,)
+        Compared channels as perfect sensors show them.
+    motion : array_like, shape (n_samples, 3)
+        Displacement, velocity, acceleration of the coordinate on which added forces act.
+    """
+
+    readings: Mapping[str, ArrayLike]
+    motion: ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class MechanicalTwin:
+    """A twin that is a linear mechanism; forces that are added run in this package's engine.
+
+    Attributes
+    ----------
+    parameters : sequence of Parameter
+    driving : sequence of str
+        Channels that drive it.
+    compared : mapping of str to Compared or str
+        Channels that it shows; a text alone is that of `Compared.units`.
+    mechanism : callable
+        (`TwinRun`, parameter values by name) → `Mechanism`.
+    """
+
+    parameters: Sequence[Parameter]
+    driving: Sequence[str]
+    compared: Mapping[str, Compared | str]
+    mechanism: Callable[[TwinRun, Mapping[str, float]], Mechanism]
+
+
+@dataclass(frozen=True, eq=False)
+class FreeTwin:
+    """A twin that simulates by itself.
+
+    Attributes
+    ----------
+    parameters, driving, compared
+        As of `MechanicalTwin`.
+    simulate : callable
+        (`TwinRun`, parameter values by name, `AddedForce`) → `Response`. It must add the force, and its mass, to
+        the equation of motion.
+    moving_mass_kg : float
+        What the added force accelerates, about; effects choose their first sizes by it.
+    stiffness_n_per_m : float
+        Of its spring, about.
+    friction_speed_m_per_s : float, optional
+        Over which added dry friction turns; 0.002 of the largest speed of the baseline by default.
+    """
+
+    parameters: Sequence[Parameter]
+    driving: Sequence[str]
+    compared: Mapping[str, Compared | str]
+    simulate: Callable[[TwinRun, Mapping[str, float], AddedForce], Response]
+    moving_mass_kg: float = 1.0
+    stiffness_n_per_m: float = 1.0
+    friction_speed_m_per_s: float | None = None
+
+
+UserTwin = MechanicalTwin | FreeTwin
+
+
+def require_sound(twin: UserTwin) -> None:
+    """Check names and kinds of what a twin is made of.
+
+    Raises
+    ------
+    InputError
+        On the first thing that cannot be.
+    """
+    names = [parameter.name for parameter in _of_kind(twin.parameters, Parameter, "parameters")]
+    if len(set(names)) < len(names):
+        raise InputError("twin: parameters", got="a name twice", allowed="each name once")
+    if not twin.compared:
+        raise InputError("twin: compared", got="no channel", allowed="at least one")
+    call = twin.mechanism if isinstance(twin, MechanicalTwin) else twin.simulate
+    if not callable(call):
+        raise InputError("twin: its function", got=type(call).__name__, allowed="a function")
+    both = set(twin.driving) & set(twin.compared)
+    if both:
+        raise InputError("twin", got=f"{', '.join(sorted(both))} driving and compared", allowed="one of them")
+
+
+def _of_kind(values: Sequence[Parameter], kind: type, what: str) -> Sequence[Parameter]:
+    for value in values:
+        if not isinstance(value, kind):
+            raise InputError(f"twin: {what}", got=type(value).__name__, allowed=kind.__name__)
+    return values

@@ -1,0 +1,228 @@
+"""Noise of the accelerometer that drives a simulation, through a resonance, against its closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded_oscillators import DAMPING, MASS_KG, OMEGA, RATE_HZ, rig, run_of
+from scipy.signal import lfilter, welch
+
+from sloshlab.identification.case import Case, CaseRun
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.noise_floor import (
+    _WHITE,
+    _ignored_where_drive_noise_dominates,
+    _NoiseSpectrum,
+    _over_bands_of_a_resonance,
+    _propagated_noise,
+    _spectrum_of_drive_noise,
+    _with_noise_of_drive,
+    weighted_observations,
+)
+from sloshlab.identification.observations import Observation, noise_of_sensor, observations
+from sloshlab.identification.rig_model import RigModel
+
+NOISE_M_PER_S2 = 0.1
+MORE_DAMPING = 10.0
+"""So that the resonance forgets within half a second, and a minute tells its noise."""
+
+
+def quiet_run(duration_s: float, seed: int = 0, noise: float = NOISE_M_PER_S2) -> CaseRun:
+    """A base that stands still and an accelerometer on it that does not know it."""
+    still = np.zeros(round(duration_s * RATE_HZ))
+    channels = {"acceleration_tip": still, "acceleration_root": still}
+    sizes = {"acceleration_root": noise, "acceleration_tip": 1e-3}
+    return run_of("quiet", channels, sizes, seed, experiment="other", repeat=seed)
+
+
+def case_of(folder: Path, *runs: CaseRun) -> Case:
+    return Case("case", folder, rig(folder), runs)
+
+
+def test_noise_of_the_base_comes_through_the_resonance_as_its_closed_form_says(tmp_path: Path) -> None:
+    """White noise of density S through |(1 + 2iζr)/(1 − r² + 2iζr)|² has the mean square S π f (1 + 4ζ²)/(4ζ)."""
+    run = quiet_run(60.0)
+    plain = {"quiet": observations(run, ["acceleration_tip"])}
+    fit = FreeRunFit((), {"damping of mode 1": MORE_DAMPING}, 0.0, 0.0)
+    [(place, draws)] = _propagated_noise(
+        case_of(tmp_path, run), run, {"acceleration_root": _WHITE}, plain=plain, fit=fit
+    ).items()
+    found = np.mean(draws**2, axis=0)
+    ratio = MORE_DAMPING * DAMPING / (2 * MASS_KG * OMEGA)
+    density = 2 * NOISE_M_PER_S2**2 / RATE_HZ
+    expected = density * np.pi * OMEGA / (2 * np.pi) * (1 + 4 * ratio**2) / (4 * ratio)
+    assert place == ("quiet", "acceleration_tip")
+    noisier = _NoiseSpectrum(np.zeros(1), np.array([4.0]))
+    [of_louder] = _propagated_noise(
+        case_of(tmp_path, run), run, {"acceleration_root": noisier}, plain=plain, fit=fit
+    ).values()
+    assert of_louder == pytest.approx(2.0 * draws)
+    assert float(found.mean()) == pytest.approx(expected, rel=0.15)
+    frequencies, bands = plain["quiet"][0].frequencies_hz, found.mean(axis=0)
+    resonance, above = (int(np.argmin(np.abs(frequencies - f))) for f in (OMEGA / (2 * np.pi), 25.0))
+    assert bands[resonance] > 0.8 * bands.max() > 20 * bands[above]
+
+
+def test_a_channel_that_is_left_out_of_the_drive_is_compared_with_another_sensor(tmp_path: Path) -> None:
+    run = quiet_run(4.0)
+    plain = {"quiet": observations(run, ["acceleration_tip"])}
+    without = CaseRun(run.name, run.recording.drop_vars("acceleration_tip"), run.attributes)
+    fit = FreeRunFit((), {}, 0.0, 0.0)
+    [found] = _propagated_noise(
+        case_of(tmp_path, run), without, {"acceleration_root": _WHITE}, plain=plain, fit=fit
+    ).values()
+    # Away from the tapered ends, draws of white noise as loud as the sensor: 4 × 5 × 124 of them tell 3 %.
+    assert float(np.mean(found[:, 2:-2] ** 2)) == pytest.approx(NOISE_M_PER_S2**2, rel=0.08)
+
+
+SLOW, WHITE = 0.6, 0.8
+"""Standard deviations of two parts of a sensor's noise; they are stated as one, of size 1."""
+KEPT = 0.97
+"""Of the slow part from one sample to the next."""
+
+
+def coloured_run(seed: int, motion: np.ndarray) -> CaseRun:
+    """A base whose accelerometer adds white noise and a first-order process to its motion."""
+    generator = np.random.default_rng(seed)
+    steps = np.sqrt(1 - KEPT**2) * SLOW * generator.standard_normal(motion.size)
+    noise = lfilter([1.0], [1.0, -KEPT], steps) + WHITE * generator.standard_normal(motion.size)
+    run = run_of(f"run_{seed}", {"acceleration_root": motion + noise}, {}, seed, experiment="other", repeat=seed)
+    run.recording["acceleration_root"].attrs["noise_std"] = 1.0
+    return run
+
+
+def test_the_colour_of_a_drives_noise_is_that_of_its_closed_form(tmp_path: Path) -> None:
+    """White noise beside a first-order process: density over that of all of it as white noise, at least one."""
+    motion = 30.0 * np.sin(np.arange(50 * 250) / 9.0)
+    runs = [coloured_run(seed, motion) for seed in (1, 2, 3)]
+    found = _spectrum_of_drive_noise(case_of(tmp_path, *runs), "acceleration_root")
+    for frequency in (1.0, 2.0, 4.0, 8.0, 100.0):
+        turned = 1 + KEPT**2 - 2 * KEPT * np.cos(2 * np.pi * frequency / RATE_HZ)
+        expected = max(WHITE**2 + SLOW**2 * (1 - KEPT**2) / turned, 1.0)
+        assert np.interp(frequency, found.frequencies_hz, found.ratios) == pytest.approx(expected, rel=0.25)
+
+
+def test_noise_of_a_colour_has_its_spectrum_and_no_other(tmp_path: Path) -> None:
+    motion = np.zeros(50 * 250)
+    found = _spectrum_of_drive_noise(
+        case_of(tmp_path, *(coloured_run(seed, motion) for seed in (1, 2, 3))), "acceleration_root"
+    )
+    noise = found.coloured(np.random.default_rng(9).standard_normal(200 * 250), RATE_HZ)
+    frequencies, density = welch(noise, RATE_HZ, nperseg=1000)
+    chosen = (frequencies > 0.5) & (frequencies < 20)
+    expected = np.interp(frequencies, found.frequencies_hz, found.ratios) * 2 / RATE_HZ
+    assert density[chosen] == pytest.approx(expected[chosen], rel=0.5)
+    assert density[chosen].mean() == pytest.approx(expected[chosen].mean(), rel=0.1)
+
+
+def test_drives_that_differ_by_more_than_noise_tell_no_colour(tmp_path: Path) -> None:
+    motion = 30.0 * np.sin(np.arange(50 * 250) / 9.0)
+    runs = [coloured_run(1, motion), coloured_run(2, motion + 5.0 * np.sin(np.arange(motion.size) / 40.0))]
+    case = case_of(tmp_path, *runs)
+    assert len(case.tests()) == 1
+    assert _spectrum_of_drive_noise(case, "acceleration_root") is _WHITE
+    assert _spectrum_of_drive_noise(case_of(tmp_path, runs[0]), "acceleration_root") is _WHITE
+
+
+def test_the_floor_of_two_repeats_knows_the_noise_of_the_base(tmp_path: Path) -> None:
+    """Two repeats whose noise happens to be the same: their difference is none, the floor is that of the noise."""
+    runs = [quiet_run(8.0) for _ in range(2)]
+    runs[1] = CaseRun("again", runs[0].recording.assign_attrs(repeat=1), runs[1].attributes)
+    case = case_of(tmp_path, *runs)
+    found = weighted_observations(case, RigModel(case.rig, tmp_path, case.runs))  # type: ignore[arg-type]
+    [observation] = found["quiet"]
+    least = observation.variance[:, np.argmax(observation.variance.mean(axis=0))].mean()
+    assert least > 10 * 1e-3**2
+
+
+def test_the_noise_of_a_sensor_is_what_is_stated_or_what_its_high_bands_show() -> None:
+    run = quiet_run(20.0)
+    assert noise_of_sensor(run, "acceleration_root") == pytest.approx(NOISE_M_PER_S2, rel=0.05)
+    del run.recording["acceleration_root"].attrs["noise_std"]
+    assert noise_of_sensor(run, "acceleration_root") == pytest.approx(NOISE_M_PER_S2, rel=0.15)
+
+
+def test_what_a_drive_moves_counts_where_nothing_is_recorded(tmp_path: Path) -> None:
+    """A hum on the accelerometer of the base alone: the simulated mass hums, the recorded one rests."""
+    hum_hz, runs = 20.0, []
+    for repeat in range(2):
+        run = quiet_run(8.0, seed=repeat, noise=1e-3)
+        root = run.recording["acceleration_root"]
+        hum = 2.0 * np.sin(2 * np.pi * hum_hz * np.arange(root.size) / RATE_HZ + repeat)
+        recording = run.recording.assign(acceleration_root=root.copy(data=root.values + hum))
+        runs.append(CaseRun(f"run {repeat}", recording.assign_attrs(repeat=repeat), run.attributes))
+    case = case_of(tmp_path, *runs)
+    found = weighted_observations(case, RigModel(case.rig, tmp_path, case.runs))  # type: ignore[arg-type]
+    for [observation] in found.values():
+        hums = np.abs(observation.frequencies_hz - hum_hz) < 1.0
+        assert observation.informative[2:-2, hums].all()
+        assert observation.simulated is not None
+        # well above its resonance a mass on a spring moves by 1/(r² − 1) of its base, and a first fit lessens it
+        passed = 1 / ((2 * np.pi * hum_hz / OMEGA) ** 2 - 1)
+        of_base = observation.of(hum)
+        power = (observation.simulated[3:-3, hums] ** 2).sum() / (of_base[3:-3, hums] ** 2).sum()
+        assert np.sqrt(power) == pytest.approx(passed, rel=0.3)
+
+
+def test_noise_of_a_resonance_may_lie_where_the_resonance_may() -> None:
+    """One narrow line: as large in all bands within five per cent, at least in the next ones, over some blocks."""
+    square = np.zeros((40, 100))
+    square[:, 5], square[:, 60] = 1.0, 2.0
+    found = _over_bands_of_a_resonance(square)
+    expected = np.zeros(100)
+    # band k is at k + 1/2 and looks 0.05 (k + 1/2) bands to both sides, rounded up: 57 and 64 look at 60
+    expected[4:7], expected[57:65] = 1.0, 2.0
+    np.testing.assert_allclose(found, np.tile(expected, (40, 1)))
+    burst = np.zeros((40, 100))
+    burst[20, 30] = 9.0
+    assert _over_bands_of_a_resonance(burst)[:, 30].tolist() == [0.0] * 16 + [1.0] * 9 + [0.0] * 15
+
+
+def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
+    run = quiet_run(8.0)
+    [rests] = observations(run, ["acceleration_tip"])
+    sensor, place = rests.variance, ("quiet", "acceleration_tip")
+
+    def counts_for_less(observation: Observation, share: float) -> bool:
+        noise = {place: share * sensor}
+        noisier = _with_noise_of_drive(observation, noise, ())
+        np.testing.assert_allclose(noisier.variance, (1 + share) * sensor)
+        [factor] = np.unique(
+            (_ignored_where_drive_noise_dominates(noisier, observation, noise).variance / noisier.variance).round(
+                6
+            )
+        )
+        assert factor in (1.0, 100.0)
+        return bool(factor > 1.0)
+
+    assert counts_for_less(rests, 3.0)
+    assert not counts_for_less(rests, 0.5)
+    assert not counts_for_less(replace(rests, spectra=rests.spectra + 10 * np.sqrt(sensor)), 3.0)
+    assert not counts_for_less(replace(rests, simulated=np.full(sensor.shape, 10 * np.sqrt(sensor.max()))), 3.0)
+    np.testing.assert_array_equal(_ignored_where_drive_noise_dominates(rests, rests, {}).variance, sensor)
+
+
+def test_slow_displacements_are_known_to_a_few_times_the_noise_of_the_base(tmp_path: Path) -> None:
+    """Near the ends, where the filter that removes drift settles, and where that is not known: not at all."""
+    still = np.zeros(round(20.0 * RATE_HZ))
+    channels = {"displacement_tank": still + 1e-3, "acceleration_root": still}
+    run = run_of("quiet", channels, {"acceleration_root": 0.1, "displacement_tank": 1e-5}, 1, experiment="other")
+    driving = ("acceleration_root",)
+    [observation] = observations(run, ["displacement_tank"], driving, knows_noise_of_drive=True)
+    [unknown] = observations(run, ["displacement_tank"], driving)
+    slow, middle = observation.frequencies_hz < 2.5, (observation.times_s > 2.5) & (observation.times_s < 17.0)
+    sensor = observation.variance[-1, -1]
+    assert (observation.variance[np.ix_(middle, slow)] == sensor).all()
+    assert (observation.variance[np.ix_(~middle, slow)] > 1e3 * sensor).sum() >= 2 * 4 * slow.sum()
+    assert (unknown.variance[:, slow] > 1e3 * sensor).all()
+    assert (unknown.variance[:, ~slow] == sensor).all()
+    noise = {("quiet", "displacement_tank"): np.full(observation.spectra.shape, 7.0 * sensor)}
+    noisier = _with_noise_of_drive(observation, noise, driving).variance
+    np.testing.assert_allclose(noisier[np.ix_(middle, slow)], 9 * 8.0 * sensor)
+    np.testing.assert_allclose(noisier[:, ~slow], 8.0 * sensor)
+    np.testing.assert_allclose(
+        _with_noise_of_drive(observation, noise, ()).variance[np.ix_(middle, slow)], 8.0 * sensor
+    )

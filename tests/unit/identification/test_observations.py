@@ -1,0 +1,187 @@
+"""Noise that is known, repeats that scatter, samples that are lost or clipped: what they weigh."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from recorded_oscillators import NOISE, RATE_HZ, decays, run_of
+
+from sloshlab.identification.case import CaseRun
+from sloshlab.identification.lapped_transform import lapped_spectra
+from sloshlab.identification.observations import Observation, observations, with_scatter, with_typical_scatter
+
+N = 3000
+HELD = 16
+"""Samples in which a release may be: four times four."""
+TIME = np.arange(N) / RATE_HZ
+TONE = 2.0 * np.cos(2 * np.pi * 6.0 * TIME)
+
+
+def run(values: np.ndarray, channel: str = "acceleration_tip", noise: float = 0.0, **described: Any) -> CaseRun:
+    found = run_of("run", {channel: values}, {channel: noise}, 3, initial_displacement_m=0.01)
+    found.recording[channel].attrs.update(described)
+    return found
+
+
+def test_the_stated_noise_is_the_variance() -> None:
+    [observation] = observations(run(TONE, noise=0.05), ["acceleration_tip"])
+    np.testing.assert_allclose(observation.variance, 0.05**2, rtol=0.25)
+    assert observation.variance.min() >= 0.05**2
+
+
+def test_what_no_model_need_describe_is_added_in_squares() -> None:
+    [observation] = observations(run(TONE, noise=0.03, known_to=0.04), ["acceleration_tip"])
+    np.testing.assert_allclose(observation.variance, 0.05**2, rtol=1e-6)
+    assert observation.is_rough
+    [other] = observations(run(TONE, noise=0.03), ["acceleration_tip"])
+    assert not other.is_rough
+
+
+def test_noise_that_nobody_stated_is_read_from_the_quiet_end_of_the_spectrum() -> None:
+    noisy = TONE + 0.05 * np.random.default_rng(1).normal(size=N)
+    [observation] = observations(run(noisy), ["acceleration_tip"])
+    assert np.sqrt(observation.variance.max()) == pytest.approx(0.05, rel=0.15)
+
+
+def test_no_channel_is_believed_beyond_quantisation() -> None:
+    [observation] = observations(run(TONE), ["acceleration_tip"])
+    assert np.sqrt(observation.variance.min()) == pytest.approx(
+        1e-4 * np.sqrt(np.mean(observation.spectra**2)), rel=0.3
+    )
+
+
+def test_a_residual_of_the_noise_alone_is_of_unit_size() -> None:
+    decay = decays((0.01,), 6.0)[0]
+    clean = decays((0.01,), 6.0, noise={})[0]
+    for observation in observations(decay, list(NOISE)[:2]):
+        residual = observation.residual(clean.recording[observation.channel].values)
+        # the transform keeps energy: as many degrees of freedom as samples, fewer than coefficients
+        assert 0.85 < np.sum(residual**2) / observation.known.sum() < 1.1, observation.channel
+
+
+def test_lost_and_clipped_samples_are_masked_on_both_sides() -> None:
+    values = TONE.copy()
+    values[500:520] = np.nan
+    clipped = np.clip(values, -1.9, 1.9)
+    [observation] = observations(run(clipped, range_min=-1.9, range_max=1.9), ["acceleration_tip"])
+    released = np.arange(N) >= HELD
+    np.testing.assert_array_equal(observation.known, np.isfinite(values) & (np.abs(values) < 1.9) & released)
+    assert np.isfinite(observation.spectra).all()
+    # what a simulation shows in the masked samples does not matter
+    wild = np.where(observation.known, clipped, 1e6)
+    assert np.abs(observation.residual(wild)).max() < 1e-6
+
+
+def test_a_channel_that_is_mostly_lost_is_no_observation() -> None:
+    values = np.full(N, np.nan)
+    values[:200] = TONE[:200]
+    assert observations(run(values), ["acceleration_tip"]) == []
+
+
+def test_the_zero_of_an_accelerometer_means_nothing_and_that_of_a_displacement_does() -> None:
+    for channel, matters in (("acceleration_tip", False), ("displacement_tank", True)):
+        [observation] = observations(run(TONE + 0.3, channel), [channel])
+        assert observation.keeps_mean == matters
+        moved = np.abs(observation.residual(TONE)).max()
+        assert (moved > 10) == matters, channel
+
+
+def test_the_end_of_a_shorter_simulation_is_taken_as_zero() -> None:
+    [observation] = observations(run(TONE), ["acceleration_tip"])
+    short, padded = TONE[:2000], np.where(np.arange(N) < 2000, TONE, 0.0)
+    mean_free = padded.copy()
+    mean_free[:2000] -= short[HELD:].mean()
+    mean_free[:HELD] = 0.0
+    np.testing.assert_allclose(
+        observation.of(short), lapped_spectra(faded(mean_free, observation), observation.n_bands), atol=1e-9
+    )
+
+
+def faded(values: np.ndarray, observation: Observation) -> np.ndarray:
+    """Raised cosines: half a block in and out, a release comes in sixteen times faster once it has happened."""
+    n = observation.n_bands // 2
+    n_held, n_in = (HELD, n // 16) if observation.run.is_free else (0, n)
+    rising = 0.5 - 0.5 * np.cos(np.pi * np.arange(n_in) / n_in)
+    falling = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, n + 1) / n)
+    return values * np.concatenate([np.zeros(n_held), rising, np.ones(values.size - n_held - n_in - n), falling])
+
+
+def test_an_abrupt_end_does_not_spread_over_all_bands() -> None:
+    """An error of the tone's size, such as a sensor's gain, stays where the tone is."""
+    [observation] = observations(run(TONE), ["acceleration_tip"])
+    error = (0.99 * observation.spectra - observation.of(TONE))[-3:] ** 2
+    near = np.abs(observation.frequencies_hz - 6.0) < 8.0
+    assert error[:, ~near].sum() < 1e-3 * error.sum()
+
+
+def repeats(n: int, scatter: float, quiet: float = 0.02) -> list[CaseRun]:
+    generator = np.random.default_rng(7)
+    return [run(TONE * (1 + scatter * generator.normal()), noise=quiet) for _ in range(n)]
+
+
+def test_what_does_not_repeat_is_not_believed() -> None:
+    """The scatter of the residuals of repeats is the variance, where it exceeds that of the sensor."""
+    generator = np.random.default_rng(8)
+    group = [observations(run(TONE, noise=0.02), ["acceleration_tip"]) for _ in range(40)]
+    shape = group[0][0].spectra.shape
+    size = np.where(np.arange(shape[1]) < shape[1] // 2, 0.5, 0.0)
+    residuals = [{"acceleration_tip": size * generator.normal(size=shape)} for _ in group]
+    [first, *_] = with_scatter(group, residuals)
+    variance = first[0].variance
+    half = shape[1] // 2
+    assert np.median(variance[:, : half - 9]) == pytest.approx(0.25, rel=0.05)
+    np.testing.assert_allclose(variance[:, half + 9 :], group[0][0].variance.min())
+
+
+@pytest.mark.parametrize("n_repeats", [2, 12])
+def test_steady_noise_of_the_lowest_bands_is_not_smeared(n_repeats: int) -> None:
+    """Noise with a hundred times the variance in the lowest band alone, at all times alike."""
+    generator = np.random.default_rng(9)
+    group = [observations(run(TONE, noise=0.02), ["acceleration_tip"]) for _ in range(n_repeats)]
+    shape = group[0][0].spectra.shape
+    size = np.where(np.arange(shape[1]) < 1, 10.0, 1.0)
+    lowest = [
+        with_scatter(group, [{"acceleration_tip": size * generator.normal(size=shape)} for _ in group])[0][
+            0
+        ].variance
+        for _ in range(60)
+    ]
+    # The mean of sixty medians over the blocks of the runs.
+    assert np.mean([np.median(variance[:, 0]) for variance in lowest]) == pytest.approx(100.0, rel=0.25)
+
+
+def test_a_channel_that_shows_nothing_has_its_noise_where_no_test_was_repeated_too() -> None:
+    group = [observations(repeat, ["acceleration_tip"]) for repeat in repeats(2, 0.0)]
+    loud = [replace(each, variance=np.full(each.spectra.shape, 1e6)) for repeat in group for each in repeat]
+    assert not any(each.informative.any() for each in loud)
+    [target] = with_typical_scatter(observations(run(TONE, noise=0.02), ["acceleration_tip"]), loud)
+    np.testing.assert_allclose(target.variance, 1e6)
+
+
+def test_an_equal_error_in_all_repeats_is_no_scatter() -> None:
+    """What the model misses in every repeat alike must stay visible."""
+    group = [observations(run(TONE, noise=0.02), ["acceleration_tip"]) for _ in range(3)]
+    same = {"acceleration_tip": np.full(group[0][0].spectra.shape, 5.0)}
+    for repeat in with_scatter(group, [same] * 3):
+        np.testing.assert_allclose(repeat[0].variance, group[0][0].variance.min())
+
+
+def test_a_test_without_repeats_is_weighted_as_its_channels_scatter_elsewhere() -> None:
+    group = [observations(repeat, ["acceleration_tip"]) for repeat in repeats(6, 0.05)]
+    raw = [{"acceleration_tip": repeat[0].spectra - group[0][0].spectra} for repeat in group]
+    weighted = [observation for each in with_scatter(group, raw) for observation in each]
+    [target] = with_typical_scatter(observations(run(3.0 * TONE, noise=0.02), ["acceleration_tip"]), weighted)
+    tone = np.argmax(np.mean(target.spectra**2, axis=0))
+    share = target.variance[3:-3, tone].mean() / (target.spectra[3:-3, tone] ** 2).mean()
+    source = weighted[0]
+    expected = source.variance[3:-3, tone].mean() / (source.spectra[3:-3, tone] ** 2).mean()
+    assert share == pytest.approx(expected, rel=0.5)
+    assert target.variance[:, -5:].max() < 10 * 0.02**2
+
+
+def test_without_any_repeats_the_sensor_alone_decides() -> None:
+    target = observations(run(TONE, noise=0.02), ["acceleration_tip"])
+    assert with_typical_scatter(target, []) == target
