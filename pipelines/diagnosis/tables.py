@@ -103,7 +103,7 @@ def explanation_table(diagnosis: Diagnosis) -> Table:
         "what remains, and its log evidence",
     )
     caption = (
-        "Log evidence over all runs with the standard error of its difference by stretches of two seconds. What "
+        "Log evidence over all runs with the standard error of its difference by cells of 2 s and 4 Hz. What "
         "remains is any force of a block, or any error of a sensor, that describes the rest better than noise and "
         "bursts do."
     )

@@ -107,7 +107,7 @@ def equals_of(best: ScoredModel, found: Posterior) -> list[ScoredModel]:
 
 
 def standard_error_of_difference(first: ScoredModel, other: ScoredModel) -> float:
-    """Standard error of the difference of two log-likelihoods, by its scatter over cells of time.
+    """Standard error of the difference of two log-likelihoods, by its scatter over cells.
 
     Parameters
     ----------

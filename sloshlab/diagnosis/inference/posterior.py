@@ -1,7 +1,7 @@
 """Posterior probabilities of models: evidence averaged over resampled recordings (pseudo-BMA+).
 
-The evidence of a model is a sum over stretches of the recordings, which scatters from stretch to stretch where no
-model is quite right. Weights are averaged over Bayesian bootstraps of the stretches, so that a lead that rests on
+The evidence of a model is a sum over cells of time and frequency, which scatters from cell to cell where no
+model is quite right. Weights are averaged over Bayesian bootstraps of the cells, so that a lead that rests on
 few of them is no certainty (Yao, Vehtari, Simpson and Gelman 2018, doi:10.1214/17-BA1091).
 """
 
@@ -45,7 +45,7 @@ class Hypothesis:
     label : str
         What is said if it is true: names joined by " + ", none, or unknown.
     log_prior : float
-    by_cell : ndarray, shape (n_cells_of_time,)
+    by_cell : ndarray, shape (n_cells,)
         Tempered log-likelihood.
     """
 

@@ -26,7 +26,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from sloshlab.diagnosis.inference.places import SENSOR, block_of
 from sloshlab.diagnosis.inference.run_noise import sums_of_cells
@@ -51,14 +51,14 @@ TEMPERING: Final = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """Log-likelihood of one model, cell by cell of time, and with a remainder at each place.
+    """Log-likelihood of one model, cell by cell of time and frequency, and with a remainder at each place.
 
     Attributes
     ----------
-    noise : ndarray, shape (n_cells_of_time,)
-        With noise and bursts alone.
+    noise : ndarray, shape (n_cells,)
+        With noise and bursts alone; the cells of all runs, one after the other.
     places : dict
-        The same with any force, or any error of a sensor, at a place; shape (n_shares, n_cells_of_time).
+        The same with any force, or any error of a sensor, at a place; shape (n_shares, n_cells).
     """
 
     noise: FloatArray
@@ -92,7 +92,7 @@ def remainder(runs: Sequence[WhitenedRun], missing: Sequence[WhitenedRun] = ()) 
     per_run: list[dict[str, FloatArray]] = []
     for number, run in enumerate(runs):
         independent = run.noise.whitened(run.residual)
-        plain = sums_of_cells((-0.5 * independent**2).sum(axis=0)).sum(axis=-1)
+        plain = sums_of_cells((-0.5 * independent**2).sum(axis=0))
         gains = {place: _gains(independent, *directions) for place, directions in run.noise.places.items()}
         inexact_powers = _powers_of_inexactness(run, missing[number] if missing else None)
         small = {place: _POWERS[:, None, None] < powers for place, powers in inexact_powers.items()}
@@ -100,12 +100,11 @@ def remainder(runs: Sequence[WhitenedRun], missing: Sequence[WhitenedRun] = ()) 
         inexact = _log_mean(np.stack([_log_mean_of(gains[place], small[place]) for place in gains]))
         usual = np.logaddexp(np.log(0.5), np.log(0.5) + inexact)
         # A burst is noise of one sensor in all bands of a stretch of time.
-        bursts = [gain.sum(axis=-1) for place, gain in gains.items() if block_of(place) == SENSOR]
-        burst = np.log(BURST) + _log_mean(np.concatenate(bursts))
-        noise.append(plain + np.logaddexp(np.log1p(-BURST) + usual.sum(axis=-1), burst))
+        bursts = np.concatenate([gain for place, gain in gains.items() if block_of(place) == SENSOR])
+        noise.append((plain + _or_burst(usual, bursts)).ravel())
         mixed = {place: _mixed(usual, _log_mean_of(gains[place], ~small[place])) for place in gains}
         per_run.append(
-            {place: plain + np.logaddexp(np.log1p(-BURST) + mixed[place].sum(axis=-1), burst) for place in gains}
+            {place: (plain + _or_burst(mixed[place], bursts)).reshape(SHARES.size, -1) for place in gains}
         )
     places = dict.fromkeys(place for found in per_run for place in found)
     return Remainder(
@@ -123,6 +122,28 @@ def remainder(runs: Sequence[WhitenedRun], missing: Sequence[WhitenedRun] = ()) 
     )
 
 
+def _or_burst(usual: FloatArray, bursts: FloatArray) -> FloatArray:
+    """Log-likelihood ratios where each stretch of time may be a burst of a sensor, shape (…, n_times, n_bands).
+
+    A burst has all bands of its stretch, so that only the sum over these has a likelihood; it is shared out among
+    them as each expects of it (the lower bound of expectation maximisation, where it is exact).
+
+    Parameters
+    ----------
+    usual : ndarray, shape (…, n_times, n_bands)
+        Without a burst.
+    bursts : ndarray, shape (n_bursts, n_times, n_bands)
+        With each that is possible; all are as probable.
+    """
+    of_each = bursts.sum(axis=-1)
+    burst = np.einsum("bt,btk->tk", softmax(of_each, axis=0), bursts)
+    both = np.stack(np.broadcast_arrays(np.log1p(-BURST) + usual.sum(axis=-1), np.log(BURST) + _log_mean(of_each)))
+    without, with_burst = softmax(both, axis=0)[..., None]
+    expected = without * usual + with_burst * burst
+    total = logsumexp(both, axis=0)
+    return np.asarray(expected + ((total - expected.sum(axis=-1)) / expected.shape[-1])[..., None])
+
+
 def _powers_of_inexactness(run: WhitenedRun, missing: WhitenedRun | None) -> dict[str, FloatArray]:
     """Power that a simulation may leave at each place, in noise variances, per cell of time and frequency."""
     signal = run.noise.whitened(run.simulated)
@@ -130,7 +151,7 @@ def _powers_of_inexactness(run: WhitenedRun, missing: WhitenedRun | None) -> dic
     shown = np.any([each.informative for each in run.observed], axis=0)
     found = {}
     for place, (projections, _) in run.noise.places.items():
-        found[place] = run.noise.exactness**2 * _power_of_cells(signal, projections)
+        found[place] = run.noise.exactness[place] ** 2 * _power_of_cells(signal, projections)
         if lacking is not None:
             # A law that is off by a little leaves it elsewhere, too, such as at multiples of a frequency.
             everywhere = float(_power(lacking, projections)[shown].mean()) if shown.any() else 0.0

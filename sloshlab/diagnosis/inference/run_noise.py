@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from sloshlab.diagnosis.inference.places import SENSOR, STRUCTURE, transfers_of
+from sloshlab.diagnosis.inference.places import SENSOR, STRUCTURE, TANK, transfers_of
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
@@ -49,13 +49,13 @@ class RunNoise:
     places : dict of str to (ndarray, ndarray)
         Projections of whitened channels on the directions in which a place shows, shape (n_blocks, n_bands, m,
         n_channels), and the share of its power in each, shape (n_blocks, n_bands, m).
-    exactness : float
-        Of the simulated motion, to which a simulation can describe the run.
+    exactness : dict of str to float
+        Of the simulated motion at each place, to which a simulation can describe the run.
     """
 
     inverse_root: FloatArray
     places: dict[str, tuple[FloatArray, FloatArray]]
-    exactness: float = _EXACT
+    exactness: Mapping[str, float]
 
     def whitened(self, x: FloatArray) -> FloatArray:
         """Channels with independent noise.
@@ -83,7 +83,8 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
     n = len(observed)
     noise = np.sqrt(np.stack([each.variance for each in observed], axis=-1))
     places = {}
-    for place, transfers in transfers_of(model, observed, values).items():
+    transfers_at = transfers_of(model, observed, values)
+    for place, transfers in transfers_at.items():
         # Real and imaginary part as two directions: the transform is real, and its phase runs.
         parts = np.stack([transfers.real, transfers.imag], axis=-1)
         if parts.any():
@@ -94,7 +95,13 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
     for i, each in enumerate(observed):
         places[f"{SENSOR} {each.channel}"] = _projections(inverse_root @ np.eye(n)[:, i : i + 1])
     is_chaotic = isinstance(model, RigModel) and model.liquid_fluctuates(observed[0].run)
-    return RunNoise(inverse_root, places, _EXACT_BESIDE_CHAOS if is_chaotic else _EXACT)
+    steady = set(places)
+    if is_chaotic:
+        # What the tank does not move, such as the acceleration of a driven table, knows no chaos of its liquid.
+        is_moved = np.abs(transfers_at[TANK]).sum(axis=0) > 0
+        steady = {f"{SENSOR} {each.channel}" for each, moved in zip(observed, is_moved, strict=True) if not moved}
+    exactness = {place: _EXACT if place in steady else _EXACT_BESIDE_CHAOS for place in places}
+    return RunNoise(inverse_root, places, exactness)
 
 
 def _covariance(observed: Sequence[Observation]) -> FloatArray:

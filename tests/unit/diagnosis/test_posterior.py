@@ -45,7 +45,7 @@ def model(
         place: np.broadcast_to(np.full(N_CELLS, all_of_it / N_CELLS), (4, N_CELLS))
         for place, all_of_it in (places or {}).items()
     }
-    alone = RunNoise(np.ones((1, 4, 1, 1)), {})
+    alone = RunNoise(np.ones((1, 4, 1, 1)), {}, {})
     runs = [WhitenedRun([], np.full((1, 1, 4), -total), alone)]
     return ScoredModel(fit, values, runs, Remainder(by_cell, of_places), frozenset(), 0.0)
 

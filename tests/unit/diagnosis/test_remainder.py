@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from sloshlab.diagnosis.inference.remainder import remainder
@@ -46,7 +47,7 @@ def run(
         shown = root @ vector
         rows = np.broadcast_to((shown / np.linalg.norm(shown))[None], (*shape, 1, 2))
         places[place] = (rows, np.ones((*shape, 1)))
-    noise = RunNoise(np.broadcast_to(root, (*shape, 2, 2)), places)
+    noise = RunNoise(np.broadcast_to(root, (*shape, 2, 2)), places, dict.fromkeys(places, 0.01))
     return WhitenedRun(cast(Any, observed), residual, noise)
 
 
@@ -76,6 +77,29 @@ def test_the_marginal_likelihood_of_one_cell_is_that_of_multivariate_normals() -
         assert found.places["sensor displacement_tank"][i].sum() == pytest.approx(
             np.log(of_sensor) + constant, rel=1e-9
         )
+
+
+def test_a_burst_has_all_bands_of_its_stretch_and_is_shared_out_among_them() -> None:
+    """Two cells of frequency, the second with a line that no other cell has."""
+    x = np.random.default_rng(5).normal(size=(2, 4, 8))
+    x[1, :, 6] += 6.0
+    found = remainder([run(x)])
+    cells = (x[..., :4], x[..., 4:])
+    plain = [log_normal(cell, np.eye(2)) for cell in cells]
+    of_powers = [
+        sum(log_normal(cell, np.eye(2) + s * np.outer(along, along)) for cell in cells)
+        for along in np.eye(2)
+        for s in POWERS
+    ]
+    whole = np.logaddexp(
+        np.log(1 - BURST) + sum(plain), np.log(BURST) + logsumexp(of_powers) - np.log(len(of_powers))
+    )
+    constant = 0.5 * x.size * np.log(2 * np.pi)
+    assert found.noise.shape == (2,)
+    assert found.noise.sum() == pytest.approx(whole + constant, rel=1e-9)
+    # What a burst explains, it explains where the line is; in the other cell it expects more than there is.
+    gained = found.noise - np.array(plain) - constant / 2
+    assert gained[1] > 20.0 and gained[0] < 0.0
 
 
 def test_noise_that_the_channels_share_is_no_force() -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
+from recorded_oscillators import RATE_HZ, rig, run_of
 
 from sloshlab.diagnosis.inference.run_noise import run_noise, sums_of_cells
+from sloshlab.identification.rig_model import RigModel
 
 SHAPE = (8, 12)
 
@@ -58,6 +61,29 @@ def test_an_error_of_a_sensor_shows_along_its_channel() -> None:
     rows, shares = found.places["structure"]
     np.testing.assert_allclose(shares, 0.5)
     np.testing.assert_allclose(rows[0, 0] @ rows[0, 0].T, np.eye(2), atol=1e-12)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.5])
+def test_what_the_tank_does_not_move_knows_no_chaos_of_its_liquid(tmp_path: Path, damping: float) -> None:
+    names = ("acceleration_root", "acceleration_tip", "force_interface")
+    time = np.arange(500) / RATE_HZ
+    run = run_of("run_1", dict.fromkeys(names, np.sin(40.0 * time)), {}, 0, experiment="other")
+    channels = [
+        SimpleNamespace(
+            run=run,
+            channel=name,
+            spectra=np.zeros(SHAPE),
+            variance=np.ones(SHAPE),
+            of_drive=None,
+            frequencies_hz=np.linspace(1.0, 24.0, SHAPE[1]),
+        )
+        for name in names
+    ]
+    model = RigModel(rig(tmp_path, damping), tmp_path, [run])
+    exact = run_noise(model, cast(Any, channels), {}).exactness
+    assert exact["sensor acceleration_root"] == 0.01
+    for place in ("tank", "structure", "sensor acceleration_tip", "sensor force_interface"):
+        assert exact[place] == (0.05 if damping else 0.01)
 
 
 def test_cells_at_the_ends_are_smaller() -> None:
