@@ -1,4 +1,6 @@
-"""Intervals of what is named: the posterior of the fit, at least as wide as stretches of the runs disagree."""
+"""Intervals of what is named: the posterior of the fit, at least as wide as stretches of the runs disagree, and as
+simulations are exact.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +10,12 @@ from typing import Final
 import numpy as np
 
 from sloshlab.diagnosis.findings import Findings
+from sloshlab.diagnosis.inference.run_noise import EXACT
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.identification.cluster_robust_errors import cluster_robust_errors
 from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.units import is_calibrated
 
 LEVEL: Final = 0.90
 _NORMAL_90: Final = 1.6449
@@ -36,7 +40,8 @@ def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], In
 
     The covariance of the fit contains the priors of the baseline: where the recordings do not separate a gain or a
     mass from an effect, its interval is as wide as what is believed of these. Its part by noise is widened by what
-    is left over the noise floor, or replaced by the cluster-robust error, whichever is more.
+    is left over the noise floor, or replaced by the cluster-robust error, whichever is more. However many samples
+    tell a force or a length, it is known no better than a simulation describes the motion (`EXACT`).
 
     Parameters
     ----------
@@ -62,7 +67,8 @@ def _interval(best: ScoredModel, candidate: Candidate, parameter: str, scatter: 
     estimate = best.fit.values[name]
     of_noise, of_belief = best.fit.standard_errors(name)
     of_noise = max(of_noise * max(1.0, best.fitted_rms), scatter.get(name, 0.0))
-    width = _NORMAL_90 * float(np.hypot(of_noise, of_belief))
+    of_simulation = EXACT * abs(estimate) if is_calibrated(parameter) else 0.0
+    width = _NORMAL_90 * float(np.sqrt(of_noise**2 + of_belief**2 + of_simulation**2))
     lowest, highest = candidate.bounds(
         next(each for each in candidate.effect.parameters if each.name == parameter)
     )

@@ -21,6 +21,19 @@ _UNITS: Final = (
     ("_s", "s"),
     ("_m", "m"),
 )
+_OF_A_CHANNEL: Final = ("amplitude", "limit", "rate")
+"""Numbers of sensor effects in the unit of their channel."""
+
+
+def is_calibrated(parameter: str) -> bool:
+    """Whether a number is known no better than the gains of channels: it is no time, no frequency and no ratio.
+
+    Examples
+    --------
+    >>> [is_calibrated(name) for name in ("gap_m", "rate in run_1", "delay_s", "frequency_hz", "ratio")]
+    [True, True, False, False, False]
+    """
+    return parameter.partition(" in ")[0] in _OF_A_CHANNEL or named_and_units(parameter)[1] not in ("", "s", "Hz")
 
 
 def named_and_units(parameter: str) -> tuple[str, str]:

@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 BLOCKS_OF_A_CELL: Final = 4
 BANDS_OF_A_CELL: Final = 4
 """Two seconds and four hertz of the transform, within which powers and correlations are constant."""
-_EXACT: Final = 0.01
+EXACT: Final = 0.01
 """Of the motion, to which a simulation describes a rig: as gains are known. Less is no physics of its own."""
 _EXACT_BESIDE_CHAOS: Final = 0.05
 """The same where a liquid moves chaotically: to this its damping is believed to be that of the run's mean."""
@@ -100,7 +100,7 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
         # What the tank does not move, such as the acceleration of a driven table, knows no chaos of its liquid.
         is_moved = np.abs(transfers_at[TANK]).sum(axis=0) > 0
         steady = {f"{SENSOR} {each.channel}" for each, moved in zip(observed, is_moved, strict=True) if not moved}
-    exactness = {place: _EXACT if place in steady else _EXACT_BESIDE_CHAOS for place in places}
+    exactness = {place: EXACT if place in steady else _EXACT_BESIDE_CHAOS for place in places}
     return RunNoise(inverse_root, places, exactness)
 
 

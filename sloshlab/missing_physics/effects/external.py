@@ -10,6 +10,7 @@ from math import pi
 from typing import Final
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from sloshlab.missing_physics.candidate import (
@@ -128,31 +129,38 @@ def _folded(
     along: Mapping[str, FloatArray], period: int, *, alternate: bool
 ) -> list[tuple[float, float, dict[str, int]]]:
     """Of trains of one period, upward and downward: what they explain, their size, their first samples."""
-    folded = {run: _mean_over_periods(values, period, alternate=alternate) for run, values in along.items()}
+    best = {run: _best_places(values, period, alternate) for run, values in along.items()}
     found = []
-    for sign in (1.0, -1.0):
-        total, weight, force, first = 0.0, 0.0, 0.0, {}
-        for run, (mean, counts) in folded.items():
-            sizes = np.maximum(sign * mean, 0.0)
-            place = int(np.argmax(sizes**2 * counts))
-            first[run] = place
-            total += float(sizes[place] ** 2 * counts[place])
-            force += float(sizes[place] * counts[place])
-            weight += float(counts[place])
-        found.append((total, sign * force / weight, first))
+    for row, sign in enumerate((1.0, -1.0)):
+        explained, force, weight = (float(sum(each[row, k] for each in best.values())) for k in range(3))
+        first = {run: int(each[row, 3]) for run, each in best.items()}
+        found.append((explained, sign * force / weight, first))
     return found
 
 
-def _mean_over_periods(values: FloatArray, period: int, *, alternate: bool) -> tuple[FloatArray, FloatArray]:
-    """Mean of the values that are whole periods apart, and of how many, shape (period,)."""
-    n_rows = -(-values.size // period)
-    rows = np.zeros((n_rows, period))
-    rows.ravel()[: values.size] = values
-    counts = np.full(period, float(n_rows))
-    counts[values.size - (n_rows - 1) * period :] -= 1.0
-    if alternate:
-        rows[1::2] *= -1.0
-    return rows.sum(axis=0) / np.maximum(counts, 1.0), np.maximum(counts, 1.0)
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _best_places(values: FloatArray, period: int, alternate: bool) -> FloatArray:
+    """Where a train of one period explains most of a series, upward and downward, shape (2, 4).
+
+    Columns: what it explains; the sum of the values at its pulses, positive along its direction; how many these
+    are; the first of them [samples]. Every other pulse counts reversed where they alternate.
+    """
+    sums, counts = np.zeros(period), np.zeros(period)
+    sign = 1.0
+    for start in range(0, values.size, period):
+        for k in range(min(period, values.size - start)):
+            sums[k] += sign * values[start + k]
+            counts[k] += 1.0
+        if alternate:
+            sign = -sign
+    best = np.zeros((2, 4))
+    # A train that explains nothing has its first pulse, too: its weight must not be zero.
+    best[:, 2] = counts[0]
+    for k in range(min(period, values.size)):
+        explained, row = sums[k] ** 2 / counts[k], 0 if sums[k] > 0 else 1
+        if explained > best[row, 0]:
+            best[row, 0], best[row, 1], best[row, 2], best[row, 3] = explained, abs(sums[k]), counts[k], k
+    return best
 
 
 # --- a machine that runs by itself -----------------------------------------------------------------------------
