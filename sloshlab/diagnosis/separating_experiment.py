@@ -22,7 +22,7 @@ _FACTORS: Final = (1 / 3, 3.0)
 """Of the level, and of the frequency, of a run: what a laboratory can set without another rig."""
 _ADDED_MASS: Final = 0.1
 """Of the moving mass, as a weight that is known and screwed to the tank."""
-_TOLD_APART: Final = 3.0
+_LEAST_NOISE_FLOORS: Final = 3.0
 """Noise floors of one channel by which predictions have to differ, for an experiment to be proposed."""
 
 
@@ -80,7 +80,7 @@ def separating_experiment(found: Findings, models: Sequence[ScoredModel]) -> Exp
         if told is not None:
             experiments.append(Experiment(planned.description, *told))
     best = max(experiments, key=lambda experiment: experiment.noise_floors, default=None)
-    return best if best is not None and best.noise_floors >= _TOLD_APART else None
+    return best if best is not None and best.noise_floors >= _LEAST_NOISE_FLOORS else None
 
 
 def _planned(found: Findings, runs: Sequence[CaseRun]) -> list[_Planned]:

@@ -1,28 +1,23 @@
-"""The decision: what is said, from the posterior alone, by the numbers below.
+"""The decision: what is said, from the posterior alone, by the numbers of `thresholds`.
 
 - What is named has the posterior `NAMED`; a set of names that has it together is said as a set.
-- Two models that predict the same within `TOLD_APART` (`posterior`) are equals; of one that needs more numbers for
+- Two models that predict the same within `TOLD_APART` are equals; of one that needs more numbers for
   it only the simpler one is said.
-- An effect or a remainder below `LEAST_STRENGTH` (`scored_model`) is not worth a word: it counts as nothing.
-- A name may leave `LAW` (`remainder`) of the amplitude that lacks without it; more is a remainder.
+- An effect or a remainder below `LEAST_STRENGTH` is not worth a word: it counts as nothing.
+- A name may leave `LAW` of the amplitude that lacks without it; more is a remainder.
 - The place of what has no name needs `LOCATED`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from sloshlab.diagnosis.inference.places import block_of
-from sloshlab.diagnosis.inference.posterior import NONE, TOLD_APART, UNKNOWN, Posterior
+from sloshlab.diagnosis.inference.posterior import NONE, UNKNOWN, Posterior
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, difference
-
-NAMED: Final = 0.9
-"""Posterior probability that a name, or a set of names, needs: a wrong name costs nine times as much as none."""
-LOCATED: Final = 0.8
-"""Probability of a block, given that something is missing."""
+from sloshlab.diagnosis.inference.thresholds import LOCATED, NAMED, TOLD_APART
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,20 +16,18 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 
 from sloshlab.diagnosis.inference.places import block_of
-from sloshlab.diagnosis.inference.remainder import PRIOR_OF_REMAINDER, SHARES, TEMPERING
+from sloshlab.diagnosis.inference.remainder import SHARES, TEMPERING
 from sloshlab.diagnosis.inference.scored_model import (
-    LEAST_STRENGTH,
     ScoredModel,
     difference,
     is_worth_a_word,
     strength,
 )
+from sloshlab.diagnosis.inference.thresholds import LEAST_STRENGTH, PRIOR_OF_REMAINDER, TOLD_APART
 from sloshlab.missing_physics.candidate import BLOCKS
 
 FloatArray = NDArray[np.float64]
 NONE, UNKNOWN = "none", "unknown"
-TOLD_APART: Final = 3.0
-"""Expected log-likelihood ratio from which recordings tell two models apart: twenty to one."""
 _N_DRAWS: Final = 1000
 
 

@@ -30,6 +30,7 @@ from scipy.special import logsumexp, softmax
 
 from sloshlab.diagnosis.inference.places import SENSOR, block_of
 from sloshlab.diagnosis.inference.run_noise import sums_of_cells
+from sloshlab.diagnosis.inference.thresholds import LAW, PRIOR_OF_REMAINDER
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
 
 FloatArray = NDArray[np.float64]
@@ -40,11 +41,6 @@ SHARES: Final = np.array([0.01, 0.05, 0.2, 0.8])
 """Of cells that have a remainder: from bursts to everywhere."""
 BURST: Final = 0.01
 """Share of the stretches of time in which a sensor has a burst of noise, of any power."""
-
-LAW: Final = 0.1
-"""Of the amplitude that lacks where nothing is added, which a law may leave: a formula is not the physics."""
-PRIOR_OF_REMAINDER: Final = 0.1
-"""Probability that something is left that no effect of a model explains."""
 TEMPERING: Final = 10.0
 """Factor by which log-likelihoods are too large: coefficients of a cell share what is wrong with their noise."""
 

@@ -18,14 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.inference.remainder import TEMPERING, Remainder, remainder
+from sloshlab.diagnosis.inference.thresholds import LEAST_STRENGTH
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
 from sloshlab.identification.free_run_problem import HUBER_LIMIT, FreeRunFit
 from sloshlab.missing_physics.candidate import channels_of
 from sloshlab.missing_physics.prior import ParameterPrior
 
 FloatArray = NDArray[np.float64]
-LEAST_STRENGTH: Final = 0.5
-"""Noise floors of the channel that shows it most, below which an effect, or a remainder, is not worth a word."""
 _FEWEST_COEFFICIENTS: Final = 50
 """Below it a mean square is too uncertain to be used: its standard error is a fifth."""
 
