@@ -138,7 +138,7 @@ def findings_of(
     nothing = next(fit for fit in fits if not fit.candidates)
     with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)
     believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), 0.0, 0.0)
-    score = _Scoring(model, fitting, held_out, nothing)
+    score = _Scoring(model, fitting, held_out, nothing, case.names_by_test())
     believed, retuned = score.required(believed_fit, "as believed"), score.required(nothing, "retuned")
     explanations = [found for fit in with_effects[:_MOST_SCORED] if (found := score.of(fit, retuned)) is not None]
     return Findings(
@@ -166,8 +166,10 @@ class _Scoring:
         fitting: Sequence[Sequence[Observation]],
         held_out: Sequence[Sequence[Observation]],
         nothing: FreeRunFit,
+        tests: Sequence[Sequence[str]],
     ) -> None:
         self.model, self.held_out, self.everything = model, held_out, [*fitting, *held_out]
+        self.tests = tests
         self.noise = [run_noise(model, run, nothing.values) for run in self.everything]
 
     def of(self, fit: FreeRunFit, nothing: ScoredModel | None = None) -> ScoredModel | None:
@@ -176,7 +178,7 @@ class _Scoring:
         runs = whitened(self.model, self.everything, fit.candidates, values, self.noise)
         if runs is None:
             return None
-        return scored(fit, values, runs, {run[0].run.name for run in self.held_out}, nothing)
+        return scored(fit, values, runs, {run[0].run.name for run in self.held_out}, nothing, self.tests)
 
     def required(self, fit: FreeRunFit, which: str) -> ScoredModel:
         """The same of the baseline, without which nothing can be compared."""

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.special import logsumexp, softmax
 
+from sloshlab.diagnosis.inference.independent_residuals import IndependentResiduals, independent_residuals
 from sloshlab.diagnosis.inference.places import SENSOR, block_of
 from sloshlab.diagnosis.inference.run_noise import sums_of_cells
 from sloshlab.diagnosis.inference.thresholds import LAW, PRIOR_OF_REMAINDER
@@ -75,7 +76,9 @@ class Remainder:
         return self.largest_gain / TEMPERING + float(np.log(PRIOR_OF_REMAINDER)) > 0
 
 
-def remainder(runs: Sequence[WhitenedRun], missing: Sequence[WhitenedRun] = ()) -> Remainder:
+def remainder(
+    runs: Sequence[WhitenedRun], missing: Sequence[WhitenedRun] = (), tests: Sequence[Sequence[str]] = ()
+) -> Remainder:
     """What a model leaves.
 
     Parameters
@@ -83,15 +86,15 @@ def remainder(runs: Sequence[WhitenedRun], missing: Sequence[WhitenedRun] = ()) 
     runs : sequence of WhitenedRun
     missing : sequence of WhitenedRun, optional
         The same runs with nothing added, of which laws explain most; none for the baseline itself.
+    tests : sequence of sequences of str, optional
+        Names of the runs of every test: what its repeats share counts as one.
     """
     noise: list[FloatArray] = []
     per_run: list[dict[str, FloatArray]] = []
-    for number, run in enumerate(runs):
-        independent = run.noise.whitened(run.residual)
-        plain = sums_of_cells((-0.5 * independent**2).sum(axis=0))
-        gains = {place: _gains(independent, *directions) for place, directions in run.noise.places.items()}
-        inexact_powers = _powers_of_inexactness(run, missing[number] if missing else None)
-        small = {place: _POWERS[:, None, None] < powers for place, powers in inexact_powers.items()}
+    for each in independent_residuals(runs, missing, tests):
+        plain = sums_of_cells((-0.5 * each.residual**2).sum(axis=0))
+        gains = {place: _gains(each.residual, *directions) for place, directions in each.places.items()}
+        small = {place: _POWERS[:, None, None] < power for place, power in _powers_of_inexactness(each).items()}
         # Noise, and what a simulation that is as exact as it can be leaves at any place.
         inexact = _log_mean(np.stack([_log_mean_of(gains[place], small[place]) for place in gains]))
         usual = np.logaddexp(np.log(0.5), np.log(0.5) + inexact)
@@ -140,18 +143,17 @@ def _or_burst(usual: FloatArray, bursts: FloatArray) -> FloatArray:
     return np.asarray(expected + ((total - expected.sum(axis=-1)) / expected.shape[-1])[..., None])
 
 
-def _powers_of_inexactness(run: WhitenedRun, missing: WhitenedRun | None) -> dict[str, FloatArray]:
+def _powers_of_inexactness(each: IndependentResiduals) -> dict[str, FloatArray]:
     """Power that a simulation may leave at each place, in noise variances, per cell of time and frequency."""
-    signal = run.noise.whitened(run.simulated)
-    lacking = None if missing is None else run.noise.whitened(missing.residual)
-    shown = np.any([each.informative for each in run.observed], axis=0)
     found = {}
-    for place, (projections, _) in run.noise.places.items():
-        found[place] = run.noise.exactness[place] ** 2 * _power_of_cells(signal, projections)
-        if lacking is not None:
+    for place, (projections, _) in each.places.items():
+        simulated = [_power_of_cells(signal, projections) for signal in each.simulated]
+        found[place] = each.exactness[place] ** 2 * np.sum(simulated, axis=0)
+        for signal in each.lacking:
             # A law that is off by a little leaves it elsewhere, too, such as at multiples of a frequency.
-            everywhere = float(_power(lacking, projections)[shown].mean()) if shown.any() else 0.0
-            found[place] = found[place] + LAW**2 * np.maximum(_power_of_cells(lacking, projections), everywhere)
+            shown = _power(signal, projections)[each.is_informative]
+            everywhere = float(shown.mean()) if shown.size else 0.0
+            found[place] = found[place] + LAW**2 * np.maximum(_power_of_cells(signal, projections), everywhere)
     return found
 
 

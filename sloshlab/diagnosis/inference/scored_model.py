@@ -112,6 +112,7 @@ def scored(
     runs: Sequence[WhitenedRun],
     held_out: Collection[str] = (),
     nothing: ScoredModel | None = None,
+    tests: Sequence[Sequence[str]] = (),
 ) -> ScoredModel:
     """A model with its likelihood.
 
@@ -124,11 +125,12 @@ def scored(
         Names of the runs that chose nothing.
     nothing : ScoredModel, optional
         Nothing missing: of what it leaves a model with effects may leave a little (`LAW`).
+    tests : sequence of sequences of str, optional
+        Names of the runs of every test.
     """
     missing = nothing.runs if nothing is not None and fit.candidates else ()
-    return ScoredModel(
-        fit, dict(values), list(runs), remainder(runs, missing), frozenset(held_out), complexity(fit)
-    )
+    left = remainder(runs, missing, tests)
+    return ScoredModel(fit, dict(values), list(runs), left, frozenset(held_out), complexity(fit))
 
 
 def complexity(fit: FreeRunFit) -> float:

@@ -136,7 +136,9 @@ class ModelSelection:
         model, runs = self.runs.model, self.runs.runs
         noise = [run_noise(model, run, fit.values) for run in runs]
         residuals = whitened(model, runs, fit.candidates, fit.values, noise)
-        return residuals is None or (is_worth_a_word(residuals) and remainder(residuals).is_probable)
+        if residuals is None:
+            return True
+        return is_worth_a_word(residuals) and remainder(residuals, tests=self.runs.tests).is_probable
 
     def _explains_little(self, n: int) -> bool:
         """Whether the best model of so many effects leaves nearly what the best one of an effect less leaves."""

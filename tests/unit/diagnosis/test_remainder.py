@@ -26,17 +26,18 @@ def run(
     directions: dict[str, np.ndarray] | None = None,
     correlation: float = 0.0,
     simulated: np.ndarray | None = None,
+    name: str = "run_1",
 ) -> WhitenedRun:
     """A run with places that all channels see in phase, and noise with a correlation of its two channels."""
     observed = [
         SimpleNamespace(
-            channel=name,
-            run=SimpleNamespace(name="run_1"),
+            channel=channel,
+            run=SimpleNamespace(name=name),
             spectra=values,
             variance=np.ones_like(values),
             informative=np.ones(values.shape, bool),
         )
-        for name, values in zip(CHANNELS, residual if simulated is None else residual + simulated, strict=True)
+        for channel, values in zip(CHANNELS, residual if simulated is None else residual + simulated, strict=True)
     ]
     covariance = np.array([[1.0, correlation], [correlation, 1.0]])
     root = np.linalg.inv(np.linalg.cholesky(covariance))
@@ -99,7 +100,8 @@ def test_a_burst_has_all_bands_of_its_stretch_and_is_shared_out_among_them() -> 
     assert found.noise.sum() == pytest.approx(whole + constant, rel=1e-9)
     # What a burst explains, it explains where the line is; in the other cell it expects more than there is.
     gained = found.noise - np.array(plain) - constant / 2
-    assert gained[1] > 20.0 and gained[0] < 0.0
+    assert gained[1] > 20.0
+    assert gained[0] < 0.0
 
 
 def test_noise_that_the_channels_share_is_no_force() -> None:
@@ -162,6 +164,48 @@ def test_less_than_a_hundredth_of_the_motion_is_how_exact_a_simulation_is(size: 
     x = generator.normal(size=(2, 16, 40)) + size * simulated[:, :, ::-1]
     found = remainder([run(x, directions={"structure": np.ones(2)}, simulated=simulated)])
     assert (found.gain("structure") > 100.0) == remains
+
+
+REPEATS = (("run_1", "run_2"),)
+
+
+def test_repeats_are_judged_by_their_sum_and_their_difference() -> None:
+    first, other = np.random.default_rng(6).normal(size=(2, 2, 8, 8))
+    places = {"structure": np.ones(2)}
+    found = remainder([run(first, places), run(other, places, name="run_2")], tests=REPEATS)
+    combined = [run(x / np.sqrt(2), places) for x in (first + other, first - other)]
+    apart = [remainder([each]) for each in combined]
+    assert found.noise.sum() == pytest.approx(sum(each.noise.sum() for each in apart), rel=1e-12)
+    for i in range(len(SHARES)):
+        expected = sum(each.places["structure"][i].sum() for each in apart)
+        assert found.places["structure"][i].sum() == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(("phase", "counts_more"), [(1.0, True), (0.0, False)])
+def test_a_force_that_repeats_share_in_phase_is_told_better(phase: float, counts_more: bool) -> None:
+    """In every repeat twice the noise, which alone would be none worth a word; or each time another."""
+    generator = np.random.default_rng(7)
+    weights = np.ones(2) / np.sqrt(2)
+    shared, own = generator.normal(size=(2, 16, 16)), generator.normal(size=(2, 16, 16))
+    runs = []
+    for i, name in enumerate(REPEATS[0]):
+        force = 2.0 * (shared[0] if phase else own[i])
+        x = generator.normal(size=(2, 16, 16)) + weights[:, None, None] * force
+        runs.append(run(x, {"structure": weights}, name=name))
+    alone, together = (remainder(runs, tests=tests).gain("structure") for tests in ((), REPEATS))
+    assert (together > alone + 20.0) == counts_more
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_repeats_may_leave_what_each_of_them_may_leave(sign: float) -> None:
+    """Nine thousandths of the motion, in phase or against it."""
+    generator = np.random.default_rng(8)
+    motion = 1000.0 * generator.normal(size=(2, 16, 16))
+    runs = [
+        run(generator.normal(size=(2, 16, 16)) + error * motion, {"structure": np.ones(2)}, 0.0, motion, name)
+        for name, error in zip(REPEATS[0], (0.009, 0.009 * sign), strict=True)
+    ]
+    assert remainder(runs, tests=REPEATS).largest_gain < 3.0
 
 
 def test_a_run_without_the_place_leaves_its_likelihood_alone() -> None:
