@@ -9,6 +9,7 @@ from typing import Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.diagnosis.inference.fluctuating_liquid import with_fluctuation
 from sloshlab.diagnosis.inference.posterior import Posterior, posterior
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
@@ -20,7 +21,7 @@ from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.identification.case import Case
 from sloshlab.identification.diagnosed_model import DiagnosedModel
-from sloshlab.identification.free_run_fit import fitted_baseline
+from sloshlab.identification.free_run_fit import INFLATION_STAGES, fitted, fitted_baseline
 from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
 from sloshlab.identification.noise_floor import weighted_observations
 from sloshlab.identification.observations import Observation
@@ -127,11 +128,16 @@ def findings_of(
     weighted = weighted_observations(case, model)
     fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
     held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]] if parts.has_held_out else []
-    runs = FittedRuns(model, fitting, case.names_by_test())
-    problem = runs.problem()
     # A plain refit can hide physics (leaving out the dry friction of a servo axis doubles its damping), and a
     # wrong mass is no missing physics: retuning within tolerances comes before any question about effects.
-    retuned_fit, _ = fitted_baseline(problem)
+    runs = FittedRuns(model, fitting, case.names_by_test())
+    retuned_fit, _ = fitted_baseline(runs.problem())
+    # What a liquid fluctuates by is computed from its motion, which only a fit tells.
+    every = with_fluctuation(model, [*fitting, *held_out], case.repeated, retuned_fit)
+    fitting, held_out = every[: len(fitting)], every[len(fitting) :]
+    runs = FittedRuns(model, fitting, case.names_by_test())
+    problem = runs.problem()
+    retuned_fit, _ = fitted(problem, retuned_fit.values, stages=INFLATION_STAGES[-1:])
     selection = ModelSelection(runs, surroundings_of(problem, retuned_fit, case.rig), progress)
     fits = selection.selected(retuned_fit)
     fitting, held_out = (with_sampled_jumps(model, some, selection.jumping) for some in (fitting, held_out))

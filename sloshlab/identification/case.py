@@ -94,6 +94,11 @@ class Case:
         """Names of the runs of every test."""
         return [[run.name for run in test] for test in self.tests()]
 
+    @property
+    def repeated(self) -> frozenset[str]:
+        """Names of the runs whose test has others."""
+        return frozenset(name for test in self.names_by_test() if len(test) > 1 for name in test)
+
 
 def read_case(folder: str | Path, *, with_rig: bool = True) -> Case:
     """Read ``rig.toml`` and ``recordings/*.nc`` of a case folder.

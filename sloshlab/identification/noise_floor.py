@@ -185,10 +185,9 @@ def _ignored_where_drive_noise_dominates(
     is_noise = (
         noise.get((observation.run.name, observation.channel), 0.0) > _DOMINANT_NOISE_RATIO * of_sensor.variance
     )
-    return replace(
-        observation,
-        variance=np.where(is_noise & ~observation.informative, IGNORED_VARIANCE, 1.0) * observation.variance,
-    )
+    ignored = is_noise & ~observation.informative
+    variance = np.where(ignored, IGNORED_VARIANCE, 1.0) * observation.variance
+    return replace(observation, variance=variance, ignored=ignored)
 
 
 @dataclass(frozen=True, eq=False)

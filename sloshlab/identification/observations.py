@@ -35,6 +35,8 @@ IGNORED_VARIANCE: Final = 100.0
 """Factor of a variance with which a coefficient counts for next to nothing."""
 _LEAST_SHARE_OF_BLOCKS: Final = 0.01
 """Of the blocks, in which a band must be informative to be kept."""
+SCATTER_AVERAGED_OVER: Final = (3, 9)
+"""Blocks and bands: two repeats leave one degree of freedom each, and 27 together tell a variance."""
 _MEDIAN_OF_SQUARE: Final = 0.4549
 """Of a normal number, over its mean (χ² with one degree of freedom)."""
 _LEAST_SHARE: Final = 1e-4
@@ -65,6 +67,8 @@ class Observation:
         Of the same, as a first fit of the baseline simulates it, where that is known.
     of_drive : ndarray, shape (n_draws, n_blocks, n_kept), or None
         What draws of the noise of a driving accelerometer make of the channel; all channels of a run share a draw.
+    ignored : ndarray of bool, of the shape of `spectra`, or None
+        Coefficients whose variance is inflated, so that they do not count.
     """
 
     run: CaseRun
@@ -77,6 +81,7 @@ class Observation:
     is_rough: bool = False
     simulated: FloatArray | None = None
     of_drive: FloatArray | None = None
+    ignored: NDArray[np.bool_] | None = None
 
     @property
     def n_bands(self) -> int:
@@ -271,6 +276,7 @@ def within_informative_bands(observed: Sequence[Observation]) -> list[Observatio
             of_drive=None
             if observation.of_drive is None
             else np.ascontiguousarray(observation.of_drive[:, :, :n_kept]),
+            ignored=None if observation.ignored is None else observation.ignored[:, :n_kept],
             n_transformed=n_bands,
         )
         for observation in observed
@@ -310,7 +316,7 @@ def with_scatter(
         # visible, and the chaos of a liquid does not count.
         about = ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0) / (n - 1)
         # Two repeats leave one degree of freedom per coefficient; 27 neighbours together tell a variance.
-        local = uniform_filter(about, (3, 9), mode="nearest")
+        local = uniform_filter(about, SCATTER_AVERAGED_OVER, mode="nearest")
         scatter[name] = np.maximum(local, _steady_noise(about, n - 1))
     return [
         [
@@ -367,7 +373,7 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
         ]
         # The median over the repeats, so that a burst in one of them does not set it.
         share = float(np.median(shares)) if shares else 0.0
-        local = uniform_filter(observation.spectra**2, (3, 9), mode="nearest")
+        local = uniform_filter(observation.spectra**2, SCATTER_AVERAGED_OVER, mode="nearest")
         weighted.append(_weighted(observation, np.maximum(quiet[None, :], share * local)))
     return weighted
 

@@ -223,7 +223,7 @@ class RigModel:
 
     def liquid_fluctuates(self, run: CaseRun) -> bool:
         """Whether a liquid moves in a run whose damping, believed as a number, never is the same twice."""
-        return run.attributes.configuration == "sloshing" and any(map(_damps_as_liquid, self.twin.terms))
+        return run.attributes.configuration == "sloshing" and any(map(damps_as_liquid, self.twin.terms))
 
     def driving(self, run: CaseRun) -> tuple[str, ...]:
         """Channels that drive the twin in a run."""
@@ -601,13 +601,14 @@ def _retuned_term(term: Term, values: Mapping[str, float]) -> Term:
     return term.changed(**changed) if changed else term
 
 
-def _damps_as_liquid(term: Term) -> bool:
+def damps_as_liquid(term: Term) -> bool:
+    """Whether a force of a twin is the damping of a liquid, believed as a number."""
     return term.place == "tank" and bool(term.values.get(_DAMPING_OF_LIQUID))
 
 
 def _fluctuating(term: Term, factor: float) -> Term:
     """The damping of the liquid in one run: that of a chaotic motion differs from run to run."""
-    if factor == 1.0 or not _damps_as_liquid(term):
+    if factor == 1.0 or not damps_as_liquid(term):
         return term
     return term.changed(**{_DAMPING_OF_LIQUID: factor * term.values[_DAMPING_OF_LIQUID]})
 

@@ -14,6 +14,7 @@ from sloshlab.identification.rig_model import RigModel, retuned_structure
 from sloshlab.missing_force.force_inversion import ORDERS, modal_weights, response
 from sloshlab.twin.structure import Structure
 
+FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 SENSOR: Final = "sensor"
 STRUCTURE, TANK = "structure", "tank"
@@ -31,9 +32,12 @@ def block_of(place: str) -> str:
 
 
 def transfers_of(
-    model: DiagnosedModel, run: Sequence[Observation], values: Mapping[str, float]
+    model: DiagnosedModel,
+    run: Sequence[Observation],
+    values: Mapping[str, float],
+    frequencies_hz: FloatArray | None = None,
 ) -> dict[str, ComplexArray]:
-    """Readings of the channels per force at each place, shape (n_bands, n_channels).
+    """Readings of the channels per force at each place, shape (n_frequencies, n_channels).
 
     Parameters
     ----------
@@ -42,6 +46,8 @@ def transfers_of(
     run : sequence of Observation
     values : mapping
         Of the baseline.
+    frequencies_hz : ndarray, optional
+        Those of the bands by default.
     """
     if not isinstance(model, RigModel):
         return {}
@@ -49,17 +55,23 @@ def transfers_of(
     carried_kg = model.twin.carried_mass_kg * values.get("carried mass", 1.0)
     n_cells = sum(each.channel.startswith("force_cell") for each in run)
     shares = np.array([1 / n_cells if each.channel.startswith("force_cell") else 1.0 for each in run])
+    at_hz = run[0].frequencies_hz if frequencies_hz is None else frequencies_hz
     return {
-        place: shares * np.stack([_transfer(model, structure, carried_kg, each, place) for each in run], axis=1)
+        place: shares
+        * np.stack([_transfer(model, structure, carried_kg, each, place, at_hz) for each in run], axis=1)
         for place in (STRUCTURE, TANK)
     }
 
 
 def _transfer(
-    model: RigModel, structure: Structure | None, carried_kg: float, observation: Observation, place: str
+    model: RigModel,
+    structure: Structure | None,
+    carried_kg: float,
+    observation: Observation,
+    place: str,
+    frequency: FloatArray,
 ) -> ComplexArray:
-    """Reading of a channel per force at a place, shape (n_bands,)."""
-    frequency = observation.frequencies_hz
+    """Reading of a channel per force at a place, shape (n_frequencies,)."""
     attributes, name = observation.run.recording[observation.channel].attrs, observation.channel
     if name.startswith("force"):
         # F = M ü − f between structure and tank: a force on the tank moves it and is itself seen by the cell, one
