@@ -14,7 +14,8 @@ from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.case import CaseRun, level
 from sloshlab.identification.observations import Observation
-from sloshlab.identification.rig_model import RELEASE, RigModel
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.identification.rig_parameters import RELEASE
 from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.twin.structure_forces import MASS_ERROR
 

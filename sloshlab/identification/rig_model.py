@@ -1,11 +1,11 @@
-"""The twin of a rig as a model to be retuned: its parameters with priors, and the readings of its channels."""
+"""The twin of a rig as a model to be retuned: readings of its channels under retuned numbers and extensions."""
 
 from __future__ import annotations
 
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -16,16 +16,19 @@ from numpy.typing import NDArray
 
 from sloshlab.conditioning.combined_channels import weights_by_noise
 from sloshlab.errors import AnalysisError, SloshlabError
-from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.diagnosed_model import Readings, Request
-from sloshlab.identification.release import (
-    AVERAGING,
-    INSTANT,
-    averaging_of_recorder,
-    instant_s,
-    late_by,
-    tolerance_s,
+from sloshlab.identification.release import AVERAGING, INSTANT, late_by
+from sloshlab.identification.rig_parameters import (
+    FLUCTUATION,
+    RELEASE,
+    RunOfRig,
+    cells_of,
+    damps_as_liquid,
+    fluctuating,
+    retuned_structure,
+    retuned_term,
+    rig_parameters,
 )
 from sloshlab.missing_physics.candidate import BLOCKS
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
@@ -39,9 +42,7 @@ from sloshlab.twin.recorded_run import Drive, drive_of
 from sloshlab.twin.simulated_channels import ORDER_OF_DERIVATIVE, channel_weights, combined, rows_of
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import save_twin
-from sloshlab.twin.structure import Structure
 from sloshlab.twin.structure_forces import MASS_ERROR
-from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
@@ -65,19 +66,6 @@ _MOST_KEPT_BYTES: Final = 5e7
 """Of simulated channels; answers do not depend on it."""
 _MOST_BYTES_AT_ONCE: Final = 2e8
 """Of the motions of lanes that are simulated together; answers do not depend on it."""
-RELEASE: Final = "release of "
-_FLUCTUATION: Final = "damping of the liquid in "
-_TOLERANCE_OF_FLUCTUATION: Final = 0.05
-"""Of the damping of a chaotic liquid in one run, over its mean."""
-_DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
-_CLOSE_TOLERANCES: Final = 1.25
-"""Bound of gains, that of the base's sensor in the participations among them, and upper one of losses: a gain that
-is further off, or more loss, is an effect with a name."""
-_TOLERANCE_OF_SHAPE: Final = 0.01
-"""Of the value at the tip: position of a sensor, and a beam that is not quite uniform.
-
-Mode shapes as constants made cross talk out of such errors.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +130,7 @@ class RigModel:
             for name in sorted({name for run in self.runs for name in self._channels[run.name].compared})
             if name.partition("_")[2].startswith("beam")
         }
-        self.parameters = self._parameters()
+        self.parameters = rig_parameters(self.twin, [self._of_rig(run) for run in self.runs], self._shapes)
         self._moving = {
             run.name: [
                 (parameter.name, parameter.believed)
@@ -151,6 +139,16 @@ class RigModel:
             ]
             for run in self.runs
         }
+
+    def _of_rig(self, run: CaseRun) -> RunOfRig:
+        drive = self._drive(run, ())
+        return RunOfRig(
+            run,
+            self.compared(run),
+            self._compared_drives(run),
+            drive.initial_displacement_m,
+            self.liquid_fluctuates(run),
+        )
 
     @property
     def believed(self) -> dict[str, float]:
@@ -182,7 +180,7 @@ class RigModel:
 
     def _belongs(self, parameter: str, run: CaseRun) -> bool:
         """Whether a parameter of the motion belongs to this run or to all."""
-        for beginning in (RELEASE, _FLUCTUATION):
+        for beginning in (RELEASE, FLUCTUATION):
             if parameter.startswith(beginning):
                 return parameter == beginning + run.name
         return True
@@ -368,7 +366,7 @@ class RigModel:
         run, values = request.run, request.values
         undone = self._undone(request)
         drive = self._drive(run, undone, request.extension.drives)
-        fluctuation = values.get(_FLUCTUATION + run.name, 1.0)
+        fluctuation = values.get(FLUCTUATION + run.name, 1.0)
         twin = self._retuned(run, values, request.extension, fluctuation=fluctuation)
         trusted = self._compared_drives(run, undone)
         gains = [values.get(f"gain of {name}", 1.0) for name in trusted]
@@ -416,7 +414,7 @@ class RigModel:
             if extension.structure is not None:
                 structure = extension.structure(structure)
         terms = tuple(
-            _fluctuating(_retuned_term(term, values), fluctuation)
+            fluctuating(retuned_term(term, values), fluctuation)
             for term in twin.terms
             if structure is not None or term.place == "tank"
         )
@@ -460,84 +458,12 @@ class RigModel:
             return self.twin.structure is not None and "x_m" in run.recording[name].attrs
         return place.startswith(("tank", "tip", "roof", "control", "mean", "root"))
 
-    def _parameters(self) -> tuple[BaselineParameter, ...]:
-        found: list[BaselineParameter] = []
-        if self.twin.structure is not None:
-            found += _structure_parameters(self.twin.structure, moves=any(not run.is_free for run in self.runs))
-        for term in self.twin.terms:
-            for name, value in term.values.items():
-                # A force that is zero in the rig file is absent, and a tolerance of 20 % of zero would be none.
-                if name in _TUNED_NUMBERS and value:
-                    number = f"{term.name}.{name}"
-                    found.append(BaselineParameter(number, value, 0.2 * abs(value), most_above=_CLOSE_TOLERANCES))
-        names = sorted({name for run in self.runs for name in self.compared(run)})
-        # Without a measured force nothing tells the carried mass from the modal masses.
-        if any(name.startswith("force") for name in names):
-            found.append(BaselineParameter("carried mass", 1.0, 0.01))
-        # Several accelerometers drive the tank by their mean, over the mean of their gains: these gains change
-        # the motion.
-        moving = {name for run in self.runs for name in self._compared_drives(run)}
-        found += [
-            BaselineParameter(
-                f"gain of {name}",
-                1.0,
-                0.01,
-                is_reading=name not in moving,
-                most_below=_CLOSE_TOLERANCES,
-                most_above=_CLOSE_TOLERANCES,
-                channel="" if name in moving else name,
-            )
-            for name in names
-            if not name.endswith(
-                "_root"
-            )  # not observable for a base at rest, and part of the participations otherwise
-        ]
-        cells = _cells(names)
-        found += [
-            BaselineParameter(f"share of {name}", 1 / len(cells), 0.3 / len(cells), is_reading=True)
-            for name in cells[:-1]
-        ]
-        found += [
-            BaselineParameter(shape, 0.0, _TOLERANCE_OF_SHAPE, is_reading=True, channel=name)
-            for name, shapes in self._shapes.items()
-            for shape in shapes
-        ]
-        if any(run.is_free for run in self.runs):
-            found.append(averaging_of_recorder())
-        for run in self.runs:
-            # Liquid that moves chaotically never damps twice alike. One number for all runs would make the
-            # difference physics.
-            if self.liquid_fluctuates(run):
-                found.append(BaselineParameter(_FLUCTUATION + run.name, 1.0, _TOLERANCE_OF_FLUCTUATION))
-            if run.is_free:
-                start = self._drive(run, ()).initial_displacement_m
-                found.append(BaselineParameter(f"{RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
-                uncertain_s = tolerance_s(run.attributes.sampling_rate_hz)
-                instant = instant_s(run.recording)
-                found.append(BaselineParameter(f"{INSTANT}{run.name}", instant, uncertain_s, "s", is_reading=True))
-            for name in self.compared(run):
-                if name.startswith("displacement"):
-                    size = float(np.nanmax(np.abs(run.recording[name].values)))
-                    found.append(
-                        BaselineParameter(
-                            f"offset of {name} in {run.name}", 0.0, 0.01 * size, "m", is_reading=True, channel=name
-                        )
-                    )
-        return tuple(found)
-
-
-_TUNED_NUMBERS: Final = ("damping_n_s_per_m", "damping_kg_per_s", "force_n", "stiffness_n_per_m")
-
-
-def _cells(names: Iterable[str]) -> list[str]:
-    return sorted(name for name in names if name.startswith("force_cell"))
-
 
 def _relative_share(name: str, truth: Mapping[str, FloatArray], values: Mapping[str, float]) -> float:
     """Share of the force that a cell carries, over an equal one; the last cell carries the rest."""
     if not name.startswith("force_cell"):
         return 1.0
-    cells = _cells(truth)
+    cells = cells_of(truth)
     n = len(cells)
     shares = [values.get(f"share of {cell}", 1 / n) for cell in cells[:-1]]
     return n * (shares[cells.index(name)] if name != cells[-1] else 1.0 - sum(shares))
@@ -550,67 +476,6 @@ def steps_per_sample(twin: Twin, sampling_rate_hz: float, per_period: float = ST
     frequencies = twin.structure.frequencies_hz
     needed = max(per_period * float(frequencies.max()), _STEPS_PER_FIRST_PERIOD * float(frequencies.min()))
     return max(1, min(1000, math.ceil(needed / sampling_rate_hz)))
-
-
-def _structure_parameters(structure: Structure, *, moves: bool) -> list[BaselineParameter]:
-    """Frequencies, losses, masses and participations of the modes.
-
-    The gain of the sensor at the base is part of the participations, as it drives the twin and is not compared.
-    """
-    n = structure.masses_kg.size
-    found = []
-    for i in range(n):
-        label = f"mode {i + 1}"
-        found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02))
-        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2, most_above=_CLOSE_TOLERANCES))
-    found += [BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01) for i in range(n)]
-    # The gain of the sensor at the base is in these. Without them leaks into it and gains of others stood in for
-    # it, a false alarm and a wrong name of the second sealed trial.
-    if moves:
-        found += [
-            BaselineParameter(
-                f"base participation of mode {i + 1}",
-                1.0,
-                0.02,
-                most_below=_CLOSE_TOLERANCES,
-                most_above=_CLOSE_TOLERANCES,
-            )
-            for i in range(n)
-        ]
-    return found
-
-
-def retuned_structure(structure: Structure, values: Mapping[str, float]) -> Structure:
-    """The structure with the retuned frequencies, losses, masses and participations of its modes."""
-    n = structure.masses_kg.size
-    frequency = np.array([values.get(f"frequency of mode {i + 1}", 1.0) for i in range(n)])
-    damping = np.array([values.get(f"damping of mode {i + 1}", 1.0) for i in range(n)])
-    participation = np.array([values.get(f"base participation of mode {i + 1}", 1.0) for i in range(n)])
-    mass = np.array([values.get(f"modal mass of mode {i + 1}", 1.0) for i in range(n)])
-    return replace(
-        structure,
-        masses_kg=structure.masses_kg * mass,
-        stiffnesses_n_per_m=structure.stiffnesses_n_per_m * mass * frequency**2,
-        dampings_kg_per_s=structure.dampings_kg_per_s * mass * frequency * damping,
-        base_participation_kg=structure.base_participation_kg * mass * participation,
-    )
-
-
-def _retuned_term(term: Term, values: Mapping[str, float]) -> Term:
-    changed = {name: values[f"{term.name}.{name}"] for name in term.values if f"{term.name}.{name}" in values}
-    return term.changed(**changed) if changed else term
-
-
-def damps_as_liquid(term: Term) -> bool:
-    """Whether a force of a twin is the damping of a liquid, believed as a number."""
-    return term.place == "tank" and bool(term.values.get(_DAMPING_OF_LIQUID))
-
-
-def _fluctuating(term: Term, factor: float) -> Term:
-    """The damping of the liquid in one run: that of a chaotic motion differs from run to run."""
-    if factor == 1.0 or not damps_as_liquid(term):
-        return term
-    return term.changed(**{_DAMPING_OF_LIQUID: factor * term.values[_DAMPING_OF_LIQUID]})
 
 
 def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:

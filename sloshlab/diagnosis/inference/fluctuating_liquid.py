@@ -26,7 +26,8 @@ from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
 from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
 from sloshlab.identification.observations import SCATTER_AVERAGED_OVER, Observation
-from sloshlab.identification.rig_model import RigModel, damps_as_liquid
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.identification.rig_parameters import damps_as_liquid
 
 FloatArray = NDArray[np.float64]
 _PLACES_IN_A_BAND: Final = 32

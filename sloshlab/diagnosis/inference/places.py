@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.observations import Observation
-from sloshlab.identification.rig_model import RigModel, retuned_structure
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.identification.rig_parameters import retuned_structure
 from sloshlab.missing_force.force_inversion import ORDERS, modal_weights, response
 from sloshlab.twin.structure import Structure
 

@@ -24,7 +24,7 @@ from sloshlab.diagnosis.selection.successive_halving import halved
 from sloshlab.identification.free_run_fit import INFLATION_STAGES, costs_at, fitted, stages_for
 from sloshlab.identification.free_run_problem import FreeRunFit, extension_of, huber_cost, run_of
 from sloshlab.identification.readiness import refuted_beliefs
-from sloshlab.identification.rig_model import RELEASE
+from sloshlab.identification.rig_parameters import RELEASE
 from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
 
 Said = Callable[[str, int, int], None]
