@@ -17,7 +17,7 @@ from sloshlab.twin.twin import Twin
 
 RELEASE: Final = "release of "
 FLUCTUATION: Final = "damping of the liquid in "
-_TOLERANCE_OF_FLUCTUATION: Final = 0.05
+TOLERANCE_OF_FLUCTUATION: Final = 0.05
 """Of the damping of a chaotic liquid in one run, over its mean."""
 _DAMPING_OF_LIQUID: Final = "damping_n_s_per_m"
 _CLOSE_TOLERANCES: Final = 1.25
@@ -124,7 +124,7 @@ def _run_parameters(each: RunOfRig) -> list[BaselineParameter]:
     # Liquid that moves chaotically never damps twice alike. One number for all runs would make the difference
     # physics.
     if each.liquid_fluctuates:
-        found.append(BaselineParameter(FLUCTUATION + run.name, 1.0, _TOLERANCE_OF_FLUCTUATION))
+        found.append(BaselineParameter(FLUCTUATION + run.name, 1.0, TOLERANCE_OF_FLUCTUATION))
     if run.is_free:
         start = each.initial_displacement_m
         found.append(BaselineParameter(f"{RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))

@@ -7,7 +7,9 @@ it differs by from its mean, σ f(t) ξ(t) with a ξ that is correlated over one
           \gamma = \frac{f'}{2\pi}
 
 (a Lorentzian about every line f' of the force). Repeats tell σ by how much they scatter; what a test would show
-that was not repeated is σ times what is simulated of it.
+that was not repeated is σ times what is simulated of it. Where no test was repeated, σ is what gives the mean of a
+run the deviation that is believed of it: :math:`\sigma^2 = \sigma_\mathrm{run}^2 f T / 2`, as the mean over T of
+what is correlated over 1/f has 2/(f T) of its variance.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
 from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
 from sloshlab.identification.observations import SCATTER_AVERAGED_OVER, Observation
 from sloshlab.identification.rig_model import RigModel
-from sloshlab.identification.rig_parameters import damps_as_liquid
+from sloshlab.identification.rig_parameters import TOLERANCE_OF_FLUCTUATION, damps_as_liquid
 
 FloatArray = NDArray[np.float64]
 _PLACES_IN_A_BAND: Final = 32
@@ -61,16 +63,24 @@ def with_fluctuation(
         for observation, power in zip(run, of_run, strict=True)
         if power.any()
     ]
-    if not np.isfinite(told).any():
-        return same
     # The median, so that a burst in one of them does not set it.
-    strength_squared = float(np.nanmedian(told))
+    of_repeats = float(np.nanmedian(told)) if np.isfinite(told).any() else None
     return [
-        [_noisier(*each, strength_squared) for each in zip(run, of_run, strict=True)]
+        [
+            _noisier(each, power, _believed_squared(run) if of_repeats is None else of_repeats)
+            for each, power in zip(run, of_run, strict=True)
+        ]
         if of_run and run[0].run.name not in repeated
         else run
         for run, of_run in zip(same, powers, strict=True)
     ]
+
+
+def _believed_squared(run: Sequence[Observation]) -> float:
+    """σ² by what is believed of the mean of a run."""
+    power = np.asarray(run[0].spectra ** 2)
+    mean_hz = float((power @ run[0].frequencies_hz).sum() / power.sum())
+    return TOLERANCE_OF_FLUCTUATION**2 * mean_hz * run[0].run.duration_s / 2
 
 
 def _noisier(observation: Observation, power: FloatArray, strength_squared: float) -> Observation:

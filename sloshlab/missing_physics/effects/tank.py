@@ -166,8 +166,7 @@ def _damping(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
     return Extension(terms=(damper,))
 
 
-# A liquid whose damping fluctuates within a run, not only from run to run, looks like this too: a false alarm of
-# the second sealed trial was one.
+# A liquid whose damping fluctuates within a run, not only from run to run, looks like this, too.
 _SLOSHING: Final = (
     EffectParameter("threshold_g", 0.02, 20.0, range=_THRESHOLD),
     EffectParameter("peak_w_bar", 0.0, 20.0, range=Range(0.01, 5.0)),
