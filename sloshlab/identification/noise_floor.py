@@ -26,7 +26,6 @@ from sloshlab.identification.observations import (
     observations,
     slow_displacements,
     with_scatter,
-    with_steady_noise,
     with_typical_scatter,
     within_informative_bands,
 )
@@ -103,12 +102,8 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
         for run, observed in zip(test, with_scatter(group, [raw[run.name] for run in test]), strict=True):
             weighted[run.name] = observed
             repeated += observed
-    if repeated:
-        weighted |= {run.name: with_typical_scatter(plain[run.name], repeated) for run in alone}
-    else:
-        names = [run.name for run in alone]
-        steady = with_steady_noise([plain[name] for name in names], [raw[name] for name in names])
-        weighted |= dict(zip(names, steady, strict=True))
+    for run in alone:
+        weighted[run.name] = with_typical_scatter(plain[run.name], repeated)
     return {
         name: within_informative_bands(
             [

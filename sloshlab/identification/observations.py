@@ -342,38 +342,6 @@ def _steady_noise(about: FloatArray, n_degrees: int) -> FloatArray:
     return np.array([np.median(by_band[first:end]) for first, end in zip(low, high, strict=True)])
 
 
-def with_steady_noise(
-    runs: Sequence[Sequence[Observation]], residuals: Sequence[Mapping[str, FloatArray]]
-) -> list[list[Observation]]:
-    """Observations of tests none of which was repeated, with the noise that each channel has in all of them.
-
-    What a simulation misses grows with the motion, and noise of a sensor does not: the steady residual of the run
-    in which there is least of it, per band, is noise.
-
-    Parameters
-    ----------
-    runs : sequence of sequences of Observation
-        Of at least two tests; one alone does not tell noise from physics.
-    residuals : sequence of mappings
-        Unweighted residual spectra per channel, of the same runs and one model.
-    """
-    steady: dict[tuple[str, int], FloatArray] = {}
-    if len(runs) > 1:
-        for run, residual in zip(runs, residuals, strict=True):
-            for observation in run:
-                place = (observation.channel, observation.n_bands)
-                if observation.channel in residual:
-                    own = _steady_noise(residual[observation.channel] ** 2, 1)
-                    steady[place] = np.minimum(steady.get(place, np.inf), own)
-    return [
-        [
-            _weighted(observation, np.asarray(steady.get((observation.channel, observation.n_bands), 0.0)))
-            for observation in run
-        ]
-        for run in runs
-    ]
-
-
 def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observation]) -> list[Observation]:
     """Observations of a test that was not repeated, with the scatter of its channels in repeated tests.
 

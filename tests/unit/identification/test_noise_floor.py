@@ -226,37 +226,3 @@ def test_slow_displacements_are_known_to_a_few_times_the_noise_of_the_base(tmp_p
     np.testing.assert_allclose(
         _with_noise_of_drive(observation, noise, ()).variance[np.ix_(middle, slow)], 8.0 * sensor
     )
-
-
-def test_noise_that_no_test_is_without_is_noise_and_what_one_of_them_lacks_is_not(tmp_path: Path) -> None:
-    """Noise of a force that an AR(1) filter makes red, in two tests of which none was repeated; one has more."""
-    size, pole = 0.05, 0.9
-    time = np.arange(round(60.0 * RATE_HZ)) / RATE_HZ
-    runs = []
-    for i, louder in enumerate((0.0, 2.0)):
-        generator = np.random.default_rng(i)
-        red = lfilter([size], [1.0, -pole], generator.normal(size=time.size))
-        channels = {
-            "acceleration_tip": np.zeros(time.size),
-            "acceleration_root": np.zeros(time.size),
-            "force_interface": (1.0 + louder) * red,
-        }
-        stated = {"acceleration_root": 1e-6, "acceleration_tip": 1e-6, "force_interface": 0.0}
-        run = run_of(f"run_{i}", channels, stated, i, experiment="other", initial_displacement_m=0.01 * i)
-        run.recording["force_interface"].attrs["noise_std"] = size / (1 + pole)
-        runs.append(run)
-    case = case_of(tmp_path, *runs)
-    model = RigModel(case.rig, tmp_path, runs)
-    assert not case.repeated
-    for i, observed in enumerate(weighted_observations(case, model).values()):
-        [force] = [each for each in observed if each.channel == "force_interface"]
-        turn = 2 * np.pi * force.frequencies_hz / RATE_HZ
-        # Power of an AR(1) process; the orthonormal transform of white noise has its variance.
-        expected = size**2 / np.abs(1 - pole * np.exp(-1j * turn)) ** 2
-        ratio = force.variance.mean(axis=0) / expected
-        # Bands that each run's own quiet end does not tell; an octave of a spectrum that falls by 6 dB in it.
-        red_bands = expected > 10 * size**2
-        assert red_bands.sum() > 5
-        assert 0.6 < ratio[red_bands].min() <= ratio[red_bands].max() < 1.6
-        # The louder one has nine times as much power: what only one has is none of the sensor.
-        assert i == 0 or float(np.mean(force.spectra[:, red_bands] ** 2)) > 5 * float(expected[red_bands].mean())
