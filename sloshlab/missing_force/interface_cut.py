@@ -221,7 +221,8 @@ def _suspect_channel(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
     ]
     for group in groups:
         worst = max((sensor.ratio for sensor in group), default=0.0)
-        if worst <= _CONSISTENT:
+        # One channel alone has no other that it could contradict.
+        if worst <= _CONSISTENT or len(group) < 2:
             continue
         # Two channels that contradict each other are symmetric. What breaks the tie is that a false reading asks
         # the blocks for forces, and the true one does not.
