@@ -21,10 +21,9 @@ from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
 from sloshlab.diagnosis.selection.successive_halving import halved
-from sloshlab.identification.free_run_fit import INFLATION_STAGES, costs_at, fitted, stages_for
+from sloshlab.identification.free_run_fit import INFLATION_STAGES, fitted, stages_for
 from sloshlab.identification.free_run_problem import FreeRunFit, extension_of, huber_cost, run_of
 from sloshlab.identification.readiness import refuted_beliefs
-from sloshlab.identification.rig_parameters import RELEASE
 from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
 
 Said = Callable[[str, int, int], None]
@@ -263,30 +262,24 @@ class ModelSelection:
                     self._grown([rest], f"in the place of {effect.key}", simpler)
 
     def _refined(self, best: FreeRunFit) -> None:
-        """The best model from places about it: friction and contacts make many local minima."""
-        problem = self.runs.problem_of(best)
-        own = [f"{c.key}.{parameter.name}" for c in best.candidates for parameter in c.effect.parameters]
-        releases = [name for name in problem.names if name.startswith(RELEASE)]
-        fit = best
-        for turn, deviation in enumerate(_DEVIATIONS):
-            self.said(f"refining {' + '.join(c.key for c in best.candidates)}", turn, len(_DEVIATIONS))
-            draws = norm.ppf(qmc.Halton(len(own) + len(releases), seed=turn).random(8 * N_KEPT))
-            starts = [
+        """Each effect of the best model from places about its numbers, beside its baseline and the believed one.
+
+        Friction and contacts make many local minima, and a baseline that stood in for the effect is at the bounds
+        of several numbers, which hold each other there.
+        """
+        for effect in best.candidates:
+            numbers, rest = _own_numbers(best, effect), _without(best, effect)
+            believed = FreeRunFit(rest.candidates, {**rest.values, **self.runs.model.believed}, 0.0, 0.0)
+            draws = norm.ppf(qmc.Halton(len(numbers), seed=0).random(8 * N_KEPT))
+            places = [
                 {
-                    **fit.values,
-                    **{name: fit.values[name] * np.exp(deviation * z) for name, z in zip(own, row, strict=False)},
-                    **{
-                        name: fit.values[name] * (1.0 + 0.03 * deviation * z)
-                        for name, z in zip(releases, row[len(own) :], strict=True)
-                    },
+                    name: value * np.exp(deviation * z)
+                    for (name, value), z in zip(numbers.items(), row, strict=True)
                 }
+                for deviation in _DEVIATIONS
                 for row in draws
             ]
-            costs = costs_at(problem, starts, INFLATION_STAGES[2])
-            other = fitted(problem, starts[int(np.argmin(costs))], n_iterations=6, stages=INFLATION_STAGES[2:])[0]
-            if not other.trouble and other.cost < fit.cost:
-                fit = other
-        self._keep([fit])
+            self._grown([rest, believed], f"refining {effect.key}", [effect], {effect.key: [numbers, *places]})
 
     def _candidates_beside(self, bases: Sequence[FreeRunFit]) -> list[Candidate]:
         """Effects that act on forces which only the effects of a fit have added, such as on a liquid's damping."""
