@@ -133,11 +133,13 @@ def findings_of(
     runs = FittedRuns(model, fitting, case.names_by_test())
     retuned_fit, _ = fitted_baseline(runs.problem())
     # What a liquid fluctuates by is computed from its motion, which only a fit tells.
-    every = with_fluctuation(model, [*fitting, *held_out], case.repeated, retuned_fit)
-    fitting, held_out = every[: len(fitting)], every[len(fitting) :]
-    runs = FittedRuns(model, fitting, case.names_by_test())
+    quiet = [*fitting, *held_out]
+    every = with_fluctuation(model, quiet, case.repeated, retuned_fit)
+    if every != quiet:
+        fitting, held_out = every[: len(fitting)], every[len(fitting) :]
+        runs = FittedRuns(model, fitting, case.names_by_test())
+        retuned_fit, _ = fitted(runs.problem(), retuned_fit.values, stages=INFLATION_STAGES[-1:])
     problem = runs.problem()
-    retuned_fit, _ = fitted(problem, retuned_fit.values, stages=INFLATION_STAGES[-1:])
     selection = ModelSelection(runs, surroundings_of(problem, retuned_fit, case.rig), progress)
     fits = selection.selected(retuned_fit)
     fitting, held_out = (with_sampled_jumps(model, some, selection.jumping) for some in (fitting, held_out))
