@@ -20,23 +20,34 @@ from sloshlab.identification.case import Case, read_case
 
 
 def main() -> int:
-    """A line per case; exit code 1 where an answer became less definite."""
+    """A line per case; exit code 1 where an answer became less definite, 2 where a case cannot be read."""
     parser = argparse.ArgumentParser(prog="python -m studies.more_evidence", description=__doc__)
     parser.add_argument("cases", nargs="+", type=Path)
     n_worse = 0
-    for folder in parser.parse_args().cases:
-        whole = verdict_of(findings_of(read_case(folder)))
-        said = [f"whole: {_in_words(whole)}"]
-        for label, names in _subsets(read_case(folder)):
-            fewer = _diagnosed(folder, names)
-            if fewer is not None:
-                is_worse = _left_open(whole) > _left_open(fewer)
-                n_worse += is_worse
-                said.append(f"{label}: {_in_words(fewer)}{' – more definite' if is_worse else ''}")
-        sys.stdout.write(f"{folder.name}: {'; '.join(said)}\n")
-        sys.stdout.flush()
+    try:
+        for folder in parser.parse_args().cases:
+            n_worse += _compared(folder)
+    except SloshlabError as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
     sys.stdout.write(f"{n_worse} answers became less definite with more recordings\n")
     return int(n_worse > 0)
+
+
+def _compared(folder: Path) -> int:
+    """Say what is answered with fewer runs and with all; how many answers became less definite."""
+    case = read_case(folder)
+    whole, n_worse = verdict_of(findings_of(case)), 0
+    said = [f"whole: {_in_words(whole)}"]
+    for label, names in _subsets(case):
+        fewer = _diagnosed(folder, names)
+        if fewer is not None:
+            is_worse = _left_open(whole) > _left_open(fewer)
+            n_worse += is_worse
+            said.append(f"{label}: {_in_words(fewer)}{' – more definite' if is_worse else ''}")
+    sys.stdout.write(f"{folder.name}: {'; '.join(said)}\n")
+    sys.stdout.flush()
+    return n_worse
 
 
 def _subsets(case: Case) -> Iterator[tuple[str, set[str]]]:
