@@ -16,6 +16,8 @@ import threading
 from collections.abc import Iterator
 from typing import Any, Final
 
+from sloshlab.errors import RecordingInterruptedError
+
 _AFTER_THE_CLEAN_UP_S = 0.02
 
 TERMINATIONS: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -117,9 +119,12 @@ def never_lost() -> Iterator[None]:
         signal.signal(number, noted)
     try:
         yield
-    # compiled code that was looking at its arguments says SystemError, a module that was being loaded
-    # ImportError
-    except (SystemError, ImportError) as error:
+    # one that has put away on purpose what it had when it was interrupted
+    except RecordingInterruptedError:
+        raise
+    # whatever comes up after a signal comes of it: compiled code that was looking at its arguments says
+    # SystemError, a module half loaded ImportError, AttributeError or what else it likes
+    except Exception as error:
         if not arrived:
             raise
         try:

@@ -35,7 +35,7 @@ from typing import Any, Final, NoReturn, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from sloshlab import errors
+from sloshlab import errors, interrupt
 from sloshlab.errors import InputError, MissingExtraError, SourceError
 from sloshlab.netcdf_lock import NETCDF_LOCK
 from sloshlab.returned_values import Packed, Store, Unpacked
@@ -173,11 +173,13 @@ def _by_fork(
             os.close(theirs)
         try:
             answer = _received(ours, file)
-            status = _ended(child)
         except BaseException:
             os.kill(child, signal.SIGKILL)
-            _ended(child)
             raise
+        finally:
+            # an interrupt between its end and the note of it would have somebody else's process killed, or none
+            with interrupt.held():
+                status = _ended(child)
         if status or not answer:
             raise file.of_the_dead(status)
         return json.loads(answer), _mapped(numbers)

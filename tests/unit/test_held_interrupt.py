@@ -9,6 +9,7 @@ import time
 import pytest
 
 from sloshlab import interrupt
+from sloshlab.errors import RecordingInterruptedError
 
 
 def test_a_held_block_is_done_before_the_interrupt_arrives() -> None:
@@ -120,3 +121,25 @@ def test_a_termination_in_the_clean_up_of_an_object_arrives_after_it() -> None:
 
     with pytest.raises(interrupt.Terminated), interrupt.never_lost():
         work()
+
+
+def test_what_comes_up_after_a_signal_comes_of_it() -> None:
+    """A library caught halfway may say anything; what was put away on purpose keeps its own words."""
+
+    def failing(error: Exception, is_interrupted: bool) -> None:
+        with interrupt.never_lost():
+            try:
+                if is_interrupted:
+                    signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt:
+                pass
+            raise error
+
+    for error in (AttributeError("half a module"), ProcessLookupError(3, "No such process")):
+        with pytest.raises(KeyboardInterrupt) as interrupted:
+            failing(error, True)
+        assert interrupted.value.__cause__ is error
+        with pytest.raises(type(error)):
+            failing(error, False)
+    with pytest.raises(RecordingInterruptedError):
+        failing(RecordingInterruptedError("what was recorded is kept"), True)

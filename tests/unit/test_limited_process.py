@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
+import signal
 import time
 from typing import Any
 
@@ -124,6 +125,21 @@ def test_errors_come_back_as_they_were(reader, kind, message: str, fork: bool) -
 def test_what_a_reader_may_not_return_is_a_mistake_of_ours() -> None:
     with pytest.raises(RuntimeError, match="a reader may not return <class 'object'>"):
         FILE.read(object)
+
+
+@pytest.mark.skipif(not CAN_FORK, reason="no fork here")
+def test_an_interrupt_as_the_reader_ends_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its process is gone then: killing it would fail, or meet another."""
+    waited_for = os.waitpid
+
+    def interrupted(*arguments: int) -> tuple[int, int]:
+        ended = waited_for(*arguments)
+        signal.raise_signal(signal.SIGINT)
+        return ended
+
+    monkeypatch.setattr(os, "waitpid", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        FILE.read(values, 3)
 
 
 def test_nothing_stays_behind() -> None:
