@@ -21,8 +21,8 @@ from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
 from sloshlab.diagnosis.selection.successive_halving import halved
-from sloshlab.identification.free_run_fit import INFLATION_STAGES, fitted, stages_for
-from sloshlab.identification.free_run_problem import FreeRunFit, extension_of, huber_cost, run_of
+from sloshlab.identification.free_run_fit import fitted, stages_for
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost, run_of
 from sloshlab.identification.readiness import refuted_beliefs
 from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
 
@@ -223,13 +223,13 @@ class ModelSelection:
         """A fit on all runs."""
         self.said(f"fitting {' + '.join(candidate.key for candidate in coarse.candidates)}", 0, 1)
         problem = self.runs.problem_of(coarse)
-        fit = fitted(problem, {**base.values, **coarse.values}, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]
+        fit = _at_its_optimum(problem, {**base.values, **coarse.values})
         released = [run for run in self.runs.runs if run[0].run.is_free]
         if fit.trouble or not released or problem.is_down_to_noise(fit):
             return fit
         # Each release by itself, from many starts: one that comes to rest elsewhere holds all other numbers back.
         values = values_of_runs(self.runs.model, released, fit)
-        other = fitted(problem, values, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]
+        other = _at_its_optimum(problem, values)
         return other if other.cost < fit.cost else fit
 
     def _swapped(self, n: int) -> None:
@@ -253,7 +253,7 @@ class ModelSelection:
                 rest = _without(model, effect)
                 problem = self.runs.problem_of(rest)
                 start = {name: value for name, value in rest.values.items() if name in problem.names}
-                self._keep([fitted(problem, start, n_iterations=15, stages=INFLATION_STAGES[-2:])[0]])
+                self._keep([_at_its_optimum(problem, start)])
                 others = frozenset(candidate.key for candidate in rest.candidates)
                 simpler = [
                     each for each in self.pool if effect.reduces_to(each) and others | {each.key} not in self.fits
@@ -292,6 +292,12 @@ class ModelSelection:
                 beside = candidates(replace(self.at, twin=twin))
                 found |= {candidate.key: candidate for candidate in beside if candidate.key not in known}
         return list(found.values())
+
+
+def _at_its_optimum(problem: FreeRunProblem, start: Mapping[str, float]) -> FreeRunFit:
+    """A fit from where it shows: what stood in for another number a moment ago is that far off with it."""
+    here = FreeRunFit(problem.candidates, dict(start), 0.0, 0.0)
+    return fitted(problem, start, n_iterations=15, stages=stages_for(problem, here))[0]
 
 
 def _without(fit: FreeRunFit, effect: Candidate) -> FreeRunFit:
