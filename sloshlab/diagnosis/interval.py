@@ -4,7 +4,7 @@ simulations are exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,8 @@ from sloshlab.diagnosis.inference.run_noise import EXACT
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.identification.cluster_robust_errors import cluster_robust_errors
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, robust_weights
+from sloshlab.identification.profile_likelihood import profiled_distance
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.units import is_calibrated
 
@@ -41,7 +43,8 @@ def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], In
     The covariance of the fit contains the priors of the baseline: where the recordings do not separate a gain or a
     mass from an effect, its interval is as wide as what is believed of these. Its part by noise is widened by what
     is left over the noise floor, or replaced by the cluster-robust error, whichever is more. However many samples
-    tell a force or a length, it is known no better than a simulation describes the motion (`EXACT`).
+    tell a force or a length, it is known no better than a simulation describes the motion (`EXACT`). Where the
+    profile of the likelihood is flatter than its curvature at the optimum, the interval goes as far as that.
 
     Parameters
     ----------
@@ -51,10 +54,15 @@ def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], In
     runs = FittedRuns(found.model, found.fitting, found.case.names_by_test())
     problem = runs.problem_of(best.fit)
     theta = problem.theta_of(best.fit.values)
-    jacobian = problem.jacobian(theta, problem.residual(theta), range(theta.size))
-    scatter = cluster_robust_errors(problem, best.fit, jacobian)
+    jacobian = problem.central_jacobian(theta)
+    weights = robust_weights(problem.residual(theta))
+    hessian = jacobian.weighted(weights).normal() + np.diag(problem.prior)
+    covariance = np.asarray(np.linalg.pinv(hessian), np.float64)
+    fit = replace(best.fit, covariance=covariance, names=problem.names, scales=problem.scales)
+    scatter = cluster_robust_errors(problem, fit, jacobian)
+    noise = max(1.0, best.fitted_rms)
     return {
-        (candidate.key, parameter.name): _interval(best, candidate, parameter.name, scatter)
+        (candidate.key, parameter.name): _interval(problem, fit, noise, candidate, parameter.name, scatter)
         for candidate in best.fit.candidates
         for parameter in candidate.effect.parameters
         # Numbers of runs that were not fitted have none.
@@ -62,14 +70,22 @@ def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], In
     }
 
 
-def _interval(best: ScoredModel, candidate: Candidate, parameter: str, scatter: dict[str, float]) -> Interval:
+def _interval(
+    problem: FreeRunProblem,
+    fit: FreeRunFit,
+    noise: float,
+    candidate: Candidate,
+    parameter: str,
+    scatter: dict[str, float],
+) -> Interval:
     name = f"{candidate.key}.{parameter}"
-    estimate = best.fit.values[name]
-    of_noise, of_belief = best.fit.standard_errors(name)
-    of_noise = max(of_noise * max(1.0, best.fitted_rms), scatter.get(name, 0.0))
+    estimate = fit.values[name]
+    of_noise, of_belief = fit.standard_errors(name)
+    of_noise = max(of_noise * noise, scatter.get(name, 0.0))
     of_simulation = EXACT * abs(estimate) if is_calibrated(parameter) else 0.0
     width = _NORMAL_90 * float(np.sqrt(of_noise**2 + of_belief**2 + of_simulation**2))
     lowest, highest = candidate.bounds(
         next(each for each in candidate.effect.parameters if each.name == parameter)
     )
-    return Interval(estimate, max(estimate - width, lowest), min(estimate + width, highest))
+    down, up = (profiled_distance(problem, fit, name, sign * width) for sign in (-1.0, 1.0))
+    return Interval(estimate, max(estimate + down, lowest), min(estimate + up, highest))

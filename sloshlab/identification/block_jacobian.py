@@ -85,6 +85,25 @@ class BlockJacobian:
         )
         return BlockJacobian(self.n_columns + more.n_columns, blocks)
 
+    def mean_with(self, other: BlockJacobian) -> BlockJacobian:
+        """Of two sets of derivatives; a column that is zero throughout in one of them counts as in the other.
+
+        Parameters
+        ----------
+        other : BlockJacobian
+            Of the same residuals by the same parameters.
+        """
+        blocks = []
+        for one, two in zip(self.blocks, other.blocks, strict=True):
+            columns = np.union1d(one.columns, two.columns).astype(np.intp)
+            total, n = np.zeros((one.values.shape[0], columns.size)), np.zeros(columns.size)
+            for block in (one, two):
+                places = np.searchsorted(columns, block.columns)
+                total[:, places] += block.values
+                n[places] += 1
+            blocks.append(_Block(one.rows, columns, total / n))
+        return BlockJacobian(self.n_columns, tuple(blocks))
+
     def part(self, chosen: Sequence[int], columns: Sequence[int]) -> BlockJacobian:
         """Some blocks, one after another, and some columns alone.
 

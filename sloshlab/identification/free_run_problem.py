@@ -195,6 +195,17 @@ class FreeRunProblem:
         found = iter(self._weighted(parts))
         return [np.concatenate([next(found) for run in self.runs for _ in run]) for _ in thetas]
 
+    def costs(self, several: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Cost of several sets of values, as of a fit; infinite where a simulation does not reach its end."""
+        thetas = [self.theta_of(values) for values in several]
+        squares = [float((self.prior * theta**2).sum()) for theta in thetas]
+        return np.array(
+            [
+                huber_cost(residual) + square if np.isfinite(residual).all() else np.inf
+                for square, residual in zip(squares, self.residuals(thetas), strict=True)
+            ]
+        )
+
     def _weighted(self, parts: Sequence[_Part]) -> Iterator[FloatArray]:
         """Weighted residuals of every observation of every part, one after the other."""
         self.n_simulations += len(parts)
@@ -218,13 +229,20 @@ class FreeRunProblem:
         )
 
     def jacobian(
-        self, theta: FloatArray, at: FloatArray, columns: Sequence[int], *, coarse: bool = False
+        self,
+        theta: FloatArray,
+        at: FloatArray,
+        columns: Sequence[int],
+        *,
+        coarse: bool = False,
+        forward: bool = True,
     ) -> BlockJacobian:
         """Derivatives of the residuals by some scaled parameters, by finite differences.
 
-        Coarse differences are wider: the residual is rough on a small scale with dry friction and contacts.
+        Coarse differences are wider: the residual is rough on a small scale with dry friction and contacts. Steps
+        are upward, or downward where not `forward`, and away from bounds.
         """
-        places = []
+        places, direction = [], 1.0 if forward else -1.0
         for column in columns:
             is_effect, is_damping = column >= self.n_baseline, self.names[column].startswith("damping")
             step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
@@ -236,9 +254,10 @@ class FreeRunProblem:
                 # Only in coarse stages: the optimum itself is sought with the fine step.
                 step *= _TOLERANCES_OF_DAMPING
             moved = theta.copy()
+            step *= direction
             physical = self.centres[column] + (theta[column] + step) * self.scales[column]
             # Away from the bound, where the values would be clipped and the difference zero.
-            moved[column] += step if physical <= self.high[column] else -step
+            moved[column] += step if self.low[column] <= physical <= self.high[column] else -step
             places.append(moved)
 
         changed = [self._changed_by([column]) for column in columns]
@@ -261,6 +280,15 @@ class FreeRunProblem:
         return BlockJacobian.of_blocks(
             derivatives, [observation.spectra.size for run in self.runs for observation in run]
         )
+
+    def central_jacobian(self, theta: FloatArray) -> BlockJacobian:
+        """Derivatives by all scaled parameters, by central differences: for a covariance.
+
+        Where two numbers do nearly the same, such as a frequency and a spring that stiffens, what tells them apart
+        is the small difference of two large columns, within the error of forward differences.
+        """
+        at, columns = self.residual(theta), range(theta.size)
+        return self.jacobian(theta, at, columns).mean_with(self.jacobian(theta, at, columns, forward=False))
 
     def residuals_moved(
         self, thetas: Sequence[FloatArray], columns: Sequence[int], at: FloatArray

@@ -174,10 +174,10 @@ def difference(first: ScoredModel, other: ScoredModel) -> float:
 
 
 def strength(before: ScoredModel, after: ScoredModel) -> float:
-    """Effect size: what a model removes from the channel of a run that shows it most, in noise floors.
+    """Effect size: RMS of what a model adds to the prediction of another, in the channel that shows it most.
 
-    √(before/after − 1) of the mean squares of informative residuals, neither below the noise floor; bursts count
-    linearly.
+    Of one run, in noise floors, where the recordings stand out of the noise. Not by how much less is left over the
+    floor: a floor is no lower than the noise, and what is within its margin would be no effect.
 
     Parameters
     ----------
@@ -188,8 +188,8 @@ def strength(before: ScoredModel, after: ScoredModel) -> float:
         for i, observation in enumerate(one.observed):
             shown = observation.informative
             if shown.sum() >= _FEWEST_COEFFICIENTS:
-                left = [max(1.0, float(robust_squares(run.residual[i][shown]).mean())) for run in (one, two)]
-                largest = max(largest, left[0] / left[1] - 1.0)
+                added = one.residual[i][shown] - two.residual[i][shown]
+                largest = max(largest, float(np.mean(added**2)))
     return float(np.sqrt(largest))
 
 

@@ -143,3 +143,13 @@ def test_a_correction_does_not_depend_on_the_units_of_the_residuals(scale: float
     jacobian.correct(step, change)
     other.correct(step, scale * change)
     np.testing.assert_allclose(as_dense(other), scale * as_dense(jacobian), rtol=1e-12)
+
+
+def test_the_mean_of_two_counts_what_only_one_of_them_sees() -> None:
+    """A column without derivatives is one whose simulation failed on that side."""
+    one = BlockJacobian.of_blocks([{0: np.array([2.0, 4.0])}, {}, {1: np.array([6.0])}], [2, 1])
+    two = BlockJacobian.of_blocks(
+        [{0: np.array([4.0, 0.0])}, {0: np.array([1.0, 1.0])}, {1: np.array([8.0])}], [2, 1]
+    )
+    mean = one.mean_with(two)
+    assert [mean.times(unit).tolist() for unit in np.eye(3)] == [[3.0, 2.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 7.0]]
