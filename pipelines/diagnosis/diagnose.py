@@ -63,7 +63,7 @@ def diagnose_case(
     model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
         found = findings_of(
-            case, lambda what, done, of: advance(done, max(of, 1)), model, executor=WorkerThreads()
+            case, lambda what, done, of: advance(done, max(of, 1), what), model, executor=WorkerThreads()
         )
         verdict = verdict_of(found)
     examination = examined(found)

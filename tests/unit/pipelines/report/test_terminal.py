@@ -82,6 +82,26 @@ def test_notes_of_progress_are_shown_as_they_are(name: str, monkeypatch: pytest.
         assert "\x1b[2J" not in terminal.getvalue()
 
 
+def test_a_pipe_has_a_line_every_half_minute(capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("pipelines.report.progress.time.monotonic", lambda: now[0])
+    with amounts("diagnosing") as advance:
+        for second in range(0, 100, 5):
+            now[0] = 100.0 + second
+            # two steps of work: one of 20 s, one of 160 s of which a half is done at the end
+            advance(*((second, 20.0, "first") if second < 20 else (second - 20.0, 160.0, "one effect: \x1b[2J")))
+    assert capsys.readouterr().err.splitlines() == [
+        "diagnosing, 30 s so far: one effect: \\x1b[2J, 6 %, about 2 min left of this step",
+        "diagnosing, 60 s so far: one effect: \\x1b[2J, 25 %, about 2 min left of this step",
+        "diagnosing, 90 s so far: one effect: \\x1b[2J, 44 %, about 90 s left of this step",
+    ]
+    with progress("runs", 4) as step:
+        step("run_01")
+        now[0] += 31.0
+        step("run_02")
+    assert capsys.readouterr().err == "runs, 31 s so far: run_02, 50 %, about 31 s left of this step\n"
+
+
 def test_the_live_view_writes_out_what_a_device_says() -> None:
     from acquisition.recorder.status import Event
 
