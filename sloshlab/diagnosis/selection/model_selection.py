@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 from scipy.stats import norm, qmc
 
-from sloshlab.diagnosis.inference.remainder import remainder
+from sloshlab.diagnosis.inference.remainder import TEMPERING, remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
-from sloshlab.diagnosis.inference.scored_model import is_worth_a_word
+from sloshlab.diagnosis.inference.scored_model import complexity, is_worth_a_word
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
@@ -39,6 +39,8 @@ _LEAST_EXPLAINED: Final = 0.1
 
 Two effects that explain all of it together, and neither a tenth of it alone, would act only together.
 """
+_NO_CHANCE: Final = 7.0
+"""Nats: a model that is so much less probable than another, by a thousand to one, is not worth more fits."""
 _DEVIATIONS: Final = (0.3, 0.1)
 """Standard deviations of the logarithms of an effect's numbers about a fit, from which it is refined in turns."""
 
@@ -248,7 +250,7 @@ class ModelSelection:
         An effect without size would otherwise gain what is only a better optimum of what is nested in it, and the
         simpler of two forms may have been hopeless beside the other one on its way.
         """
-        for model in self._leading(n):
+        for model in filter(self._may_win, self._leading(n)):
             for effect in model.candidates:
                 rest = _without(model, effect)
                 problem = self.runs.problem_of(rest)
@@ -280,6 +282,11 @@ class ModelSelection:
                 for row in draws
             ]
             self._grown([rest, believed], f"refining {effect.key}", [effect], {effect.key: [numbers, *places]})
+
+    def _may_win(self, model: FreeRunFit) -> bool:
+        """Whether what is nested in a model, which explains no more, could have the evidence of the best model."""
+        best = min(self.fits.values(), key=lambda fit: fit.cost)
+        return (model.cost - best.cost) / (2 * TEMPERING) < complexity(best) + _NO_CHANCE
 
     def _candidates_beside(self, bases: Sequence[FreeRunFit]) -> list[Candidate]:
         """Effects that act on forces which only the effects of a fit have added, such as on a liquid's damping."""
