@@ -7,7 +7,7 @@ few of them is no certainty (Yao, Vehtari, Simpson and Gelman 2018, doi:10.1214/
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from sloshlab.diagnosis.inference.places import block_of
+from sloshlab.diagnosis.inference.places import SENSOR, block_of
 from sloshlab.diagnosis.inference.remainder import SHARES, TEMPERING
 from sloshlab.diagnosis.inference.scored_model import (
     ScoredModel,
@@ -195,10 +195,20 @@ def _is_nested(other: ScoredModel, model: ScoredModel) -> bool:
     return True
 
 
+def _told_apart(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Places without sensors that show as what moves does: only another reading tells a sensor from it."""
+    moving = [by_share for place, by_share in places.items() if block_of(place) != SENSOR]
+    return {
+        place: by_share
+        for place, by_share in places.items()
+        if block_of(place) != SENSOR or not any(np.allclose(by_share, other) for other in moving)
+    }
+
+
 def _hypotheses(model: ScoredModel, label: str, n_candidates: int, tempering: float) -> list[Hypothesis]:
     log_prior = _log_prior(model, n_candidates)
     found = [Hypothesis(model, "", label, log_prior, model.remainder.noise / tempering)]
-    places = model.remainder.places
+    places = _told_apart(model.remainder.places)
     # A remainder of a size that is not worth a word leaves the model what it is.
     of_remainder = UNKNOWN if is_worth_a_word(model.runs) else label
     for place, by_share in places.items():

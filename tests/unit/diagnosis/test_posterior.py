@@ -199,3 +199,10 @@ def test_models_are_ranked_by_the_evidence_that_their_probabilities_have() -> No
 
 def _rank(hypothesis: posterior_module.Hypothesis) -> float:
     return -hypothesis.log_evidence
+
+
+def test_a_sensor_that_shows_as_a_force_does_is_no_place_of_its_own() -> None:
+    """Of one channel alone nothing tells the two apart; where the sensor shows otherwise it is a place."""
+    for sensor, blocks in ((60.0, {"structure"}), (60.5, {"structure", "sensor"})):
+        found = posterior([model(0.0, places={"structure": 60.0, "sensor acceleration_tip": sensor})], 10, 1.0)
+        assert set(found.by_block()) == blocks
