@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, cast
 
 import numpy as np
@@ -126,8 +126,6 @@ def findings_of(
     progress("retuning the baseline", 0, 1)
     # The noise floor uses all runs, held-out ones too: it says how well readings are known and chooses nothing.
     weighted = weighted_observations(case, model)
-    if all(len(observed) < 2 for observed in weighted.values()):
-        parts = replace(parts, limits=(*parts.limits, "one channel alone: what its sensor does counts as a force"))
     fitting = [weighted[run.name] for run in parts.fitting if weighted[run.name]]
     held_out = [weighted[run.name] for run in parts.held_out if weighted[run.name]] if parts.has_held_out else []
     # A plain refit can hide physics (leaving out the dry friction of a servo axis doubles its damping), and a

@@ -60,6 +60,8 @@ def _unknown(found: Findings, decision: Decision) -> str:
         "": "and its place cannot be located",
         SENSOR: f"in a sensor ({_channel(decision.place)})",
     }.get(decision.block, f"in the {decision.block}")
+    if decision.block not in ("", SENSOR) and all(len(run) == 1 for run in found.fitting):
+        where += " or in what its only sensor makes of it"
     nearest = ""
     if decision.best is not None:
         named = " and ".join(named_and_placed(candidate) for candidate in decision.best.fit.candidates)
