@@ -174,7 +174,8 @@ def _by_fork(
         try:
             answer = _received(ours, file)
         except BaseException:
-            os.kill(child, signal.SIGKILL)
+            with contextlib.suppress(ProcessLookupError):  # where the system throws codes away, it may be gone
+                os.kill(child, signal.SIGKILL)
             raise
         finally:
             # an interrupt between its end and the note of it would have somebody else's process killed, or none

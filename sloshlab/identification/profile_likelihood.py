@@ -42,8 +42,12 @@ def profiled_distance(problem: FreeRunProblem, fit: FreeRunFit, name: str, dista
     Returns
     -------
     float
-        Of the same sign, no shorter than `distance` and within the bounds of the number.
+        Of the same sign, no shorter than `distance` unless the bound of the number is nearer.
     """
+    at = problem.names.index(name)
+    bound = float((problem.high if distance > 0 else problem.low)[at] - fit.values[name])
+    if abs(bound) <= abs(distance):
+        return bound
     i = fit.names.index(name)
     variance = float(fit.covariance[i, i]) * fit.scales[i] ** 2
     if not variance > 0 or distance == 0:
@@ -52,8 +56,6 @@ def profiled_distance(problem: FreeRunProblem, fit: FreeRunFit, name: str, dista
     centre = problem.theta_of(fit.values)
     # Not the cost of the fit: it may have been fitted with other noise.
     [least] = problem.costs([fit.values])
-    at = problem.names.index(name)
-    bound = (problem.high if distance > 0 else problem.low)[at] - fit.values[name]
     along = fit.covariance[:, i] / fit.covariance[i, i]
     reached, widening, below, root_below = distance, 1.0, 0.0, 0.0
     for _ in range(_MOST_REFITS):

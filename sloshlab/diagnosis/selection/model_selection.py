@@ -302,7 +302,10 @@ class ModelSelection:
 
 
 def _at_its_optimum(problem: FreeRunProblem, start: Mapping[str, float]) -> FreeRunFit:
-    """A fit from where it shows: what stood in for another number a moment ago is that far off with it."""
+    """A fit through all stages of noise inflation in which the residuals of its start show.
+
+    What stood in for an effect is off by as much when the effect is taken out, and the other way round.
+    """
     here = FreeRunFit(problem.candidates, dict(start), 0.0, 0.0)
     return fitted(problem, start, n_iterations=15, stages=stages_for(problem, here))[0]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -14,6 +15,7 @@ from sloshlab.diagnosis import interval as interval_module
 from sloshlab.diagnosis.interval import intervals_of
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import observations
+from sloshlab.identification.profile_likelihood import profiled_distance
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate
@@ -36,16 +38,46 @@ def _cubic(tmp_path: Path) -> tuple[SimpleNamespace, FreeRunProblem, FreeRunFit,
     return found, problem, fit, name
 
 
-def test_its_ends_are_where_the_profile_has_risen(cubic: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The number grows with 1/gain² of a displacement: forward differences had a fifth of this interval."""
+def risen(problem: FreeRunProblem, fit: FreeRunFit, name: str, value: float) -> float:
+    """By how much a fit is worse with one number held at a value."""
+    held = FreeRunProblem(problem.model, problem.runs, problem.candidates, {name: value})
+    return fitted_from(held, [fit.values], n_iterations=12).cost - fit.cost
+
+
+@pytest.mark.parametrize("is_profiled", [True, False])
+def test_its_ends_are_where_the_profile_has_risen(
+    cubic: Any, is_profiled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The number grows with 1/gain² of a displacement: forward differences had a fifth of this interval.
+
+    The profile would mend a covariance that is wrong: the covariance is seen without it, too.
+    """
     found, problem, fit, name = cubic
     monkeypatch.setattr(interval_module, "EXACT", 0.0)
+    if not is_profiled:
+        monkeypatch.setattr(interval_module, "profiled_distance", lambda problem, fit, name, distance: distance)
     [interval] = intervals_of(cast(Any, found), cast(Any, SimpleNamespace(fit=fit, fitted_rms=1.0))).values()
     assert interval.low < CUBIC_N_PER_M3 < interval.high
     for end in (interval.low, interval.high):
-        held = FreeRunProblem(problem.model, problem.runs, problem.candidates, {name: end})
-        rise = fitted_from(held, [fit.values], n_iterations=12).cost - fit.cost
-        assert rise == pytest.approx(1.645**2, rel=0.15)
+        assert risen(problem, fit, name, end) == pytest.approx(1.645**2, rel=0.15)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_profile_goes_on_where_a_covariance_is_too_small_and_nowhere_where_it_is_not(
+    cubic: Any, sign: float
+) -> None:
+    _, problem, fit, name = cubic
+    theta = problem.theta_of(fit.values)
+    covariance = np.linalg.pinv(problem.central_jacobian(theta).normal() + np.diag(problem.prior))
+    for share in (0.25, 4.0):
+        other = replace(fit, covariance=share * covariance)
+        given = sign * 1.645 * other.standard_error(name)
+        reached = profiled_distance(problem, other, name, given)
+        if share > 1:
+            assert reached == given
+        else:
+            assert abs(reached) > 1.5 * abs(given)
+            assert risen(problem, fit, name, fit.values[name] + reached) == pytest.approx(1.645**2, rel=0.15)
 
 
 def test_a_force_is_known_no_better_than_a_simulation_is_exact(

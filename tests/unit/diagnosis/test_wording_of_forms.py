@@ -7,8 +7,15 @@ from typing import Any, cast
 
 import pytest
 
+from sloshlab.diagnosis.inference.decision import Decision
 from sloshlab.diagnosis.interval import Interval
-from sloshlab.diagnosis.wording import _described, form_and_place, named_and_placed, refuted_statement
+from sloshlab.diagnosis.wording import (
+    _described,
+    form_and_place,
+    named_and_placed,
+    refuted_statement,
+    statement_of,
+)
 from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate, known_effects
@@ -94,3 +101,11 @@ def test_numbers_that_all_runs_share_stand_beside_those_of_runs() -> None:
         "external force in the tank, size 2 N (1.8 to 2.2), frequency 9 Hz (8.1 to 9.9), "
         "phase 0.25 to 0.75 in 2 runs"
     )
+
+
+@pytest.mark.parametrize("n_channels", [1, 2])
+def test_of_one_channel_alone_its_sensor_may_be_meant(n_channels: int) -> None:
+    found: Any = SimpleNamespace(fitting=[[object()] * n_channels], split=SimpleNamespace(has_held_out=True))
+    said = statement_of(found, Decision("unknown", None, [], "structure", {}), {})
+    sensor = " or in what its only sensor makes of it" if n_channels == 1 else ""
+    assert said == f"Something is missing that has no name here, in the structure{sensor}."
