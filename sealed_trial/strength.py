@@ -43,7 +43,7 @@ _RELINEARISED_AT_ONCE, _SCANNED = 3, 13
 _MOST_BASELINES: Final = {"sdof": 7, "beam": 5, "shaker": 4}
 """Of an effect; a beam's are costly."""
 _HIDDEN, _WORTHWHILE = 0.25, 0.9
-QUICK = 1e-7
+QUICK = 1e-8
 """Tolerance of the integrator where only the size of an effect matters."""
 
 ONLY_DAMPING = ("viscous_damping", "structural_damping", "unknown")

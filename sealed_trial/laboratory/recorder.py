@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import bessel, cont2discrete, dlsim
+from scipy.signal import bessel, cont2discrete, lfilter
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -55,11 +56,15 @@ class Recorder:
         """
         if not self.filters:
             return values
-        # exact for what is straight between samples; in samples, so that one filter serves all rates
-        continuous = bessel(ORDER, 2 * np.pi * CORNER, analog=True, output="ba", norm="mag")
-        numerator, denominator, _ = cont2discrete(continuous, 1.0, method="foh")
-        _, out = dlsim((numerator.ravel(), denominator, 1.0), np.asarray(values) - before)
-        return np.asarray(out.ravel() + before)
+        return np.asarray(lfilter(*_filter(), np.asarray(values) - before) + before)
+
+
+@cache
+def _filter() -> tuple[FloatArray, FloatArray]:
+    """Numerator and denominator, exact for what is straight between samples; in samples, one for all rates."""
+    continuous = bessel(ORDER, 2 * np.pi * CORNER, analog=True, output="ba", norm="mag")
+    numerator, denominator, _ = cont2discrete(continuous, 1.0, method="foh")
+    return numerator.ravel(), denominator
 
 
 def drawn_recorder(generator: np.random.Generator) -> Recorder:
