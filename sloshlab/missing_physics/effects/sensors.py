@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
+from scipy.ndimage import map_coordinates
 from scipy.signal import lfilter, zoom_fft
 
 from sloshlab.missing_physics.candidate import (
@@ -45,6 +45,8 @@ _MAINS_HZ: Final = 0.2
 _MOST_PAIRS: Final = 20
 """Of channel and source."""
 _SPLINE_DEGREE: Final = 5
+_SPLINE_MARGIN: Final = 32
+"""Samples beyond which one does not show in a coefficient of the spline: 0.4306^32 = 2e-12 (its larger pole)."""
 _LARGEST_LEAK: Final = 0.1
 """Of a channel's reading; more than that is another connection or gain."""
 _LARGEST_LEAK_OF_ITS_KIND: Final = 0.2
@@ -152,16 +154,20 @@ def _advanced(numbers: Numbers) -> Reading:
 def _shifted(values: FloatArray, samples: float) -> FloatArray:
     """Values delayed by `samples`, by a linear phase; the series is reflected at its ends."""
     margin = min(values.size - 1, 64 + int(abs(samples)))
-    # Reflected about the end points, so that value and slope go on: a Fourier transform takes the series for
-    # periodic, and the jump between its ends would ring into the run.
-    padded = np.concatenate(
-        [2 * values[0] - values[margin:0:-1], values, 2 * values[-1] - values[-2 : -margin - 2 : -1]]
-    )
+    # A Fourier transform takes the series for periodic, and the jump between its ends would ring into the run.
+    padded = _reflected(values, margin)
     spectrum = np.fft.rfft(np.nan_to_num(padded))
     frequency = np.fft.rfftfreq(padded.size)
     moved = np.fft.irfft(spectrum * np.exp(-2j * np.pi * frequency * samples), padded.size)
     result = moved[margin : margin + values.size]
     return np.asarray(np.where(np.isfinite(values), result, np.nan))
+
+
+def _reflected(values: FloatArray, margin: int) -> FloatArray:
+    """With margins, reflected about the end points, so that value and slope go on."""
+    return np.concatenate(
+        [2 * values[0] - values[margin:0:-1], values, 2 * values[-1] - values[-2 : -margin - 2 : -1]]
+    )
 
 
 DELAY = _sensor_effect(
@@ -349,12 +355,15 @@ def _interpolated(values: FloatArray, places: FloatArray) -> FloatArray:
     Beyond the ends the last value stays; what is next to a lost sample is lost.
     """
     samples, known = np.arange(values.size), np.isfinite(values)
-    if values.size <= _SPLINE_DEGREE or not known.any():
+    if values.size <= _SPLINE_MARGIN or not known.any():
         return np.asarray(np.interp(places, samples, values))
+    all_known = bool(known.all())
     # A spline through a lost sample would be lost throughout.
-    whole = values if known.all() else np.interp(samples, samples[known], values[known])
-    found = make_interp_spline(samples, whole, k=_SPLINE_DEGREE)(np.clip(places, 0, values.size - 1))
-    return np.asarray(np.where(np.interp(places, samples, known) == 1.0, found, np.nan))
+    whole = values if all_known else np.interp(samples, samples[known], values[known])
+    # On equal distances the coefficients of the spline are a filter, which begins and ends in the margins.
+    within = np.clip(places, 0, values.size - 1) + _SPLINE_MARGIN
+    found = map_coordinates(_reflected(whole, _SPLINE_MARGIN), [within], order=_SPLINE_DEGREE, mode="mirror")
+    return np.asarray(found if all_known else np.where(np.interp(places, samples, known) == 1.0, found, np.nan))
 
 
 CLOCK = _sensor_effect(
