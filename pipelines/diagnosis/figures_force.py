@@ -64,9 +64,9 @@ def worst_place(diagnosis: Diagnosis) -> str:
 
 def _in_time(axes: Axes, latent_force: LatentForce) -> None:
     spread = latent_force.motion[:, 2].std() / max(latent_force.motion[:, 1].std(), 1e-300)
-    n = min(
-        latent_force.time_s.size, int(_CYCLES * 2 * np.pi / spread * latent_force.run.attributes.sampling_rate_hz)
-    )
+    # of what does not move a cycle is as long as the run
+    shown_s = _CYCLES * 2 * np.pi / spread if spread > 0 else np.inf
+    n = int(min(latent_force.time_s.size, shown_s * latent_force.run.attributes.sampling_rate_hz))
     power = np.convolve(latent_force.force_n**2, np.ones(n), "valid")
     # A release has its largest motion at the start.
     start = int(power.argmax()) if not latent_force.run.is_free else 0
