@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Final
+
+import numpy as np
 
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.free_run_fit import fitted, fitted_baseline
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, run_of
 from sloshlab.identification.observations import Observation
 from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.prior import drawn
 
 Runs = Sequence[Sequence[Observation]]
+_N_DRAWN: Final = 256
+"""Places of what an effect has of its own in a run: every 30 ms of one of eight seconds."""
 
 
 class FittedRuns:
@@ -63,7 +69,8 @@ def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[s
 
     Releases, offsets and the fluctuation of a liquid are unknown in a run that was not fitted and are no part of
     what is judged there; everything else stays as it is. Where a release comes to rest after another number of
-    half cycles is another minimum, so that releases are fitted from many starts.
+    half cycles is another minimum, and so is every instant of a pulse or phase of a machine: both are fitted from
+    many starts.
 
     Parameters
     ----------
@@ -77,8 +84,19 @@ def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[s
         problem = FreeRunProblem(model, [run], fit.candidates, shared)
         if problem.names:
             fits = fitted_baseline if run[0].run.is_free else fitted
-            own, _ = fits(problem, start=problem.values(problem.theta_of(fit.values)), n_iterations=3)
+            start = _best_drawn(problem, problem.values(problem.theta_of(fit.values)))
+            own, _ = fits(problem, start=start, n_iterations=3)
             # In this problem the numbers of other runs rest where they start, not where the fit has them.
             here = run[0].run.name
             values |= {name: value for name, value in own.values.items() if run_of(name, model) == here}
     return values
+
+
+def _best_drawn(problem: FreeRunProblem, start: dict[str, float]) -> dict[str, float]:
+    """The best of a start and draws of the numbers that an effect has of its own in this run."""
+    free = set(problem.names)
+    priors = [prior for candidate in problem.candidates for prior in candidate.prior if prior.name in free]
+    if not priors:
+        return start
+    several = [start, *({**start, **numbers} for numbers in drawn(priors, _N_DRAWN))]
+    return several[int(np.argmin(problem.costs(several)))]

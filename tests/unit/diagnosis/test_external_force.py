@@ -168,6 +168,17 @@ def test_numbers_of_runs_that_were_not_fitted_leave_those_of_the_fitted_alone(pu
     assert found[f"{key}.size_n"] == 0.4
 
 
+def test_the_instant_of_pulses_is_found_in_a_run_that_was_not_fitted(pulsed: RigModel) -> None:
+    """From the start of the run no step leads to a pulse that is many widths away."""
+    train = Candidate(effect("structure.external_force").of_runs(("first", "second")), of_runs(pulsed))
+    key = train.key
+    _, second = (observations(run, pulsed.compared(run)) for run in pulsed.runs)
+    numbers = {"size_n": FORCE_N, "period_s": PERIOD_S, "width_s": WIDTH_S, "start_s in first": 0.37}
+    fit = FreeRunFit((train,), {**pulsed.believed, **{f"{key}.{n}": v for n, v in numbers.items()}}, 0.0, 0.0)
+    found = values_of_runs(pulsed, [second], fit)
+    assert found[f"{key}.start_s in second"] == pytest.approx(0.81, abs=0.002)
+
+
 def test_all_runs_show_an_effect_that_has_a_number_in_each_of_them(pulsed: RigModel) -> None:
     line = Candidate(effect("structure.harmonic_force").of_runs(("first", "second")), of_runs(pulsed))
     problem = FreeRunProblem(pulsed, [observations(run, pulsed.compared(run)) for run in pulsed.runs], [line])
