@@ -4,8 +4,9 @@ r"""Evidence of one model: its likelihood in every cell of time, less what its f
           + \log \pi(\hat\theta_\mathrm{effect}) + \tfrac12 \log\det(2\pi C_\mathrm{effect}) + \mathrm{const}
 
 Laplace's approximation about the maximum a posteriori fit, whose covariance C contains the correlation of the
-effect's numbers with those of the baseline; the constant is common to all models. Held-out runs are part of y:
-their likelihood given the fit is the predictive factor of the same evidence (chain rule).
+effect's numbers with those of the baseline; the constant is common to all models. Log-likelihoods are tempered, so
+that C is that of the tempered posterior: a likelihood that counts a tenth tells a number √10 less well. Held-out
+runs are part of y: their likelihood given the fit is the predictive factor of the same evidence (chain rule).
 """
 
 from __future__ import annotations
@@ -148,9 +149,20 @@ def complexity(fit: FreeRunFit) -> float:
     # In units in which the prior is uniform from 0 to 1: by its density. A number beyond its range is at its end.
     densities = [np.exp(prior.log_density(_within(fit.values[prior.name], prior))) for prior in priors]
     errors = fit.scales[places] * np.array(densities)
-    variances = np.linalg.eigvalsh(fit.covariance[np.ix_(places, places)] * np.outer(errors, errors))
+    variances = np.linalg.eigvalsh(_tempered_covariance(fit)[np.ix_(places, places)] * np.outer(errors, errors))
     # A number that the recordings do not tell has its prior: no wider than that, and no gain by it.
     return of_belief - 0.5 * float(np.log(np.clip(2 * np.pi * variances, 1e-300, 1.0)).sum())
+
+
+def _tempered_covariance(fit: FreeRunFit) -> FloatArray:
+    """Covariance of a fit whose part by noise is larger by the tempering, that by belief as it is.
+
+    The covariance C = (JᵀJ + P)⁻¹, with P one for each number of the baseline, is C JᵀJ C + C P C.
+    """
+    of_effects = {prior.name for candidate in fit.candidates for prior in candidate.prior}
+    baseline = [i for i, name in enumerate(fit.names) if name not in of_effects]
+    of_belief = fit.covariance[:, baseline] @ fit.covariance[baseline, :]
+    return np.asarray(TEMPERING * (fit.covariance - of_belief) + of_belief)
 
 
 def _within(value: float, prior: ParameterPrior) -> float:

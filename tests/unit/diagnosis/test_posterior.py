@@ -9,12 +9,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import norm
 
 from sloshlab.diagnosis.inference import posterior as posterior_module
 from sloshlab.diagnosis.inference.decision import decided
 from sloshlab.diagnosis.inference.posterior import posterior
-from sloshlab.diagnosis.inference.remainder import Remainder
+from sloshlab.diagnosis.inference.remainder import TEMPERING, Remainder
 from sloshlab.diagnosis.inference.run_noise import RunNoise
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, complexity
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
@@ -102,13 +101,28 @@ def test_a_wider_model_that_predicts_the_same_is_the_simple_one() -> None:
 
 def test_the_occam_factor_is_the_integral_over_the_prior() -> None:
     # y = a x + noise with Σx² = 1: the likelihood of a is normal about its estimate with standard error one.
-    estimate, key = 40.0, "structure.coulomb_friction.force_n"
+    estimate, key = 400.0, "structure.coulomb_friction.force_n"
     prior = ParameterPrior(key, 0.1, 1000.0, is_log=True, may_be_negative=False)
     alone = cast(Any, SimpleNamespace(prior=(prior,)))
     fit = FreeRunFit((alone,), {key: estimate}, 0.0, 0.0, np.eye(1), (key,), np.ones(1))
-    integral, _ = quad(lambda a: norm.pdf(a, estimate, 1.0) / a / np.log(1e4), 30.0, 50.0)
+    integral, _ = quad(lambda a: np.exp(-0.5 * (a - estimate) ** 2 / TEMPERING) / a / np.log(1e4), 350.0, 450.0)
     # Laplace takes 1/a at the estimate; the integral differs by (σ/a)².
-    assert complexity(fit) == pytest.approx(-np.log(integral / norm.pdf(0.0)), abs=2e-3)
+    assert complexity(fit) == pytest.approx(-np.log(integral), abs=2e-3)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 1.0 - 1e-8])
+def test_the_occam_factor_beside_a_number_of_the_baseline(correlation: float) -> None:
+    # Known to 1/100 of the prior of the baseline: alone by noise, or as well as the baseline's number is believed.
+    key = "structure.coulomb_friction.force_n"
+    prior = ParameterPrior(key, 0.1, 1e4, is_log=True, may_be_negative=False)
+    alone = cast(Any, SimpleNamespace(prior=(prior,)))
+    information, belief = 1e4 * np.array([[1.0, correlation], [correlation, 1.0]]), np.diag([1.0, 0.0])
+    covariance = np.linalg.inv(information + belief)
+    fit = FreeRunFit((alone,), {"mass": 0.0, key: 500.0}, 0.0, 0.0, covariance, ("mass", key), np.ones(2))
+    variance = np.linalg.inv(information / TEMPERING + belief)[1, 1]
+    assert complexity(fit) == pytest.approx(
+        np.log(500.0 * np.log(1e5)) - 0.5 * np.log(2 * np.pi * variance), abs=0.05
+    )
 
 
 def test_a_number_that_nothing_tells_costs_nothing() -> None:
