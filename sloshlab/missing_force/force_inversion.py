@@ -42,11 +42,14 @@ class InvertedForce:
     spectrum : ndarray, shape (n + 1,)
     noise : ndarray, shape (n + 1,)
         Expected |F̂ − F|² by the noise of the channels and the filter.
+    kept_share : ndarray, shape (n + 1,)
+        Of every frequency that the filter keeps, 0 … 1.
     """
 
     frequency_hz: FloatArray
     spectrum: ComplexArray
     noise: FloatArray
+    kept_share: FloatArray
 
 
 def frequencies_hz(n_samples: int, rate_hz: float) -> FloatArray:
@@ -189,4 +192,4 @@ def inverted_force(
         at_release = float((share * (start.conj() * force).real).sum()) / size if size > 0 else 0.0
         force = force - at_release * start
     share = wiener_gain(np.abs(force) ** 2, noise, frequency_hz, rate_hz)
-    return InvertedForce(frequency_hz, np.asarray(share * force, np.complex128), share * noise), at_release
+    return InvertedForce(frequency_hz, np.asarray(share * force, np.complex128), share * noise, share), at_release

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -65,6 +65,10 @@ class LatentForce:
     time_s : ndarray, shape (n,)
     motion : ndarray, shape (n, 3)
         Displacement, velocity, acceleration there: relative to the base for the structure, absolute for the tank.
+    motion_before : ndarray, shape (m, 3)
+        The same from the start of the run to the first sample of the force.
+    kept_share : ndarray, shape (n_samples_of_the_run + 1,)
+        What the regularisation kept of every frequency of the padded run (`in_frequency`), 0 … 1.
     """
 
     run: CaseRun
@@ -73,6 +77,8 @@ class LatentForce:
     standard_error_n: float
     time_s: FloatArray
     motion: FloatArray
+    motion_before: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    kept_share: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @property
     def power_n2(self) -> float:
@@ -277,14 +283,17 @@ def _on_structure(
     kept = slice(kept.start, min(kept.stop, sampled))
     time = np.asarray(run.recording["time"].values, np.float64)
 
-    def latent(place: str, series: FloatArray, expected: FloatArray, motion: FloatArray) -> LatentForce:
+    def latent(
+        place: str, series: FloatArray, expected: FloatArray, motion: FloatArray, share: FloatArray
+    ) -> LatentForce:
         error = float(np.sqrt(sample_variance(expected, n)))
-        return LatentForce(run, place, series[kept], error, time[kept], motion[kept])
+        return LatentForce(run, place, series[kept], error, time[kept], motion[kept], motion[: kept.start], share)
 
     measured = _measured(observed, believed, missed)
     # Simulation alone tells the sum of both forces only.
     if measured is None:
-        return (latent(EITHER, force - on_structure - in_tank, inverted.noise, relative),), left
+        either = latent(EITHER, force - on_structure - in_tank, inverted.noise, relative, inverted.kept_share)
+        return (either,), left
     missed_force, force_noise = measured
     inertia = simulation.twin.carried_mass_kg * orders[2]
     # What a wrong release adds to the force between structure and tank is inertia, no missing force of the
@@ -301,8 +310,8 @@ def _on_structure(
     # The remainder, so that both parts add up to the inverted force whatever the regularisation took.
     of_structure = force - in_tank - in_liquid - on_structure
     return (
-        latent(STRUCTURE, of_structure, inverted.noise + kept_share * noise, relative),
-        latent(TANK, in_liquid, kept_share * noise, absolute),
+        latent(STRUCTURE, of_structure, inverted.noise + kept_share * noise, relative, inverted.kept_share),
+        latent(TANK, in_liquid, kept_share * noise, absolute, kept_share),
     ), left
 
 
@@ -398,7 +407,8 @@ def _on_shaker(
     kept = slice(kept.start, min(kept.stop, sampled))
     time = np.asarray(run.recording["time"].values, np.float64)
     error = float(np.sqrt(sample_variance(share * of_noise, n)))
-    return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept]),), left
+    before = motion[: kept.start]
+    return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept], before, share),), left
 
 
 def _order(name: str) -> int:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,7 @@ from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import complexity, is_worth_a_word
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
+from sloshlab.diagnosis.selection.matched_forces import MatchedForces, matched_forces
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
 from sloshlab.diagnosis.selection.successive_halving import halved
 from sloshlab.identification.free_run_fit import fitted, stages_for
@@ -78,7 +80,7 @@ class ModelSelection:
         if not self._remains(retuned) and not self._refuted(retuned):
             return [retuned]
         believed = self._as_believed()
-        self._grown([believed, retuned], "one effect")
+        self._grown([believed, retuned], "one effect", matched_beside=retuned)
         self._renew_sampling()
         self._swapped(1)
         self._simplified(1)
@@ -93,7 +95,8 @@ class ModelSelection:
             self._joined(n)
             joined = self._best_of(n + 1)
             if joined is None or self._remains(joined):
-                self._grown(self._leading(n), "one more effect")
+                leading = self._leading(n)
+                self._grown(leading, "one more effect", matched_beside=leading[0])
             self._renew_sampling()
             self._swapped(n + 1)
             self._simplified(n + 1)
@@ -177,8 +180,13 @@ class ModelSelection:
         what: str,
         only: Sequence[Candidate] = (),
         promising: Mapping[str, Sequence[Mapping[str, float]]] = NO_STARTS,
+        *,
+        matched_beside: FreeRunFit | None = None,
     ) -> None:
-        """Every candidate, or some alone, beside some fits; the best ones to the end."""
+        """Every candidate, or some alone, beside some fits; the best ones to the end.
+
+        Where forces match what is missing beside a fit these are fitted first, and if nothing remains no others.
+        """
         # A simpler form costs a hundredth of all candidates, and decides what is said of a wider one.
         if self._left <= 0 and not only:
             self.failed["search"] = "ended at its budget, with more effects to try"
@@ -186,9 +194,17 @@ class ModelSelection:
         few = self.runs.one_repeat_per_test
         kept = [Base.of(few, base) for base in bases]
         pool = only or [*self.pool, *self._candidates_beside(bases)]
+        matched = MatchedForces()
+        if matched_beside is not None:
+            self.said(f"{what}: matching forces", 0, 1)
+            matched = matched_forces(few, matched_beside, pool)
+            fits = list(self.runs.model.executor.map(partial(self._compensated, matched_beside), matched.leading))
+            self._keep(fits)
+            if any(not self._remains(fit) for fit in fits if not fit.trouble):
+                return
         stages = self._stages(bases[-1])
         inflations = sorted({stages[0], stages[-1]}, reverse=True)
-        proposed = proposals(few, kept, pool, inflations, promising or self._promising)
+        proposed = proposals(few, kept, pool, inflations, promising or self._promising, matched.starts)
         self._left -= (len(proposed) + _EVALUATIONS_OF_FITS) * few.n_coefficients
         ran = {proposal.candidates[-1].key for proposal in proposed}
         tried = {candidate.key for candidate in pool} - {c.key for base in bases for c in base.candidates}
@@ -233,6 +249,15 @@ class ModelSelection:
         values = values_of_runs(self.runs.model, released, fit)
         other = _at_its_optimum(problem, values)
         return other if other.cost < fit.cost else fit
+
+    def _compensated(self, base: FreeRunFit, matched: tuple[Candidate, Mapping[str, float]]) -> FreeRunFit:
+        """A fit from matched numbers, first of all others beside them, which had taken the place of the effect."""
+        candidate, numbers = matched
+        candidates = (*base.candidates, candidate)
+        beside = FreeRunProblem(self.runs.model, self.runs.runs, candidates, numbers)
+        start = {**base.values, **numbers}
+        held = _at_its_optimum(beside, beside.values(beside.theta_of(start)))
+        return held if held.trouble else self._to_the_end(held, base)
 
     def _swapped(self, n: int) -> None:
         """Other effects in the place of each effect of the best model of so many, beside its baseline."""

@@ -83,6 +83,7 @@ def proposals(
     pool: Sequence[Candidate],
     inflations: Sequence[float],
     promising: Mapping[str, Sequence[Mapping[str, float]]] = NO_STARTS,
+    matched: Mapping[str, Sequence[Mapping[str, float]]] = NO_STARTS,
 ) -> list[Proposal]:
     """Starts of all candidates beside all bases, each with what a first step promises.
 
@@ -100,13 +101,15 @@ def proposals(
         Shares of every channel's RMS that are added to its noise.
     promising : mapping of key to sequence of mapping
         Starts of candidates that promised most before, in the place of draws from their priors.
+    matched : mapping of key to sequence of mapping
+        Starts of candidates that are forces, matched to the missing one.
     """
     least = [min(_cost(runs, base, inflation) for base in bases) for inflation in inflations]
     found: list[Proposal] = []
     for base in bases:
         # Where an effect shows beside the first base it is looked for beside the others.
         places = promising or most_promising(found)
-        found += _beside(runs, base, pool, dict(zip(inflations, least, strict=True)), places)
+        found += _beside(runs, base, pool, dict(zip(inflations, least, strict=True)), places, matched)
     return found
 
 
@@ -122,6 +125,7 @@ def _beside(
     pool: Sequence[Candidate],
     least: Mapping[float, float],
     promising: Mapping[str, Sequence[Mapping[str, float]]],
+    matched: Mapping[str, Sequence[Mapping[str, float]]],
 ) -> list[Proposal]:
     problem = runs.problem_of(base.fit)
     theta = problem.theta_of(base.fit.values)
@@ -132,14 +136,14 @@ def _beside(
         (inflation, ScoreTest(problem, theta, residual, base.jacobian, inflation), _cost(runs, base, inflation))
         for inflation in least
     ]
-    known = {candidate.key for candidate in base.fit.candidates}
-    missed_hz = residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND)
-    missing = _missing_forces(runs, base.fit)
+    places = Places.beside(runs, base.fit, residual)
     first = next(iter(least))
     first_weights = problem.inflation_weights(first)
 
     def of_candidate(candidate: Candidate) -> list[Proposal]:
-        sets = [*starts_of(candidate, missed_hz, missing, promising.get(candidate.key))]
+        sets = [*places.of(candidate, promising.get(candidate.key)), *matched.get(candidate.key, ())]
+        if candidate.key not in matched and candidate.key not in promising:
+            sets += candidate.sought_at()
         extended = runs.problem((*base.fit.candidates, candidate))
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
@@ -171,35 +175,55 @@ def _beside(
             )
         return found
 
-    others = [candidate for candidate in pool if candidate.key not in known]
+    others = without(base.fit, pool)
     return [proposal for found in runs.model.executor.map(of_candidate, others) for proposal in found]
 
 
-def starts_of(
-    candidate: Candidate,
-    missed_hz: tuple[float, ...],
-    missing: MissingForces,
-    promising: Sequence[Mapping[str, float]] | None = None,
-) -> list[dict[str, float]]:
-    """Starts of a candidate: its own, what the missing force shows, and quasi-random ones from its prior.
+def without(fit: FreeRunFit, pool: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates that a fit has not."""
+    known = {candidate.key for candidate in fit.candidates}
+    return [candidate for candidate in pool if candidate.key not in known]
 
-    Parameters
+
+@dataclass(frozen=True)
+class Places:
+    """What a fit lacks, which says where effects may start.
+
+    Attributes
     ----------
-    candidate : Candidate
     missed_hz : tuple of float
-        Frequencies of the largest residuals, where a mode may be missing.
-    missing : mapping
-        Force that each run lacks, where it is known.
-    promising : sequence of mapping, optional
-        In the place of draws from the prior.
+        Frequencies of its largest residuals, where a mode may be missing.
+    forces : dict
+        Latent forces of each run, where they are known.
+    missing : dict
+        The largest of them, over the whole run.
     """
-    # A mode has a narrow minimum: it starts where the residuals beside this base are largest.
-    here = replace(candidate, surroundings=replace(candidate.surroundings, missed_hz=missed_hz))
-    own = [*here.starts(), *candidate.proposed(missing)]
-    if promising is not None:
-        return [*own, *map(dict, promising)]
-    n = _DRAWS_PER_NUMBER * len(candidate.effect.kinds_of_numbers)
-    return [*own, *candidate.drawn(n)[1:], *candidate.sought_at()]
+
+    missed_hz: tuple[float, ...]
+    forces: dict[str, tuple[LatentForce, ...]]
+    missing: MissingForces
+
+    @classmethod
+    def beside(cls, runs: FittedRuns, fit: FreeRunFit, residual: FloatArray) -> Places:
+        """Of a fit with its residuals."""
+        problem = runs.problem_of(fit)
+        forces = _latent_forces(runs, fit)
+        missing = {run: _of_whole_run(max(own, key=lambda force: force.power_n2)) for run, own in forces.items()}
+        return cls(residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND), forces, missing)
+
+    def of(
+        self, candidate: Candidate, promising: Sequence[Mapping[str, float]] | None = None
+    ) -> list[dict[str, float]]:
+        """Starts of a candidate: its own, what the missing force shows, and quasi-random ones from its prior, or
+        promising ones in the place of these.
+        """
+        # A mode has a narrow minimum: it starts where the residuals beside this base are largest.
+        here = replace(candidate, surroundings=replace(candidate.surroundings, missed_hz=self.missed_hz))
+        own = [*here.starts(), *candidate.proposed(self.missing)]
+        if promising is not None:
+            return [*own, *map(dict, promising)]
+        n = _DRAWS_PER_NUMBER * len(candidate.effect.kinds_of_numbers)
+        return [*own, *candidate.drawn(n)[1:]]
 
 
 def most_promising(proposed: Sequence[Proposal]) -> dict[str, list[dict[str, float]]]:
@@ -222,17 +246,16 @@ def most_promising(proposed: Sequence[Proposal]) -> dict[str, list[dict[str, flo
     return found
 
 
-def _missing_forces(runs: FittedRuns, fit: FreeRunFit) -> dict[str, FloatArray]:
-    """The latent force of every run beside a fit; none of a twin of a user's own, of which it is not known."""
-    found: dict[str, FloatArray] = {}
+def _latent_forces(runs: FittedRuns, fit: FreeRunFit) -> dict[str, tuple[LatentForce, ...]]:
+    """Latent forces of every run beside a fit; none of a twin of a user's own, of which they are not known."""
+    found: dict[str, tuple[LatentForce, ...]] = {}
     if isinstance(runs.model, RigModel):
         for observed in runs.runs:
             with suppress(SloshlabError):
                 extension = extension_of(fit.candidates, fit.values)
                 forces = run_forces(runs.model, observed, fit.values, extension=extension).forces
                 if forces:
-                    largest = max(forces, key=lambda force: force.power_n2)
-                    found[observed[0].run.name] = _of_whole_run(largest)
+                    found[observed[0].run.name] = forces
     return found
 
 

@@ -1,0 +1,279 @@
+"""Numbers of a force that matches the missing one along the motion that was recorded.
+
+The force is computed on the recorded motion, without the structure that it would act on: what it does to the
+motion is in the recording already. So bounces of a liquid, phases of a wave and the memory of a friction follow
+those of the laboratory, where a free-running simulation with other numbers goes its own way; and one costs little.
+The force contains the noise of the recorded motion: what matches best is a start of a fit, never a judgement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import differential_evolution, least_squares
+
+from sloshlab.errors import SloshlabError
+from sloshlab.identification.rig_model import steps_per_sample
+from sloshlab.missing_force.force_inversion import in_time
+from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce
+from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.prior import ParameterPrior
+from sloshlab.twin.excitation import Excitation, recorded, with_cached_inputs
+from sloshlab.twin.lane_preparation import Lane, motions
+from sloshlab.twin.motion import Motion
+from sloshlab.twin.status import Status
+from sloshlab.twin.twin import Twin
+
+FloatArray = NDArray[np.float64]
+Numbers = Mapping[str, float]
+_N_REFINED: Final = 3
+"""Starts that are refined beside what has evolved."""
+_MOST_STEPS: Final = 30
+_LEAST_GAIN: Final = 1e-3
+"""Of the misfit, relative, at which a refinement ends."""
+_POPULATION, _GENERATIONS = 32, 16
+"""Of differential evolution: some five hundred forces."""
+_STEP: Final = 1e-3
+"""Of a finite difference, relative to a number."""
+_EXACTLY: Final = 1e-3
+"""Of a force, relative, by which twice its half may miss it."""
+_FAILED: Final = 1e3
+"""In place of the force of what does not reach its end, over the RMS of the missing one."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """Numbers of an effect and how well they match.
+
+    Attributes
+    ----------
+    misfit : float
+        Mean square of what is left, over that of the missing force.
+    numbers : dict
+        Named as in a fit.
+    """
+
+    misfit: float
+    numbers: dict[str, float]
+
+
+class ForceMatching:
+    """Missing forces of some runs at one place, and what moves there.
+
+    What a spring, a damper and a mass could do is set aside on both sides: the baseline's own numbers have taken
+    their share of it.
+
+    Parameters
+    ----------
+    forces : sequence of LatentForce
+        Of one place, one per run.
+    """
+
+    def __init__(self, forces: Sequence[LatentForce]) -> None:
+        self._drives = [_drive(force) for force in forces]
+        self._kept = [slice(f.motion_before.shape[0], f.motion_before.shape[0] + f.force_n.size) for f in forces]
+        self._shares = [force.kept_share for force in forces]
+        motion = np.concatenate([force.motion for force in forces])
+        linear = np.column_stack([motion / np.maximum(np.abs(motion).max(axis=0), 1e-300), np.ones(len(motion))])
+        self._linear, _ = np.linalg.qr(linear)
+        missing = self._without_linear(np.concatenate([force.force_n for force in forces]))
+        self._scale = max(float(np.sqrt(np.mean(missing**2))), 1e-300)
+        self._missing = missing / self._scale
+
+    def matched(self, candidate: Candidate, starts: Sequence[Numbers]) -> list[Match]:
+        """The two best matches, the best first; none of what is no force that a motion makes.
+
+        Where all numbers are sizes the best multiple is the best match. Otherwise a population evolves from the
+        best starts, as contacts and friction make the misfit rough (differential evolution, Storn and Price 1997,
+        doi:10.1023/A:1008202821328); its best and the best starts are refined by least squares, which alone follow
+        the narrow valley of a resonance.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        starts : sequence of mapping
+            Named as in a fit; five or more where not all numbers are sizes.
+        """
+        sound = next((start for start in starts if _twin_of(candidate, start)), None)
+        if sound is None:
+            return []
+        scales = self._scales(candidate, sound)
+        ranked = sorted(self._matches(candidate, starts, scales=scales), key=_misfit)
+        if scales and {known.name for known in candidate.effect.parameters} <= set(candidate.sizes):
+            return ranked[:1]
+        evolved = self._evolved(candidate, ranked[:_POPULATION], scales=scales)
+        refined = [self._refined(candidate, match) for match in (evolved, *ranked[:_N_REFINED])]
+        return sorted([*refined, evolved, ranked[0]], key=_misfit)[:2]
+
+    def _scales(self, candidate: Candidate, numbers: Numbers) -> bool:
+        """Whether half the sizes of an effect make half its force: not where they set a frequency or a limit."""
+        if not candidate.sizes:
+            return False
+        force, half = self._forces(candidate, [numbers, candidate.sized(numbers, 0.5)])
+        return bool(np.linalg.norm(force - 2.0 * half) < _EXACTLY * np.linalg.norm(force))
+
+    def _evolved(self, candidate: Candidate, population: Sequence[Match], *, scales: bool) -> Match:
+        logarithms = _Logarithms(candidate, population[0].numbers)
+
+        def misfits(x: FloatArray) -> FloatArray:
+            sets = [logarithms.numbers(each) for each in x.T]
+            return np.array([match.misfit for match in self._matches(candidate, sets, scales=scales)])
+
+        found = differential_evolution(
+            misfits,
+            list(zip(logarithms.low, logarithms.high, strict=True)),
+            init=np.array([logarithms.of(match.numbers) for match in population]),
+            maxiter=_GENERATIONS,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            rng=np.random.default_rng(0),
+        )
+        [best] = self._matches(candidate, [logarithms.numbers(found.x)], scales=scales)
+        return best
+
+    def _matches(self, candidate: Candidate, sets: Sequence[Numbers], *, scales: bool) -> list[Match]:
+        """How well numbers match, each set with the best multiple of its sizes where these scale the force."""
+        found = []
+        for numbers, force in zip(sets, self._forces(candidate, sets), strict=True):
+            size = float(force @ force)
+            factor = float(force @ self._missing) / size if size > 0 else 0.0
+            if scales and factor > 0:
+                found.append(Match(_mean_square(self._missing - factor * force), candidate.sized(numbers, factor)))
+            else:
+                found.append(Match(_mean_square(self._missing - force), dict(numbers)))
+        return found
+
+    def _refined(self, candidate: Candidate, match: Match) -> Match:
+        """Nonlinear least squares from one start."""
+        logarithms = _Logarithms(candidate, match.numbers)
+
+        def residual(x: FloatArray) -> FloatArray:
+            return self._forces(candidate, [logarithms.numbers(x)])[0] - self._missing
+
+        def jacobian(x: FloatArray) -> FloatArray:
+            places = [x, *(x + step for step in _STEP * np.eye(x.size))]
+            at, *moved = self._forces(candidate, [logarithms.numbers(place) for place in places])
+            return np.column_stack([(each - at) / _STEP for each in moved])
+
+        start, ends = logarithms.of(match.numbers), (logarithms.low, logarithms.high)
+        found = least_squares(residual, start, jacobian, ends, max_nfev=_MOST_STEPS, ftol=_LEAST_GAIN)
+        return Match(2.0 * float(found.cost) / self._missing.size, logarithms.numbers(found.x))
+
+    def _forces(self, candidate: Candidate, sets: Sequence[Numbers]) -> list[FloatArray]:
+        """Forces with some sets of numbers, all runs one after the other, over the RMS of the missing one."""
+        n = len(self._drives)
+        twins = [_twin_of(candidate, numbers) for numbers in sets]
+        lanes = [
+            Lane(twin, drive, n_substeps=steps_per_sample(twin, drive.sampling_rate_hz))
+            for twin in twins
+            if twin is not None
+            for drive in self._drives
+        ]
+        found = iter(motions(lanes))
+        failed = np.full(self._missing.size, _FAILED)
+        return [failed if twin is None else self._joined(list(islice(found, n))) for twin in twins]
+
+    def _joined(self, found: Sequence[Motion | Exception]) -> FloatArray:
+        parts = []
+        for motion, kept, share in zip(found, self._kept, self._shares, strict=True):
+            if isinstance(motion, Exception) or motion.ending.status is not Status.DONE:
+                return np.full(self._missing.size, _FAILED)
+            # What the regularisation took from the missing force is no misfit.
+            n = share.size - 1
+            parts.append(in_time(share * np.fft.rfft(motion.tank_force_n, 2 * n), n)[kept])
+        return self._without_linear(np.concatenate(parts)) / self._scale
+
+    def _without_linear(self, series: FloatArray) -> FloatArray:
+        return np.asarray(series - self._linear @ (self._linear.T @ series))
+
+
+def matchings(forces: Sequence[Sequence[LatentForce]]) -> dict[str, ForceMatching]:
+    """Per block, where its missing forces are told apart and are more than their noise.
+
+    Parameters
+    ----------
+    forces : sequence of sequences of LatentForce
+        Per run.
+    """
+    found = {}
+    for place in (STRUCTURE, TANK):
+        # A force that may be either's acts along the motion of the structure.
+        places = (place, EITHER) if place == STRUCTURE else (place,)
+        own = [force for of_run in forces for force in of_run if force.place in places]
+        if sum(force.power_n2 for force in own) > sum(force.standard_error_n**2 for force in own):
+            found[place] = ForceMatching(own)
+    return found
+
+
+def _drive(force: LatentForce) -> Excitation:
+    motion = np.concatenate([force.motion_before, force.motion])
+    rate = force.run.attributes.sampling_rate_hz
+    return with_cached_inputs(
+        recorded(rate, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])
+    )
+
+
+def _within_bounds(candidate: Candidate, numbers: Numbers) -> dict[str, float]:
+    """Numbers of an effect as it takes them."""
+    found = {}
+    for parameter in candidate.effect.parameters:
+        low, high = candidate.bounds(parameter)
+        found[parameter.name] = float(np.clip(numbers[f"{candidate.key}.{parameter.name}"], low, high))
+    return found
+
+
+def _twin_of(candidate: Candidate, numbers: Numbers) -> Twin | None:
+    """The force alone; none of what acts otherwise too, and of numbers that lack or contradict each other."""
+    if any(f"{candidate.key}.{known.name}" not in numbers for known in candidate.effect.parameters):
+        return None
+    try:
+        added = candidate.extension(_within_bounds(candidate, numbers))
+    except SloshlabError:
+        return None
+    if any((added.liquid, added.structure, added.faults, added.drives, added.run_terms)) or not added.terms:
+        return None
+    # On a motion that is prescribed it does not matter where a force acts.
+    return Twin(None, tuple(replace(term, place=TANK) for term in added.terms))
+
+
+class _Logarithms:
+    """Numbers of an effect as logarithms of their sizes, signs as they are at a place."""
+
+    def __init__(self, candidate: Candidate, at: Numbers) -> None:
+        self._candidate, self._at = candidate, at
+        priors = candidate.prior
+        self._names = [known.name for known in priors]
+        self._signs = np.array([np.sign(at[name]) or 1.0 for name in self._names])
+        ends = [_ends(known) for known in priors]
+        self.low, self.high = (np.log([each[k] for each in ends]) for k in (0, 1))
+
+    def of(self, numbers: Numbers) -> FloatArray:
+        """Within the range that is believed."""
+        sizes = np.maximum(np.abs([numbers[name] for name in self._names]), 1e-300)
+        return np.asarray(np.clip(np.log(sizes), self.low, self.high))
+
+    def numbers(self, x: FloatArray) -> dict[str, float]:
+        """Within the bounds of the effect."""
+        moved = {**self._at, **dict(zip(self._names, (self._signs * np.exp(x)).tolist(), strict=True))}
+        within = _within_bounds(self._candidate, moved)
+        return {f"{self._candidate.key}.{name}": value for name, value in within.items()}
+
+
+def _ends(known: ParameterPrior) -> tuple[float, float]:
+    """Between which a size is sought."""
+    high = max(abs(known.low), abs(known.high), 1e-300)
+    return max(min(abs(known.low), abs(known.high)), 1e-6 * high), high
+
+
+def _mean_square(series: FloatArray) -> float:
+    return float(np.mean(series**2))
+
+
+def _misfit(match: Match) -> float:
+    return match.misfit

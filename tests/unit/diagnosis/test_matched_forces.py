@@ -1,0 +1,98 @@
+"""A liquid that moves by itself, near the frequency of what carries it: found by its force, not by a free run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded_oscillators import DAMPING, LIQUID_KG, MASS_KG, RATE_HZ, STIFFNESS, base_motion, rig, run_of
+from scipy.integrate import solve_ivp
+
+from sloshlab.diagnosis.selection import model_selection
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.matched_forces import matched_forces
+from sloshlab.diagnosis.selection.model_selection import ModelSelection
+from sloshlab.diagnosis.surroundings import surroundings_of
+from sloshlab.identification.case import Case, CaseRun
+from sloshlab.identification.free_run_fit import fitted_baseline
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.noise_floor import weighted_observations
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import candidates
+
+assert effects.__all__  # importing the vocabulary makes it known
+
+SLUG_KG, SLUG_HZ, SLUG_DAMPING = 0.15 * LIQUID_KG, 5.5, 0.01
+CUSHION = "tank.air_cushion"
+NOISE = {"acceleration_tip": 0.005, "acceleration_root": 0.005, "force_interface": 0.01}
+
+
+def driven(size: float, seed: int) -> CaseRun:
+    """(M − m) ẍ = −k x − c ẋ + m (ω² s + 2ζω ṡ) − (M − m) a_b, s̈ = −ω² s − 2ζω ṡ − ẍ − a_b, by SciPy."""
+    omega = 2 * np.pi * SLUG_HZ
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        pull, base = omega**2 * y[2] + 2 * SLUG_DAMPING * omega * y[3], size * base_motion(t)
+        a = (-STIFFNESS * y[0] - DAMPING * y[1] + SLUG_KG * pull) / (MASS_KG - SLUG_KG) - base
+        return [y[1], a, y[3], -pull - a - base]
+
+    time = np.arange(round(6.0 * RATE_HZ)) / RATE_HZ
+    y = solve_ivp(rates, (0, time[-1]), [0.0] * 4, t_eval=time, rtol=1e-9, atol=1e-12, max_step=0.01).y
+    root = size * np.array([base_motion(t) for t in time])
+    absolute = root + np.array([rates(t, each)[1] for t, each in zip(time, y.T, strict=True)])
+    pull = omega**2 * y[2] + 2 * SLUG_DAMPING * omega * y[3]
+    channels = {
+        "acceleration_tip": absolute,
+        "acceleration_root": root,
+        "force_interface": (MASS_KG - SLUG_KG) * absolute - SLUG_KG * pull,
+    }
+    return run_of(f"driven_{seed}", channels, NOISE, seed, experiment="other")
+
+
+@pytest.fixture(name="search")
+def _search(tmp_path: Path) -> tuple[ModelSelection, FreeRunFit]:
+    case = Case("case", tmp_path, rig(tmp_path), (driven(2.0, 1), driven(4.0, 2)))
+    assert case.rig is not None
+    model = RigModel(case.rig, tmp_path, case.runs)
+    runs = FittedRuns(model, list(weighted_observations(case, model).values()), case.names_by_test())
+    retuned = fitted_baseline(runs.problem())[0]
+    at = surroundings_of(runs.problem(), retuned, case.rig)
+    return ModelSelection(runs, at, lambda what, done, of: None), retuned
+
+
+def test_a_mass_that_retuning_hides_is_fitted_from_its_force(search: tuple[ModelSelection, FreeRunFit]) -> None:
+    selection, retuned = search
+    found = matched_forces(selection.runs, retuned, candidates(selection.at))
+    leading = {candidate.key: (candidate, numbers) for candidate, numbers in found.leading}
+    candidate, numbers = leading[CUSHION]
+    # as far as what a spring, a damper and a mass could do is set aside
+    assert frequency_hz(numbers) == pytest.approx(SLUG_HZ, rel=0.06)
+    # Beside the baseline that had taken its place it makes things worse, so that no search by free runs goes on.
+    problem = selection.runs.problem((candidate,))
+    assert problem.costs([{**retuned.values, **numbers}])[0] > retuned.cost
+    fit = selection._compensated(retuned, (candidate, numbers))
+    assert fit.cost < 0.5 * retuned.cost
+    assert problem.is_down_to_noise(fit)
+    assert frequency_hz(fit.values) == pytest.approx(SLUG_HZ, rel=0.002)
+    assert fit.values[f"{CUSHION}.mass_kg"] == pytest.approx(SLUG_KG, rel=0.02)
+
+
+def test_what_leaves_nothing_ends_the_step(
+    search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    selection, retuned = search
+
+    def not_asked(*args: object) -> None:
+        raise AssertionError("proposals beside the baseline that hides the effect")
+
+    monkeypatch.setattr(model_selection, "proposals", not_asked)
+    selection._keep([retuned])
+    selection._grown([retuned], "one effect", matched_beside=retuned)
+    best = min(selection.fits.values(), key=lambda fit: fit.cost)
+    assert [candidate.key for candidate in best.candidates] == [CUSHION]
+
+
+def frequency_hz(numbers: dict[str, float]) -> float:
+    return float(np.sqrt(numbers[f"{CUSHION}.stiffness_n_per_m"] / numbers[f"{CUSHION}.mass_kg"]) / (2 * np.pi))

@@ -1,0 +1,149 @@
+"""Numbers of forces from the missing one alone: laws by formula and by SciPy's integrator, on a known motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded_oscillators import decays, effect, rig, run_of, surroundings
+from scipy.integrate import solve_ivp
+
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_force.force_matching import ForceMatching, matchings
+from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate
+
+RATE_HZ = 250.0
+N = 1500
+N_BEFORE = 50
+TIME = np.arange(N) / RATE_HZ
+OMEGA = 30.0
+Law = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+def motion_of(size_m: float) -> np.ndarray:
+    """A tone that grows from rest and then beats."""
+    grown = size_m * (1 - np.exp(-TIME)) * (1 + 0.5 * np.sin(2.0 * TIME))
+    x = grown * np.sin(OMEGA * TIME)
+    v = np.gradient(x, 1 / RATE_HZ, edge_order=2)
+    return np.stack([x, v, np.gradient(v, 1 / RATE_HZ, edge_order=2)], axis=1)
+
+
+def latent(force: np.ndarray, motion: np.ndarray, name: str, place: str = STRUCTURE) -> LatentForce:
+    """A missing force that begins fifty samples after its run."""
+    run = run_of(name, {"acceleration_tip": motion[:, 2]}, {}, 0)
+    kept = slice(N_BEFORE, N)
+    everything = np.ones(N + 1)
+    return LatentForce(run, place, force[kept], 0.0, TIME[kept], motion[kept], motion[:N_BEFORE], everything)
+
+
+def candidate(tmp_path: Path, key: str, channel: str = "") -> Candidate:
+    assert effects.__all__  # importing the vocabulary makes it known
+    model = RigModel(rig(tmp_path), tmp_path, decays())
+    return Candidate(effect(key), surroundings(model), channel)
+
+
+def starts_of(known: Candidate) -> list[dict[str, float]]:
+    return [*known.starts(), *known.drawn(12)]
+
+
+def test_size_of_friction_beside_what_the_baseline_may_be_off(tmp_path: Path) -> None:
+    """A spring, a damper and a mass that are off are set aside; the friction is told by its form."""
+    known = candidate(tmp_path, "structure.coulomb_friction")
+    forces = []
+    for k, size in enumerate((0.002, 0.004)):
+        motion = motion_of(size)
+        off = 300.0 * motion[:, 0] - 2.0 * motion[:, 1] + 0.1 * motion[:, 2] + 0.7
+        forces.append(latent(-0.31 * np.sign(motion[:, 1]) + off, motion, f"run_{k}"))
+    best = ForceMatching(forces).matched(known, starts_of(known))[0]
+    assert best.numbers["structure.coulomb_friction.force_n"] == pytest.approx(0.31, rel=0.02)
+    # jumps between samples are all that is left
+    assert best.misfit < 0.02
+
+
+def test_numbers_that_are_no_sizes_are_refined(tmp_path: Path) -> None:
+    """A rope's hysteresis: ż = k v (1 − ½ (1 + sgn(v z)) (|z|/z_y)), by SciPy, from draws of its prior."""
+    known = candidate(tmp_path, "structure.hysteresis")
+    motion = motion_of(0.004)
+    stiffness, limit = 800.0, 1.2
+
+    def rate(t: float, z: np.ndarray) -> np.ndarray:
+        v = float(np.interp(t, TIME, motion[:, 1]))
+        loading = 0.5 * (1 + np.sign(v * z)) * np.abs(z) / limit
+        return np.asarray(stiffness * v * (1 - loading))
+
+    z = solve_ivp(rate, (0.0, TIME[-1]), [0.0], t_eval=TIME, max_step=1 / RATE_HZ, rtol=1e-8).y[0]
+    matching = ForceMatching([latent(-z, motion, "run_1")])
+    best = matching.matched(known, starts_of(known))[0]
+    assert best.numbers["structure.hysteresis.stiffness_n_per_m"] == pytest.approx(stiffness, rel=0.01)
+    assert best.numbers["structure.hysteresis.exponent"] == pytest.approx(1.0, rel=0.01)
+    assert best.misfit < 1e-4
+
+
+def test_impacts_are_met_by_a_population(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mass that flies between floor and ceiling, by SciPy; its numbers come from far away."""
+    known = candidate(tmp_path, "tank.ceiling_impact")
+    motion = motion_of(0.03)
+    mass, gap, stiffness, damping = 0.2 * known.surroundings.rig.liquid_mass_kg, 0.015, 2000.0, 1.5
+
+    def contact(z: float, speed: float) -> float:
+        if z < 0:
+            return min(stiffness * z + damping * speed, 0.0)
+        if z > gap:
+            return max(stiffness * (z - gap) + damping * speed, 0.0)
+        return 0.0
+
+    def rate(t: float, y: np.ndarray) -> list[float]:
+        base = float(np.interp(t, TIME, motion[:, 2]))
+        return [y[1], -9.81 - base - contact(y[0], y[1]) / mass]
+
+    flown = solve_ivp(rate, (0.0, TIME[-1]), [-mass * 9.81 / stiffness, 0.0], t_eval=TIME, max_step=2e-4).y
+    pushed = np.array([contact(z, speed) for z, speed in flown.T])
+    force = pushed + mass * motion[:, 2] + mass * 9.81
+    matching = ForceMatching([latent(force, motion, "run_1", TANK)])
+    starts = [*starts_of(known), *known.sought_at()[:100]]
+    best = matching.matched(known, starts)[0]
+    monkeypatch.setattr(ForceMatching, "_evolved", lambda self, candidate, population, scales: population[0])
+    assert best.misfit < 0.9 * matching.matched(known, starts)[0].misfit
+    assert best.numbers["tank.ceiling_impact.gap_m"] == pytest.approx(gap, rel=0.05)
+    assert best.numbers["tank.ceiling_impact.share"] == pytest.approx(0.2, rel=0.3)
+
+
+def test_what_the_regularisation_took_is_no_misfit(tmp_path: Path) -> None:
+    known = candidate(tmp_path, "structure.coulomb_friction")
+    motion = motion_of(0.003)
+    force = -0.2 * np.sign(motion[:, 1])
+    spectrum = np.fft.rfft(force, 2 * N)
+    share = (np.arange(N + 1) < 0.15 * N).astype(float)
+    whole = latent(np.fft.irfft(share * spectrum, 2 * N)[:N], motion, "run_1")
+    taken = LatentForce(
+        whole.run, STRUCTURE, whole.force_n, 0.0, whole.time_s, whole.motion, whole.motion_before, share
+    )
+    start = [{"structure.coulomb_friction.force_n": 0.2}]
+    as_known, as_if_whole = (ForceMatching([each]).matched(known, start)[0].misfit for each in (taken, whole))
+    assert as_known < 1e-9
+    assert as_if_whole > 0.01
+
+
+def test_what_is_no_force_of_the_motion_has_no_match(tmp_path: Path) -> None:
+    late = candidate(tmp_path, "sensor.sensor_delay", "acceleration_tip")
+    matching = ForceMatching([latent(np.sin(OMEGA * TIME), motion_of(0.003), "run_1")])
+    assert matching.matched(late, late.starts()) == []
+
+
+def test_a_force_of_either_place_is_looked_for_in_the_structure() -> None:
+    motion = motion_of(0.003)
+    found = matchings([[latent(np.sin(OMEGA * TIME), motion, "run_1", EITHER)]])
+    assert list(found) == [STRUCTURE]
+    both = [latent(np.sin(OMEGA * TIME), motion, "run_1", place) for place in (STRUCTURE, TANK)]
+    assert set(matchings([both])) == {STRUCTURE, TANK}
+
+
+def test_a_force_within_its_noise_is_not_matched() -> None:
+    motion = motion_of(0.003)
+    drowned = replace(latent(np.sin(OMEGA * TIME), motion, "run_1", TANK), standard_error_n=0.6)
+    assert matchings([[drowned]]) == {}
