@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.stats import norm
 
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.run_noise import EXACT
@@ -20,7 +21,7 @@ from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.units import is_calibrated
 
 LEVEL: Final = 0.90
-_NORMAL_90: Final = 1.6449
+_DEVIATIONS: Final = float(norm.ppf(0.5 + 0.5 * LEVEL))
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def _interval(
     of_noise, of_belief = fit.standard_errors(name)
     of_noise = max(of_noise * noise, scatter.get(name, 0.0))
     of_simulation = EXACT * abs(estimate) if is_calibrated(parameter) else 0.0
-    width = _NORMAL_90 * float(np.sqrt(of_noise**2 + of_belief**2 + of_simulation**2))
+    width = _DEVIATIONS * float(np.sqrt(of_noise**2 + of_belief**2 + of_simulation**2))
     lowest, highest = candidate.bounds(
         next(each for each in candidate.effect.parameters if each.name == parameter)
     )

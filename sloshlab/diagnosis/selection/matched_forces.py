@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
 
 import numpy as np
 
@@ -15,8 +14,6 @@ from sloshlab.missing_force.force_matching import Match, matchings
 from sloshlab.missing_physics.candidate import Candidate
 
 Numbers = Mapping[str, float]
-N_LEADING: Final = 3
-"""Candidates of a place that match best and are fitted."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +32,7 @@ class MatchedForces:
     leading: list[tuple[Candidate, Numbers]] = field(default_factory=list)
 
 
-def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate]) -> MatchedForces:
+def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate], n_leading: int) -> MatchedForces:
     """Candidates matched to the force that is missing beside a fit.
 
     Parameters
@@ -44,6 +41,8 @@ def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
     fit : FreeRunFit
         Retuned, so that nothing linear is left at other places; what that took of a force is set aside.
     pool : sequence of Candidate
+    n_leading : int
+        Of every place.
     """
     problem = runs.problem_of(fit)
     residual = problem.residual(problem.theta_of(fit.values))
@@ -61,7 +60,7 @@ def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
     leading: list[tuple[Candidate, Numbers]] = []
     for block in matching:
         own = [each for each in others if each.effect.block == block and matches[each.key]]
-        best = sorted(own, key=lambda each: matches[each.key][0].misfit)[:N_LEADING]
+        best = sorted(own, key=lambda each: matches[each.key][0].misfit)[:n_leading]
         leading += [(each, matches[each.key][0].numbers) for each in best]
     starts = {key: [match.numbers for match in own] for key, own in matches.items() if own}
     return MatchedForces(starts, leading)

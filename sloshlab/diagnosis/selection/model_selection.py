@@ -195,9 +195,10 @@ class ModelSelection:
         kept = [Base.of(few, base) for base in bases]
         pool = only or [*self.pool, *self._candidates_beside(bases)]
         matched = MatchedForces()
-        if matched_beside is not None:
+        # Where nothing remains no force shows: a number that is not believed may be what hides it.
+        if matched_beside is not None and self._remains(matched_beside):
             self.said(f"{what}: matching forces", 0, 1)
-            matched = matched_forces(few, matched_beside, pool)
+            matched = matched_forces(few, matched_beside, pool, N_KEPT)
             fits = list(self.runs.model.executor.map(partial(self._compensated, matched_beside), matched.leading))
             self._keep(fits)
             if any(not self._remains(fit) for fit in fits if not fit.trouble):
