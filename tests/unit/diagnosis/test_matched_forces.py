@@ -26,6 +26,7 @@ assert effects.__all__  # importing the vocabulary makes it known
 
 SLUG_KG, SLUG_HZ, SLUG_DAMPING = 0.15 * LIQUID_KG, 5.5, 0.01
 CUSHION = "tank.air_cushion"
+TRIED = (CUSHION, "tank.liquid_sloshing", "tank.mass_error", "structure.hysteresis", "structure.quadratic_drag")
 NOISE = {"acceleration_tip": 0.005, "acceleration_root": 0.005, "force_interface": 0.01}
 
 
@@ -59,12 +60,14 @@ def _search(tmp_path: Path) -> tuple[ModelSelection, FreeRunFit]:
     runs = FittedRuns(model, list(weighted_observations(case, model).values()), case.names_by_test())
     retuned = fitted_baseline(runs.problem())[0]
     at = surroundings_of(runs.problem(), retuned, case.rig)
-    return ModelSelection(runs, at, lambda what, done, of: None), retuned
+    selection = ModelSelection(runs, at, lambda what, done, of: None)
+    selection.pool = [candidate for candidate in candidates(at) if candidate.key in TRIED]
+    return selection, retuned
 
 
 def test_a_mass_that_retuning_hides_is_fitted_from_its_force(search: tuple[ModelSelection, FreeRunFit]) -> None:
     selection, retuned = search
-    found = matched_forces(selection.runs, retuned, candidates(selection.at), 3)
+    found = matched_forces(selection.runs, retuned, selection.pool, 3)
     leading = {candidate.key: (candidate, numbers) for candidate, numbers in found.leading}
     candidate, numbers = leading[CUSHION]
     # as far as what a spring, a damper and a mass could do is set aside
