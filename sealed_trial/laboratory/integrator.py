@@ -98,9 +98,9 @@ def _note(row, seen, rates, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _until_next(t, knots_s):  # type: ignore[no-untyped-def]
-    """From an instant to the next knot [s]."""
-    return (np.floor((t + _SHORTEST) / knots_s) + 1.0) * knots_s - t
+def _until_next_knot(t, spacing_s):  # type: ignore[no-untyped-def]
+    """From an instant to the next knot of the table [s]."""
+    return (np.floor((t + _SHORTEST) / spacing_s) + 1.0) * spacing_s - t
 
 
 @njit(cache=True)
@@ -132,14 +132,14 @@ def integrate(y, sampling, system, record):  # type: ignore[no-untyped-def]
         while t < end_s - _SHORTEST:
             now = min(h, end_s - t)
             if stops_at_knots:
-                now = min(now, _until_next(t, system.step))
+                now = min(now, _until_next_knot(t, system.step))
             _step(t, y, now, whole, system)
             error = _error(now, whole, relative, scale)
             if not error <= 1.0:
                 if now < 1e-11 or not np.isfinite(error):
                     return -1
                 h = now * max(0.2, 0.9 * error**-0.2)
-                if now > _until_next(t, system.step):
+                if now > _until_next_knot(t, system.step):
                     h, stops_at_knots = now, True
                 continue
             margins(end, seen, conditions, p, out)

@@ -69,6 +69,16 @@ class FreeRunFit:
     n_simulations: int = 0
     trouble: str = ""
 
+    @property
+    def covariance_by_belief(self) -> FloatArray:
+        """The part of the covariance that the prior of the baseline leaves; the rest is by noise.
+
+        The covariance C = (JᵀJ + P)⁻¹, with P one for each baseline parameter, is C JᵀJ C + C P C.
+        """
+        own = tuple(f"{candidate.key}." for candidate in self.candidates)
+        baseline = [i for i, name in enumerate(self.names) if not own or not name.startswith(own)]
+        return np.asarray(self.covariance[:, baseline] @ self.covariance[baseline, :])
+
     def standard_error(self, name: str) -> float:
         """Standard error of a parameter in its own unit."""
         return float(np.hypot(*self.standard_errors(name)))
@@ -76,12 +86,10 @@ class FreeRunFit:
     def standard_errors(self, name: str) -> tuple[float, float]:
         """Standard errors of a parameter in its own unit: by noise, and by the prior of the baseline.
 
-        The covariance C = (JᵀJ + P)⁻¹, with P one for each baseline parameter, is C JᵀJ C + C P C.
+        These are the two parts of the covariance (`covariance_by_belief`).
         """
         i = self.names.index(name)
-        own = tuple(f"{candidate.key}." for candidate in self.candidates)
-        n_baseline = sum(not own or not name.startswith(own) for name in self.names)
-        of_belief = float((self.covariance[i, :n_baseline] ** 2).sum())
+        of_belief = float(self.covariance_by_belief[i, i])
         of_noise = max(float(self.covariance[i, i]) - of_belief, 0.0)
         return float(np.sqrt(of_noise) * self.scales[i]), float(np.sqrt(of_belief) * self.scales[i])
 

@@ -8,7 +8,7 @@ tolerances explain is subtracted, or widens the interval.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -179,15 +179,7 @@ def force_character(
 
 
 def _with_damping(latent_force: LatentForce, shift: float) -> LatentForce:
-    force = latent_force.force_n - shift * latent_force.motion[:, 1]
-    return LatentForce(
-        latent_force.run,
-        latent_force.place,
-        force,
-        latent_force.standard_error_n,
-        latent_force.time_s,
-        latent_force.motion,
-    )
+    return replace(latent_force, force_n=latent_force.force_n - shift * latent_force.motion[:, 1])
 
 
 class _Regression:

@@ -8,8 +8,8 @@ The force contains the noise of the recorded motion: what matches best is a star
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import islice
 from typing import Final
 
@@ -20,17 +20,16 @@ from scipy.optimize import differential_evolution, least_squares
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.rig_model import steps_per_sample
 from sloshlab.missing_force.force_inversion import in_time
-from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce
-from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce, along, forces_alone
+from sloshlab.missing_physics.candidate import Candidate, Numbers
 from sloshlab.missing_physics.prior import ParameterPrior
-from sloshlab.twin.excitation import Excitation, recorded, with_cached_inputs
+from sloshlab.twin.excitation import Excitation, with_cached_inputs
 from sloshlab.twin.lane_preparation import Lane, motions
 from sloshlab.twin.motion import Motion
 from sloshlab.twin.status import Status
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
-Numbers = Mapping[str, float]
 _N_REFINED: Final = 3
 """Starts that are refined beside what has evolved."""
 _MOST_STEPS: Final = 30
@@ -38,12 +37,14 @@ _LEAST_GAIN: Final = 1e-3
 """Of the misfit, relative, at which a refinement ends."""
 _POPULATION, _GENERATIONS = 32, 16
 """Of differential evolution: some five hundred forces."""
+_FEWEST: Final = 5
+"""Of a population that evolves."""
 _STEP: Final = 1e-3
 """Of a finite difference, relative to a number."""
 _EXACTLY: Final = 1e-3
 """Of a force, relative, by which twice its half may miss it."""
 _FAILED: Final = 1e3
-"""In place of the force of what does not reach its end, over the RMS of the missing one."""
+"""In place of the residual of a force that does not reach its end, over the RMS of the missing one."""
 
 
 @dataclass(frozen=True)
@@ -97,24 +98,27 @@ class ForceMatching:
         ----------
         candidate : Candidate
         starts : sequence of mapping
-            Named as in a fit; five or more where not all numbers are sizes.
+            Named as in a fit.
         """
-        sound = next((start for start in starts if _twin_of(candidate, start)), None)
-        if sound is None:
+        sound = [start for start in starts if _twin_of(candidate, start) is not None]
+        if not sound:
             return []
-        scales = self._scales(candidate, sound)
-        ranked = sorted(self._matches(candidate, starts, scales=scales), key=_misfit)
+        scales = self._scales(candidate, sound[0])
+        ranked = sorted(self._matches(candidate, sound, scales=scales), key=_misfit)
         if scales and {known.name for known in candidate.effect.parameters} <= set(candidate.sizes):
             return ranked[:1]
-        evolved = self._evolved(candidate, ranked[:_POPULATION], scales=scales)
-        refined = [self._refined(candidate, match) for match in (evolved, *ranked[:_N_REFINED])]
-        return sorted([*refined, evolved, ranked[0]], key=_misfit)[:2]
+        best = ranked[:_N_REFINED]
+        if len(ranked) >= _FEWEST:
+            best.insert(0, self._evolved(candidate, ranked[:_POPULATION], scales=scales))
+        return sorted([*best, *(self._refined(candidate, match) for match in best)], key=_misfit)[:2]
 
     def _scales(self, candidate: Candidate, numbers: Numbers) -> bool:
         """Whether half the sizes of an effect make half its force: not where they set a frequency or a limit."""
         if not candidate.sizes:
             return False
         force, half = self._forces(candidate, [numbers, candidate.sized(numbers, 0.5)])
+        if force is None or half is None:
+            return False
         return bool(np.linalg.norm(force - 2.0 * half) < _EXACTLY * np.linalg.norm(force))
 
     def _evolved(self, candidate: Candidate, population: Sequence[Match], *, scales: bool) -> Match:
@@ -141,32 +145,39 @@ class ForceMatching:
         """How well numbers match, each set with the best multiple of its sizes where these scale the force."""
         found = []
         for numbers, force in zip(sets, self._forces(candidate, sets), strict=True):
+            if force is None:
+                found.append(Match(_FAILED**2, dict(numbers)))
+                continue
             size = float(force @ force)
-            factor = float(force @ self._missing) / size if size > 0 else 0.0
-            if scales and factor > 0:
-                found.append(Match(_mean_square(self._missing - factor * force), candidate.sized(numbers, factor)))
-            else:
-                found.append(Match(_mean_square(self._missing - force), dict(numbers)))
+            factor = float(force @ self._missing) / size if scales and size > 0 else 1.0
+            factor = float(np.clip(factor, *_multiples(candidate, numbers))) if factor > 0 else 1.0
+            found.append(Match(_mean_square(self._missing - factor * force), candidate.sized(numbers, factor)))
         return found
 
     def _refined(self, candidate: Candidate, match: Match) -> Match:
         """Nonlinear least squares from one start."""
         logarithms = _Logarithms(candidate, match.numbers)
 
+        def forces(places: Sequence[FloatArray]) -> list[FloatArray]:
+            found = self._forces(candidate, [logarithms.numbers(x) for x in places])
+            return [np.full(self._missing.size, _FAILED) if force is None else force for force in found]
+
         def residual(x: FloatArray) -> FloatArray:
-            return self._forces(candidate, [logarithms.numbers(x)])[0] - self._missing
+            return forces([x])[0] - self._missing
 
         def jacobian(x: FloatArray) -> FloatArray:
-            places = [x, *(x + step for step in _STEP * np.eye(x.size))]
-            at, *moved = self._forces(candidate, [logarithms.numbers(place) for place in places])
+            at, *moved = forces([x, *(x + step for step in _STEP * np.eye(x.size))])
             return np.column_stack([(each - at) / _STEP for each in moved])
 
         start, ends = logarithms.of(match.numbers), (logarithms.low, logarithms.high)
         found = least_squares(residual, start, jacobian, ends, max_nfev=_MOST_STEPS, ftol=_LEAST_GAIN)
         return Match(2.0 * float(found.cost) / self._missing.size, logarithms.numbers(found.x))
 
-    def _forces(self, candidate: Candidate, sets: Sequence[Numbers]) -> list[FloatArray]:
-        """Forces with some sets of numbers, all runs one after the other, over the RMS of the missing one."""
+    def _forces(self, candidate: Candidate, sets: Sequence[Numbers]) -> list[FloatArray | None]:
+        """Forces with some sets of numbers, all runs one after the other, over the RMS of the missing one.
+
+        None where there is no such force, or it does not reach the end of a run.
+        """
         n = len(self._drives)
         twins = [_twin_of(candidate, numbers) for numbers in sets]
         lanes = [
@@ -176,14 +187,13 @@ class ForceMatching:
             for drive in self._drives
         ]
         found = iter(motions(lanes))
-        failed = np.full(self._missing.size, _FAILED)
-        return [failed if twin is None else self._joined(list(islice(found, n))) for twin in twins]
+        return [None if twin is None else self._joined(list(islice(found, n))) for twin in twins]
 
-    def _joined(self, found: Sequence[Motion | Exception]) -> FloatArray:
+    def _joined(self, found: Sequence[Motion | Exception]) -> FloatArray | None:
         parts = []
         for motion, kept, share in zip(found, self._kept, self._shares, strict=True):
             if isinstance(motion, Exception) or motion.ending.status is not Status.DONE:
-                return np.full(self._missing.size, _FAILED)
+                return None
             # What the regularisation took from the missing force is no misfit.
             n = share.size - 1
             parts.append(in_time(share * np.fft.rfft(motion.tank_force_n, 2 * n), n)[kept])
@@ -213,10 +223,18 @@ def matchings(forces: Sequence[Sequence[LatentForce]]) -> dict[str, ForceMatchin
 
 def _drive(force: LatentForce) -> Excitation:
     motion = np.concatenate([force.motion_before, force.motion])
-    rate = force.run.attributes.sampling_rate_hz
-    return with_cached_inputs(
-        recorded(rate, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])
-    )
+    return with_cached_inputs(along(motion, force.run.attributes.sampling_rate_hz))
+
+
+def _multiples(candidate: Candidate, numbers: Numbers) -> tuple[float, float]:
+    """The smallest and the largest multiple of an effect with all its sizes within their bounds."""
+    least, most = 0.0, np.inf
+    for parameter in candidate.effect.parameters:
+        size = numbers[f"{candidate.key}.{parameter.name}"]
+        if parameter.name in candidate.sizes and size != 0:
+            ends = sorted(bound / size for bound in candidate.bounds(parameter))
+            least, most = max(least, ends[0]), min(most, ends[1])
+    return least, max(least, most)
 
 
 def _within_bounds(candidate: Candidate, numbers: Numbers) -> dict[str, float]:
@@ -238,8 +256,7 @@ def _twin_of(candidate: Candidate, numbers: Numbers) -> Twin | None:
         return None
     if any((added.liquid, added.structure, added.faults, added.drives, added.run_terms)) or not added.terms:
         return None
-    # On a motion that is prescribed it does not matter where a force acts.
-    return Twin(None, tuple(replace(term, place=TANK) for term in added.terms))
+    return forces_alone(added.terms)
 
 
 class _Logarithms:

@@ -9,7 +9,7 @@ still explain within their tolerances is charged to no block.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -454,4 +454,4 @@ def beyond_own_parameters(model: RigModel, forces: RunForces, force: LatentForce
     ridge = max(ridge, 1e-9 * float(np.trace(squares)), 1e-30)
     numbers = np.linalg.solve(squares + ridge * np.eye(scaled.shape[1]), scaled.T @ force.force_n)
     rest = force.force_n - scaled @ numbers
-    return LatentForce(force.run, force.place, rest, force.standard_error_n, force.time_s, force.motion)
+    return replace(force, force_n=rest)

@@ -35,7 +35,7 @@ from sloshlab.missing_force.force_inversion import (
 from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.rig import Rig
 from sloshlab.twin.blocks import Blocks
-from sloshlab.twin.excitation import recorded
+from sloshlab.twin.excitation import Excitation, recorded
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import Term
@@ -455,15 +455,18 @@ def _change_of_baseline_force(
     chosen = [i for i, term in enumerate(twin.terms) if term.place == place]
     if not chosen:
         return np.zeros(motion.shape[0])
-    # The forces alone, on a prescribed motion: contacts and forces with memory are integrated by the same
-    # engine.
     simulated = simulation.forces_n[: motion.shape[0], chosen].sum(axis=1)
-    alone = Twin(None, tuple(_moved_to_tank(twin.terms[i]) for i in chosen))
-    drive = recorded(rate_hz, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])
-    forces = alone.simulate(drive).require_done().forces_n.sum(axis=1)
+    # Contacts and forces with memory are integrated by the same engine.
+    alone = forces_alone([twin.terms[i] for i in chosen])
+    forces = alone.simulate(along(motion, rate_hz)).require_done().forces_n.sum(axis=1)
     return np.asarray(forces - simulated)
 
 
-def _moved_to_tank(term: Term) -> Term:
-    """A force on a motion that is prescribed: where it acts no longer matters."""
-    return replace(term, place="tank")
+def forces_alone(terms: Sequence[Term]) -> Twin:
+    """Forces on a motion that is prescribed, where it no longer matters at which place they act."""
+    return Twin(None, tuple(replace(term, place=TANK) for term in terms))
+
+
+def along(motion: FloatArray, rate_hz: float) -> Excitation:
+    """A prescribed motion: displacement, velocity, acceleration, shape (n, 3)."""
+    return recorded(rate_hz, displacement=motion[:, 0], velocity=motion[:, 1], acceleration=motion[:, 2])

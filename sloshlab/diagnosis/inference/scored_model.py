@@ -155,13 +155,8 @@ def complexity(fit: FreeRunFit) -> float:
 
 
 def _tempered_covariance(fit: FreeRunFit) -> FloatArray:
-    """Covariance of a fit whose part by noise is larger by the tempering, that by belief as it is.
-
-    The covariance C = (JᵀJ + P)⁻¹, with P one for each number of the baseline, is C JᵀJ C + C P C.
-    """
-    of_effects = {prior.name for candidate in fit.candidates for prior in candidate.prior}
-    baseline = [i for i, name in enumerate(fit.names) if name not in of_effects]
-    of_belief = fit.covariance[:, baseline] @ fit.covariance[baseline, :]
+    """Covariance of a fit whose part by noise is larger by the tempering, that by belief as it is."""
+    of_belief = fit.covariance_by_belief
     return np.asarray(TEMPERING * (fit.covariance - of_belief) + of_belief)
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
-from sloshlab.diagnosis.selection.proposals import Places, without
+from sloshlab.diagnosis.selection.proposals import Places, missing_from
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.force_matching import Match, matchings
-from sloshlab.missing_physics.candidate import Candidate
-
-Numbers = Mapping[str, float]
+from sloshlab.missing_physics.candidate import Candidate, Numbers
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate],
     if not np.isfinite(residual).all():
         return MatchedForces()
     places = Places.beside(runs, fit, residual)
-    matching, others = matchings(list(places.forces.values())), without(fit, pool)
+    matching, others = matchings(list(places.forces.values())), missing_from(fit, pool)
 
     def matches_of(candidate: Candidate) -> list[Match]:
         place = matching.get(candidate.effect.block)

@@ -199,6 +199,7 @@ class ModelSelection:
         if matched_beside is not None and self._remains(matched_beside):
             self.said(f"{what}: matching forces", 0, 1)
             matched = matched_forces(few, matched_beside, pool, N_KEPT)
+            self._left -= _EVALUATIONS_OF_FITS * few.n_coefficients
             fits = list(self.runs.model.executor.map(partial(self._compensated, matched_beside), matched.leading))
             self._keep(fits)
             if any(not self._remains(fit) for fit in fits if not fit.trouble):

@@ -175,11 +175,11 @@ def _beside(
             )
         return found
 
-    others = without(base.fit, pool)
+    others = missing_from(base.fit, pool)
     return [proposal for found in runs.model.executor.map(of_candidate, others) for proposal in found]
 
 
-def without(fit: FreeRunFit, pool: Sequence[Candidate]) -> list[Candidate]:
+def missing_from(fit: FreeRunFit, pool: Sequence[Candidate]) -> list[Candidate]:
     """Candidates that a fit has not."""
     known = {candidate.key for candidate in fit.candidates}
     return [candidate for candidate in pool if candidate.key not in known]

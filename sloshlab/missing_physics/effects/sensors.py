@@ -355,14 +355,15 @@ def _interpolated(values: FloatArray, places: FloatArray) -> FloatArray:
     Beyond the ends the last value stays; what is next to a lost sample is lost.
     """
     samples, known = np.arange(values.size), np.isfinite(values)
-    if values.size <= _SPLINE_MARGIN or not known.any():
+    if values.size <= _SPLINE_DEGREE or not known.any():
         return np.asarray(np.interp(places, samples, values))
     all_known = bool(known.all())
     # A spline through a lost sample would be lost throughout.
     whole = values if all_known else np.interp(samples, samples[known], values[known])
     # On equal distances the coefficients of the spline are a filter, which begins and ends in the margins.
-    within = np.clip(places, 0, values.size - 1) + _SPLINE_MARGIN
-    found = map_coordinates(_reflected(whole, _SPLINE_MARGIN), [within], order=_SPLINE_DEGREE, mode="mirror")
+    margin = min(values.size - 1, _SPLINE_MARGIN)
+    within = np.clip(places, 0, values.size - 1) + margin
+    found = map_coordinates(_reflected(whole, margin), [within], order=_SPLINE_DEGREE, mode="mirror")
     return np.asarray(found if all_known else np.where(np.interp(places, samples, known) == 1.0, found, np.nan))
 
 

@@ -103,7 +103,7 @@ def test_the_occam_factor_is_the_integral_over_the_prior() -> None:
     # y = a x + noise with Σx² = 1: the likelihood of a is normal about its estimate with standard error one.
     estimate, key = 400.0, "structure.coulomb_friction.force_n"
     prior = ParameterPrior(key, 0.1, 1000.0, is_log=True, may_be_negative=False)
-    alone = cast(Any, SimpleNamespace(prior=(prior,)))
+    alone = cast(Any, SimpleNamespace(key="structure.coulomb_friction", prior=(prior,)))
     fit = FreeRunFit((alone,), {key: estimate}, 0.0, 0.0, np.eye(1), (key,), np.ones(1))
     integral, _ = quad(lambda a: np.exp(-0.5 * (a - estimate) ** 2 / TEMPERING) / a / np.log(1e4), 350.0, 450.0)
     # Laplace takes 1/a at the estimate; the integral differs by (σ/a)².
@@ -115,7 +115,7 @@ def test_the_occam_factor_beside_a_number_of_the_baseline(correlation: float) ->
     # Known to 1/100 of the prior of the baseline: alone by noise, or as well as the baseline's number is believed.
     key = "structure.coulomb_friction.force_n"
     prior = ParameterPrior(key, 0.1, 1e4, is_log=True, may_be_negative=False)
-    alone = cast(Any, SimpleNamespace(prior=(prior,)))
+    alone = cast(Any, SimpleNamespace(key="structure.coulomb_friction", prior=(prior,)))
     information, belief = 1e4 * np.array([[1.0, correlation], [correlation, 1.0]]), np.diag([1.0, 0.0])
     covariance = np.linalg.inv(information + belief)
     fit = FreeRunFit((alone,), {"mass": 0.0, key: 500.0}, 0.0, 0.0, covariance, ("mass", key), np.ones(2))
@@ -128,7 +128,7 @@ def test_the_occam_factor_beside_a_number_of_the_baseline(correlation: float) ->
 def test_a_number_that_nothing_tells_costs_nothing() -> None:
     key = "structure.coulomb_friction.force_n"
     prior = ParameterPrior(key, 0.1, 1000.0, is_log=True, may_be_negative=False)
-    alone = cast(Any, SimpleNamespace(prior=(prior,)))
+    alone = cast(Any, SimpleNamespace(key="structure.coulomb_friction", prior=(prior,)))
     fit = FreeRunFit((alone,), {key: 1.0}, 0.0, 0.0, 1e6 * np.eye(1), (key,), np.ones(1))
     assert complexity(fit) == 0.0
 

@@ -147,3 +147,30 @@ def test_a_force_within_its_noise_is_not_matched() -> None:
     motion = motion_of(0.003)
     drowned = replace(latent(np.sin(OMEGA * TIME), motion, "run_1", TANK), standard_error_n=0.6)
     assert matchings([[drowned]]) == {}
+
+
+def test_a_multiple_stays_within_the_bounds_of_every_size(tmp_path: Path) -> None:
+    """Half as much again of nine tenths of a liquid are more than there is."""
+    known = candidate(tmp_path, "tank.ceiling_impact")
+    motion = motion_of(0.03)
+    numbers = {**known.starts()[0], f"{known.key}.share": 0.9}
+    one = ForceMatching([latent(np.sin(OMEGA * TIME) ** 3, motion, "run_1", TANK)])
+    [force] = one._forces(known, [numbers])
+    assert force is not None
+    whole = np.zeros(N)
+    whole[N_BEFORE:] = 1.5 * force * one._scale
+    matching = ForceMatching([latent(whole, motion, "run_1", TANK)])
+    [match] = matching._matches(known, [numbers], scales=True)
+    assert match.numbers[f"{known.key}.share"] == pytest.approx(1.0)
+    assert match.misfit == pytest.approx((1 - (1 / 0.9) / 1.5) ** 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_does_not_run_matches_worst(tmp_path: Path, sign: float) -> None:
+    known = candidate(tmp_path, "tank.ceiling_impact")
+    # Springs that the weight of the liquid presses through.
+    soft = {**known.starts()[0], f"{known.key}.stiffness_n_per_m": 50.0}
+    matching = ForceMatching([latent(sign * np.sin(OMEGA * TIME) ** 3, motion_of(0.003), "run_1", TANK)])
+    [broken], [sound] = (matching._matches(known, [numbers], scales=True) for numbers in (soft, known.starts()[0]))
+    assert broken.misfit > 1e5 > sound.misfit
+    assert broken.numbers == soft
