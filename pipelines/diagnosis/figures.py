@@ -168,7 +168,9 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
         for label, simulated, colour, line in steps:
             values = simulated[observation.channel]
             left.plot(time[stretch], factor * values[stretch], color=colour, lw=0.9, ls=line, label=label)
-            right.plot(time, factor * _left(observation, recorded - values), color=colour, lw=0.6)
+            # A sample that is not judged, such as the one of a release, would squash all others.
+            left_over = np.where(observation.known, _left(observation, recorded - values), np.nan)
+            right.plot(time, factor * left_over, color=colour, lw=0.6)
         left.set_ylabel(f"{plain(observation.channel)}\n[{plain(units)}]", fontsize=7)
         right.axvspan(time[stretch][0], time[stretch][-1], color="#f0ead8", zorder=0)
     grid[0, 0].set_title("recorded and simulated, a stretch")

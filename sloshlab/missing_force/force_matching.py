@@ -3,6 +3,7 @@
 The force is computed on the recorded motion, without the structure that it would act on: what it does to the
 motion is in the recording already. So bounces of a liquid, phases of a wave and the memory of a friction follow
 those of the laboratory, where a free-running simulation with other numbers goes its own way; and one costs little.
+Forces are compared over the noise of the missing one, which a structure shows best at its resonances.
 The force contains the noise of the recorded motion: what matches best is a start of a fit, never a judgement.
 """
 
@@ -11,15 +12,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Final
+from typing import Final, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.optimize import differential_evolution, least_squares
 
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.rig_model import steps_per_sample
-from sloshlab.missing_force.force_inversion import in_time
 from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce, along, forces_alone
 from sloshlab.missing_physics.candidate import Candidate, Numbers
 from sloshlab.missing_physics.prior import ParameterPrior
@@ -73,26 +74,35 @@ class ForceMatching:
     ----------
     forces : sequence of LatentForce
         Of one place, one per run.
+
+    Attributes
+    ----------
+    power : float
+        Squares of what is missing, in noise variances.
+    is_more_than_noise : bool
+        Whether they are more than those of noise besides those of noise.
     """
 
     def __init__(self, forces: Sequence[LatentForce]) -> None:
         self._drives = [_drive(force) for force in forces]
-        self._kept = [slice(f.motion_before.shape[0], f.motion_before.shape[0] + f.force_n.size) for f in forces]
-        self._shares = [force.kept_share for force in forces]
-        motion = np.concatenate([force.motion for force in forces])
-        linear = np.column_stack([motion / np.maximum(np.abs(motion).max(axis=0), 1e-300), np.ones(len(motion))])
-        self._linear, _ = np.linalg.qr(linear)
-        missing = self._without_linear(np.concatenate([force.force_n for force in forces]))
+        self._doubled = [_drive(force, 2.0) for force in forces]
+        self._whiteners = [_Whitener(force) for force in forces]
+        moved = [np.concatenate([force.motion_before, force.motion]) for force in forces]
+        of_runs = [[*motion.T, np.ones(len(motion))] for motion in moved]
+        linear = np.stack([self._whitened(columns) for columns in zip(*of_runs, strict=True)], axis=1)
+        self._linear, _ = np.linalg.qr(linear / np.maximum(np.abs(linear).max(axis=0), 1e-300))
+        known = zip(forces, self._whiteners, strict=True)
+        missing = self._without_linear(np.concatenate([w.of_regularised(force.force_n) for force, w in known]))
+        self.power = float(missing @ missing)
+        self.is_more_than_noise = self.power > 2.0 * sum(whitener.noise for whitener in self._whiteners)
         self._scale = max(float(np.sqrt(np.mean(missing**2))), 1e-300)
         self._missing = missing / self._scale
 
-    def matched(self, candidate: Candidate, starts: Sequence[Numbers]) -> list[Match]:
-        """The two best matches, the best first; none of what is no force that a motion makes.
+    def ranked(self, candidate: Candidate, starts: Sequence[Numbers]) -> list[Match]:
+        """Starts as they match, the best first; none of what is no force that a motion makes.
 
-        Where all numbers are sizes the best multiple is the best match. Otherwise a population evolves from the
-        best starts, as contacts and friction make the misfit rough (differential evolution, Storn and Price 1997,
-        doi:10.1023/A:1008202821328); its best and the best starts are refined by least squares, which alone follow
-        the narrow valley of a resonance.
+        Where sizes scale the force each start has its best multiple; where there are no other numbers the best of
+        these is the best match, and no other is given.
 
         Parameters
         ----------
@@ -100,17 +110,71 @@ class ForceMatching:
         starts : sequence of mapping
             Named as in a fit.
         """
-        sound = [start for start in starts if _twin_of(candidate, start) is not None]
+        sound = [start for start in starts if force_alone(candidate, start) is not None]
         if not sound:
             return []
         scales = self._scales(candidate, sound[0])
         ranked = sorted(self._matches(candidate, sound, scales=scales), key=_misfit)
-        if scales and {known.name for known in candidate.effect.parameters} <= set(candidate.sizes):
-            return ranked[:1]
+        return ranked[:1] if scales and self._is_linear(candidate) else ranked
+
+    def refined(self, candidate: Candidate, ranked: Sequence[Match]) -> list[Match]:
+        """The best of some matches by least squares, the best first.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        ranked : sequence of Match
+        """
         best = ranked[:_N_REFINED]
-        if len(ranked) >= _FEWEST:
-            best.insert(0, self._evolved(candidate, ranked[:_POPULATION], scales=scales))
-        return sorted([*best, *(self._refined(candidate, match) for match in best)], key=_misfit)[:2]
+        if self._scales(candidate, best[0].numbers) and self._is_linear(candidate):
+            return list(best)
+        return sorted([*best, *(self._by_least_squares(candidate, match) for match in best)], key=_misfit)
+
+    def evolved(self, candidate: Candidate, ranked: Sequence[Match]) -> list[Match]:
+        """The best of some matches, and of a population that evolves from them, by least squares; the best first.
+
+        Contacts and friction make the misfit rough (differential evolution, Storn and Price 1997,
+        doi:10.1023/A:1008202821328).
+
+        Parameters
+        ----------
+        candidate : Candidate
+        ranked : sequence of Match
+        """
+        refined = self.refined(candidate, ranked)
+        scales = self._scales(candidate, ranked[0].numbers)
+        if len(ranked) < _FEWEST or (scales and self._is_linear(candidate)):
+            return refined
+        best = self._evolution(candidate, ranked[:_POPULATION], scales=scales)
+        return sorted([*refined, best, self._by_least_squares(candidate, best)], key=_misfit)
+
+    @staticmethod
+    def _is_linear(candidate: Candidate) -> bool:
+        """Whether an effect has no numbers but sizes."""
+        return {known.name for known in candidate.effect.parameters} <= set(candidate.sizes)
+
+    def compares(self, candidate: Candidate, numbers: Numbers) -> bool:
+        """Whether what a force leaves says how good it is: not of one that is linear in the motion.
+
+        What that does is hidden by what is set aside, or by numbers of the baseline that have taken its share.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        numbers : mapping
+        """
+        twin = force_alone(candidate, numbers)
+        if twin is None:
+            return False
+        for drive, doubled in zip(self._drives, self._doubled, strict=True):
+            n_substeps = steps_per_sample(twin, drive.sampling_rate_hz)
+            one, two = motions([Lane(twin, each, n_substeps=n_substeps) for each in (drive, doubled)])
+            if not (_is_done(one) and _is_done(two)):
+                continue
+            changes = [each.tank_force_n - each.tank_force_n.mean() for each in (one, two)]
+            if np.linalg.norm(changes[1] - 2.0 * changes[0]) > _EXACTLY * np.linalg.norm(two.tank_force_n):
+                return True
+        return False
 
     def _scales(self, candidate: Candidate, numbers: Numbers) -> bool:
         """Whether half the sizes of an effect make half its force: not where they set a frequency or a limit."""
@@ -121,7 +185,7 @@ class ForceMatching:
             return False
         return bool(np.linalg.norm(force - 2.0 * half) < _EXACTLY * np.linalg.norm(force))
 
-    def _evolved(self, candidate: Candidate, population: Sequence[Match], *, scales: bool) -> Match:
+    def _evolution(self, candidate: Candidate, population: Sequence[Match], *, scales: bool) -> Match:
         logarithms = _Logarithms(candidate, population[0].numbers)
 
         def misfits(x: FloatArray) -> FloatArray:
@@ -154,7 +218,7 @@ class ForceMatching:
             found.append(Match(_mean_square(self._missing - factor * force), candidate.sized(numbers, factor)))
         return found
 
-    def _refined(self, candidate: Candidate, match: Match) -> Match:
+    def _by_least_squares(self, candidate: Candidate, match: Match) -> Match:
         """Nonlinear least squares from one start."""
         logarithms = _Logarithms(candidate, match.numbers)
 
@@ -179,7 +243,7 @@ class ForceMatching:
         None where there is no such force, or it does not reach the end of a run.
         """
         n = len(self._drives)
-        twins = [_twin_of(candidate, numbers) for numbers in sets]
+        twins = [force_alone(candidate, numbers) for numbers in sets]
         lanes = [
             Lane(twin, drive, n_substeps=steps_per_sample(twin, drive.sampling_rate_hz))
             for twin in twins
@@ -190,21 +254,24 @@ class ForceMatching:
         return [None if twin is None else self._joined(list(islice(found, n))) for twin in twins]
 
     def _joined(self, found: Sequence[Motion | Exception]) -> FloatArray | None:
-        parts = []
-        for motion, kept, share in zip(found, self._kept, self._shares, strict=True):
-            if isinstance(motion, Exception) or motion.ending.status is not Status.DONE:
+        series = []
+        for motion in found:
+            if not _is_done(motion):
                 return None
-            # What the regularisation took from the missing force is no misfit.
-            n = share.size - 1
-            parts.append(in_time(share * np.fft.rfft(motion.tank_force_n, 2 * n), n)[kept])
-        return self._without_linear(np.concatenate(parts)) / self._scale
+            series.append(motion.tank_force_n)
+        return self._without_linear(self._whitened(series)) / self._scale
+
+    def _whitened(self, series: Sequence[FloatArray]) -> FloatArray:
+        """Forces of all runs, one after the other."""
+        of_runs = zip(series, self._whiteners, strict=True)
+        return np.concatenate([whitener.whitened(each) for each, whitener in of_runs])
 
     def _without_linear(self, series: FloatArray) -> FloatArray:
         return np.asarray(series - self._linear @ (self._linear.T @ series))
 
 
 def matchings(forces: Sequence[Sequence[LatentForce]]) -> dict[str, ForceMatching]:
-    """Per block, where its missing forces are told apart and are more than their noise.
+    """Per block, where its missing forces are told apart.
 
     Parameters
     ----------
@@ -216,13 +283,58 @@ def matchings(forces: Sequence[Sequence[LatentForce]]) -> dict[str, ForceMatchin
         # A force that may be either's acts along the motion of the structure.
         places = (place, EITHER) if place == STRUCTURE else (place,)
         own = [force for of_run in forces for force in of_run if force.place in places]
-        if sum(force.power_n2 for force in own) > sum(force.standard_error_n**2 for force in own):
+        if own:
             found[place] = ForceMatching(own)
     return found
 
 
-def _drive(force: LatentForce) -> Excitation:
-    motion = np.concatenate([force.motion_before, force.motion])
+class _Whitener:
+    """Spectra of forces of one run over the noise of the missing one, real parts before imaginary ones.
+
+    Squares add up to as many as there are samples for noise that the regularisation leaves whole.
+
+    Parameters
+    ----------
+    force : LatentForce
+    """
+
+    def __init__(self, force: LatentForce) -> None:
+        self._kept = slice(len(force.motion_before), len(force.motion_before) + len(force.motion))
+        # Lengths of many small factors are transformed many times as fast.
+        self._length, self._whole = (next_fast_len(2 * n, real=True) for n in (len(force.motion), self._kept.stop))
+        known = (force.kept_share > 0) & (force.noise_power > 0)
+        # The noise is that of a whole run, at half as many lines as that has padded samples.
+        power = np.where(known, force.noise_power, 1.0) * self._length / (2 * (force.kept_share.size - 1))
+        self._weights = _at_lines(np.where(known, 1.0 / np.sqrt(power), 0.0), self._length)
+        self._share = _at_lines(np.where(known, force.kept_share, 0.0), self._whole)
+
+    @property
+    def noise(self) -> float:
+        """Squares that are expected of noise alone."""
+        return float(self._kept.stop - self._kept.start) * float(np.mean(self._share**2))
+
+    def whitened(self, series: FloatArray) -> FloatArray:
+        """Of a force as it acts, from the start of the run: what the regularisation took is no misfit."""
+        regularised = irfft(self._share * rfft(series[: self._kept.stop], self._whole), self._whole)
+        return self.of_regularised(regularised[self._kept])
+
+    def of_regularised(self, series: FloatArray) -> FloatArray:
+        """Of one that was regularised as the missing force was, as long as that."""
+        spectrum = self._weights * rfft(series, self._length)
+        return np.concatenate([spectrum.real, spectrum.imag])
+
+
+def _at_lines(values: FloatArray, n_samples: int) -> FloatArray:
+    """What is given at evenly spaced frequencies at those of a series of so many samples."""
+    return np.interp(np.linspace(0.0, 1.0, n_samples // 2 + 1), np.linspace(0.0, 1.0, values.size), values)
+
+
+def _is_done(motion: Motion | Exception) -> TypeGuard[Motion]:
+    return not isinstance(motion, Exception) and motion.ending.status is Status.DONE
+
+
+def _drive(force: LatentForce, factor: float = 1.0) -> Excitation:
+    motion = factor * np.concatenate([force.motion_before, force.motion])
     return with_cached_inputs(along(motion, force.run.attributes.sampling_rate_hz))
 
 
@@ -246,8 +358,16 @@ def _within_bounds(candidate: Candidate, numbers: Numbers) -> dict[str, float]:
     return found
 
 
-def _twin_of(candidate: Candidate, numbers: Numbers) -> Twin | None:
-    """The force alone; none of what acts otherwise too, and of numbers that lack or contradict each other."""
+def force_alone(candidate: Candidate, numbers: Numbers) -> Twin | None:
+    """The force that a motion makes; none of what acts otherwise too, and of numbers that lack or contradict each
+    other.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    numbers : mapping
+        Named as in a fit.
+    """
     if any(f"{candidate.key}.{known.name}" not in numbers for known in candidate.effect.parameters):
         return None
     try:

@@ -69,6 +69,8 @@ class LatentForce:
         The same from the start of the run to the first sample of the force.
     kept_share : ndarray, shape (n_samples_of_the_run + 1,)
         What the regularisation kept of every frequency of the padded run (`in_frequency`), 0 … 1.
+    noise_power : ndarray, shape (n_samples_of_the_run + 1,)
+        Expected noise of every frequency of the padded run before the regularisation [N²].
     """
 
     run: CaseRun
@@ -79,6 +81,7 @@ class LatentForce:
     motion: FloatArray
     motion_before: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     kept_share: FloatArray = field(default_factory=lambda: np.empty(0))
+    noise_power: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @property
     def power_n2(self) -> float:
@@ -287,7 +290,9 @@ def _on_structure(
         place: str, series: FloatArray, expected: FloatArray, motion: FloatArray, share: FloatArray
     ) -> LatentForce:
         error = float(np.sqrt(sample_variance(expected, n)))
-        return LatentForce(run, place, series[kept], error, time[kept], motion[kept], motion[: kept.start], share)
+        noise = expected / np.maximum(share, 1e-300)
+        before = motion[: kept.start]
+        return LatentForce(run, place, series[kept], error, time[kept], motion[kept], before, share, noise)
 
     measured = _measured(observed, believed, missed)
     # Simulation alone tells the sum of both forces only.
@@ -408,7 +413,7 @@ def _on_shaker(
     time = np.asarray(run.recording["time"].values, np.float64)
     error = float(np.sqrt(sample_variance(share * of_noise, n)))
     before = motion[: kept.start]
-    return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept], before, share),), left
+    return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept], before, share, of_noise),), left
 
 
 def _order(name: str) -> int:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -22,10 +21,11 @@ from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.matched_forces import MatchedForces, matched_forces
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
-from sloshlab.diagnosis.selection.successive_halving import halved
+from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, halved
 from sloshlab.identification.free_run_fit import fitted, stages_for
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost, run_of
 from sloshlab.identification.readiness import refuted_beliefs
+from sloshlab.missing_force.latent_force import STRUCTURE, TANK
 from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
 
 Said = Callable[[str, int, int], None]
@@ -63,7 +63,8 @@ class ModelSelection:
         self.pool = candidates(at)
         self.fits: dict[frozenset[str], FreeRunFit] = {}
         self.failed: dict[str, str] = {}
-        self._swapped_models: set[frozenset[str]] = set()
+        self._matched: dict[frozenset[str], MatchedForces] = {}
+        self._swapped_beside: dict[frozenset[str], set[frozenset[str]]] = {}
         self._promising: dict[str, list[dict[str, float]]] = {}
         self._left = _BUDGET
 
@@ -77,10 +78,14 @@ class ModelSelection:
         """
         self._keep([retuned])
         self._renew_sampling()
-        if not self._remains(retuned) and not self._refuted(retuned):
+        remains = self._remains(retuned)
+        if not remains and not self._refuted(retuned):
             return [retuned]
         believed = self._as_believed()
-        self._grown([believed, retuned], "one effect", matched_beside=retuned)
+        self._added([believed, retuned], "one effect", retuned)
+        # Without a remainder an effect can only be what makes numbers that are not believed less wrong.
+        if not remains and self._evidence(self._of(1)) <= self._evidence([retuned]):
+            return self._sorted()
         self._renew_sampling()
         self._swapped(1)
         self._simplified(1)
@@ -96,13 +101,16 @@ class ModelSelection:
             joined = self._best_of(n + 1)
             if joined is None or self._remains(joined):
                 leading = self._leading(n)
-                self._grown(leading, "one more effect", matched_beside=leading[0])
+                self._added(leading, "one more effect", leading[0])
             self._renew_sampling()
             self._swapped(n + 1)
             self._simplified(n + 1)
         # What was found beside other effects may be the best alone, and has look-alikes of its own.
         for n in range(1, _MOST_EFFECTS + 1):
             self._swapped(n)
+        return self._sorted()
+
+    def _sorted(self) -> list[FreeRunFit]:
         return sorted(self.fits.values(), key=lambda fit: (len(fit.candidates), fit.cost))
 
     @property
@@ -163,7 +171,7 @@ class ModelSelection:
             if fit.trouble:
                 self.failed[" + ".join(candidate.key for candidate in fit.candidates)] = fit.trouble
                 continue
-            keys = frozenset(candidate.key for candidate in fit.candidates)
+            keys = _keys_of(fit.candidates)
             if keys not in self.fits or fit.cost < self.fits[keys].cost:
                 self.fits[keys] = fit
 
@@ -181,29 +189,25 @@ class ModelSelection:
         only: Sequence[Candidate] = (),
         promising: Mapping[str, Sequence[Mapping[str, float]]] = NO_STARTS,
         *,
-        matched_beside: FreeRunFit | None = None,
+        matched: MatchedForces | None = None,
+        against: Candidate | None = None,
     ) -> None:
         """Every candidate, or some alone, beside some fits; the best ones to the end.
 
-        Where forces match what is missing beside a fit these are fitted first, and if nothing remains no others.
+        Forces start from where they match what is missing. Against an effect those are left out that leave far
+        more of it.
         """
         # A simpler form costs a hundredth of all candidates, and decides what is said of a wider one.
         if self._left <= 0 and not only:
             self.failed["search"] = "ended at its budget, with more effects to try"
             return
         few = self.runs.one_repeat_per_test
+        pool = only or self._pool_beside(bases)
+        matched = matched or MatchedForces()
+        if against is not None:
+            most = HOPELESS_COST_RATIO * matched.left.get(against.key, np.inf)
+            pool = [candidate for candidate in pool if matched.left.get(candidate.key, 0.0) <= most]
         kept = [Base.of(few, base) for base in bases]
-        pool = only or [*self.pool, *self._candidates_beside(bases)]
-        matched = MatchedForces()
-        # Where nothing remains no force shows: a number that is not believed may be what hides it.
-        if matched_beside is not None and self._remains(matched_beside):
-            self.said(f"{what}: matching forces", 0, 1)
-            matched = matched_forces(few, matched_beside, pool, N_KEPT)
-            self._left -= _EVALUATIONS_OF_FITS * few.n_coefficients
-            fits = list(self.runs.model.executor.map(partial(self._compensated, matched_beside), matched.leading))
-            self._keep(fits)
-            if any(not self._remains(fit) for fit in fits if not fit.trouble):
-                return
         stages = self._stages(bases[-1])
         inflations = sorted({stages[0], stages[-1]}, reverse=True)
         proposed = proposals(few, kept, pool, inflations, promising or self._promising, matched.starts)
@@ -216,6 +220,32 @@ class ModelSelection:
             self._promising = most_promising(proposed)
         coarse = halved(few, proposed, stages, N_KEPT, lambda name, i, n: self.said(f"{what}: {name}", i, n))
         self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))
+
+    def _added(self, bases: Sequence[FreeRunFit], what: str, best: FreeRunFit) -> None:
+        """One effect more: forces that match what is missing beside the best fit; if something remains, any."""
+        # Where nothing remains no force shows: a number that is not believed may be what hides it.
+        matched = MatchedForces()
+        if self._remains(best):
+            matched = self._matched_beside(best, what)
+            for match in matched.leading:
+                fit = self._compensated(best, match)
+                self._keep([fit])
+                if not fit.trouble and not self._remains(fit):
+                    return
+        self._grown(bases, what, matched=matched)
+
+    def _matched_beside(self, fit: FreeRunFit, what: str) -> MatchedForces:
+        """Forces matched to what is missing beside a fit."""
+        keys = _keys_of(fit.candidates)
+        if keys not in self._matched and self._left > 0:
+            self.said(f"{what}: matching forces", 0, 1)
+            few = self.runs.one_repeat_per_test
+            self._matched[keys] = matched_forces(few, fit, self._pool_beside([fit]), N_KEPT)
+            self._left -= _EVALUATIONS_OF_FITS * few.n_coefficients
+        return self._matched.get(keys, MatchedForces())
+
+    def _pool_beside(self, bases: Sequence[FreeRunFit]) -> list[Candidate]:
+        return [*self.pool, *self._candidates_beside(bases)]
 
     def _joined(self, n: int) -> None:
         """The leading models of so many effects with one more of those that lead alone, each at its own numbers.
@@ -249,6 +279,8 @@ class ModelSelection:
             return fit
         # Each release by itself, from many starts: one that comes to rest elsewhere holds all other numbers back.
         values = values_of_runs(self.runs.model, released, fit)
+        if not problem.costs([values])[0] < fit.cost:
+            return fit
         other = _at_its_optimum(problem, values)
         return other if other.cost < fit.cost else fit
 
@@ -262,14 +294,30 @@ class ModelSelection:
         return held if held.trouble else self._to_the_end(held, base)
 
     def _swapped(self, n: int) -> None:
-        """Other effects in the place of each effect of the best model of so many, beside its baseline."""
+        """Other effects in the place of each one of the best model, beside its baseline and the believed one.
+
+        A mass or a spring is hidden by what the baseline has taken of it.
+        """
         best = self._best_of(n)
-        keys = frozenset(candidate.key for candidate in best.candidates) if best is not None else frozenset()
-        if best is None or keys in self._swapped_models:
+        if best is None:
             return
-        self._swapped_models.add(keys)
         for effect in best.candidates:
-            self._grown([_without(best, effect)], f"in the place of {effect.key}")
+            rest = _without(best, effect)
+            others = _keys_of(rest.candidates)
+            compared = self._swapped_beside.setdefault(others, set())
+            # What came up in such a comparison has been compared with the same effects.
+            if others | {effect.key} in compared:
+                continue
+            what = f"in the place of {effect.key}"
+            # Beside a fit in which all other numbers have taken their share, so that little is missing.
+            is_force = effect.effect.block in (STRUCTURE, TANK) and others in self.fits
+            matched = self._matched_beside(self.fits[others], what) if is_force else None
+            self._grown([rest, self._believed_beside(rest)], what, matched=matched, against=effect)
+            compared |= {keys for keys in self.fits if len(keys) == n and others < keys}
+
+    def _believed_beside(self, fit: FreeRunFit) -> FreeRunFit:
+        """The effects of a fit beside the baseline as believed."""
+        return FreeRunFit(fit.candidates, {**fit.values, **self.runs.model.believed}, 0.0, 0.0)
 
     def _simplified(self, n: int) -> None:
         """Models nested in the leading ones of so many: with one effect less, or with what one reduces to.
@@ -283,7 +331,7 @@ class ModelSelection:
                 problem = self.runs.problem_of(rest)
                 start = {name: value for name, value in rest.values.items() if name in problem.names}
                 self._keep([_at_its_optimum(problem, start)])
-                others = frozenset(candidate.key for candidate in rest.candidates)
+                others = _keys_of(rest.candidates)
                 simpler = [
                     each for each in self.pool if effect.reduces_to(each) and others | {each.key} not in self.fits
                 ]
@@ -298,7 +346,7 @@ class ModelSelection:
         """
         for effect in best.candidates:
             numbers, rest = _own_numbers(best, effect), _without(best, effect)
-            believed = FreeRunFit(rest.candidates, {**rest.values, **self.runs.model.believed}, 0.0, 0.0)
+            believed = self._believed_beside(rest)
             draws = norm.ppf(qmc.Halton(len(numbers), seed=0).random(8 * N_KEPT))
             places = [
                 {
@@ -315,6 +363,11 @@ class ModelSelection:
         best = min(self.fits.values(), key=lambda fit: fit.cost)
         return (model.cost - best.cost) / (2 * TEMPERING) < complexity(best) + _NO_CHANCE
 
+    @staticmethod
+    def _evidence(fits: Sequence[FreeRunFit]) -> float:
+        """The largest of some fits, but for what is common to all; minus infinity of none."""
+        return max((-fit.misfit / (2 * TEMPERING) - complexity(fit) for fit in fits), default=-np.inf)
+
     def _candidates_beside(self, bases: Sequence[FreeRunFit]) -> list[Candidate]:
         """Effects that act on forces which only the effects of a fit have added, such as on a liquid's damping."""
         found: dict[str, Candidate] = {}
@@ -326,6 +379,10 @@ class ModelSelection:
                 beside = candidates(replace(self.at, twin=twin))
                 found |= {candidate.key: candidate for candidate in beside if candidate.key not in known}
         return list(found.values())
+
+
+def _keys_of(candidates: Iterable[Candidate]) -> frozenset[str]:
+    return frozenset(candidate.key for candidate in candidates)
 
 
 def _at_its_optimum(problem: FreeRunProblem, start: Mapping[str, float]) -> FreeRunFit:

@@ -23,7 +23,7 @@ _STARTS_OF_A_MODEL: Final = 2
 """That may go on beside each other."""
 _STARTS_OF_A_NAME: Final = 4
 """That are begun: two of one model and two of another. Forms and places of one effect predict nearly the same."""
-_HOPELESS_COST_RATIO: Final = 3.0
+HOPELESS_COST_RATIO: Final = 3.0
 """Cost over the lowest one at the same noise: what is its equal is no further behind after three steps."""
 
 
@@ -99,7 +99,7 @@ def _continued(runs: FittedRuns, running: _Running, inflation: float) -> _Runnin
 
 def _better(running: Sequence[_Running], n: int, of_a_model: int) -> list[_Running]:
     """The lowest costs, with at most so many starts of one model; none that is hopeless."""
-    most = _HOPELESS_COST_RATIO * min((each.cost for each in running), default=0.0)
+    most = HOPELESS_COST_RATIO * min((each.cost for each in running), default=0.0)
     kept: list[_Running] = []
     taken: dict[frozenset[str], int] = {}
     for each in sorted(running, key=lambda each: each.cost):

@@ -20,7 +20,7 @@ from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.noise_floor import weighted_observations
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
-from sloshlab.missing_physics.candidate import candidates
+from sloshlab.missing_physics.candidate import Candidate, candidates
 
 assert effects.__all__  # importing the vocabulary makes it known
 
@@ -92,9 +92,46 @@ def test_what_leaves_nothing_ends_the_step(
 
     monkeypatch.setattr(model_selection, "proposals", not_asked)
     selection._keep([retuned])
-    selection._grown([retuned], "one effect", matched_beside=retuned)
+    selection._added([retuned], "one effect", retuned)
     best = min(selection.fits.values(), key=lambda fit: fit.cost)
     assert [candidate.key for candidate in best.candidates] == [CUSHION]
+
+
+def test_in_the_place_of_a_force_come_only_forces_that_do_nearly_the_same(
+    search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    selection, retuned = search
+    delay = next(each for each in candidates(selection.at) if each.key.startswith("sensor.sensor_delay"))
+    selection.pool = [*selection.pool, delay]
+    selection._keep([retuned])
+    selection._added([retuned], "one effect", retuned)
+    best = selection._best_of(1)
+    assert best is not None
+    pools = []
+
+    def recorded_proposals(
+        runs: FittedRuns, bases: object, pool: list[Candidate], *others: object
+    ) -> list[object]:
+        pools.append({candidate.key for candidate in pool})
+        return []
+
+    monkeypatch.setattr(model_selection, "proposals", recorded_proposals)
+    selection._swapped(1)
+    # The drag leaves all of the slug's force; a mass is hidden by what is set aside, a sensor makes no force.
+    assert pools == [{CUSHION, delay.key, "tank.mass_error"}]
+
+
+def test_without_a_remainder_single_effects_end_the_search(
+    search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A number that is not believed alone: an effect that makes it no more probable starts no further search."""
+    selection, retuned = search
+    grown = []
+    monkeypatch.setattr(selection, "_remains", lambda fit: False)
+    monkeypatch.setattr(selection, "_refuted", lambda fit: True)
+    monkeypatch.setattr(selection, "_added", lambda bases, what, best: grown.append(what))
+    assert selection.selected(retuned) == [retuned]
+    assert grown == ["one effect"]
 
 
 def frequency_hz(numbers: dict[str, float]) -> float:
