@@ -29,6 +29,9 @@ FloatArray = NDArray[np.float64]
 _FEWEST_COEFFICIENTS: Final = 50
 """Below it a mean square is too uncertain to be used: its standard error is a fifth."""
 
+_NEAR_AN_END: Final = 1e-6
+"""Of a range: scaled numbers reach an end only to rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class ScoredModel:
@@ -47,6 +50,9 @@ class ScoredModel:
     complexity : float
         What its freedom costs: minus the logarithm of prior over posterior volume, and what moving the baseline
         from what is believed costs.
+    n_at_ends : int
+        Numbers of its effects, not sizes, that are at an end of their range: an effect with these is a simpler
+        one, such as a structural damping that does not creep.
     """
 
     fit: FreeRunFit
@@ -55,6 +61,7 @@ class ScoredModel:
     remainder: Remainder
     held_out: frozenset[str]
     complexity: float
+    n_at_ends: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -103,8 +110,8 @@ class ScoredModel:
 
     @property
     def n_numbers(self) -> int:
-        """Numbers of its effects."""
-        return sum(len(candidate.effect.parameters) for candidate in self.fit.candidates)
+        """Numbers of its effects that are free."""
+        return sum(len(candidate.effect.parameters) for candidate in self.fit.candidates) - self.n_at_ends
 
 
 def scored(
@@ -131,7 +138,18 @@ def scored(
     """
     missing = nothing.runs if nothing is not None and fit.candidates else ()
     left = remainder(runs, missing, tests)
-    return ScoredModel(fit, dict(values), list(runs), left, frozenset(held_out), complexity(fit))
+    return ScoredModel(fit, dict(values), list(runs), left, frozenset(held_out), complexity(fit), _n_at_ends(fit))
+
+
+def _n_at_ends(fit: FreeRunFit) -> int:
+    """Numbers of the effects of a fit, not sizes, that are at an end of their range."""
+    n = 0
+    for candidate in fit.candidates:
+        for parameter in candidate.effect.parameters:
+            low, high = candidate.bounds(parameter)
+            value, near = fit.values[f"{candidate.key}.{parameter.name}"], _NEAR_AN_END * (high - low)
+            n += parameter.name not in candidate.sizes and not low + near < value < high - near
+    return n
 
 
 def complexity(fit: FreeRunFit) -> float:

@@ -102,7 +102,7 @@ def proposals(
     promising : mapping of key to sequence of mapping
         Starts of candidates that promised most before, in the place of draws from their priors.
     matched : mapping of key to sequence of mapping
-        Starts of candidates that are forces, matched to the missing one; the same.
+        Starts of candidates that are forces, matched to the missing one.
     """
     least = [min(_cost(runs, base, inflation) for base in bases) for inflation in inflations]
     found: list[Proposal] = []
@@ -141,8 +141,9 @@ def _beside(
     first_weights = problem.inflation_weights(first)
 
     def of_candidate(candidate: Candidate) -> list[Proposal]:
-        known = [*promising.get(candidate.key, ()), *matched.get(candidate.key, ())]
-        sets = places.of(candidate, known) if known else [*places.of(candidate), *candidate.sought_at()]
+        sets = [*places.of(candidate, promising.get(candidate.key)), *matched.get(candidate.key, ())]
+        if candidate.key not in matched and candidate.key not in promising:
+            sets += candidate.sought_at()
         extended = runs.problem((*base.fit.candidates, candidate))
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.

@@ -141,6 +141,7 @@ LINEAR_STRUCTURAL = force_effect(
     ranges={"loss_factor": _LOSS_FACTOR, "creep_decades": Range(0.3, 4.0, is_log=False)},
     fixed=lambda at: {"stiffness_n_per_m": _static_stiffness(at), "frequency_hz": at.frequency_hz},
     fitted=("loss_factor", "creep_decades"),
+    size=("loss_factor",),
     separated_by="the same amplitude at two frequencies",
     spoken_for_by=STRUCTURAL_CHARACTER,
     variant_of="structural_damping",

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
+from recorded_oscillators import decays, effect, rig, surroundings
 
-from sloshlab.diagnosis.inference.scored_model import strength
+from sloshlab.diagnosis.inference.scored_model import scored, strength
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate
+
+assert effects.__all__  # importing the vocabulary makes it known
 
 SHAPE = (40, 30)
 
@@ -28,3 +36,17 @@ def test_a_size_is_that_of_what_is_added_where_recordings_stand_out() -> None:
     # The floor is three times the noise here; what is added is as large as it is.
     before, after = left_by(*(noise / 3 + added)), left_by(*(noise / 3))
     assert strength(before, after) == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(("creep_decades", "n_numbers"), [(0.3, 1), (0.31, 2), (4.0, 1)])
+def test_a_number_at_an_end_of_its_range_is_not_free(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, creep_decades: float, n_numbers: int
+) -> None:
+    known = Candidate(
+        effect("structure.linear_structural_damping"), surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
+    )
+    # a size at an end of its range is no simpler effect
+    for loss in (0.01, known.bounds(known.effect.parameters[0])[1]):
+        values = {f"{known.key}.loss_factor": loss, f"{known.key}.creep_decades": creep_decades}
+        monkeypatch.setattr("sloshlab.diagnosis.inference.scored_model.remainder", lambda *others: None)
+        assert scored(FreeRunFit((known,), values, 0.0, 0.0), values, []).n_numbers == n_numbers
