@@ -9,7 +9,7 @@ The force contains the noise of the recorded motion: what matches best is a star
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Final, TypeGuard
@@ -26,6 +26,7 @@ from sloshlab.missing_physics.candidate import Candidate, Numbers
 from sloshlab.missing_physics.prior import ParameterPrior
 from sloshlab.twin.excitation import Excitation, with_cached_inputs
 from sloshlab.twin.lane_preparation import Lane, motions
+from sloshlab.twin.lane_vector import N_LANES
 from sloshlab.twin.motion import Motion
 from sloshlab.twin.status import Status
 from sloshlab.twin.twin import Twin
@@ -237,21 +238,24 @@ class ForceMatching:
         found = least_squares(residual, start, jacobian, ends, max_nfev=_MOST_STEPS, ftol=_LEAST_GAIN)
         return Match(2.0 * float(found.cost) / self._missing.size, logarithms.numbers(found.x))
 
-    def _forces(self, candidate: Candidate, sets: Sequence[Numbers]) -> list[FloatArray | None]:
+    def _forces(self, candidate: Candidate, sets: Sequence[Numbers]) -> Iterator[FloatArray | None]:
         """Forces with some sets of numbers, all runs one after the other, over the RMS of the missing one.
 
         None where there is no such force, or it does not reach the end of a run.
         """
         n = len(self._drives)
-        twins = [force_alone(candidate, numbers) for numbers in sets]
-        lanes = [
-            Lane(twin, drive, n_substeps=steps_per_sample(twin, drive.sampling_rate_hz))
-            for twin in twins
-            if twin is not None
-            for drive in self._drives
-        ]
-        found = iter(motions(lanes))
-        return [None if twin is None else self._joined(list(islice(found, n))) for twin in twins]
+        # As many as run side by side: whole runs of some hundred sets together would fill the memory.
+        for first in range(0, len(sets), N_LANES):
+            twins = [force_alone(candidate, numbers) for numbers in sets[first : first + N_LANES]]
+            lanes = [
+                Lane(twin, drive, n_substeps=steps_per_sample(twin, drive.sampling_rate_hz))
+                for twin in twins
+                if twin is not None
+                for drive in self._drives
+            ]
+            found = iter(motions(lanes))
+            for twin in twins:
+                yield None if twin is None else self._joined(list(islice(found, n)))
 
     def _joined(self, found: Sequence[Motion | Exception]) -> FloatArray | None:
         series = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -14,6 +14,7 @@ from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.force_matching import ForceMatching, Match, matchings
 from sloshlab.missing_physics.candidate import Candidate, Numbers
+from sloshlab.twin.lane_preparation import Executor
 
 _N_STARTS: Final = 2
 """Of a match, from which a fit may be begun."""
@@ -56,59 +57,97 @@ def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate],
     residual = problem.residual(problem.theta_of(fit.values))
     if not np.isfinite(residual).all():
         return MatchedForces()
-    places = Places.beside(runs, fit, residual)
-    matching = matchings(list(places.forces.values()))
-    at_places = [each for each in missing_from(fit, pool) if each.effect.block in matching]
-    forces = [each for each in at_places if matching[each.effect.block].is_more_than_noise]
-
-    def place_of(candidate: Candidate) -> ForceMatching:
-        return matching[candidate.effect.block]
-
-    def ranked(candidate: Candidate) -> list[Match]:
-        return place_of(candidate).ranked(candidate, [*places.of(candidate), *candidate.sought_at()])
-
     executor = runs.model.executor
-    first = dict(zip([each.key for each in forces], executor.map(ranked, forces), strict=True))
-    matches = {key: found for key, found in first.items() if found}
-    forces = [each for each in forces if each.key in matches]
-    everything = sum(each.power for each in matching.values() if each.is_more_than_noise)
-
-    def left(candidate: Candidate) -> float:
-        # Where a place has no more than its noise a force there explains nothing of what is missing at others.
-        if candidate.key not in matches:
-            return everything
-        return everything - (1.0 - matches[candidate.key][0].misfit) * place_of(candidate).power
-
-    def promising() -> list[Candidate]:
-        """Those that are not hopeless beside the best one, which comes first."""
-        most = HOPELESS_COST_RATIO * min(map(left, forces), default=0.0)
-        return [each for each in sorted(forces, key=left) if left(each) <= most]
-
-    def explains(candidate: Candidate) -> bool:
-        return matches[candidate.key][0].misfit < 1.0 - _LEAST_MATCHED
-
-    def refined(candidate: Candidate) -> list[Match]:
-        return place_of(candidate).refined(candidate, first[candidate.key])
-
-    def evolved(candidate: Candidate) -> list[Match]:
-        return place_of(candidate).evolved(candidate, first[candidate.key])
-
-    hopeful = promising()
-    matches |= zip([each.key for each in hopeful], executor.map(refined, hopeful), strict=True)
-    leading = [each for each in promising() if explains(each)][:n_leading]
-    matches |= zip([each.key for each in leading], executor.map(evolved, leading), strict=True)
-
-    def is_compared(candidate: Candidate) -> bool:
-        own = matches.get(candidate.key)
-        return place_of(candidate).compares(candidate, own[0].numbers if own else candidate.starts()[0])
-
-    compared = [each for each in at_places if is_compared(each)]
+    found = _Matches(Places.beside(runs, fit, residual), missing_from(fit, pool))
+    found.improve(found.candidates, found.ranked, executor)
+    found.improve(found.hopeful(), found.refined, executor)
+    leading = [candidate for candidate in found.hopeful() if found.explains(candidate)][:n_leading]
+    found.improve(leading, found.evolved, executor)
     return MatchedForces(
         {
-            each.key: [match.numbers for match in matches[each.key][:_N_STARTS]]
-            for each in forces
-            if explains(each)
+            candidate.key: [match.numbers for match in found.of[candidate.key][:_N_STARTS]]
+            for candidate in found.candidates
+            if found.explains(candidate)
         },
-        {candidate.key: left(candidate) for candidate in compared},
-        [(each, matches[each.key][0].numbers) for each in sorted(leading, key=left)],
+        {candidate.key: found.left(candidate) for candidate in found.candidates if found.is_compared(candidate)},
+        [(candidate, found.of[candidate.key][0].numbers) for candidate in sorted(leading, key=found.left)],
     )
+
+
+class _Matches:
+    """Candidates at places at which forces are known, and how well they match.
+
+    Parameters
+    ----------
+    places : Places
+    pool : sequence of Candidate
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        At these places.
+    of : dict of key to list of Match
+        The best first; none of what is no force, or at a place at which nothing is missing.
+    """
+
+    def __init__(self, places: Places, pool: Sequence[Candidate]) -> None:
+        self._places = places
+        self._matching = matchings(list(places.forces.values()))
+        self.candidates = [candidate for candidate in pool if candidate.effect.block in self._matching]
+        self.of: dict[str, list[Match]] = {}
+        self._population: dict[str, list[Match]] = {}
+        self._everything = sum(each.power for each in self._matching.values() if each.is_more_than_noise)
+
+    def improve(
+        self,
+        candidates: Sequence[Candidate],
+        matches_of: Callable[[Candidate], list[Match]],
+        executor: Executor,
+    ) -> None:
+        """Replace the matches of some candidates."""
+        found = zip(candidates, executor.map(matches_of, candidates), strict=True)
+        self.of |= {candidate.key: matches for candidate, matches in found if matches}
+
+    def ranked(self, candidate: Candidate) -> list[Match]:
+        """Of its draws."""
+        place = self._at(candidate)
+        if not place.is_more_than_noise:
+            return []
+        starts = [*self._places.of(candidate), *candidate.sought_at()]
+        self._population[candidate.key] = place.ranked(candidate, starts)
+        return self._population[candidate.key]
+
+    def refined(self, candidate: Candidate) -> list[Match]:
+        """By least squares from the best draws."""
+        return self._at(candidate).refined(candidate, self._population[candidate.key])
+
+    def evolved(self, candidate: Candidate) -> list[Match]:
+        """The same, and by differential evolution."""
+        return self._at(candidate).evolved(candidate, self._population[candidate.key])
+
+    def left(self, candidate: Candidate) -> float:
+        """Squares that it leaves of what is missing at all places, in noise variances."""
+        if candidate.key not in self.of:
+            return self._everything
+        explained = 1.0 - self.of[candidate.key][0].misfit
+        return self._everything - explained * self._at(candidate).power
+
+    def hopeful(self) -> list[Candidate]:
+        """Those that are not hopeless beside the best one, which comes first."""
+        matched = sorted((candidate for candidate in self.candidates if candidate.key in self.of), key=self.left)
+        most = HOPELESS_COST_RATIO * min(map(self.left, matched), default=0.0)
+        return [candidate for candidate in matched if self.left(candidate) <= most]
+
+    def explains(self, candidate: Candidate) -> bool:
+        """Whether it explains some of what is missing at its place."""
+        matches = self.of.get(candidate.key)
+        return matches is not None and matches[0].misfit < 1.0 - _LEAST_MATCHED
+
+    def is_compared(self, candidate: Candidate) -> bool:
+        """Whether what it leaves says how good it is: all, where no more than noise is missing at its place."""
+        matches = self.of.get(candidate.key)
+        numbers = candidate.starts()[0] if matches is None else matches[0].numbers
+        return self._at(candidate).compares(candidate, numbers)
+
+    def _at(self, candidate: Candidate) -> ForceMatching:
+        return self._matching[candidate.effect.block]
