@@ -222,17 +222,22 @@ class ModelSelection:
         self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))
 
     def _added(self, bases: Sequence[FreeRunFit], what: str, best: FreeRunFit) -> None:
-        """One effect more: forces that match what is missing beside the best fit; if something remains, any."""
+        """One effect more: forces that match what is missing beside the best fit, until one leaves nothing; then any.
+
+        Beside a force that leaves nothing others come only if they are not far worse: a mass or a spring that
+        retuning has hidden may be more probable, and so may a sensor.
+        """
+        matched, enough = MatchedForces(), None
         # Where nothing remains no force shows: a number that is not believed may be what hides it.
-        matched = MatchedForces()
         if self._remains(best):
             matched = self._matched_beside(best, what)
-            for match in matched.leading:
-                fit = self._compensated(best, match)
+            for candidate, numbers in matched.leading:
+                fit = self._compensated(best, (candidate, numbers))
                 self._keep([fit])
                 if not fit.trouble and not self._remains(fit):
-                    return
-        self._grown(bases, what, matched=matched)
+                    enough = candidate
+                    break
+        self._grown(bases, what, matched=matched, against=enough)
 
     def _matched_beside(self, fit: FreeRunFit, what: str) -> MatchedForces:
         """Forces matched to what is missing beside a fit."""
@@ -294,10 +299,7 @@ class ModelSelection:
         return held if held.trouble else self._to_the_end(held, base)
 
     def _swapped(self, n: int) -> None:
-        """Other effects in the place of each one of the best model, beside its baseline and the believed one.
-
-        A mass or a spring is hidden by what the baseline has taken of it.
-        """
+        """Other effects in the place of each effect of the best model of so many, beside its baseline."""
         best = self._best_of(n)
         if best is None:
             return
@@ -312,12 +314,8 @@ class ModelSelection:
             # Beside a fit in which all other numbers have taken their share, so that little is missing.
             is_force = effect.effect.block in (STRUCTURE, TANK) and others in self.fits
             matched = self._matched_beside(self.fits[others], what) if is_force else None
-            self._grown([rest, self._believed_beside(rest)], what, matched=matched, against=effect)
+            self._grown([rest], what, matched=matched, against=effect)
             compared |= {keys for keys in self.fits if len(keys) == n and others < keys}
-
-    def _believed_beside(self, fit: FreeRunFit) -> FreeRunFit:
-        """The effects of a fit beside the baseline as believed."""
-        return FreeRunFit(fit.candidates, {**fit.values, **self.runs.model.believed}, 0.0, 0.0)
 
     def _simplified(self, n: int) -> None:
         """Models nested in the leading ones of so many: with one effect less, or with what one reduces to.
@@ -346,7 +344,7 @@ class ModelSelection:
         """
         for effect in best.candidates:
             numbers, rest = _own_numbers(best, effect), _without(best, effect)
-            believed = self._believed_beside(rest)
+            believed = FreeRunFit(rest.candidates, {**rest.values, **self.runs.model.believed}, 0.0, 0.0)
             draws = norm.ppf(qmc.Halton(len(numbers), seed=0).random(8 * N_KEPT))
             places = [
                 {
