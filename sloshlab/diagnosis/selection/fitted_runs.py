@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
+from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_forces
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.free_run_fit import fitted, fitted_baseline
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, run_of
@@ -18,6 +20,10 @@ from sloshlab.missing_physics.prior import drawn
 Runs = Sequence[Sequence[Observation]]
 _N_DRAWN: Final = 256
 """Places of what an effect has of its own in a run: every 30 ms of one of eight seconds."""
+_N_REFINED: Final = 2
+"""Of these, the best ones that are refined."""
+_N_HALVINGS: Final = 6
+"""Of the distance of two places: to half a millisecond."""
 
 
 class FittedRuns:
@@ -84,7 +90,7 @@ def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[s
         problem = FreeRunProblem(model, [run], fit.candidates, shared)
         if problem.names:
             fits = fitted_baseline if run[0].run.is_free else fitted
-            start = _best_drawn(problem, problem.values(problem.theta_of(fit.values)))
+            start = _best_started(problem, problem.values(problem.theta_of(fit.values)), fit)
             own, _ = fits(problem, start=start, n_iterations=3)
             # In this problem the numbers of other runs rest where they start, not where the fit has them.
             here = run[0].run.name
@@ -92,11 +98,46 @@ def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[s
     return values
 
 
-def _best_drawn(problem: FreeRunProblem, start: dict[str, float]) -> dict[str, float]:
-    """The best of a start and draws of the numbers that an effect has of its own in this run."""
-    free = set(problem.names)
-    priors = [prior for candidate in problem.candidates for prior in candidate.prior if prior.name in free]
-    if not priors:
+def _best_started(problem: FreeRunProblem, start: dict[str, float], fit: FreeRunFit) -> dict[str, float]:
+    """The best of a start and others of the numbers that an effect has of its own in this run.
+
+    They are what the force shows that lacks without the effect, and the best of many draws, each of them refined:
+    a pulse that is off by its width explains less than none.
+    """
+    spacings: dict[str, float] = {}
+    shown: list[dict[str, float]] = []
+    for candidate in problem.candidates:
+        own = {prior.name: (prior.high - prior.low) / _N_DRAWN for prior in candidate.prior}
+        own = {name: spacing for name, spacing in own.items() if name in problem.names}
+        if own:
+            rest = tuple(other for other in fit.candidates if other is not candidate)
+            forces = latent_forces(problem.model, problem.runs, replace(fit, candidates=rest))
+            proposed = candidate.proposed(missing_forces(forces)) if forces else []
+            shown += [{name: numbers[name] for name in own if name in numbers} for numbers in proposed]
+            spacings |= own
+    if not spacings:
         return start
-    several = [start, *({**start, **numbers} for numbers in drawn(priors, _N_DRAWN))]
-    return several[int(np.argmin(problem.costs(several)))]
+    priors = [prior for candidate in problem.candidates for prior in candidate.prior if prior.name in spacings]
+    draws = drawn(priors, _N_DRAWN)
+    best = np.argsort(problem.costs([{**start, **numbers} for numbers in draws]))[:_N_REFINED]
+    places = [start, *({**start, **numbers} for numbers in (*shown, *(draws[i] for i in best)))]
+    return _refined(problem, places, spacings)
+
+
+def _refined(
+    problem: FreeRunProblem, places: Sequence[dict[str, float]], spacings: Mapping[str, float]
+) -> dict[str, float]:
+    """The best place after steps up and down, each half as long as the one before."""
+    costs = problem.costs(places)
+    for k in range(_N_HALVINGS):
+        for name, spacing in spacings.items():
+            step = 0.5 ** (k + 1) * spacing
+            moved = [{**place, name: place[name] + way * step} for place in places for way in (-1.0, 1.0)]
+            tried = np.column_stack([costs, problem.costs(moved).reshape(-1, 2)])
+            which = tried.argmin(axis=1)
+            places = [
+                place if i == 0 else moved[2 * j + i - 1]
+                for j, (place, i) in enumerate(zip(places, which, strict=True))
+            ]
+            costs = tried.min(axis=1)
+    return places[int(np.argmin(costs))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -12,12 +11,11 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.score_test import ScoreTest
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_forces
 from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
-from sloshlab.errors import SloshlabError
 from sloshlab.identification.block_jacobian import BlockJacobian
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost
-from sloshlab.identification.rig_model import RigModel
-from sloshlab.missing_force.latent_force import LatentForce, run_forces
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
+from sloshlab.missing_force.latent_force import LatentForce
 from sloshlab.missing_physics.candidate import Candidate, MissingForces
 
 FloatArray = NDArray[np.float64]
@@ -207,9 +205,8 @@ class Places:
     def beside(cls, runs: FittedRuns, fit: FreeRunFit, residual: FloatArray) -> Places:
         """Of a fit with its residuals."""
         problem = runs.problem_of(fit)
-        forces = _latent_forces(runs, fit)
-        missing = {run: _of_whole_run(max(own, key=lambda force: force.power_n2)) for run, own in forces.items()}
-        return cls(residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND), forces, missing)
+        forces = latent_forces(runs.model, runs.runs, fit)
+        return cls(residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND), forces, missing_forces(forces))
 
     def of(
         self, candidate: Candidate, promising: Sequence[Mapping[str, float]] | None = None
@@ -244,29 +241,6 @@ def most_promising(proposed: Sequence[Proposal]) -> dict[str, list[dict[str, flo
             for i in sorted(best)
         ]
     return found
-
-
-def _latent_forces(runs: FittedRuns, fit: FreeRunFit) -> dict[str, tuple[LatentForce, ...]]:
-    """Latent forces of every run beside a fit; none of a twin of a user's own, of which they are not known."""
-    found: dict[str, tuple[LatentForce, ...]] = {}
-    if isinstance(runs.model, RigModel):
-        for observed in runs.runs:
-            with suppress(SloshlabError):
-                extension = extension_of(fit.candidates, fit.values)
-                forces = run_forces(runs.model, observed, fit.values, extension=extension).forces
-                if forces:
-                    found[observed[0].run.name] = forces
-    return found
-
-
-def _of_whole_run(force: LatentForce) -> FloatArray:
-    """A latent force with zeros where its run is tapered."""
-    run = force.run
-    series = np.zeros(int(run.recording.sizes["time"]))
-    start = float(run.recording["time"].values[0])
-    first = round((float(force.time_s[0]) - start) * run.attributes.sampling_rate_hz)
-    series[first : first + force.force_n.size] = force.force_n
-    return series
 
 
 def jacobian_beside(problem: FreeRunProblem, theta: FloatArray, known: BlockJacobian) -> BlockJacobian | None:

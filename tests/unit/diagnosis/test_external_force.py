@@ -15,7 +15,7 @@ from recorded_oscillators import (
     surroundings,
 )
 
-from sloshlab.diagnosis.selection.fitted_runs import values_of_runs
+from sloshlab.diagnosis.selection.fitted_runs import _refined, values_of_runs
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
@@ -177,6 +177,21 @@ def test_the_instant_of_pulses_is_found_in_a_run_that_was_not_fitted(pulsed: Rig
     fit = FreeRunFit((train,), {**pulsed.believed, **{f"{key}.{n}": v for n, v in numbers.items()}}, 0.0, 0.0)
     found = values_of_runs(pulsed, [second], fit)
     assert found[f"{key}.start_s in second"] == pytest.approx(0.81, abs=0.002)
+
+
+def test_an_instant_is_refined_where_a_pulse_explains_less_than_none(pulsed: RigModel) -> None:
+    train = Candidate(effect("structure.external_force").of_runs(("first", "second")), of_runs(pulsed))
+    _, second = (observations(run, pulsed.compared(run)) for run in pulsed.runs)
+    start = f"{train.key}.start_s in second"
+    numbers = {
+        f"{train.key}.{n}": v for n, v in (("size_n", FORCE_N), ("period_s", PERIOD_S), ("width_s", WIDTH_S))
+    }
+    problem = FreeRunProblem(pulsed, [second], (train,), numbers)
+    beside, after_the_run = ({**pulsed.believed, **numbers, start: at} for at in (0.81 + 0.5 * WIDTH_S, 3.99))
+    costs = problem.costs([beside, after_the_run])
+    assert costs[0] > costs[1]
+    found = _refined(problem, [beside, after_the_run], {start: WIDTH_S})
+    assert found[start] == pytest.approx(0.81, abs=0.001)
 
 
 def test_all_runs_show_an_effect_that_has_a_number_in_each_of_them(pulsed: RigModel) -> None:
