@@ -57,9 +57,10 @@ def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], In
     theta = problem.theta_of(best.fit.values)
     jacobian = problem.central_jacobian(theta)
     weights = robust_weights(problem.residual(theta))
-    hessian = jacobian.weighted(weights).normal() + np.diag(problem.prior)
+    prior = problem.prior_weights(theta)
+    hessian = jacobian.weighted(weights).normal() + np.diag(prior)
     covariance = np.asarray(np.linalg.pinv(hessian), np.float64)
-    fit = replace(best.fit, covariance=covariance, names=problem.names, scales=problem.scales)
+    fit = replace(best.fit, covariance=covariance, names=problem.names, scales=problem.scales, prior_weights=prior)
     scatter = cluster_robust_errors(problem, fit, jacobian)
     noise = max(1.0, best.fitted_rms)
     return {

@@ -49,7 +49,7 @@ class ScoreTest:
         self._can_move = np.flatnonzero(~problem.at_bounds(theta))
         # The prior is part of the nuisance parameters' information, so that a gain cannot be had by moving a
         # mass out of what is believed of it.
-        prior = problem.prior
+        prior = problem.prior_weights(theta, inflation)
         movable = np.ix_(self._can_move, self._can_move)
         self._inverse = np.linalg.pinv((self._weighted.normal() + np.diag(prior))[movable])
         self._gradient_of_all = self._weighted.transposed_times(self._left) + prior * theta

@@ -10,7 +10,9 @@ import numpy as np
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.decision import Decision
 from sloshlab.diagnosis.inference.places import SENSOR
+from sloshlab.diagnosis.inference.posterior import NONE
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
+from sloshlab.diagnosis.inference.thresholds import NAMED
 from sloshlab.diagnosis.interval import Interval
 from sloshlab.identification.free_run_problem import run_of
 from sloshlab.identification.readiness import refuted_beliefs
@@ -19,6 +21,9 @@ from sloshlab.missing_physics.units import named_and_units
 
 _EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure, whatever is recorded."""
+
+_SAID: Final = 0.01
+"""Probability from which a name is listed in a sentence."""
 
 
 def statement_of(found: Findings, decision: Decision, intervals: Mapping[tuple[str, str], Interval]) -> str:
@@ -32,10 +37,15 @@ def statement_of(found: Findings, decision: Decision, intervals: Mapping[tuple[s
         Of the numbers of what is named.
     """
     if decision.kind == "nothing_missing":
-        return (
+        text = (
             "Nothing is missing: with its own parameters retuned the simulation describes the held-out runs to "
-            f"{found.retuned.held_out_rms:.2f} of the noise floor."
+            f"{found.retuned.held_out_rms:.2f} of the noise floor"
         )
+        if decision.probabilities.get(NONE, 1.0) < NAMED:
+            undecided = {label: p for label, p in decision.probabilities.items() if label != NONE and p >= _SAID}
+            said = " or ".join(f"{label.replace('_', ' ')} ({p:.2f})" for label, p in undecided.items())
+            text += f"; these recordings do not tell that from {said}"
+        return text + "."
     if decision.kind == "unknown":
         return _unknown(found, decision)
     assert decision.best is not None

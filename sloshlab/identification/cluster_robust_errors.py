@@ -54,7 +54,7 @@ def cluster_robust_errors(problem: FreeRunProblem, fit: FreeRunFit, jacobian: Bl
     weighted, pull = jacobian.weighted(weights), weights * residual
     # The bread of the sandwich C G C; with independent residuals and no prior G is C⁻¹ and the usual covariance
     # is left.
-    covariance = np.linalg.pinv(weighted.normal() + np.diag(problem.prior))
+    covariance = np.linalg.pinv(weighted.normal() + np.diag(problem.prior_weights(theta)))
     error = np.zeros(theta.size)
     for n in _PARTS_OF_A_RUN:
         gradients = _gradients_of_parts(weighted, pull, _parts(problem, n))

@@ -28,6 +28,11 @@ from sloshlab.identification.free_run_problem import (
 FloatArray = NDArray[np.float64]
 _LARGEST_DAMPING: Final = 1e8
 """Beyond it a step is gradient descent of no size."""
+_DAMPING_GROWTH: Final = 2.0
+"""Factor by which a refused step is damped more, itself larger by as much with every refusal.
+
+Nielsen (1999), Damping parameter in Marquardt's method, IMM-REP-1999-05.
+"""
 _LEAST_GAIN_RATIO: Final = 0.3
 """Actual over predicted decrease, below which the Jacobian is computed anew."""
 _LAST_STAGE_FACTOR: Final = 0.03
@@ -66,7 +71,7 @@ def fitted(
     known: BlockJacobian | None = None,
     is_last: bool = True,
 ) -> tuple[FreeRunFit, BlockJacobian]:
-    """Levenberg–Marquardt from one start; the baseline has Gaussian priors.
+    """Levenberg–Marquardt from one start; the baseline has priors.
 
     Parameters
     ----------
@@ -117,14 +122,13 @@ class _LevenbergMarquardt:
     ) -> None:
         self.problem, self.theta, self.residual = problem, theta, residual
         n = theta.size
-        self.prior = problem.prior
         self.jacobian, self.hessian = known or BlockJacobian(n, ()), np.eye(n)
 
     def stage(self, inflation: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:
         """Descend with inflated noise."""
-        inflation_weights, damping, is_fresh = self.problem.inflation_weights(inflation), 1e-3, False
+        damping, is_fresh = 1e-3, False
         # The Jacobian of an earlier stage, or a warm start, serves until a step shows that it is wrong.
-        is_wanted = not self.jacobian.blocks
+        is_wanted, worth = not self.jacobian.blocks, 0.0
         for iteration in range(n_iterations if inflation > 0 else 2 * n_iterations):
             if is_wanted:
                 # Wide differences while the noise is inflated, fine ones for the optimum itself.
@@ -133,28 +137,35 @@ class _LevenbergMarquardt:
                 )
                 is_fresh = True
             least = tolerance * (1.0 if inflation > 0 else _LAST_STAGE_FACTOR)
-            gain, predicted, damping = self._step(inflation_weights, damping, _LEAST_PREDICTED_SHARE * least)
+            gain, predicted, damping = self._step(inflation, damping, _LEAST_PREDICTED_SHARE * least)
+            if is_fresh:
+                worth = gain / (self.theta.size + 1)
             is_done = gain < least and (iteration > 0 or gain <= 0)
             # A corrected Jacobian may point nowhere where the true one still does. The last stage therefore ends
-            # only with one that was computed where the fit is, which also gives the covariance.
-            if is_done and (is_fresh or not needs_fresh):
+            # only with one that was computed where the fit is, which also gives the covariance; so does any where
+            # a step should succeed and none does.
+            if is_done and (is_fresh or not (needs_fresh or predicted > least)):
                 break
-            # A step that brings far less than predicted shows that a corrected Jacobian has become wrong.
-            is_wanted = is_done or gain < _LEAST_GAIN_RATIO * predicted
+            # A step that brings far less than predicted shows that a corrected Jacobian has become wrong, and one
+            # that brings less per simulation than the last new Jacobian did, that another one is worth its price.
+            is_wanted = is_done or gain < max(_LEAST_GAIN_RATIO * predicted, worth)
             is_fresh = is_fresh and gain <= 0
 
-    def _step(self, inflation_weights: FloatArray, damping: float, least: float) -> tuple[float, float, float]:
+    def _step(self, inflation: float, damping: float, least: float) -> tuple[float, float, float]:
         """One step; relative decrease of the cost, the decrease that the Jacobian predicts, and the next damping.
+
+        Where none succeeds the prediction is that of the least damped one.
 
         No step is made where the steps small enough to succeed predict less than the least decrease.
         """
-        theta, residual, prior = self.theta, self.residual, self.prior
+        theta, residual, inflation_weights = self.theta, self.residual, self.problem.inflation_weights(inflation)
         # Iteratively reweighted least squares: Huber's weights of the present residuals are kept for this step.
         limit = _limit(inflation_weights * residual)
         weights = inflation_weights * robust_weights(inflation_weights * residual, limit)
         normal, pull = self.jacobian.normal_equations(weights, residual)
         # Gauss–Newton Hessian of half the cost. The prior enters as one more reading of each baseline parameter,
         # known to its tolerance; parameters of effects have none and must be told by the recordings.
+        prior = self.problem.prior_weights(theta, inflation)
         self.hessian = normal + np.diag(prior)
         gradient = pull + prior * theta
 
@@ -162,9 +173,9 @@ class _LevenbergMarquardt:
             # A simulation that does not reach its end costs infinitely much, so that the step to it is refused.
             if not np.isfinite(r).all():
                 return np.inf
-            return huber_cost(inflation_weights * r, limit) + float((prior * at**2).sum())
+            return huber_cost(inflation_weights * r, limit) + self.problem.prior_cost(at, inflation)
 
-        before = cost(theta, residual)
+        before, promised, growth = cost(theta, residual), 0.0, _DAMPING_GROWTH
         while damping < _LARGEST_DAMPING:
             # Marquardt's scaling, by the diagonal of the Hessian: parameters differ by orders of magnitude in
             # sensitivity.
@@ -176,14 +187,15 @@ class _LevenbergMarquardt:
             # Written with `not … >`, so that a prediction that is no number ends the loop, too.
             if not predicted > least * before:
                 break
+            promised = max(promised, predicted / before)
             new = self.problem.residual(tried)
             after = cost(tried, new)
             if after < before:
                 self.jacobian.correct(step, new - residual)
                 self.theta, self.residual = tried, new
                 return (before - after) / before, predicted / before, max(damping / 10, 1e-9)
-            damping *= 8
-        return 0.0, 0.0, 1e-3
+            damping, growth = damping * growth, growth * _DAMPING_GROWTH
+        return 0.0, promised, 1e-3
 
     def fit(self) -> FreeRunFit:
         """The fit as it is now."""
@@ -193,13 +205,14 @@ class _LevenbergMarquardt:
         return FreeRunFit(
             self.problem.candidates,
             self.problem.values(self.theta),
-            misfit + float((self.prior * self.theta**2).sum()),
+            misfit + self.problem.prior_cost(self.theta),
             misfit,
             # Effects have no prior, so that the Hessian is singular where nothing tells their parameters: no
             # inverse then.
             np.asarray(np.linalg.pinv(self.hessian), np.float64),
             self.problem.names,
             self.problem.scales,
+            self.problem.prior_weights(self.theta),
             self.problem.n_simulations,
         )
 
@@ -246,9 +259,9 @@ def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inf
 
 def inflated_cost(problem: FreeRunProblem, fit: FreeRunFit, inflation: float) -> float:
     """Cost of a fit with inflated noise, its prior included."""
-    residual = problem.residual(problem.theta_of(fit.values))
-    # Cost less misfit is the prior, which is never inflated: what is believed does not depend on the stage.
-    return huber_cost(problem.inflation_weights(inflation) * residual) + fit.cost - fit.misfit
+    theta = problem.theta_of(fit.values)
+    misfit = huber_cost(problem.inflation_weights(inflation) * problem.residual(theta))
+    return misfit + problem.prior_cost(theta, inflation)
 
 
 def fitted_baseline(
@@ -273,8 +286,9 @@ def fitted_baseline(
     """
     first = problem.theta_of(problem.model.believed if start is None else start)
     best = fitted(problem, problem.values(first), n_iterations=n_iterations)
-    # Other minima can leave no less than noise.
-    if problem.is_down_to_noise(best[0]):
+    # Other minima can leave no less than noise, and be no more probable where all numbers are within tolerances.
+    theta = problem.theta_of(best[0].values)[: problem.n_baseline]
+    if problem.is_down_to_noise(best[0]) and bool(np.all(np.abs(theta) <= 1.0)):
         return best
     inflation = INFLATION_STAGES[1]
     reached = inflated_cost(problem, best[0], inflation)
@@ -298,26 +312,36 @@ def fitted_baseline(
 def _step_within_bounds(
     problem: FreeRunProblem, theta: FloatArray, hessian: FloatArray, gradient: FloatArray
 ) -> FloatArray:
-    """Minimum of the quadratic model within the parameter bounds.
-
-    A step clipped at a bound need not be a descent direction where parameters are correlated. It is clipped
-    nevertheless where the model is not finite, or singular to rounding.
-    """
+    """Minimum of the quadratic model within the parameter bounds."""
     # Cutting the step off at a bound was tried: fits of the baseline and of effects stopped wherever masses and
     # gains trade against an effect.
     low = (problem.low - problem.centres) / problem.scales
     high = (problem.high - problem.centres) / problem.scales
-    tried = theta - np.linalg.solve(hessian, gradient)
-    if not np.isfinite(tried).all() or bool(np.all((low <= tried) & (tried <= high))):
-        return np.asarray(tried)
+    # Where rounding has left theta outside its bounds, the step of zero stays within these.
+    step = bounded_step(hessian, gradient, np.minimum(low - theta, 0.0), np.maximum(high - theta, 0.0))
+    return np.asarray(np.clip(theta + step, low, high))
+
+
+def bounded_step(hessian: FloatArray, gradient: FloatArray, down: FloatArray, up: FloatArray) -> FloatArray:
+    """Minimum of ½ sᵀH s + gᵀs within bounds.
+
+    A step clipped at a bound need not be a descent direction where parameters are correlated. It is clipped
+    nevertheless where the Hessian is singular to rounding.
+
+    Parameters
+    ----------
+    hessian : ndarray, shape (n, n)
+    gradient : ndarray, shape (n,)
+    down, up : ndarray, shape (n,)
+        Of the step, zero within them.
+    """
+    step = -np.linalg.solve(hessian, gradient)
+    if not np.isfinite(step).all() or bool(np.all((down <= step) & (step <= up))):
+        return np.asarray(step)
     try:
         upper = cholesky(hessian)
     except np.linalg.LinAlgError:
-        return np.asarray(np.clip(tried, low, high))
+        return np.asarray(np.clip(step, down, up))
     # With H = UᵀU the model ½ sᵀH s + gᵀs is ½ |U s + U⁻ᵀg|² and a constant: bounded linear least squares.
     target = solve_triangular(upper, -gradient, trans="T")
-    # Where rounding has left theta outside its bounds, the step of zero stays within these.
-    down = np.minimum(low - theta, 0.0) - _LEAST_ROOM
-    up = np.maximum(high - theta, 0.0) + _LEAST_ROOM
-    step = lsq_linear(upper, target, (down, up), method="bvls").x
-    return np.asarray(np.clip(theta + step, low, high))
+    return np.asarray(lsq_linear(upper, target, (down - _LEAST_ROOM, up + _LEAST_ROOM), method="bvls").x)

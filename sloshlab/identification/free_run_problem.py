@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.errors import SloshlabError
-from sloshlab.identification.baseline_parameter import BaselineParameter
+from sloshlab.identification.baseline_parameter import BaselineParameter, prior_cost, prior_weights
 from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
 from sloshlab.identification.observations import Observation
@@ -30,6 +30,8 @@ _Part = tuple[Sequence[Observation], Mapping[str, float]]
 """Observations of one run, and parameters with which it is simulated."""
 HUBER_LIMIT: Final = 4.0
 """Standard deviations beyond which Huber's loss is linear: bursts of noise and lost blocks are outliers."""
+TEMPERING: Final = 10.0
+"""Factor by which log-likelihoods are too large: coefficients of a cell share what is wrong with their noise."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel up to which nothing but noise is left."""
 _MOST_BYTES_AT_ONCE: Final = 1e8
@@ -47,13 +49,16 @@ class FreeRunFit:
     values : dict
         Baseline parameters by name, and ``key.parameter`` of every candidate.
     cost : float
-        Huber loss of the weighted residuals plus squares of the deviations from the prior means, in tolerances.
+        Minus twice the logarithm of the tempered posterior, times the tempering, but for a constant: Huber loss of
+        the weighted residuals and what the baseline costs by its prior.
     misfit : float
         The part of the cost that the residuals have.
     covariance : ndarray, shape (n, n)
         Of the free parameters in scaled values, in the order of `names`.
     names : tuple of str
     scales : ndarray, shape (n,)
+    prior_weights : ndarray, shape (n,)
+        Weights of the squares of scaled values in the Hessian, by the prior of the baseline.
     n_simulations : int
     trouble : str
         Why there is no result; empty where there is one.
@@ -66,32 +71,26 @@ class FreeRunFit:
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     names: tuple[str, ...] = ()
     scales: FloatArray = field(default_factory=lambda: np.zeros(0))
+    prior_weights: FloatArray = field(default_factory=lambda: np.zeros(0))
     n_simulations: int = 0
     trouble: str = ""
-
-    @property
-    def covariance_by_belief(self) -> FloatArray:
-        """The part of the covariance that the prior of the baseline leaves; the rest is by noise.
-
-        The covariance C = (JᵀJ + P)⁻¹, with P one for each baseline parameter, is C JᵀJ C + C P C.
-        """
-        own = tuple(f"{candidate.key}." for candidate in self.candidates)
-        baseline = [i for i, name in enumerate(self.names) if not own or not name.startswith(own)]
-        return np.asarray(self.covariance[:, baseline] @ self.covariance[baseline, :])
 
     def standard_error(self, name: str) -> float:
         """Standard error of a parameter in its own unit."""
         return float(np.hypot(*self.standard_errors(name)))
 
     def standard_errors(self, name: str) -> tuple[float, float]:
-        """Standard errors of a parameter in its own unit: by noise, and by the prior of the baseline.
+        """Standard errors of a parameter in its own unit: by noise, and by what is not known of the baseline.
 
-        These are the two parts of the covariance (`covariance_by_belief`).
+        The covariance C = (JᵀJ + W)⁻¹, with W the weights of the prior, is C JᵀJ C + C W C. The first part is by
+        noise. Numbers of the baseline are off by the variance T/W, which moves the fit by C W: the second part
+        counts T times, the factor by which likelihoods are tempered.
         """
         i = self.names.index(name)
-        of_belief = float(self.covariance_by_belief[i, i])
-        of_noise = max(float(self.covariance[i, i]) - of_belief, 0.0)
-        return float(np.sqrt(of_noise) * self.scales[i]), float(np.sqrt(of_belief) * self.scales[i])
+        of_prior = float(self.covariance[i] ** 2 @ self.prior_weights)
+        of_noise = max(float(self.covariance[i, i]) - of_prior, 0.0)
+        scale = float(self.scales[i])
+        return float(np.sqrt(of_noise)) * scale, float(np.sqrt(TEMPERING * of_prior)) * scale
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class _Number:
     """A free number: counted from its centre in units of its scale, within its bounds.
 
     Numbers of the baseline are counted in tolerances from what is believed, so that the negative logarithm of
-    their prior is half the sum of squares of theta; those of effects by their starts, from zero, where an effect
+    their prior is a function of theta; those of effects by their starts, from zero, where an effect
     is absent. `channels` are those that it alone changes, none where it changes the motion.
     """
 
@@ -159,10 +158,18 @@ class FreeRunProblem:
         self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
         self.n_simulations = 0
 
-    @property
-    def prior(self) -> FloatArray:
-        """Weights of the squares of scaled parameters: one with a prior, zero without."""
-        return np.array([1.0] * self.n_baseline + [0.0] * (len(self.names) - self.n_baseline))
+    def prior_cost(self, theta: FloatArray, inflation: float = 0.0) -> float:
+        """What scaled parameters cost by their prior, zero where all are as believed.
+
+        Minus twice its logarithm, times the tempering: likelihood and prior have the weights of the posterior.
+        Inflated noise weakens the likelihood by itself.
+        """
+        return _tempering(inflation) * float(prior_cost(theta[: self.n_baseline]).sum())
+
+    def prior_weights(self, theta: FloatArray, inflation: float = 0.0) -> FloatArray:
+        """Weights of the squares of scaled parameters with the slope of this cost; zero of those of effects."""
+        weights = _tempering(inflation) * prior_weights(theta[: self.n_baseline])
+        return np.pad(weights, (0, len(self.names) - self.n_baseline))
 
     @property
     def changes_motion(self) -> NDArray[np.bool_]:
@@ -206,11 +213,10 @@ class FreeRunProblem:
     def costs(self, several: Sequence[Mapping[str, float]]) -> FloatArray:
         """Cost of several sets of values, as of a fit; infinite where a simulation does not reach its end."""
         thetas = [self.theta_of(values) for values in several]
-        squares = [float((self.prior * theta**2).sum()) for theta in thetas]
         return np.array(
             [
-                huber_cost(residual) + square if np.isfinite(residual).all() else np.inf
-                for square, residual in zip(squares, self.residuals(thetas), strict=True)
+                huber_cost(residual) + self.prior_cost(theta) if np.isfinite(residual).all() else np.inf
+                for theta, residual in zip(thetas, self.residuals(thetas), strict=True)
             ]
         )
 
@@ -344,6 +350,10 @@ class FreeRunProblem:
             blocks += [n_before + i for i in chosen]
             n_before += len(run)
         return blocks, runs
+
+
+def _tempering(inflation: float) -> float:
+    return TEMPERING if inflation == 0 else 1.0
 
 
 def _at_once(parts: Sequence[_Part]) -> Iterator[Sequence[_Part]]:

@@ -29,7 +29,7 @@ _MASSES_AGREE: Final = 0.05
 """Relative difference, up to which two statements of a mass agree."""
 _FEWEST_SAMPLES: Final = 64
 _REFUTED: Final = 3.0
-"""Tolerances from what is believed: three standard deviations of its prior."""
+"""Tolerances from what is believed, beyond which its prior has less than a thousandth."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class RefutedBelief:
     ----------
     name : str
     believed, tolerance : float
-        Mean and standard deviation of its prior.
+        Centre of its prior, and half-width of where it is expected.
     found : float
         Where the fit ends.
     units : str

@@ -28,7 +28,7 @@ class Parameter:
     name : str
     believed : float
     tolerance : float
-        Standard deviation of what it may be. Retuning goes up to four tolerances away.
+        Half-width of where it is expected, as in 100 ± 2. Retuning goes up to four tolerances away.
     units : str
         UDUNITS text; ``"1"`` where it has none.
     each_run : bool

@@ -1,6 +1,7 @@
 """The decision: what is said, from the posterior alone, by the numbers of `thresholds`.
 
-- What is named has the posterior `NAMED`; a set of names that has it together is said as a set.
+- That something is missing has the posterior `NAMED`, and so has what is named; a set of names that has it
+  together is said as a set.
 - Two models that predict the same within `TOLD_APART` are equals; of one that needs more numbers for
   it only the simpler one is said.
 - An effect or a remainder below `LEAST_STRENGTH` is not worth a word: it counts as nothing.
@@ -58,7 +59,8 @@ def decided(found: Posterior) -> Decision:
     """
     labels = found.by_label()
     named = {label: p for label, p in labels.items() if label not in (NONE, UNKNOWN)}
-    if labels.get(NONE, 0.0) >= max(sum(named.values()), labels.get(UNKNOWN, 0.0)):
+    none = labels.get(NONE, 0.0)
+    if none > 1 - NAMED and none >= labels.get(UNKNOWN, 0.0):
         return Decision("nothing_missing", None, [], "", labels)
     chosen: list[str] = []
     for label in named:

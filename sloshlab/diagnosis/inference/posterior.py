@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 
 from sloshlab.diagnosis.inference.places import SENSOR, block_of
-from sloshlab.diagnosis.inference.remainder import SHARES, TEMPERING
+from sloshlab.diagnosis.inference.remainder import SHARES
 from sloshlab.diagnosis.inference.scored_model import (
     ScoredModel,
     difference,
@@ -24,6 +24,7 @@ from sloshlab.diagnosis.inference.scored_model import (
     strength,
 )
 from sloshlab.diagnosis.inference.thresholds import LEAST_STRENGTH, PRIOR_OF_REMAINDER, TOLD_APART
+from sloshlab.identification.free_run_problem import TEMPERING
 from sloshlab.missing_physics.candidate import BLOCKS
 
 FloatArray = NDArray[np.float64]
@@ -140,7 +141,7 @@ def posterior(
         Log-likelihoods are divided by it.
     seed : int
     """
-    labels = _labels(models, n_candidates, tempering)
+    labels = _labels(models, tempering)
     found = [
         hypothesis
         for model, label in zip(models, labels, strict=True)
@@ -153,34 +154,40 @@ def posterior(
     return Posterior(tuple(found), np.asarray(softmax(scores, axis=1).mean(axis=0)), tempering)
 
 
-def _labels(models: Sequence[ScoredModel], n_candidates: int, tempering: float) -> list[str]:
+def _labels(models: Sequence[ScoredModel], tempering: float) -> list[str]:
     """What is said of each model: the names of the simplest one that it is no more than.
 
-    A model is no more than one of fewer numbers that predicts the same and needs no less probable baseline for it,
-    nor than one to which its further effects add nothing worth a word.
+    A model is no more than one of fewer numbers that predicts the same, nor than one to which its further effects
+    add nothing worth a word, if what is believed of the baseline does not tell them apart either.
     """
     labels = []
     for model in models:
         simpler = [
             other
             for other in models
-            if other.n_numbers < model.n_numbers and _is_no_more_than(model, other, n_candidates, tempering)
+            if other.n_numbers < model.n_numbers and _is_no_more_than(model, other, tempering)
         ]
         as_simple = min(simpler, key=lambda other: (other.n_numbers, -other.evidence), default=model)
         labels.append(" + ".join(as_simple.names) or NONE)
     return labels
 
 
-def _is_no_more_than(model: ScoredModel, other: ScoredModel, n_candidates: int, tempering: float) -> bool:
-    costs = [each.complexity - _log_prior(each, n_candidates) for each in (model, other)]
-    if difference(model, other) / tempering < TOLD_APART and costs[1] <= costs[0]:
+def _is_no_more_than(model: ScoredModel, other: ScoredModel, tempering: float) -> bool:
+    # Beliefs are readings, too: a model that needs less probable numbers of the baseline is another one.
+    if other.cost_of_baseline - model.cost_of_baseline >= TOLD_APART:
+        return False
+    if difference(model, other) / tempering < TOLD_APART:
         return True
     return _is_nested(other, model) and strength(other, model) < LEAST_STRENGTH
 
 
-def _log_prior(model: ScoredModel, n_candidates: int) -> float:
-    """Half of all cases have no effect, a quarter one, an eighth two …; candidates are alike."""
-    n = len(model.fit.candidates)
+def log_prior(n: int, n_candidates: int) -> float:
+    """Of n effects: half of all cases have none, a quarter one, an eighth two …; candidates are alike.
+
+    Parameters
+    ----------
+    n, n_candidates : int
+    """
     return float(-(n + 1) * np.log(2.0) - n * np.log(max(n_candidates, 1)))
 
 
@@ -206,8 +213,8 @@ def _told_apart(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 
 
 def _hypotheses(model: ScoredModel, label: str, n_candidates: int, tempering: float) -> list[Hypothesis]:
-    log_prior = _log_prior(model, n_candidates)
-    found = [Hypothesis(model, "", label, log_prior, model.remainder.noise / tempering)]
+    of_model = log_prior(len(model.fit.candidates), n_candidates)
+    found = [Hypothesis(model, "", label, of_model, model.remainder.noise / tempering)]
     places = _told_apart(model.remainder.places)
     # A remainder of a size that is not worth a word leaves the model what it is.
     of_remainder = UNKNOWN if is_worth_a_word(model.runs) else label
@@ -219,7 +226,7 @@ def _hypotheses(model: ScoredModel, label: str, n_candidates: int, tempering: fl
                 model,
                 place,
                 of_remainder,
-                log_prior + np.log(PRIOR_OF_REMAINDER / len(places) / SHARES.size),
+                of_model + np.log(PRIOR_OF_REMAINDER / len(places) / SHARES.size),
                 by_share[share] / tempering,
             )
         )

@@ -33,6 +33,7 @@ from sloshlab.diagnosis.inference.places import SENSOR, block_of
 from sloshlab.diagnosis.inference.run_noise import sums_of_cells
 from sloshlab.diagnosis.inference.thresholds import LAW, PRIOR_OF_REMAINDER
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
+from sloshlab.identification.free_run_problem import TEMPERING
 
 FloatArray = NDArray[np.float64]
 _POWERS: Final = np.geomspace(4.0, 4e6, 13)
@@ -42,8 +43,6 @@ SHARES: Final = np.array([0.01, 0.05, 0.2, 0.8])
 """Of cells that have a remainder: from bursts to everywhere."""
 BURST: Final = 0.01
 """Share of the stretches of time in which a sensor has a burst of noise, of any power."""
-TEMPERING: Final = 10.0
-"""Factor by which log-likelihoods are too large: coefficients of a cell share what is wrong with their noise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.inference.remainder import TEMPERING, Remainder, remainder
+from sloshlab.diagnosis.inference.remainder import Remainder, remainder
 from sloshlab.diagnosis.inference.thresholds import LEAST_STRENGTH
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
-from sloshlab.identification.free_run_problem import HUBER_LIMIT, FreeRunFit
+from sloshlab.identification.free_run_problem import HUBER_LIMIT, TEMPERING, FreeRunFit
 from sloshlab.missing_physics.candidate import channels_of
 from sloshlab.missing_physics.prior import ParameterPrior
 
@@ -109,6 +109,11 @@ class ScoredModel:
         return float(self.remainder.noise.sum()) / TEMPERING - self.complexity
 
     @property
+    def cost_of_baseline(self) -> float:
+        """What moving the baseline from what is believed costs of the logarithm of the evidence."""
+        return cost_of_baseline(self.fit)
+
+    @property
     def n_numbers(self) -> int:
         """Numbers of its effects that are free."""
         return sum(len(candidate.effect.parameters) for candidate in self.fit.candidates) - self.n_at_ends
@@ -152,6 +157,16 @@ def _n_at_ends(fit: FreeRunFit) -> int:
     return n
 
 
+def cost_of_baseline(fit: FreeRunFit) -> float:
+    """Minus the logarithm of the prior of a baseline, over that of the believed one.
+
+    Parameters
+    ----------
+    fit : FreeRunFit
+    """
+    return 0.5 * max(fit.cost - fit.misfit, 0.0) / TEMPERING
+
+
 def complexity(fit: FreeRunFit) -> float:
     """Minus the logarithm of posterior over prior volume of a fit, and the cost of its baseline's deviations.
 
@@ -159,7 +174,7 @@ def complexity(fit: FreeRunFit) -> float:
     ----------
     fit : FreeRunFit
     """
-    of_belief = 0.5 * max(fit.cost - fit.misfit, 0.0)
+    of_belief = cost_of_baseline(fit)
     priors = [prior for candidate in fit.candidates for prior in candidate.prior if prior.name in fit.names]
     if not priors:
         return of_belief
@@ -167,15 +182,9 @@ def complexity(fit: FreeRunFit) -> float:
     # In units in which the prior is uniform from 0 to 1: by its density. A number beyond its range is at its end.
     densities = [np.exp(prior.log_density(_within(fit.values[prior.name], prior))) for prior in priors]
     errors = fit.scales[places] * np.array(densities)
-    variances = np.linalg.eigvalsh(_tempered_covariance(fit)[np.ix_(places, places)] * np.outer(errors, errors))
+    variances = TEMPERING * np.linalg.eigvalsh(fit.covariance[np.ix_(places, places)] * np.outer(errors, errors))
     # A number that the recordings do not tell has its prior: no wider than that, and no gain by it.
     return of_belief - 0.5 * float(np.log(np.clip(2 * np.pi * variances, 1e-300, 1.0)).sum())
-
-
-def _tempered_covariance(fit: FreeRunFit) -> FloatArray:
-    """Covariance of a fit whose part by noise is larger by the tempering, that by belief as it is."""
-    of_belief = fit.covariance_by_belief
-    return np.asarray(TEMPERING * (fit.covariance - of_belief) + of_belief)
 
 
 def _within(value: float, prior: ParameterPrior) -> float:

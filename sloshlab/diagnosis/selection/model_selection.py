@@ -13,20 +13,29 @@ from typing import Final
 import numpy as np
 from scipy.stats import norm, qmc
 
-from sloshlab.diagnosis.inference.remainder import TEMPERING, remainder
+from sloshlab.diagnosis.inference.posterior import log_prior
+from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import complexity, is_worth_a_word
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
+from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
 from sloshlab.diagnosis.selection.matched_forces import MatchedForces, matched_forces
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
-from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, halved
+from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, NO_CHANCE, halved
 from sloshlab.identification.free_run_fit import fitted, stages_for
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, extension_of, huber_cost, run_of
-from sloshlab.identification.readiness import refuted_beliefs
+from sloshlab.identification.free_run_problem import (
+    TEMPERING,
+    FreeRunFit,
+    FreeRunProblem,
+    extension_of,
+    huber_cost,
+    run_of,
+)
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
 from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
+from sloshlab.missing_physics.units import named_and_units
 
 Said = Callable[[str, int, int], None]
 N_KEPT: Final = 4
@@ -41,8 +50,6 @@ _LEAST_EXPLAINED: Final = 0.1
 
 Two effects that explain all of it together, and neither a tenth of it alone, would act only together.
 """
-_NO_CHANCE: Final = 7.0
-"""Nats: a model that is so much less probable than another, by a thousand to one, is not worth more fits."""
 _DEVIATIONS: Final = (0.3, 0.1)
 """Standard deviations of the logarithms of an effect's numbers about a fit, from which it is refined in turns."""
 
@@ -78,20 +85,20 @@ class ModelSelection:
         """
         self._keep([retuned])
         self._renew_sampling()
-        remains = self._remains(retuned)
-        if not remains and not self._refuted(retuned):
-            return [retuned]
-        believed = self._as_believed()
-        self._added([believed, retuned], "one effect", retuned)
-        # Without a remainder an effect can only be what makes numbers that are not believed less wrong.
-        if not remains and self._evidence(self._of(1)) <= self._evidence([retuned]):
+        if self._remains(retuned):
+            self._added([self._as_believed(), retuned], "one effect", retuned)
+            self._renew_sampling()
+            self._swapped(1)
+        elif not self._uncovered(retuned):
             return self._sorted()
-        self._renew_sampling()
-        self._swapped(1)
         self._simplified(1)
         for n in range(1, _MOST_EFFECTS + 1):
             best = self._best_of(n)
-            if best is None or not self._remains(best):
+            if best is None:
+                break
+            if not self._remains(best):
+                if n < _MOST_EFFECTS and self._uncovered(best):
+                    self._simplified(n + 1)
                 break
             self._refined(best)
             best = self._best_of(n)
@@ -107,7 +114,11 @@ class ModelSelection:
             self._simplified(n + 1)
         # What was found beside other effects may be the best alone, and has look-alikes of its own.
         for n in range(1, _MOST_EFFECTS + 1):
-            self._swapped(n)
+            if any(self._may_win(fit) for fit in self._of(n)[:1]):
+                self._swapped(n)
+        # What came up beside an effect may need none beside it.
+        for n in range(_MOST_EFFECTS, 0, -1):
+            self._simplified(n)
         return self._sorted()
 
     def _sorted(self) -> list[FreeRunFit]:
@@ -159,11 +170,6 @@ class ModelSelection:
             return False
         left = before.misfit - self.runs.n_coefficients
         return left > 0 and before.misfit - after.misfit < _LEAST_EXPLAINED * left
-
-    def _refuted(self, fit: FreeRunFit) -> bool:
-        """Whether a fit of the baseline needs numbers that are not believed: an effect may be more probable."""
-        shared = [known for known in self.runs.model.parameters if not run_of(known.name, self.runs.model)]
-        return bool(refuted_beliefs(fit.values, shared))
 
     def _keep(self, fits: Iterable[FreeRunFit]) -> None:
         """Of every model the fit of the lowest cost."""
@@ -221,22 +227,37 @@ class ModelSelection:
         coarse = halved(few, proposed, stages, N_KEPT, lambda name, i, n: self.said(f"{what}: {name}", i, n))
         self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))
 
+    def _uncovered(self, fit: FreeRunFit) -> bool:
+        """Effects that the baseline hides beside a fit which leaves nothing; whether one is more probable."""
+        self.said("effects hidden by retuning", 0, 1)
+        n, pool = len(fit.candidates), len(self.pool)
+        least = log_prior(n, pool) - log_prior(n + 1, pool)
+        hidden = [each for each in hidden_effects(self.runs, fit, self.pool) if each.gain > least]
+        starts = [
+            FreeRunFit((*fit.candidates, each.candidate), each.values, 0.0, 0.0) for each in hidden[: 2 * N_KEPT]
+        ]
+        found = list(self.runs.model.executor.map(lambda start: self._to_the_end(start, fit), starts))
+        self._keep(found)
+        # All others have been compared with these.
+        self._swapped_beside.setdefault(_keys_of(fit.candidates), set()).update(
+            _keys_of(start.candidates) for start in starts
+        )
+        return self._evidence([each for each in found if not each.trouble]) > self._evidence([fit])
+
     def _added(self, bases: Sequence[FreeRunFit], what: str, best: FreeRunFit) -> None:
-        """One effect more: forces that match what is missing beside the best fit, until one leaves nothing; then any.
+        """One effect more: forces that match what is missing beside a fit, until one leaves nothing; then any.
 
         Beside a force that leaves nothing others come only if they are not far worse: a mass or a spring that
         retuning has hidden may be more probable, and so may a sensor.
         """
-        matched, enough = MatchedForces(), None
-        # Where nothing remains no force shows: a number that is not believed may be what hides it.
-        if self._remains(best):
-            matched = self._matched_beside(best, what)
-            for candidate, numbers in matched.leading:
-                fit = self._compensated(best, (candidate, numbers))
-                self._keep([fit])
-                if not fit.trouble and not self._remains(fit):
-                    enough = candidate
-                    break
+        enough = None
+        matched = self._matched_beside(best, what)
+        for candidate, numbers in matched.leading:
+            fit = self._compensated(best, (candidate, numbers))
+            self._keep([fit])
+            if not fit.trouble and not self._remains(fit):
+                enough = candidate
+                break
         self._grown(bases, what, matched=matched, against=enough)
 
     def _matched_beside(self, fit: FreeRunFit, what: str) -> MatchedForces:
@@ -279,11 +300,14 @@ class ModelSelection:
         self.said(f"fitting {' + '.join(candidate.key for candidate in coarse.candidates)}", 0, 1)
         problem = self.runs.problem_of(coarse)
         fit = _at_its_optimum(problem, {**base.values, **coarse.values})
-        released = [run for run in self.runs.runs if run[0].run.is_free]
-        if fit.trouble or not released or problem.is_down_to_noise(fit):
+        # What an effect has of its own in a run, such as an instant.
+        own = {run_of(name, self.runs.model) for name in problem.names[problem.n_baseline :]}
+        alone = [run for run in self.runs.runs if run[0].run.is_free or run[0].run.name in own]
+        if fit.trouble or not alone or problem.is_down_to_noise(fit):
             return fit
-        # Each release by itself, from many starts: one that comes to rest elsewhere holds all other numbers back.
-        values = values_of_runs(self.runs.model, released, fit)
+        # Each of these by itself, from many starts: one that comes to rest elsewhere, or has its pulses at other
+        # instants, holds all other numbers back.
+        values = values_of_runs(self.runs.model, alone, fit)
         if not problem.costs([values])[0] < fit.cost:
             return fit
         other = _at_its_optimum(problem, values)
@@ -334,7 +358,8 @@ class ModelSelection:
                     each for each in self.pool if effect.reduces_to(each) and others | {each.key} not in self.fits
                 ]
                 if simpler:
-                    self._grown([rest], f"in the place of {effect.key}", simpler)
+                    starts = {each.key: [_reduced(model, effect, each)] for each in simpler}
+                    self._grown([rest], f"in the place of {effect.key}", simpler, starts)
 
     def _refined(self, best: FreeRunFit) -> None:
         """Each effect of the best model from places about its numbers, beside its baseline and the believed one.
@@ -359,7 +384,7 @@ class ModelSelection:
     def _may_win(self, model: FreeRunFit) -> bool:
         """Whether what is nested in a model, which explains no more, could have the evidence of the best model."""
         best = min(self.fits.values(), key=lambda fit: fit.cost)
-        return (model.cost - best.cost) / (2 * TEMPERING) < complexity(best) + _NO_CHANCE
+        return (model.cost - best.cost) / (2 * TEMPERING) < complexity(best) + NO_CHANCE
 
     @staticmethod
     def _evidence(fits: Sequence[FreeRunFit]) -> float:
@@ -397,6 +422,19 @@ def _without(fit: FreeRunFit, effect: Candidate) -> FreeRunFit:
     rest = tuple(candidate for candidate in fit.candidates if candidate is not effect)
     own = _own_numbers(fit, effect)
     return FreeRunFit(rest, {name: value for name, value in fit.values.items() if name not in own}, 0.0, 0.0)
+
+
+def _reduced(fit: FreeRunFit, wider: Candidate, simpler: Candidate) -> dict[str, float]:
+    """Numbers of what an effect of a fit reduces to: those of the same name, sizes as they are in mean."""
+    own = _own_numbers(fit, wider)
+    found = {}
+    for name, start in simpler.starts()[0].items():
+        number = name.removeprefix(f"{simpler.key}.")
+        unit = named_and_units(number)[1]
+        alike = [own[f"{wider.key}.{size}"] for size in wider.sizes if named_and_units(size)[1] == unit]
+        mean = float(np.mean(alike)) if number in simpler.sizes and alike else start
+        found[name] = own.get(f"{wider.key}.{number}", mean)
+    return found
 
 
 def _own_numbers(fit: FreeRunFit, effect: Candidate) -> dict[str, float]:

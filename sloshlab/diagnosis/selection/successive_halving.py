@@ -15,7 +15,7 @@ import numpy as np
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.proposals import Proposal, jacobian_beside
 from sloshlab.identification.free_run_fit import fitted, inflated_cost
-from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit
 
 _STEPS_OF_A_RUNG: Final = 3
 """Of a fit before it is compared with the others."""
@@ -25,6 +25,8 @@ _STARTS_OF_A_NAME: Final = 4
 """That are begun: two of one model and two of another. Forms and places of one effect predict nearly the same."""
 HOPELESS_COST_RATIO: Final = 3.0
 """Cost over the lowest one at the same noise: what is its equal is no further behind after three steps."""
+NO_CHANCE: Final = 7.0
+"""Nats: a model that is so much less probable than another, by a thousand to one, is not worth more fits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +101,9 @@ def _continued(runs: FittedRuns, running: _Running, inflation: float) -> _Runnin
 
 def _better(running: Sequence[_Running], n: int, of_a_model: int) -> list[_Running]:
     """The lowest costs, with at most so many starts of one model; none that is hopeless."""
-    most = HOPELESS_COST_RATIO * min((each.cost for each in running), default=0.0)
+    least = min((each.cost for each in running), default=0.0)
+    # Where nearly all noise is inflated a ratio of costs says nothing.
+    most = max(HOPELESS_COST_RATIO * least, least + 2 * TEMPERING * NO_CHANCE)
     kept: list[_Running] = []
     taken: dict[frozenset[str], int] = {}
     for each in sorted(running, key=lambda each: each.cost):

@@ -130,14 +130,13 @@ def test_in_the_place_of_a_force_come_only_forces_that_do_nearly_the_same(
 def test_without_a_remainder_single_effects_end_the_search(
     search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A number that is not believed alone: an effect that makes it no more probable starts no further search."""
+    """An effect that makes the baseline no more probable starts no further search."""
     selection, retuned = search
-    grown = []
+    uncovered = []
     monkeypatch.setattr(selection, "_remains", lambda fit: False)
-    monkeypatch.setattr(selection, "_refuted", lambda fit: True)
-    monkeypatch.setattr(selection, "_added", lambda bases, what, best: grown.append(what))
+    monkeypatch.setattr(selection, "_uncovered", uncovered.append)
     assert selection.selected(retuned) == [retuned]
-    assert grown == ["one effect"]
+    assert uncovered == [retuned]
 
 
 def frequency_hz(numbers: dict[str, float]) -> float:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
-from recorded_oscillators import effect
+from recorded_oscillators import decays, effect, rig, surroundings
 
-from sloshlab.diagnosis.selection.model_selection import ModelSelection
+from sloshlab.diagnosis.selection.model_selection import ModelSelection, _reduced
 from sloshlab.diagnosis.selection.successive_halving import _best_starts
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate
 
@@ -70,3 +73,15 @@ def test_forms_and_places_of_one_effect_leave_room_for_others() -> None:
         ["friction"],
         ["drag"],
     ]
+
+
+def test_a_simpler_form_is_fitted_from_the_numbers_of_the_wider_one(tmp_path: Path) -> None:
+    """Drawn from its prior a friction rests elsewhere, and the wider form is named in its place."""
+    at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
+    wider, simpler = (
+        Candidate(effect(f"structure.{name}"), at) for name in ("asymmetric_friction", "coulomb_friction")
+    )
+    own = {"structure.asymmetric_friction.force_up_n": 5.0, "structure.asymmetric_friction.force_down_n": 6.0}
+    fit = FreeRunFit((wider,), {"frequency of mode 1": 1.01, **own}, 0.0, 0.0)
+    assert wider.reduces_to(simpler)
+    assert _reduced(fit, wider, simpler) == {"structure.coulomb_friction.force_n": 5.5}

@@ -117,7 +117,7 @@ def test_the_occam_factor_beside_a_number_of_the_baseline(correlation: float) ->
     prior = ParameterPrior(key, 0.1, 1e4, is_log=True, may_be_negative=False)
     alone = cast(Any, SimpleNamespace(key="structure.coulomb_friction", prior=(prior,)))
     information, belief = 1e4 * np.array([[1.0, correlation], [correlation, 1.0]]), np.diag([1.0, 0.0])
-    covariance = np.linalg.inv(information + belief)
+    covariance = np.linalg.inv(information + TEMPERING * belief)
     fit = FreeRunFit((alone,), {"mass": 0.0, key: 500.0}, 0.0, 0.0, covariance, ("mass", key), np.ones(2))
     variance = np.linalg.inv(information / TEMPERING + belief)[1, 1]
     assert complexity(fit) == pytest.approx(
@@ -138,6 +138,9 @@ def test_a_number_that_nothing_tells_costs_nothing() -> None:
     [
         ([model(0.0)], "nothing_missing", set()),
         ([model(0.0), model(1.0, FRICTION)], "nothing_missing", set()),
+        # twenty to one for nothing before; then 0.7 and 0.93 for friction
+        ([model(0.0), model(3.85, FRICTION)], "nothing_missing", set()),
+        ([model(0.0), model(5.6, FRICTION)], "named", {"coulomb_friction"}),
         ([model(0.0), model(50.0, FRICTION), model(20.0, DRAG)], "named", {"coulomb_friction"}),
         (
             [model(0.0), model(50.0, FRICTION), model(50.0, DRAG)],
@@ -193,7 +196,14 @@ def test_a_remainder_that_is_not_worth_a_word_leaves_the_name_what_it_is(monkeyp
 @pytest.mark.parametrize(("cost", "named"), [(1.0, False), (30.0, True)])
 def test_a_baseline_that_nobody_believes_is_no_simpler_than_an_effect(cost: float, named: bool) -> None:
     """Both predict the same: the baseline by numbers that cost so much of its prior, the effect by one more."""
-    found = posterior([replace(model(0.0), complexity=cost), model(0.0, DRAG)], n_candidates=10, tempering=1.0)
+    found = posterior(
+        [
+            replace(model(0.0), fit=replace(model(0.0).fit, cost=2 * TEMPERING * cost), complexity=cost),
+            model(0.0, DRAG),
+        ],
+        n_candidates=10,
+        tempering=1.0,
+    )
     odds = np.exp(cost) * (1 / 40) / (1 / 2)
     expected = odds / (1 + odds) if named else 0.0
     assert found.by_label().get("quadratic_drag", 0.0) == pytest.approx(expected, rel=1e-6)

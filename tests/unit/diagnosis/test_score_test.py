@@ -26,8 +26,7 @@ class Linear:
     soft: float = 1.0
     n_baseline: int = 2
 
-    @property
-    def prior(self) -> np.ndarray:
+    def prior_weights(self, theta: np.ndarray, inflation: float) -> np.ndarray:
         return np.array([1.0] * self.n_baseline + [0.0] * (self.fixed.size - self.n_baseline))
 
     def inflation_weights(self, share: float) -> np.ndarray:

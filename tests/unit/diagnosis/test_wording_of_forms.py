@@ -103,6 +103,26 @@ def test_numbers_that_all_runs_share_stand_beside_those_of_runs() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("none", "added"),
+    [
+        (0.47, "; these recordings do not tell that from mass error (0.30) or cross talk + mass error (0.22)"),
+        (0.95, ""),
+    ],
+)
+def test_what_may_be_the_rig_alone_is_said_beside_nothing(none: float, added: str) -> None:
+    probabilities = {"none": none, "mass_error": 0.3, "cross_talk + mass_error": 0.22, "clearance": 0.001}
+    decision = Decision("nothing_missing", None, [], "", {**probabilities, "unknown": 0.009})
+    found: Any = SimpleNamespace(retuned=SimpleNamespace(held_out_rms=0.84))
+    said = (
+        "Nothing is missing: with its own parameters retuned the simulation describes the held-out runs to 0.84 of"
+    )
+    said += " the noise floor"
+    if none < 0.9:
+        said += "; these recordings do not tell that from mass error (0.30) or cross talk + mass error (0.22)"
+    assert statement_of(found, decision, {}) == f"{said}."
+
+
 @pytest.mark.parametrize("n_channels", [1, 2])
 def test_of_one_channel_alone_its_sensor_may_be_meant(n_channels: int) -> None:
     found: Any = SimpleNamespace(fitting=[[object()] * n_channels], split=SimpleNamespace(has_held_out=True))

@@ -25,7 +25,7 @@ def scatter_of(offsets: np.ndarray, n_runs: int) -> float:
         runs=runs,
         names=[EFFECT],
         n_baseline=0,
-        prior=np.zeros(1),
+        prior_weights=lambda theta: np.zeros(1),
         scales=np.array([SCALE]),
         theta_of=lambda values: np.zeros(1),
         residual=lambda theta: residual,

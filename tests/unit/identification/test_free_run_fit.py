@@ -27,8 +27,9 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lsim
 
 from sloshlab.identification import rig_model
+from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.case import CaseRun
-from sloshlab.identification.free_run_fit import INFLATION_STAGES, _step_within_bounds, fitted
+from sloshlab.identification.free_run_fit import INFLATION_STAGES, _step_within_bounds, fitted, inflated_cost
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost, robust_weights
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
@@ -401,3 +402,19 @@ def test_no_step_is_simulated_that_predicts_next_to_nothing(
     far, _ = fitted(problem, problem.values(theta + 2.0), stages=INFLATION_STAGES[-1:])
     assert n_made > 3
     np.testing.assert_allclose(problem.theta_of(far.values), theta, atol=1e-2)
+
+
+def test_derivatives_that_are_wrong_are_made_anew_in_every_stage(tmp_path: Path) -> None:
+    """With those of another model no step succeeds: the stage ended where it had begun."""
+    problem = problem_of(tmp_path, decays(duration_s=1.5), [], [FREQUENCY, LOSS])
+    theta = np.full(len(problem.names), 1.0)
+    right = problem.jacobian(theta, problem.residual(theta), range(theta.size))
+    wrong = [-right.times(unit) for unit in np.eye(theta.size)]
+    known = BlockJacobian.of_columns(wrong, [each.spectra.size for run in problem.runs for each in run])
+    inflation, start = INFLATION_STAGES[2], problem.values(theta)
+    best, _ = fitted(problem, start, stages=(inflation,), n_iterations=20)
+    fit, _ = fitted(problem, start, stages=(inflation,), n_iterations=20, known=known, is_last=False)
+    least = inflated_cost(problem, best, inflation)
+    begun = FreeRunFit((), start, 0.0, 0.0)
+    assert inflated_cost(problem, begun, inflation) > 10 * least
+    assert inflated_cost(problem, fit, inflation) < 1.01 * least

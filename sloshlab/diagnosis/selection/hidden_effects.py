@@ -1,0 +1,165 @@
+"""Effects that retuning hides: without them as little remains, and the baseline's numbers are less probable.
+
+Where a fit of the baseline leaves nothing no effect can make the recordings more probable. It can only bring
+numbers of the baseline nearer to what is believed of them. What a small size of an effect changes is linear, and
+so is what the numbers make up for: a quadratic programme says how much more probable the tempered posterior
+becomes, and from where the effect is to be fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.proposals import missing_from
+from sloshlab.identification.baseline_parameter import prior_cost, prior_weights
+from sloshlab.identification.free_run_fit import bounded_step
+from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit, FreeRunProblem, robust_weights
+from sloshlab.missing_physics.candidate import Candidate
+
+FloatArray = NDArray[np.float64]
+_SMALL: Final = 1e-3
+"""Of the size at which an effect starts: a mass that moves a frequency by percents is not linear over a run."""
+_LEAST_LIFT: Final = 1e-9
+"""Of a diagonal that is added to it, so that it can be inverted."""
+_N_REWEIGHTED: Final = 8
+"""Steps of iteratively reweighted least squares, by the weights of the prior."""
+
+
+@dataclass(frozen=True, eq=False)
+class HiddenEffect:
+    """An effect beside a baseline that is more probable with it.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    values : dict
+        Of the baseline and of the effect, from where a fit starts.
+    gain : float
+        Of the logarithm of the tempered posterior density, over the baseline alone.
+    """
+
+    candidate: Candidate
+    values: dict[str, float]
+    gain: float
+
+
+def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate]) -> list[HiddenEffect]:
+    """Of every effect that shows by its size the best of its starts, the largest gain first.
+
+    Parameters
+    ----------
+    runs : FittedRuns
+    fit : FreeRunFit
+        Of the baseline, which leaves nothing.
+    pool : sequence of Candidate
+    """
+    problem = runs.problem_of(fit)
+    about = _AboutFit(problem, problem.theta_of(fit.values))
+
+    def of_candidate(candidate: Candidate) -> HiddenEffect | None:
+        extended = runs.problem((*fit.candidates, candidate))
+        starts = _directions(candidate)
+        thetas = [
+            extended.theta_of({**fit.values, **candidate.sized(start, size * _SMALL)})
+            for start in starts
+            for size in (1, 2, 3)
+        ]
+        own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
+        found = []
+        moved = extended.residuals_moved(thetas, own, about.residual)
+        for start, *of_sizes in zip(starts, moved[::3], moved[1::3], moved[2::3], strict=True):
+            if not all(np.isfinite(each).all() for each in of_sizes):
+                continue
+            one, two, three = of_sizes
+            # The slope at no size, but not from there: beside an effect on an accelerometer another one may drive.
+            change = (8 * two - 5 * one - 3 * three) / (2 * _SMALL)
+            if not change.any():
+                continue
+            low, high = _factors(candidate, start)
+            theta, factor, gain = about.with_effect(change, low, high)
+            if isfinite(gain):
+                found.append(
+                    HiddenEffect(candidate, {**problem.values(theta), **candidate.sized(start, factor)}, gain)
+                )
+        return max(found, key=lambda hidden: hidden.gain, default=None)
+
+    each = runs.model.executor.map(of_candidate, missing_from(fit, pool))
+    return sorted((hidden for hidden in each if hidden is not None), key=lambda hidden: -hidden.gain)
+
+
+def _directions(candidate: Candidate) -> list[dict[str, float]]:
+    """Starts of an effect that differ by more than the sign of its size."""
+    found: list[dict[str, float]] = []
+    for start in candidate.starts() if candidate.sizes else ():
+        if candidate.sized(start, -1.0) not in found:
+            found.append(start)
+    return found
+
+
+def _factors(candidate: Candidate, start: dict[str, float]) -> tuple[float, float]:
+    """Range of the factor of a start in which all of its sizes are in their ranges."""
+    low, high = -np.inf, np.inf
+    for parameter in candidate.effect.parameters:
+        value = start[f"{candidate.key}.{parameter.name}"]
+        if parameter.name in candidate.sizes and value:
+            ends = sorted(end / value for end in candidate.bounds(parameter))
+            low, high = max(low, ends[0]), min(high, ends[1])
+    # Absent, an effect has no size, which may be less than the least of its range.
+    return min(low, 0.0), max(high, 0.0)
+
+
+class _AboutFit:
+    """Tempered posterior of a baseline about a fit: its likelihood quadratic, its prior as it is."""
+
+    def __init__(self, problem: FreeRunProblem, theta: FloatArray) -> None:
+        self._theta, self.residual = theta, problem.residual(theta)
+        # What an effect does is nearly what some numbers do.
+        jacobian = problem.central_jacobian(theta)
+        self._weights = robust_weights(self.residual) / np.sqrt(TEMPERING)
+        self._jacobian, self._left = jacobian.weighted(self._weights), self._weights * self.residual
+        self._normal, self._pull = self._jacobian.normal(), self._jacobian.transposed_times(self._left)
+        self._n_baseline = problem.n_baseline
+        self._down = np.minimum((problem.low - problem.centres) / problem.scales - theta, 0.0)
+        self._up = np.maximum((problem.high - problem.centres) / problem.scales - theta, 0.0)
+        _, self._alone = self._least(self._normal, self._pull, self._down, self._up)
+
+    def with_effect(self, change: FloatArray, low: float, high: float) -> tuple[FloatArray, float, float]:
+        """Scaled numbers of the baseline, the factor of the change, and the gain where the posterior is highest.
+
+        Parameters
+        ----------
+        change : ndarray
+            Of the residuals, by an effect of factor one.
+        low, high : float
+            Range of its factor.
+        """
+        weighted = self._weights * change
+        along = self._jacobian.transposed_times(weighted)
+        normal = np.block([[self._normal, along[:, None]], [along[None, :], weighted @ weighted]])
+        pull = np.append(self._pull, weighted @ self._left)
+        step, cost = self._least(normal, pull, np.append(self._down, low), np.append(self._up, high))
+        return self._theta + step[:-1], float(step[-1]), 0.5 * (self._alone - cost)
+
+    def _least(
+        self, normal: FloatArray, pull: FloatArray, down: FloatArray, up: FloatArray
+    ) -> tuple[FloatArray, float]:
+        """The step to the least cost, and minus twice the logarithm of the density there, but for a constant."""
+        n = self._n_baseline
+        theta, step = self._theta[:n], np.zeros(pull.size)
+        for _ in range(_N_REWEIGHTED):
+            weights = np.zeros(pull.size)
+            weights[:n] = prior_weights(theta + step[:n])
+            towards_belief = np.zeros(pull.size)
+            towards_belief[:n] = weights[:n] * theta
+            # Numbers of effects that change nothing here stay where they are.
+            weights += _LEAST_LIFT * np.maximum(np.diag(normal), 1.0)
+            step = bounded_step(normal + np.diag(weights), pull + towards_belief, down, up)
+        cost = 2 * pull @ step + step @ normal @ step + prior_cost(theta + step[:n]).sum()
+        return step, float(cost)
