@@ -82,11 +82,9 @@ def test_a_mass_that_retuning_hides_is_fitted_from_its_force(search: tuple[Model
     assert fit.values[f"{CUSHION}.mass_kg"] == pytest.approx(SLUG_KG, rel=0.02)
 
 
-def test_beside_what_leaves_nothing_come_only_forces_that_do_nearly_the_same(
-    search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    selection, retuned = search
-    pools = []
+def pools_of_proposals(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
+    """The pool of every proposal from here on; nothing is proposed."""
+    pools: list[set[str]] = []
 
     def recorded_proposals(
         runs: FittedRuns, bases: object, pool: list[Candidate], *others: object
@@ -95,6 +93,14 @@ def test_beside_what_leaves_nothing_come_only_forces_that_do_nearly_the_same(
         return []
 
     monkeypatch.setattr(model_selection, "proposals", recorded_proposals)
+    return pools
+
+
+def test_beside_what_leaves_nothing_come_only_forces_that_do_nearly_the_same(
+    search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    selection, retuned = search
+    pools = pools_of_proposals(monkeypatch)
     selection._keep([retuned])
     selection._added([retuned], "one effect", retuned)
     best = min(selection.fits.values(), key=lambda fit: fit.cost)
@@ -113,15 +119,7 @@ def test_in_the_place_of_a_force_come_only_forces_that_do_nearly_the_same(
     selection._added([retuned], "one effect", retuned)
     best = selection._best_of(1)
     assert best is not None
-    pools = []
-
-    def recorded_proposals(
-        runs: FittedRuns, bases: object, pool: list[Candidate], *others: object
-    ) -> list[object]:
-        pools.append({candidate.key for candidate in pool})
-        return []
-
-    monkeypatch.setattr(model_selection, "proposals", recorded_proposals)
+    pools = pools_of_proposals(monkeypatch)
     selection._swapped(1)
     # The drag leaves all of the slug's force; a mass is hidden by what is set aside, a sensor makes no force.
     assert pools == [{CUSHION, delay.key, "tank.mass_error"}]
