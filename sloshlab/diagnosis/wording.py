@@ -10,7 +10,7 @@ import numpy as np
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.decision import Decision
 from sloshlab.diagnosis.inference.places import SENSOR
-from sloshlab.diagnosis.inference.posterior import NONE
+from sloshlab.diagnosis.inference.posterior import NONE, UNKNOWN
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.inference.thresholds import NAMED
 from sloshlab.diagnosis.interval import Interval
@@ -43,7 +43,10 @@ def statement_of(found: Findings, decision: Decision, intervals: Mapping[tuple[s
         )
         if decision.probabilities.get(NONE, 1.0) < NAMED:
             undecided = {label: p for label, p in decision.probabilities.items() if label != NONE and p >= _SAID}
-            said = " or ".join(f"{label.replace('_', ' ')} ({p:.2f})" for label, p in undecided.items())
+            words = {UNKNOWN: "something that has no name"}
+            said = " or ".join(
+                f"{words.get(label, label.replace('_', ' '))} ({p:.2f})" for label, p in undecided.items()
+            )
             text += f"; these recordings do not tell that from {said}"
         return text + "."
     if decision.kind == "unknown":

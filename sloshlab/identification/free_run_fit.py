@@ -123,9 +123,11 @@ class _LevenbergMarquardt:
         self.problem, self.theta, self.residual = problem, theta, residual
         n = theta.size
         self.jacobian, self.hessian = known or BlockJacobian(n, ()), np.eye(n)
+        self.inflation, self.inflation_weights = 0.0, np.ones(residual.size)
 
     def stage(self, inflation: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:
         """Descend with inflated noise."""
+        self.inflation, self.inflation_weights = inflation, self.problem.inflation_weights(inflation)
         damping, is_fresh = 1e-3, False
         # The Jacobian of an earlier stage, or a warm start, serves until a step shows that it is wrong.
         is_wanted, worth = not self.jacobian.blocks, 0.0
@@ -137,7 +139,7 @@ class _LevenbergMarquardt:
                 )
                 is_fresh = True
             least = tolerance * (1.0 if inflation > 0 else _LAST_STAGE_FACTOR)
-            gain, predicted, damping = self._step(inflation, damping, _LEAST_PREDICTED_SHARE * least)
+            gain, predicted, damping = self._step(damping, _LEAST_PREDICTED_SHARE * least)
             if is_fresh:
                 worth = gain / (self.theta.size + 1)
             is_done = gain < least and (iteration > 0 or gain <= 0)
@@ -151,14 +153,15 @@ class _LevenbergMarquardt:
             is_wanted = is_done or gain < max(_LEAST_GAIN_RATIO * predicted, worth)
             is_fresh = is_fresh and gain <= 0
 
-    def _step(self, inflation: float, damping: float, least: float) -> tuple[float, float, float]:
+    def _step(self, damping: float, least: float) -> tuple[float, float, float]:
         """One step; relative decrease of the cost, the decrease that the Jacobian predicts, and the next damping.
 
         Where none succeeds the prediction is that of the least damped one.
 
         No step is made where the steps small enough to succeed predict less than the least decrease.
         """
-        theta, residual, inflation_weights = self.theta, self.residual, self.problem.inflation_weights(inflation)
+        theta, residual = self.theta, self.residual
+        inflation, inflation_weights = self.inflation, self.inflation_weights
         # Iteratively reweighted least squares: Huber's weights of the present residuals are kept for this step.
         limit = _limit(inflation_weights * residual)
         weights = inflation_weights * robust_weights(inflation_weights * residual, limit)

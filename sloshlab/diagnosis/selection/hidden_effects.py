@@ -40,7 +40,7 @@ class HiddenEffect:
     ----------
     candidate : Candidate
     values : dict
-        Of the baseline and of the effect, from where a fit starts.
+        Of the fit and of the effect, from where the two are to be fitted.
     gain : float
         Of the logarithm of the tempered posterior density, over the baseline alone.
     """
@@ -57,7 +57,7 @@ def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
     ----------
     runs : FittedRuns
     fit : FreeRunFit
-        Of the baseline, which leaves nothing.
+        Which leaves nothing.
     pool : sequence of Candidate
     """
     problem = runs.problem_of(fit)
@@ -120,7 +120,7 @@ class _AboutFit:
 
     def __init__(self, problem: FreeRunProblem, theta: FloatArray) -> None:
         self._theta, self.residual = theta, problem.residual(theta)
-        # What an effect does is nearly what some numbers do.
+        # An effect and the numbers that hide it do nearly the same: forward differences do not tell them apart.
         jacobian = problem.central_jacobian(theta)
         self._weights = robust_weights(self.residual) / np.sqrt(TEMPERING)
         self._jacobian, self._left = jacobian.weighted(self._weights), self._weights * self.residual
