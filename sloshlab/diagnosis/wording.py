@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Final
 
@@ -57,6 +58,10 @@ def statement_of(found: Findings, decision: Decision, intervals: Mapping[tuple[s
     if decision.kind == "indistinguishable":
         others = [" + ".join(names).replace("_", " ") for names in names_of_alternatives(decision)[1:]]
         text += f"; cannot be told from {' or '.join(others)}"
+    if decision.wider:
+        besides = (Counter(model.names) - Counter(decision.best.names) for model in decision.wider)
+        more = dict.fromkeys(" + ".join(names.elements()).replace("_", " ") for names in besides)
+        text += f"; these recordings do not tell whether {' or '.join(more)} is missing besides"
     return text + "."
 
 

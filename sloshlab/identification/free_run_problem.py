@@ -193,12 +193,12 @@ class FreeRunProblem:
         known = np.array([values.get(name, centre) for name, centre in zip(self.names, self.centres, strict=True)])
         return np.asarray((known - self.centres) / self.scales)
 
-    def at_bounds(self, theta: FloatArray) -> NDArray[np.bool_]:
-        """Which parameters are as large or as small as they may be."""
+    def at_bounds(self, theta: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which parameters are as small as they may be, and which as large."""
         physical = self.centres + theta * self.scales
         # To a relative tolerance: scaled values reach a bound only to rounding.
         near = 1e-6 * (self.high - self.low)
-        return np.asarray((physical <= self.low + near) | (physical >= self.high - near))
+        return physical <= self.low + near, physical >= self.high - near
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Weighted residuals of all runs; infinite where the simulation does not reach its end."""

@@ -2,6 +2,8 @@
 
 - That something is missing has the posterior `NAMED`, and so has what is named; a set of names that has it
   together is said as a set.
+- Of a set all of whose models have one of them in common that one is named (Barbieri and Berger 2004,
+  doi:10.1214/009053604000000238); whether more is missing cannot be told.
 - Two models that predict the same within `TOLD_APART` are equals; of one that needs more numbers for
   it only the simpler one is said.
 - An effect or a remainder below `LEAST_STRENGTH` is not worth a word: it counts as nothing.
@@ -11,7 +13,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -36,6 +39,8 @@ class Decision:
         Of what has no name; empty where it is not located.
     probabilities : dict
         Of everything that might be said, the largest first.
+    wider : list of ScoredModel
+        Models of what is named and something besides, which cannot be told from it.
     """
 
     kind: str
@@ -43,6 +48,7 @@ class Decision:
     alternatives: list[ScoredModel]
     place: str
     probabilities: dict[str, float]
+    wider: list[ScoredModel] = field(default_factory=list)
 
     @property
     def block(self) -> str:
@@ -72,7 +78,11 @@ def decided(found: Posterior) -> Decision:
     best = found.best(chosen[0]).model
     models = [found.best(label).model for label in chosen]
     models += [model for model in equals_of(best, found) if all(model.names != m.names for m in models)]
-    return Decision("named" if len(models) == 1 else "indistinguishable", best, models, "", labels)
+    for model in models:
+        wider = [other for other in models if other is not model]
+        if all(Counter(model.names) < Counter(other.names) for other in wider):
+            return Decision("named", model, [model], "", labels, wider)
+    return Decision("indistinguishable", best, models, "", labels)
 
 
 def _unknown(found: Posterior, nearest: str, labels: dict[str, float]) -> Decision:

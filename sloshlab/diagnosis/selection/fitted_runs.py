@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from math import ceil
 from typing import Final
 
 import numpy as np
@@ -18,8 +19,8 @@ from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.prior import drawn
 
 Runs = Sequence[Sequence[Observation]]
-_N_DRAWN: Final = 256
-"""Places of what an effect has of its own in a run: every 30 ms of one of eight seconds."""
+_DRAWS_PER_SCALE: Final = 6
+"""Places of what an effect has of its own in a run, for each of its scales: six instants of a pulse a period."""
 _N_REFINED: Final = 2
 """Of these, the best ones that are refined."""
 _N_HALVINGS: Final = 6
@@ -107,8 +108,12 @@ def _best_started(problem: FreeRunProblem, start: dict[str, float], fit: FreeRun
     spacings: dict[str, float] = {}
     shown: list[dict[str, float]] = []
     for candidate in problem.candidates:
-        own = {prior.name: (prior.high - prior.low) / _N_DRAWN for prior in candidate.prior}
-        own = {name: spacing for name, spacing in own.items() if name in problem.names}
+        # A size follows one linear step from anywhere.
+        own = {
+            f"{candidate.key}.{known.name}": candidate.scale(known.name) / _DRAWS_PER_SCALE
+            for known in candidate.effect.parameters
+            if known.name not in candidate.sizes and f"{candidate.key}.{known.name}" in problem.names
+        }
         if own:
             rest = tuple(other for other in fit.candidates if other is not candidate)
             forces = latent_forces(problem.model, problem.runs, replace(fit, candidates=rest))
@@ -118,7 +123,8 @@ def _best_started(problem: FreeRunProblem, start: dict[str, float], fit: FreeRun
     if not spacings:
         return start
     priors = [prior for candidate in problem.candidates for prior in candidate.prior if prior.name in spacings]
-    draws = drawn(priors, _N_DRAWN)
+    n_drawn = max((prior.high - prior.low) / spacings[prior.name] for prior in priors)
+    draws = drawn(priors, ceil(n_drawn))
     best = np.argsort(problem.costs([{**start, **numbers} for numbers in draws]))[:_N_REFINED]
     places = [start, *({**start, **numbers} for numbers in (*shown, *(draws[i] for i in best)))]
     return _refined(problem, places, spacings)

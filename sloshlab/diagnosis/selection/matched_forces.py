@@ -12,7 +12,7 @@ from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.proposals import Places, missing_from
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO
 from sloshlab.identification.free_run_problem import FreeRunFit
-from sloshlab.missing_force.force_matching import ForceMatching, Match, matchings
+from sloshlab.missing_force.force_matching import ForceMatching, Match, force_alone, matchings
 from sloshlab.missing_physics.candidate import Candidate, Numbers
 from sloshlab.twin.lane_preparation import Executor
 
@@ -111,7 +111,7 @@ class _Matches:
     def ranked(self, candidate: Candidate) -> list[Match]:
         """Of its draws."""
         place = self._at(candidate)
-        if not place.is_more_than_noise:
+        if not place.is_more_than_noise or force_alone(candidate, candidate.starts()[0]) is None:
             return []
         starts = [*self._places.of(candidate), *candidate.sought_at()]
         self._population[candidate.key] = place.ranked(candidate, starts)

@@ -72,6 +72,7 @@ class ModelSelection:
         self.failed: dict[str, str] = {}
         self._matched: dict[frozenset[str], MatchedForces] = {}
         self._swapped_beside: dict[frozenset[str], set[frozenset[str]]] = {}
+        self._simplified_at: dict[tuple[frozenset[str], str], Mapping[str, float]] = {}
         self._promising: dict[str, list[dict[str, float]]] = {}
         self._left = _BUDGET
 
@@ -349,6 +350,10 @@ class ModelSelection:
         """
         for model in filter(self._may_win, self._leading(n)):
             for effect in model.candidates:
+                place = (_keys_of(model.candidates), effect.key)
+                if self._simplified_at.get(place) is model.values:
+                    continue
+                self._simplified_at[place] = model.values
                 rest = _without(model, effect)
                 problem = self.runs.problem_of(rest)
                 start = {name: value for name, value in rest.values.items() if name in problem.names}

@@ -5,7 +5,7 @@ What repeats from run to run is size, period and frequency; instants and phases 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from math import pi
 from typing import Final
 
@@ -103,63 +103,58 @@ def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], li
                 continue
             # force along the shape of a pulse that begins at each sample
             along = {run: np.correlate(force, shape, "valid") / (shape @ shape) for run, force in missing.items()}
-            for period in _periods(n, longest):
-                for score, size, first in _folded(along, period, alternate=alternate):
-                    explained = score * float(shape @ shape)
-                    if explained > best.get(np.sign(size), (0.0,))[0]:
-                        rate = at.sampling_rate_hz
-                        starts = {in_run("start_s", run): place / rate for run, place in first.items()}
-                        train = {"size_n": size, "period_s": period / rate, "width_s": n / rate, **starts}
-                        best[np.sign(size)] = (explained, train)
+            periods = _periods(n, longest)
+            # (run, period, direction, column)
+            places = np.stack([_best_places(values, periods, alternate) for values in along.values()])
+            explained, force, weight, _ = np.moveaxis(places.sum(axis=0), -1, 0)
+            for row, sign in enumerate((1.0, -1.0)):
+                k = int(np.argmax(explained[:, row]))
+                score = float(explained[k, row] * (shape @ shape))
+                if score > best.get(sign, (0.0,))[0]:
+                    rate = at.sampling_rate_hz
+                    first = zip(along, places[:, k, row, 3].tolist(), strict=True)
+                    starts = {in_run("start_s", run): place / rate for run, place in first}
+                    size = float(sign * force[k, row] / weight[k, row])
+                    train = {"size_n": size, "period_s": float(periods[k]) / rate, "width_s": n / rate, **starts}
+                    best[sign] = (score, train)
         return [train for _, train in sorted(best.values(), key=lambda found: -found[0])]
 
     return proposed
 
 
-def _periods(width: int, longest: int) -> list[int]:
+def _periods(width: int, longest: int) -> NDArray[np.int64]:
     """Periods [samples], so near to each other that the last pulse slips by half a width at most."""
     found, period = [], 2.0 * width
     while period <= longest:
         found.append(round(period))
         period += max(1.0, 0.5 * width * period / longest)
-    return found
-
-
-def _folded(
-    along: Mapping[str, FloatArray], period: int, *, alternate: bool
-) -> list[tuple[float, float, dict[str, int]]]:
-    """Of trains of one period, upward and downward: what they explain, their size, their first samples."""
-    best = {run: _best_places(values, period, alternate) for run, values in along.items()}
-    found = []
-    for row, sign in enumerate((1.0, -1.0)):
-        explained, force, weight = (float(sum(each[row, k] for each in best.values())) for k in range(3))
-        first = {run: int(each[row, 3]) for run, each in best.items()}
-        found.append((explained, sign * force / weight, first))
-    return found
+    return np.array(found, np.int64)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _best_places(values: FloatArray, period: int, alternate: bool) -> FloatArray:
-    """Where a train of one period explains most of a series, upward and downward, shape (2, 4).
+def _best_places(values: FloatArray, periods: NDArray[np.int64], alternate: bool) -> FloatArray:
+    """Where a train of each period explains most of a series, upward and downward, shape (n_periods, 2, 4).
 
     Columns: what it explains; the sum of the values at its pulses, positive along its direction; how many these
     are; the first of them [samples]. Every other pulse counts reversed where they alternate.
     """
-    sums, counts = np.zeros(period), np.zeros(period)
-    sign = 1.0
-    for start in range(0, values.size, period):
-        for k in range(min(period, values.size - start)):
-            sums[k] += sign * values[start + k]
-            counts[k] += 1.0
-        if alternate:
-            sign = -sign
-    best = np.zeros((2, 4))
-    # A train that explains nothing has its first pulse, too: its weight must not be zero.
-    best[:, 2] = counts[0]
-    for k in range(min(period, values.size)):
-        explained, row = sums[k] ** 2 / counts[k], 0 if sums[k] > 0 else 1
-        if explained > best[row, 0]:
-            best[row, 0], best[row, 1], best[row, 2], best[row, 3] = explained, abs(sums[k]), counts[k], k
+    best = np.zeros((periods.size, 2, 4))
+    for i, period in enumerate(periods):
+        sums, counts = np.zeros(period), np.zeros(period)
+        sign = 1.0
+        for start in range(0, values.size, period):
+            for k in range(min(period, values.size - start)):
+                sums[k] += sign * values[start + k]
+                counts[k] += 1.0
+            if alternate:
+                sign = -sign
+        # A train that explains nothing has its first pulse, too: its weight must not be zero.
+        best[i, :, 2] = counts[0]
+        for k in range(min(period, values.size)):
+            explained, row = sums[k] ** 2 / counts[k], 0 if sums[k] > 0 else 1
+            if explained > best[i, row, 0]:
+                best[i, row, 0], best[i, row, 1] = explained, abs(sums[k])
+                best[i, row, 2], best[i, row, 3] = counts[k], k
     return best
 
 

@@ -148,12 +148,27 @@ def test_a_number_that_nothing_tells_costs_nothing() -> None:
             {"coulomb_friction", "quadratic_drag"},
         ),
         ([model(0.0, places={"tank": 80.0}), model(50.0, FRICTION)], "unknown", set()),
+        # both models have friction, which is one of them
+        ([model(0.0), model(50.0, FRICTION), model(55.0, FRICTION, DRAG)], "named", {"coulomb_friction"}),
+        # three, and none of two effects is in all of them
+        (
+            [model(0.0), model(50.0, FRICTION), model(50.0, DRAG), model(55.0, FRICTION, DRAG)],
+            "indistinguishable",
+            {"coulomb_friction", "quadratic_drag"},
+        ),
     ],
 )  # fmt: skip
 def test_decisions(models: list[ScoredModel], kind: str, names: set[str]) -> None:
     decision = decided(posterior(models, 10, 1.0))
     assert decision.kind == kind
     assert {name for each in decision.alternatives for name in each.names} == names
+
+
+def test_what_may_be_missing_besides_is_said() -> None:
+    wider = [model(53.0, FRICTION, DRAG), model(53.0, FRICTION, DAMPER)]
+    decision = decided(posterior([model(0.0), model(50.0, FRICTION), *wider], 10, 1.0))
+    assert (decision.best is not None and decision.best.keys) == (FRICTION,)
+    assert {each.keys for each in decision.wider} == {each.keys for each in wider}
 
 
 def test_names_that_are_not_sure_enough_tell_the_block_too() -> None:

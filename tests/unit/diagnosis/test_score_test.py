@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from recorded_oscillators import RATE_HZ, run_of
+from scipy.optimize import lsq_linear
 
 from sloshlab.diagnosis import surroundings
 from sloshlab.diagnosis.score_test import ScoreTest
@@ -32,8 +33,8 @@ class Linear:
     def inflation_weights(self, share: float) -> np.ndarray:
         return np.full(N, self.soft)
 
-    def at_bounds(self, theta: np.ndarray) -> np.ndarray:
-        return self.fixed
+    def at_bounds(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.fixed, self.fixed
 
 
 def least(columns: np.ndarray, residual: np.ndarray, prior: np.ndarray, theta: np.ndarray) -> float:
@@ -78,6 +79,33 @@ def test_the_gain_is_that_of_least_squares_with_the_numbers_that_can_follow(
     assert gain == pytest.approx(without - with_it, rel=1e-9)
     moved = least(soft * jacobian[:, free], soft * (residual + size * change), prior, place)
     assert moved == pytest.approx(with_it, rel=1e-9)
+
+
+@dataclass
+class AtBounds(Linear):
+    """One whose numbers that are fixed are at their lower bounds."""
+
+    def at_bounds(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.fixed, np.zeros(self.fixed.size, bool)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_number_at_its_bound_follows_an_effect_inwards_alone(seed: int, way: float) -> None:
+    """Bounded least squares of SciPy, with the effect and without."""
+    generator = np.random.default_rng(seed)
+    jacobian, residual = generator.standard_normal((N, N_NUMBERS)), generator.standard_normal(N)
+    # What the effect does, the first number does too: the one comes inwards, or goes outwards, with the other.
+    change = way * jacobian[:, 0] + 0.3 * generator.standard_normal(N)
+    residual -= change
+    fixed = np.array([True, False, True, False])
+    problem = cast(FreeRunProblem, cast(Any, AtBounds(fixed, n_baseline=0)))
+    known = BlockJacobian.of_columns(list(jacobian.T), [N])
+    gain, _ = ScoreTest(problem, np.zeros(N_NUMBERS), residual, known, 0.1).gains([change])[0]
+    low = np.where(fixed, 0.0, -np.inf)
+    alone = lsq_linear(jacobian, -residual, (low, np.inf))
+    both = lsq_linear(np.column_stack([jacobian, change]), -residual, (np.append(low, -np.inf), np.inf))
+    assert gain == pytest.approx(2 * (alone.cost - both.cost), rel=1e-6)
 
 
 def test_a_change_that_the_baseline_can_follow_predicts_no_gain() -> None:
