@@ -108,12 +108,7 @@ def _best_started(problem: FreeRunProblem, start: dict[str, float], fit: FreeRun
     spacings: dict[str, float] = {}
     shown: list[dict[str, float]] = []
     for candidate in problem.candidates:
-        # A size follows one linear step from anywhere.
-        own = {
-            f"{candidate.key}.{known.name}": candidate.scale(known.name) / _DRAWS_PER_SCALE
-            for known in candidate.effect.parameters
-            if known.name not in candidate.sizes and f"{candidate.key}.{known.name}" in problem.names
-        }
+        own = places_in_runs(problem, candidate)
         if own:
             rest = tuple(other for other in fit.candidates if other is not candidate)
             forces = latent_forces(problem.model, problem.runs, replace(fit, candidates=rest))
@@ -128,6 +123,26 @@ def _best_started(problem: FreeRunProblem, start: dict[str, float], fit: FreeRun
     best = np.argsort(problem.costs([{**start, **numbers} for numbers in draws]))[:_N_REFINED]
     places = [start, *({**start, **numbers} for numbers in (*shown, *(draws[i] for i in best)))]
     return _refined(problem, places, spacings)
+
+
+def places_in_runs(problem: FreeRunProblem, candidate: Candidate) -> dict[str, float]:
+    """Spacing of the places of what an effect has of its own in runs, by the names of these numbers.
+
+    Sizes are none of them: they follow one linear step from anywhere.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+        With the effect.
+    candidate : Candidate
+    """
+    return {
+        name: candidate.scale(known.name) / _DRAWS_PER_SCALE
+        for known in candidate.effect.parameters
+        if known.name not in candidate.sizes
+        and (name := f"{candidate.key}.{known.name}") in problem.names
+        and run_of(name, problem.model)
+    }
 
 
 def _refined(

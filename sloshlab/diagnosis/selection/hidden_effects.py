@@ -1,23 +1,23 @@
-"""Effects that retuning hides: without them as little remains, and the baseline's numbers are less probable.
+"""Effects that hide beside a fit which leaves nothing: in the numbers of the baseline, or in the noise.
 
-Where a fit of the baseline leaves nothing no effect can make the recordings more probable. It can only bring
-numbers of the baseline nearer to what is believed of them. What a small size of an effect changes is linear, and
-so is what the numbers make up for: a quadratic programme says how much more probable the tempered posterior
-becomes, and from where the effect is to be fitted.
+An effect can bring numbers of the baseline nearer to what is believed of them. And what differs from repeat to
+repeat, such as pulses at other instants, is counted as noise until it is explained. What a small size of an effect
+changes is linear, and so is what the numbers make up for: a quadratic programme says how much more probable the
+tempered posterior becomes, and from where the effect is to be fitted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, log
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
-from sloshlab.diagnosis.selection.proposals import missing_from
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, places_in_runs
+from sloshlab.diagnosis.selection.proposals import Places, missing_from
 from sloshlab.identification.baseline_parameter import prior_cost, prior_weights
 from sloshlab.identification.free_run_fit import bounded_step
 from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit, FreeRunProblem, robust_weights
@@ -42,7 +42,8 @@ class HiddenEffect:
     values : dict
         Of the fit and of the effect, from where the two are to be fitted.
     gain : float
-        Of the logarithm of the tempered posterior density, over the baseline alone.
+        Of the logarithm of the tempered posterior density, over the baseline alone; less the logarithm of the
+        places among which the best one was chosen in every run.
     """
 
     candidate: Candidate
@@ -53,6 +54,8 @@ class HiddenEffect:
 def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate]) -> list[HiddenEffect]:
     """Of every effect that shows by its size the best of its starts, the largest gain first.
 
+    Starts are its own and those that the missing force shows, such as instants of pulses.
+
     Parameters
     ----------
     runs : FittedRuns
@@ -62,19 +65,22 @@ def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
     """
     problem = runs.problem_of(fit)
     about = _AboutFit(problem, problem.theta_of(fit.values))
+    places = Places.beside(runs, fit, about.residual)
 
     def of_candidate(candidate: Candidate) -> HiddenEffect | None:
         extended = runs.problem((*fit.candidates, candidate))
-        starts = _directions(candidate)
+        starts = _directions(candidate, places)
         thetas = [
-            extended.theta_of({**fit.values, **candidate.sized(start, size * _SMALL)})
+            extended.theta_of({**fit.values, **candidate.sized(start, size)})
             for start in starts
-            for size in (1, 2, 3)
+            for size in (_SMALL, 2 * _SMALL, 3 * _SMALL)
         ]
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
-        found = []
+        spacings, found = places_in_runs(extended, candidate), []
+        ranges = {prior.name: prior.high - prior.low for prior in candidate.prior}
+        chosen_among = sum(log(max(ranges[name] / spacing, 1.0)) for name, spacing in spacings.items())
         moved = extended.residuals_moved(thetas, own, about.residual)
-        for start, *of_sizes in zip(starts, moved[::3], moved[1::3], moved[2::3], strict=True):
+        for start, *of_sizes in zip(starts, *(moved[k::3] for k in range(3)), strict=True):
             if not all(np.isfinite(each).all() for each in of_sizes):
                 continue
             one, two, three = of_sizes
@@ -85,19 +91,18 @@ def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
             low, high = _factors(candidate, start)
             theta, factor, gain = about.with_effect(change, low, high)
             if isfinite(gain):
-                found.append(
-                    HiddenEffect(candidate, {**problem.values(theta), **candidate.sized(start, factor)}, gain)
-                )
+                values = {**problem.values(theta), **candidate.sized(start, factor)}
+                found.append(HiddenEffect(candidate, values, gain - chosen_among))
         return max(found, key=lambda hidden: hidden.gain, default=None)
 
     each = runs.model.executor.map(of_candidate, missing_from(fit, pool))
     return sorted((hidden for hidden in each if hidden is not None), key=lambda hidden: -hidden.gain)
 
 
-def _directions(candidate: Candidate) -> list[dict[str, float]]:
+def _directions(candidate: Candidate, places: Places) -> list[dict[str, float]]:
     """Starts of an effect that differ by more than the sign of its size."""
     found: list[dict[str, float]] = []
-    for start in candidate.starts() if candidate.sizes else ():
+    for start in places.of(candidate, ()) if candidate.sizes else ():
         if candidate.sized(start, -1.0) not in found:
             found.append(start)
     return found
@@ -107,8 +112,8 @@ def _factors(candidate: Candidate, start: dict[str, float]) -> tuple[float, floa
     """Range of the factor of a start in which all of its sizes are in their ranges."""
     low, high = -np.inf, np.inf
     for parameter in candidate.effect.parameters:
-        value = start[f"{candidate.key}.{parameter.name}"]
-        if parameter.name in candidate.sizes and value:
+        value = start.get(f"{candidate.key}.{parameter.name}", 0.0) if parameter.name in candidate.sizes else 0.0
+        if value:
             ends = sorted(end / value for end in candidate.bounds(parameter))
             low, high = max(low, ends[0]), min(high, ends[1])
     # Absent, an effect has no size, which may be less than the least of its range.

@@ -41,8 +41,8 @@ Said = Callable[[str, int, int], None]
 N_KEPT: Final = 4
 """Models that are fitted to the end at every step of the search; two, four and eight times as many are begun."""
 _MOST_EFFECTS: Final = 2
-_BUDGET: Final = 6e8
-"""Coefficients that may be simulated, a minute on two cores; what is begun then is finished, no more is begun."""
+_BUDGET: Final = 1.2e9
+"""Coefficients that may be simulated, two minutes on two cores; what is begun is finished, no more is begun."""
 _EVALUATIONS_OF_FITS: Final = 800
 """Simulations that the fits of one growth take, about: 56 of three steps and four to the end."""
 _LEAST_EXPLAINED: Final = 0.1
@@ -105,11 +105,7 @@ class ModelSelection:
             best = self._best_of(n)
             if best is None or n == _MOST_EFFECTS or not self._remains(best) or self._explains_little(n):
                 break
-            self._joined(n)
-            joined = self._best_of(n + 1)
-            if joined is None or self._remains(joined):
-                leading = self._leading(n)
-                self._added(leading, "one more effect", leading[0])
+            self._extended(n)
             self._renew_sampling()
             self._swapped(n + 1)
             self._simplified(n + 1)
@@ -205,8 +201,7 @@ class ModelSelection:
         more of it.
         """
         # A simpler form costs a hundredth of all candidates, and decides what is said of a wider one.
-        if self._left <= 0 and not only:
-            self.failed["search"] = "ended at its budget, with more effects to try"
+        if not only and not self._has_budget():
             return
         few = self.runs.one_repeat_per_test
         pool = only or self._pool_beside(bases)
@@ -228,24 +223,35 @@ class ModelSelection:
         coarse = halved(few, proposed, stages, N_KEPT, lambda name, i, n: self.said(f"{what}: {name}", i, n))
         self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))
 
+    def _has_budget(self) -> bool:
+        if self._left <= 0:
+            self.failed["search"] = "ended at its budget, with more effects to try"
+        return self._left > 0
+
     def _uncovered(self, fit: FreeRunFit) -> bool:
-        """Effects that the baseline hides beside a fit which leaves nothing; whether one is more probable."""
-        self.said("effects hidden by retuning", 0, 1)
+        """Effects that baseline or noise hide beside a fit which leaves nothing; whether one is more probable."""
+        self.said("hidden effects", 0, 1)
         n, pool = len(fit.candidates), len(self.pool)
         least = log_prior(n, pool) - log_prior(n + 1, pool)
-        hidden = [each for each in hidden_effects(self.runs, fit, self.pool) if each.gain > least]
-        starts = [
-            FreeRunFit((*fit.candidates, each.candidate), each.values, 0.0, 0.0) for each in hidden[: 2 * N_KEPT]
-        ]
-        found = list(self.runs.model.executor.map(lambda start: self._to_the_end(start, fit), starts))
-        self._keep(found)
-        # All others have been compared with these.
-        self._swapped_beside.setdefault(_keys_of(fit.candidates), set()).update(
-            _keys_of(start.candidates) for start in starts
-        )
-        return self._evidence([each for each in found if not each.trouble]) > self._evidence([fit])
+        hidden = [each for each in hidden_effects(self.runs, fit, self._pool_beside([fit])) if each.gain > least]
+        starts = [FreeRunFit((*fit.candidates, each.candidate), each.values, 0.0, 0.0) for each in hidden]
+        is_more_probable = False
+        # Those that promise most first; look-alikes of what keeps its promise after them.
+        for some in (starts[:N_KEPT], starts[N_KEPT : 2 * N_KEPT]):
+            found = list(self.runs.model.executor.map(lambda start: self._to_the_end(start, fit), some))
+            self._keep(found)
+            # All others have been compared with these.
+            self._swapped_beside.setdefault(_keys_of(fit.candidates), set()).update(
+                _keys_of(start.candidates) for start in some
+            )
+            if self._evidence([each for each in found if not each.trouble]) <= self._evidence([fit]):
+                break
+            is_more_probable = True
+        return is_more_probable
 
-    def _added(self, bases: Sequence[FreeRunFit], what: str, best: FreeRunFit) -> None:
+    def _added(
+        self, bases: Sequence[FreeRunFit], what: str, best: FreeRunFit, only: Sequence[Candidate] = ()
+    ) -> None:
         """One effect more: forces that match what is missing beside a fit, until one leaves nothing; then any.
 
         Beside a force that leaves nothing others come only if they are not far worse: a mass or a spring that
@@ -259,7 +265,7 @@ class ModelSelection:
             if not fit.trouble and not self._remains(fit):
                 enough = candidate
                 break
-        self._grown(bases, what, matched=matched, against=enough)
+        self._grown(bases, what, only, matched=matched, against=enough)
 
     def _matched_beside(self, fit: FreeRunFit, what: str) -> MatchedForces:
         """Forces matched to what is missing beside a fit."""
@@ -274,18 +280,24 @@ class ModelSelection:
     def _pool_beside(self, bases: Sequence[FreeRunFit]) -> list[Candidate]:
         return [*self.pool, *self._candidates_beside(bases)]
 
-    def _joined(self, n: int) -> None:
-        """The leading models of so many effects with one more of those that lead alone, each at its own numbers.
+    def _extended(self, n: int) -> None:
+        """The two leading models of so many effects with one more; forces are matched where none is enough.
 
-        Two effects of which both show alone need no search beside each other.
+        Those that lead alone are begun from their own numbers, too: two effects of which both show alone need no
+        search beside each other.
         """
-        alone = self._of(1)[: 2 * N_KEPT]
-        effects = [fit.candidates[0] for fit in alone]
-        starts = {
-            effect.key: [*self._promising.get(effect.key, ()), _own_numbers(fit, effect)]
-            for effect, fit in zip(effects, alone, strict=True)
-        }
-        self._grown(self._of(n)[: 2 * N_KEPT], "effects together", effects, starts)
+        what, leading = "one more effect", self._leading(n)
+        starts = dict(self._promising)
+        for alone in self._of(1)[: 2 * N_KEPT]:
+            [effect] = alone.candidates
+            starts[effect.key] = [*self._promising.get(effect.key, ()), _own_numbers(alone, effect)]
+        self._grown(leading, what, promising=starts)
+        found = self._best_of(n + 1)
+        if (found is None or self._remains(found)) and self._has_budget():
+            matched = self._matched_beside(leading[0], what)
+            forces = [each for each in self._pool_beside(leading[:1]) if each.key in matched.starts]
+            if forces:
+                self._added(leading, what, leading[0], forces)
 
     def _of(self, n: int) -> list[FreeRunFit]:
         """Fits of so many effects, the best first."""

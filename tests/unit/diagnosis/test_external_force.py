@@ -15,7 +15,7 @@ from recorded_oscillators import (
     surroundings,
 )
 
-from sloshlab.diagnosis.selection.fitted_runs import _refined, values_of_runs
+from sloshlab.diagnosis.selection.fitted_runs import _refined, places_in_runs, values_of_runs
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
@@ -166,6 +166,16 @@ def test_numbers_of_runs_that_were_not_fitted_leave_those_of_the_fitted_alone(pu
     assert found[f"{key}.phase in first"] == 0.37
     assert f"{key}.phase in second" in found
     assert found[f"{key}.size_n"] == 0.4
+
+
+def test_an_instant_has_six_places_in_a_period_of_the_motion(pulsed: RigModel) -> None:
+    at = of_runs(pulsed)
+    train = Candidate(effect("structure.external_force").of_runs(("first", "second")), at)
+    problem = FreeRunProblem(pulsed, [observations(run, pulsed.compared(run)) for run in pulsed.runs], [train])
+    found = places_in_runs(problem, train)
+    assert found == pytest.approx(
+        {f"{train.key}.start_s in {run}": 1 / (6 * at.frequency_hz) for run in ("first", "second")}
+    )
 
 
 def test_the_instant_of_pulses_is_found_in_a_run_that_was_not_fitted(pulsed: RigModel) -> None:
