@@ -34,6 +34,7 @@ def test_friction_is_named_with_its_size(tmp_path: Path) -> None:
     assert its.low < 0.2 < its.high
 
 
+@pytest.mark.slow
 def test_a_damper_that_closes_with_the_displacement_has_no_name_and_is_placed(tmp_path: Path) -> None:
     # c x² v: dissipates, and is no function of the velocity alone.
     found = verdict(tmp_path, decays(LEVELS_M, seed=7, force=lambda t, x, v: -3e4 * x**2 * v))
