@@ -106,7 +106,11 @@ def test_numbers_that_all_runs_share_stand_beside_those_of_runs() -> None:
 @pytest.mark.parametrize(
     ("none", "added"),
     [
-        (0.47, "; these recordings do not tell that from mass error (0.30) or cross talk + mass error (0.22)"),
+        (
+            0.47,
+            "; these recordings do not tell that from mass error (0.30) or cross talk + mass error (0.22)"
+            " or something that has no name (0.02)",
+        ),
         (0.95, ""),
     ],
 )
@@ -117,11 +121,15 @@ def test_what_may_be_the_rig_alone_is_said_beside_nothing(none: float, added: st
     said = (
         "Nothing is missing: with its own parameters retuned the simulation describes the held-out runs to 0.84 of"
     )
-    said += " the noise floor"
-    if none < 0.9:
-        said += "; these recordings do not tell that from mass error (0.30) or cross talk + mass error (0.22)"
-        said += " or something that has no name (0.02)"
-    assert statement_of(found, decision, {}) == f"{said}."
+    assert statement_of(found, decision, {}) == f"{said} the noise floor{added}."
+
+
+def test_what_may_be_missing_besides_is_in_the_statement() -> None:
+    best: Any = SimpleNamespace(names=("drag",), fit=SimpleNamespace(candidates=()), held_out_rms=0.9)
+    wider: Any = [SimpleNamespace(names=names) for names in (("cross_talk", "drag"), ("drag", "sensor_gain"))]
+    found: Any = SimpleNamespace(retuned=SimpleNamespace(held_out_rms=1.4))
+    said = statement_of(found, Decision("named", best, [best], "", {}, wider), {})
+    assert said.endswith("; these recordings do not tell whether cross talk or sensor gain is missing besides.")
 
 
 @pytest.mark.parametrize("n_channels", [1, 2])
