@@ -59,19 +59,26 @@ def _can_act(block: str) -> Callable[[Surroundings], bool]:
 # --- pulses ----------------------------------------------------------------------------------------------------
 
 
-_PULSES: Final = (
-    EffectParameter("size_n", -1e7, 1e7, range=Range(1e-3, 10.0, scales.force, may_be_negative=True)),
-    EffectParameter("period_s", 1e-3, 1e5, range=Range(0.02, 1.0, scales.duration), tolerance=scales.period),
-    EffectParameter("width_s", 1e-4, 1e4, range=Range(0.03, 3.0, scales.period)),
-    EffectParameter(
-        "start_s",
-        0.0,
-        1e5,
-        range=Range(0.0, 1.0, scales.duration, is_log=False),
-        each_run=True,
-        tolerance=scales.period,
-    ),
-)
+def _pulse_numbers(earliest_start: float) -> tuple[EffectParameter, ...]:
+    """Of a train that begins at the earliest start [lengths of a run] or later."""
+    return (
+        EffectParameter("size_n", -1e7, 1e7, range=Range(1e-3, 10.0, scales.force, may_be_negative=True)),
+        EffectParameter("period_s", 1e-3, 1e5, range=Range(0.02, 1.0, scales.duration), tolerance=scales.period),
+        EffectParameter("width_s", 1e-4, 1e4, range=Range(0.03, 3.0, scales.period)),
+        EffectParameter(
+            "start_s",
+            1e5 * earliest_start,
+            1e5,
+            range=Range(earliest_start, 1.0, scales.duration, is_log=False),
+            each_run=True,
+            tolerance=scales.period,
+        ),
+    )
+
+
+_PULSES: Final = _pulse_numbers(0.0)
+_ALTERNATING: Final = _pulse_numbers(-1.0)
+"""May have begun before a run, so that its first pulse is a reversed one."""
 
 
 def _pulses(block: str, *, alternates: bool) -> Callable[[Numbers, str, Surroundings], Term]:
@@ -94,7 +101,7 @@ def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], li
     """The train that explains most of a missing force, for pulses upward and downward."""
 
     def proposed(at: Surroundings, missing: MissingForces) -> list[Numbers]:
-        best: dict[float, tuple[float, Numbers]] = {}
+        best: dict[float, tuple[float, int, Numbers]] = {}
         for width in _WIDTHS:
             n = max(4, round(width / at.frequency_hz * at.sampling_rate_hz))
             shape = 0.5 * (1 - np.cos(2 * pi * np.arange(n) / n))
@@ -116,8 +123,9 @@ def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], li
                     starts = {in_run("start_s", run): place / rate for run, place in first}
                     size = float(sign * force[k, row] / weight[k, row])
                     train = {"size_n": size, "period_s": float(periods[k]) / rate, "width_s": n / rate, **starts}
-                    best[sign] = (score, train)
-        return [train for _, train in sorted(best.values(), key=lambda found: -found[0])]
+                    best[sign] = (score, sum(start < 0 for start in starts.values()), train)
+        # what alternates is as well its own reverse, begun earlier: it is told by the pulse it begins with
+        return [train for *_, train in sorted(best.values(), key=lambda found: (-found[0], found[1]))]
 
     return proposed
 
@@ -136,7 +144,8 @@ def _best_places(values: FloatArray, periods: NDArray[np.int64], alternate: bool
     """Where a train of each period explains most of a series, upward and downward, shape (n_periods, 2, 4).
 
     Columns: what it explains; the sum of the values at its pulses, positive along its direction; how many these
-    are; the first of them [samples]. Every other pulse counts reversed where they alternate.
+    are; when it begins [samples], within the first two periods, or, where pulses alternate and every other one
+    counts reversed, up to a period before the series.
     """
     best = np.zeros((periods.size, 2, 4))
     for i, period in enumerate(periods):
@@ -151,10 +160,16 @@ def _best_places(values: FloatArray, periods: NDArray[np.int64], alternate: bool
         # A train that explains nothing has its first pulse, too: its weight must not be zero.
         best[i, :, 2] = counts[0]
         for k in range(min(period, values.size)):
-            explained, row = sums[k] ** 2 / counts[k], 0 if sums[k] > 0 else 1
-            if explained > best[i, row, 0]:
-                best[i, row, 0], best[i, row, 1] = explained, abs(sums[k])
-                best[i, row, 2], best[i, row, 3] = counts[k], k
+            later = sums[k] - values[k]
+            for total, count, begins in (
+                (sums[k], counts[k], k),
+                (-sums[k] if alternate else 0.0, counts[k], k - period),
+                (-later if alternate else later, counts[k] - 1.0, k + period),
+            ):
+                row = 0 if total > 0 else 1
+                if count > 0 and total**2 / count > best[i, row, 0]:
+                    best[i, row, 0], best[i, row, 1] = total**2 / count, abs(total)
+                    best[i, row, 2], best[i, row, 3] = count, begins
     return best
 
 
@@ -235,7 +250,7 @@ def _registered(block: str) -> tuple[Effect, Effect, Effect]:
                 name,
                 block,
                 PULSE_TRAIN.equation + after,
-                _PULSES,
+                numbers,
                 train,
                 _in_every_run(_pulses(block, alternates=alternates)),
                 _SEPARATED_BY,
@@ -246,9 +261,9 @@ def _registered(block: str) -> tuple[Effect, Effect, Effect]:
                 proposes=_pulses_in(alternate=alternates),
             )
         )
-        for name, after, alternates, variant_of in (
-            ("external_force", "", False, ""),
-            ("alternating_pulses", ", up and down in turn", True, "external_force"),
+        for name, after, numbers, alternates, variant_of in (
+            ("external_force", "", _PULSES, False, ""),
+            ("alternating_pulses", ", up and down in turn", _ALTERNATING, True, "external_force"),
         )
     )
     line = Effect(

@@ -85,11 +85,12 @@ def pulsed(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
     return RigModel(rig(folder), folder, runs)
 
 
-def pulses(start_s: float) -> Callable[[float, float, float], float]:
+def pulses(start_s: float, every_other: float = 1.0) -> Callable[[float, float, float], float]:
     def force(t: float, x: float, v: float) -> float:
-        within = (t - start_s) % PERIOD_S
+        n, within = divmod(t - start_s, PERIOD_S)
         inside = t >= start_s and within < WIDTH_S
-        return FORCE_N * 0.5 * (1 - np.cos(2 * np.pi * within / WIDTH_S)) if inside else 0.0
+        sign = every_other if n % 2 else 1.0
+        return sign * FORCE_N * 0.5 * (1 - np.cos(2 * np.pi * within / WIDTH_S)) if inside else 0.0
 
     return force
 
@@ -131,6 +132,28 @@ def test_a_missing_force_shows_the_train_that_is_in_it(pulsed: RigModel) -> None
     for name, start in (("first", 0.37), ("second", 0.21)):
         off = (best[f"{key}.start_s in {name}"] - start + 0.5 * PERIOD_S) % PERIOD_S - 0.5 * PERIOD_S
         assert abs(off) < WIDTH_S
+
+
+@pytest.mark.parametrize("key", ["structure.external_force", "structure.alternating_pulses"])
+@pytest.mark.parametrize("size_n", [FORCE_N, -FORCE_N])
+def test_a_train_may_begin_later_than_its_period_or_before_the_run(
+    pulsed: RigModel, key: str, size_n: float
+) -> None:
+    """Folded by the period, both fall on one instant; what alternates begins there with another sign."""
+    alternates = key.endswith("alternating_pulses")
+    starts = {"first": 0.13, "second": PERIOD_S + 0.08} | ({"third": 0.27 - PERIOD_S} if alternates else {})
+    time = np.arange(2000) / RATE_HZ
+    missing = {
+        name: np.array([size_n / FORCE_N * pulses(start, -1.0 if alternates else 1.0)(t, 0.0, 0.0) for t in time])
+        for name, start in starts.items()
+    }
+    train = Candidate(effect(key).of_runs(tuple(starts)), of_runs(pulsed))
+    best = train.proposed(missing)[0]
+    # the pulses' own width is none of those that are tried: 0.25 of a period is nearest
+    assert best[f"{key}.size_n"] == pytest.approx(size_n, rel=0.25)
+    assert best[f"{key}.period_s"] == pytest.approx(PERIOD_S, abs=0.5 * WIDTH_S * PERIOD_S / 8.0)
+    for name, start in starts.items():
+        assert best[f"{key}.start_s in {name}"] == pytest.approx(start, abs=WIDTH_S)
 
 
 def test_a_missing_force_shows_the_line_that_is_in_it(pulsed: RigModel) -> None:
