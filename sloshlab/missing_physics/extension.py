@@ -86,7 +86,7 @@ class Extension:
         Changes the baseline's forces of the liquid.
     faults : tuple of SensorFault
     key : tuple
-        Identifies the extension, for caches: names and numbers of all effects.
+        Identifies the extension, for caches: names and numbers of all effects; by default of all that it adds.
     structure : callable or None
         Changes the baseline's structure, after its own numbers were retuned.
     drives : tuple of ActingDrive
@@ -101,6 +101,15 @@ class Extension:
     structure: Callable[[Structure], Structure] | None = None
     drives: tuple[ActingDrive, ...] = ()
     run_terms: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.key:
+            of_runs = [(run, term) for run, terms in self.run_terms.items() for term in terms]
+            own = [_identity(term) for term in self.terms] + [(run, *_identity(term)) for run, term in of_runs]
+            others = [fault.key for fault in self.faults] + [drive.key for drive in self.drives]
+            # by the functions themselves, which a cache that keeps the key keeps alive
+            changes = [("changes", part) for part in (self.liquid, self.structure) if part is not None]
+            object.__setattr__(self, "key", (*own, *others, *changes))
 
     def terms_in(self, run: str) -> tuple[Term, ...]:
         """Forces that are added in a run."""
@@ -120,6 +129,10 @@ class Extension:
                 for run in {**self.run_terms, **other.run_terms}
             },
         )
+
+
+def _identity(term: Term) -> tuple[Any, ...]:
+    return (term.name, term.place, *sorted(term.values.items()), hash(term.table.tobytes()))
 
 
 _Changed = TypeVar("_Changed")

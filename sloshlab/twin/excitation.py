@@ -6,7 +6,7 @@ recording is interpolated band-limited. Velocity and displacement of the same mo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -218,6 +218,31 @@ def recorded(
     given = {
         column: np.asarray(values, dtype=np.float64) for column, values in columns.items() if values is not None
     }
+    moves = any(column in given for column in (_ACCELERATION, _VELOCITY, _DISPLACEMENT))
+    return _of_series(sampling_rate_hz, given, {column: INPUTS[column] for column in given}, moves_base=moves)
+
+
+def recorded_for_equations(sampling_rate_hz: float, series: Mapping[str, npt.ArrayLike]) -> Excitation:
+    """What state equations read of a recording, in the order of the series.
+
+    Parameters
+    ----------
+    sampling_rate_hz : float
+    series : mapping of str to array_like, shape (n_samples,)
+
+    Raises
+    ------
+    InputError
+        If lengths differ, or values are lost.
+    """
+    given = {len(INPUTS) + k: np.asarray(values, dtype=np.float64) for k, values in enumerate(series.values())}
+    return _of_series(sampling_rate_hz, given, dict(zip(given, series, strict=True)), moves_base=False)
+
+
+def _of_series(
+    sampling_rate_hz: float, given: Mapping[int, FloatArray], names: Mapping[int, str], *, moves_base: bool
+) -> Excitation:
+    """Series by their column of the inputs, interpolated between their samples."""
     lengths = {values.shape for values in given.values()}
     if len(lengths) != 1 or len(next(iter(lengths))) != 1:
         raise InputError("recorded inputs", got=f"shapes {sorted(lengths)}", allowed="series of one length")
@@ -225,13 +250,14 @@ def recorded(
         lost = int((~np.isfinite(values)).sum())
         if lost:
             raise InputError(
-                f"recorded {INPUTS[column]}", got=f"{lost} lost samples", remedy="simulate a stretch without gaps"
+                f"recorded {names[column]}", got=f"{lost} lost samples", remedy="simulate a stretch without gaps"
             )
 
+    n_columns = max(len(INPUTS), 1 + max(given))
     between = {column: _BandLimitedSeries(values) for column, values in given.items()}
 
     def inputs(time: FloatArray) -> FloatArray:
-        table = np.zeros((time.size, len(INPUTS)))
+        table = np.zeros((time.size, n_columns))
         # instants are whole fractions of a sample, so that a few rows of weights serve all of them
         per_sample = round(1.0 / ((time[1] - time[0]) * sampling_rate_hz))
         first = round(time[0] * sampling_rate_hz * per_sample)
@@ -240,8 +266,7 @@ def recorded(
         return table
 
     (shape,) = lengths
-    moves = any(column in given for column in (_ACCELERATION, _VELOCITY, _DISPLACEMENT))
-    return Excitation(sampling_rate_hz, shape[0], inputs, moves_base=moves)
+    return Excitation(sampling_rate_hz, shape[0], inputs, moves_base=moves_base)
 
 
 def with_cached_inputs(excitation: Excitation) -> Excitation:

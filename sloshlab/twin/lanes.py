@@ -147,7 +147,7 @@ def _model(lanes: Lanes, lane: int) -> Model:
         lanes.base_participation[lane], lanes.mobility[lane], lanes.added_mass[lane], lanes.inverse_inertia[lane],
         of.law, of.events, of.update, lanes.update_period[lane], of.kind, of.frame, lanes.mass[lane],
         lanes.parameters[lane], of.parameters_at, of.memory_at, of.n_states, of.n_switches, of.n_limits,
-        of.friction_frame, of.uses_acceleration, of.updates,
+        of.friction_frame, of.uses_acceleration, of.updates, of.equations,
     )  # fmt: skip
 
 
@@ -156,7 +156,7 @@ def _scratch(s: LaneScratch, lane: int) -> Scratch:
     return Scratch(
         s.state[lane], s.nothing, s.updates[lane], s.friction[lane], s.motion[lane], s.force[lane],
         s.residual[lane], s.inputs[lane], s.slope[lane], s.values[lane], s.slopes[lane], s.no_powers,
-        s.trial[lane], s.nothing,
+        s.trial[lane], s.nothing, s.nothing, s.nothing,
     )  # fmt: skip
 
 

@@ -38,6 +38,19 @@ STICKS, NO_FRICTION = 0.0, 2.0
 """Values of `Scratch.friction[0]` beside the directions ±1 of sliding."""
 
 
+class Equations(NamedTuple):
+    """State equations that somebody wrote, in place of modes; `sloshlab.twin.state_equations` makes them."""
+
+    address: int  # of (drive, numbers, state) → rates and readings; 0 where the twin has modes
+    numbers: FloatArray  # (n_numbers,)
+    n_states: int  # the first ones of the state
+    displacement: int  # of them, that the forces of terms see
+    velocity: int  # of them, −1 where the displacement is a state of the first order
+
+
+NO_EQUATIONS: Final = Equations(0, np.empty(0), 0, 0, 0)
+
+
 class Model(NamedTuple):
     """Everything the engine needs to know of a twin; terms are rows."""
 
@@ -65,6 +78,7 @@ class Model(NamedTuple):
     friction_frame: int  # −1 without dry friction
     uses_acceleration: bool  # any of the laws
     updates: bool  # any of the terms
+    equations: Equations
 
 
 class Scratch(NamedTuple):
@@ -77,13 +91,15 @@ class Scratch(NamedTuple):
     motion: FloatArray  # (2 N_MOTION,) one row per frame
     force: FloatArray  # (n_terms,)
     residual: FloatArray  # (n_modes,) r
-    inputs: FloatArray  # (len(INPUTS),)
+    inputs: FloatArray  # (len(INPUTS) + those that equations read beside them,)
     slope: FloatArray  # (1,) of the forces over the acceleration, where it was solved for last; NaN at first
     values: FloatArray  # (largest number of events of a term,)
     slopes: FloatArray  # (5, n_states)
     powers: FloatArray  # (5, n_works)
     trial: FloatArray  # (n_states,)
     trial_works: FloatArray  # (n_works,)
+    drive: FloatArray  # (2 + inputs of equations,) added force, time, inputs; empty without equations
+    answer: FloatArray  # (n_states + readings of equations,) their rates and readings
 
 
 class Stage(NamedTuple):
@@ -104,7 +120,7 @@ class Time(NamedTuple):
 class Excited(NamedTuple):
     """The excitation of one stretch."""
 
-    table: FloatArray  # (n_half_steps or 0, len(INPUTS))
+    table: FloatArray  # (n_half_steps or 0, len(INPUTS) + those that equations read beside them)
     first: int  # half step of the whole simulation in its first row
     factor: float  # of the motion of the base
 
@@ -142,8 +158,20 @@ def columns(rows: FloatArray, n_modes: int, n_terms: int, n_memory: int) -> tupl
     return modes, rows[:, memory:forces], rows[:, forces:works], rows[:, works:]
 
 
-def scratch(model: Model, state: FloatArray, n_event_functions: int) -> Scratch:
-    """Working memory of a simulation that starts from `state`."""
+def scratch(
+    model: Model, state: FloatArray, n_event_functions: int, *, n_further_inputs: int = 0, n_readings: int = 0
+) -> Scratch:
+    """Working memory of a simulation that starts from `state`.
+
+    Parameters
+    ----------
+    model : Model
+    state : ndarray, shape (n_states,)
+    n_event_functions : int
+        Largest number of a term.
+    n_further_inputs, n_readings : int
+        Of equations.
+    """
     n_terms, n_modes = model.law.size, model.stiffness.size
     n_works = 2 * n_terms + N_OTHER_WORKS
     friction = np.zeros(4)
@@ -151,7 +179,8 @@ def scratch(model: Model, state: FloatArray, n_event_functions: int) -> Scratch:
     return Scratch(
         state, np.zeros(n_works), np.zeros(n_terms), friction,
         np.zeros(2 * N_MOTION), np.zeros(n_terms), np.zeros(n_modes),
-        np.zeros(len(INPUTS)), np.full(1, np.nan), np.zeros(max(n_event_functions, 1)),
+        np.zeros(len(INPUTS) + n_further_inputs), np.full(1, np.nan), np.zeros(max(n_event_functions, 1)),
         np.zeros((5, state.size)),
         np.zeros((5, n_works)), np.zeros(state.size), np.zeros(n_works),
+        np.zeros(2 + n_further_inputs), np.zeros(model.equations.n_states + n_readings),
     )  # fmt: skip

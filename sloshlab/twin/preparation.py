@@ -27,6 +27,7 @@ from sloshlab.twin.model import (
     scratch,
 )
 from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.state_equations import StateEquations, engine_equations
 from sloshlab.twin.status import Ending, Status
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import PLACES, Term
@@ -60,7 +61,12 @@ class Prepared:
     memory: FloatArray
 
 
-def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Excitation) -> Prepared:
+def prepared(
+    terms: Sequence[Term],
+    structure: Structure | None,
+    excitation: Excitation,
+    equations: StateEquations | None = None,
+) -> Prepared:
     """Blocks as arrays.
 
     Raises
@@ -79,6 +85,10 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
     # Acceleration of the place per force on it. One number for all modes, because all forces act at one place:
     # several tanks would make it a small matrix.
     mobility = 0.0 if structure is None else float((structure.mode_shape**2 / structure.masses_kg).sum())
+    n_before_terms = 2 * n_modes
+    if equations is not None:
+        _require_that_forces_fit(terms, equations)
+        mobility, n_before_terms = equations.mobility_per_kg, equations.start.size
     model = Model(
         shape=empty if structure is None else np.ascontiguousarray(structure.mode_shape),
         inverse_mass=empty if structure is None else 1.0 / structure.masses_kg,
@@ -99,15 +109,26 @@ def prepared(terms: Sequence[Term], structure: Structure | None, excitation: Exc
         # (with `empty`, because a twin may have no terms)
         parameters=np.concatenate([*numbers, empty]),
         parameters_at=_offsets(numbers)[:-1],
-        memory_at=2 * n_modes + _offsets(blocks),
+        memory_at=n_before_terms + _offsets(blocks),
         n_states=_integers([m.size for m in memories]),
         n_switches=_integers([term.kind.n_switches for term in terms]),
         n_limits=_integers([len(term.kind.limits) for term in terms]),
         friction_frame=_friction_frame(terms, excitation),
         uses_acceleration=any(term.kind.uses_acceleration for term in terms),
         updates=any(term.kind.update is not None for term in terms),
+        equations=engine_equations(equations),
     )
     return Prepared(model, np.concatenate([*blocks, empty]))
+
+
+def _require_that_forces_fit(terms: Sequence[Term], equations: StateEquations) -> None:
+    """A state of the first order has neither mass nor a velocity at which friction could stick."""
+    for term in terms:
+        kind = term.kind
+        if equations.velocity < 0 and (term.mass_kg or kind.uses_acceleration or kind.dry_friction):
+            raise InputError(
+                f"twin: {term.name}", got="a state of the first order", allowed="forces of displacement and rate"
+            )
 
 
 def _integers(values: Sequence[int]) -> npt.NDArray[np.int64]:
@@ -173,6 +194,10 @@ def start_state(
         if not np.isfinite(value) or (value != 0.0 and twin.structure is None):
             raise InputError(f"twin: {name}", got=str(value), allowed="a number, for twins with a structure")
     modes = np.empty(0)
+    if twin.equations is not None:
+        modes = twin.equations.start
+        displacement_m = float(modes[twin.equations.displacement])
+        velocity_m_per_s = float(modes[twin.equations.velocity]) if twin.equations.velocity >= 0 else 0.0
     if twin.structure is not None:
         # a weight that is hung to the tank and cut off: all modes are deflected, not the first alone
         deflected = twin.structure.static_deflection
@@ -194,11 +219,19 @@ def run(
     watch: Watch | None = None,
 ) -> Simulation:
     """Integrate stretch by stretch; `watch` is told samples done and samples in all after each."""
-    ready = prepared(twin.terms, twin.structure, excitation)
+    ready = prepared(twin.terms, twin.structure, excitation, twin.equations)
     model, n_rows = ready.model, excitation.n_samples
-    largest = bounds_of_states(model.stiffness.size, ready.memory.size)
-    s = scratch(model, start_state(twin, ready, excitation.at_start(), *start), most_event_functions(twin.terms))
-    n_kept = n_columns(model.stiffness.size, model.law.size, ready.memory.size)
+    own = twin.equations
+    n_memory = model.equations.n_states + ready.memory.size
+    largest = bounds_of_states(model.stiffness.size, n_memory)
+    s = scratch(
+        model,
+        start_state(twin, ready, excitation.at_start(), *start),
+        most_event_functions(twin.terms),
+        n_further_inputs=0 if own is None else len(own.compiled.inputs),
+        n_readings=0 if own is None else own.compiled.n_readings,
+    )
+    n_kept = n_columns(model.stiffness.size, model.law.size, n_memory)
     _check_size(n_rows, n_kept)
     out = Outputs(np.empty((n_rows, n_kept)), np.empty((_LARGEST_EVENT_LOG, 4)), np.zeros(1, np.int64))
     inputs = _KeptInputs(np.zeros(n_rows), np.zeros((n_rows, 3)))
@@ -297,6 +330,8 @@ def place_of(twin: Blocks, model: Model, status: int, where: int) -> str:
         n = model.stiffness.size
         if where < 2 * n:
             return f"{'displacement' if where < n else 'velocity'} of mode {where % n + 1}"
+        if twin.equations is not None and where < model.equations.n_states:
+            return f"state {twin.equations.compiled.states[where]}"
         owner = int(np.searchsorted(model.memory_at, where, side="right")) - 1
         return f"memory of {twin.terms[owner].name}"
     return "" if status == Status.DONE else "twin"

@@ -20,10 +20,12 @@ from sloshlab.twin.law_call import call_law
 from sloshlab.twin.model import (
     ABSOLUTE,
     DRY_FRICTION,
+    INPUTS,
     N_OF_BASE_MOTION,
     RELATIVE,
     STICKS,
     USES_ACCELERATION,
+    Equations,
     Excited,
     FloatArray,
     Model,
@@ -116,22 +118,22 @@ def _forces_at(m: Model, a: float, stage: Stage, s: Scratch) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _solve_acceleration(m: Model, free: float, known: float, stage: Stage, s: Scratch) -> float:
+def _solve_acceleration(m: Model, mobility: float, free: float, known: float, stage: Stage, s: Scratch) -> float:
     """The relative acceleration under forces that depend on it; NaN if there is none.
 
     Secants from the slope of the last time, which most laws keep, or else Newton's method.
     """
     # (1 + m_a μ) a = free + μ (known + F(a)), μ = Σψ²/m being the mobility of the place: one unknown, whatever
     # the number of modes
-    inertia = 1.0 + m.added_mass * m.mobility
-    start = (free + m.mobility * known) * m.inverse_inertia
+    inertia = 1.0 + m.added_mass * mobility
+    start = (free + mobility * known) / inertia
     a, slope, before, force_before = start, s.slope[0], np.nan, 0.0
     for _ in range(_MOST_SECANTS):
         there = _forces_at(m, a, stage, s)
         # `before` starts as NaN: the first step takes the slope of the last time
         if abs(a - before) > _LEAST_CHORD * (1.0 + abs(a)):
             slope = (there - force_before) / (a - before)
-        correction = (free + m.mobility * (known + there) - inertia * a) / (inertia - m.mobility * slope)
+        correction = (free + mobility * (known + there) - inertia * a) / (inertia - mobility * slope)
         if not np.isfinite(correction):
             break
         before, force_before = a, there
@@ -146,8 +148,8 @@ def _solve_acceleration(m: Model, free: float, known: float, stage: Stage, s: Sc
         slope = _forces_at(m, nearby, stage, s)
         there = _forces_at(m, a, stage, s)
         slope = (slope - there) / (nearby - a)
-        correction = free + m.mobility * (known + there) - inertia * a
-        correction /= inertia - m.mobility * slope
+        correction = free + mobility * (known + there) - inertia * a
+        correction /= inertia - mobility * slope
         if not np.isfinite(correction):
             break
         a += correction
@@ -200,22 +202,64 @@ def _known_force(m: Model, stage: Stage, s: Scratch) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _implicit_force(m: Model, free: float, known: float, stage: Stage, s: Scratch) -> tuple[float, bool]:
+def _implicit_force(
+    m: Model, mobility: float, free: float, known: float, stage: Stage, s: Scratch
+) -> tuple[float, bool]:
     """Sum of all forces where some depend on the acceleration or friction holds, and whether there is one."""
-    inertia = 1.0 + m.added_mass * m.mobility
+    inertia = 1.0 + m.added_mass * mobility
     if s.friction[0] == STICKS:
         # The place stands still in the frame of its friction: the acceleration is known and the force is the
         # unknown. An exact constraint, where a steep function of the velocity would make the equations stiff.
         a = -s.inputs[2] if m.friction_frame == ABSOLUTE else 0.0
         known += _forces_at(m, a, stage, s)
-        holding = (inertia * a - free) / m.mobility - known
+        holding = (inertia * a - free) / mobility - known
         _hold(m, holding, stage, s)
         return known + holding, True
     # prescribed motion: the acceleration relative to it is zero, whatever the forces
-    if m.mobility == 0.0:
+    if mobility == 0.0:
         return known + _forces_at(m, 0.0, stage, s), True
-    a = _solve_acceleration(m, free, known, stage, s)
-    return (inertia * a - free) / m.mobility, np.isfinite(a)
+    a = _solve_acceleration(m, mobility, free, known, stage, s)
+    return (inertia * a - free) / mobility, np.isfinite(a)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def _ask(e: Equations, force: float, y: FloatArray, s: Scratch) -> None:
+    """Rates and readings of equations under a force, into `answer`."""
+    s.drive[0] = force
+    call_law(e.address, (s.drive, e.numbers, y, s.answer), (0, 0, 0, 0))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _rates_of_equations(m: Model, now: Time, stage: Stage, s: Scratch) -> bool:
+    """The rates where somebody's own equations stand in place of modes, in which the added force is linear."""
+    e, y = m.equations, stage.state
+    s.drive[1] = now.seconds
+    for k in range(s.drive.size - 2):
+        s.drive[2 + k] = s.inputs[len(INPUTS) + k]
+    x = y[e.displacement]
+    if e.velocity >= 0:
+        v = y[e.velocity]
+    else:
+        # of a state of the first order the velocity is a rate, which an added force itself would change
+        _ask(e, 0.0, y, s)
+        v = s.answer[e.displacement]
+    _set_motion(s, now.seconds, x, v)
+    total, good = _known_force(m, stage, s), True
+    if m.added_mass != 0.0 or m.uses_acceleration or s.friction[0] == STICKS:
+        _ask(e, 0.0, y, s)
+        free = s.answer[e.velocity]
+        _ask(e, 1.0, y, s)
+        mobility = s.answer[e.velocity] - free
+        if m.uses_acceleration or s.friction[0] == STICKS:
+            total, good = _implicit_force(m, mobility, free, total, stage, s)
+        total -= m.added_mass * (free + mobility * total) / (1.0 + m.added_mass * mobility)
+    _ask(e, total, y, s)
+    for j in range(e.n_states):
+        stage.rates[j] = s.answer[j]
+    a = s.answer[e.velocity] if e.velocity >= 0 else 0.0
+    s.motion[ACCELERATION] = s.motion[N_MOTION + ACCELERATION] = a
+    _set_powers(m, stage, v, s)
+    return good
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -223,6 +267,8 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
     """Time derivatives of the state and of the works; forces and motions stay in `s`."""
     n, y, dy = m.stiffness.size, stage.state, stage.rates
     _read_inputs(excited, now.half_steps, s.inputs)
+    if m.equations.address != 0:
+        return _rates_of_equations(m, now, stage, s)  # type: ignore[no-any-return]
     base = s.inputs[2]
     x, v, free = 0.0, 0.0, 0.0
     for j in range(n):
@@ -236,7 +282,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
     _set_motion(s, now.seconds, x, v)
     total, good = _known_force(m, stage, s), True
     if m.uses_acceleration or s.friction[0] == STICKS:
-        total, good = _implicit_force(m, free, total, stage, s)
+        total, good = _implicit_force(m, m.mobility, free, total, stage, s)
     # all forces act at one place of the modes, so that the mass they add needs no system of equations
     a = (free + m.mobility * total) * m.inverse_inertia
     # inertia of the added masses; a negative one takes out of the frozen liquid what a ball or a wave moves by
@@ -322,6 +368,8 @@ def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     # what is left of the velocity is rounding of the event; an impulse at the place takes it out of all modes
     for j in range(n):
         s.state[n + j] -= m.shape[j] * m.inverse_mass[j] * velocity / m.mobility
+    if m.equations.address != 0:
+        s.state[m.equations.velocity] = 0.0
     s.friction[0] = STICKS
     rates_by_call(m, excited, now, s)
     release_friction(s)

@@ -26,7 +26,7 @@ class Simulation(Motion):
     forces_n : ndarray, shape (n, n_terms)
         Each term's force at its place, upward positive.
     memory : ndarray, shape (n, n_memory)
-        States of the terms, one after the other, each followed by its switches.
+        States of the terms, one after the other, each followed by its switches; those of equations first.
     works_j : ndarray, shape (n, 2 n_terms + 3)
         Work since the start: of each term on the modes and in the frame of its place, then modal damping,
         inertia of the base motion, external force, on the modes.
@@ -74,7 +74,7 @@ class Simulation(Motion):
     def remarks(self) -> tuple[str, ...]:
         """What the forces have to say, each on its motion and memory: regions that they were not measured in."""
         lines: list[str] = []
-        at = 0
+        at = 0 if self.twin.equations is None else self.twin.n_states_before_terms
         for term in self.twin.terms:
             n_memory = len(term.kind.memory(term.values, term.table)) + term.kind.n_switches
             if term.kind.remarks is not None:

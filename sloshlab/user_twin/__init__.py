@@ -1,17 +1,19 @@
 """A user's own twin, given as a Python module that defines ``TWIN``.
 
-Two forms: `MechanicalTwin` only describes masses, springs, dampers, what drives and what is read, and runs in this
-package's own engine, which finds every contact and every turn of dry friction; `FreeTwin` simulates by itself and
-adds the force that it is handed.
+Three forms. `EquationTwin` is a function of state, inputs and parameters; `MechanicalTwin` describes masses,
+springs, dampers, what drives and what is read. Both run in this package's own engine, which finds every contact
+and every turn of dry friction. `FreeTwin` simulates by itself and adds the force that it is handed.
 """
 
 from sloshlab.user_twin.added_force import AddedForce
 from sloshlab.user_twin.description import (
     Compared,
+    EquationTwin,
     FreeTwin,
     MechanicalTwin,
     Parameter,
     Response,
+    State,
     TwinRun,
 )
 from sloshlab.user_twin.extended import load_extended
@@ -22,12 +24,14 @@ from sloshlab.user_twin.model import UserTwinModel
 __all__ = [
     "AddedForce",
     "Compared",
+    "EquationTwin",
     "FreeTwin",
     "MechanicalTwin",
     "Mechanism",
     "Parameter",
     "Reading",
     "Response",
+    "State",
     "TwinRun",
     "UserTwinModel",
     "load_extended",

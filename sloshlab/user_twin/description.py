@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -223,7 +223,85 @@ class FreeTwin:
     friction_speed_m_per_s: float | None = None
 
 
-UserTwin = MechanicalTwin | FreeTwin
+@dataclass(frozen=True)
+class State:
+    """From where a state of equations starts in every run.
+
+    Attributes
+    ----------
+    start : float or str
+        A number, or a compared channel whose first samples tell it.
+    slope : bool
+        Of the channel, per second, in place of its value.
+    tolerance : float
+        Half-width of where the start of each run is expected; a parameter of the baseline unless it is zero.
+    units : str
+        UDUNITS text.
+    """
+
+    start: float | str = 0.0
+    slope: bool = False
+    tolerance: float = 0.0
+    units: str = "1"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.start, bool) or not isinstance(self.start, int | float | str):
+            raise InputError("state: start", got=repr(self.start)[:80], allowed="a number or a channel")
+        if not isinstance(self.start, str) and not isfinite(self.start):
+            raise InputError("state: start", got=repr(self.start)[:80], allowed="a finite number")
+        if not (isfinite(self.tolerance) and self.tolerance >= 0):
+            raise InputError("state: tolerance", got=f"{self.tolerance}", allowed="≥ 0")
+        _require_units(self.units, "state")
+
+
+@dataclass(frozen=True, eq=False)
+class EquationTwin:
+    """A twin that is a function of state, inputs and parameters, compiled and run in this package's engine.
+
+    Attributes
+    ----------
+    equations : callable
+        (state, inputs, parameters, force) → rates of all states, what each compared channel reads; two tuples.
+        `inputs` has the driving channels and `time_s`, all by name. The rates are linear in the added force.
+    states : mapping of str to State, number or str
+        In their order; a number or a channel alone is that of `State.start`.
+    parameters, driving, compared
+        As of `MechanicalTwin`, with names that Python allows.
+    moves : sequence of str
+        The states that the added force sees as displacement and velocity of what it moves, or one alone, which it
+        moves by its rate. By default the first two, or the only one.
+    """
+
+    equations: Callable[..., Any]
+    states: Mapping[str, State | float | str]
+    parameters: Sequence[Parameter]
+    driving: Sequence[str]
+    compared: Mapping[str, Compared | str]
+    moves: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if not self.states:
+            raise InputError("twin: states", got="none", allowed="at least one")
+        if not self.moves:
+            object.__setattr__(self, "moves", tuple(self.states)[:2])
+        if not 1 <= len(self.moves) <= 2 or not set(self.moves) <= set(self.states):
+            raise InputError(
+                "twin: moves", got=", ".join(map(str, self.moves))[:120], allowed="one or two of the states"
+            )
+        for start in self.starts.values():
+            if isinstance(start.start, str) and start.start not in self.compared:
+                raise InputError("twin: states", got=repr(start.start)[:80], allowed="a compared channel")
+
+    @property
+    def starts(self) -> dict[str, State]:
+        """Starts of all states under the names that they have in a fit."""
+        return {
+            f"start of {name}": start if isinstance(start, State) else State(start)
+            for name, start in self.states.items()
+        }
+
+
+UserTwin = MechanicalTwin | FreeTwin | EquationTwin
 
 
 def require_sound(twin: UserTwin) -> None:
@@ -239,12 +317,18 @@ def require_sound(twin: UserTwin) -> None:
         raise InputError("twin: parameters", got="a name twice", allowed="each name once")
     if not twin.compared:
         raise InputError("twin: compared", got="no channel", allowed="at least one")
-    call = twin.mechanism if isinstance(twin, MechanicalTwin) else twin.simulate
+    call = _function_of(twin)
     if not callable(call):
         raise InputError("twin: its function", got=type(call).__name__, allowed="a function")
     both = set(twin.driving) & set(twin.compared)
     if both:
         raise InputError("twin", got=f"{', '.join(sorted(both))} driving and compared", allowed="one of them")
+
+
+def _function_of(twin: UserTwin) -> Any:
+    if isinstance(twin, EquationTwin):
+        return twin.equations
+    return twin.mechanism if isinstance(twin, MechanicalTwin) else twin.simulate
 
 
 def _of_kind(values: Sequence[Parameter], kind: type, what: str) -> Sequence[Parameter]:

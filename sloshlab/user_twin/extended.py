@@ -60,7 +60,7 @@ def load_extended(path: str | Path) -> tuple[dict[str, float], Extension]:
         raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"twin {file}", got=f"contents that are no twin ({error})"[:200]) from error
-    return values, Extension(terms, key=tuple((term.name, *sorted(term.values.items())) for term in terms))
+    return values, Extension(terms)
 
 
 def _document(file: Path) -> dict[str, Any]:

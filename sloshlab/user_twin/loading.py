@@ -7,7 +7,7 @@ from typing import Final
 
 from sloshlab.errors import InputError, SloshlabError
 from sloshlab.missing_physics.user_module import user_module
-from sloshlab.user_twin.description import FreeTwin, MechanicalTwin, UserTwin, require_sound
+from sloshlab.user_twin.description import UserTwin, require_sound
 
 NAME: Final = "TWIN"
 
@@ -28,9 +28,12 @@ def load_user_twin(path: str | Path) -> UserTwin:
     file = Path(path)
     twin = getattr(user_module(file, "twin"), NAME, None)
     if twin is None:
-        raise InputError(f"twin {file}", got=f"no {NAME}", allowed=f"{NAME} = MechanicalTwin(…) or FreeTwin(…)")
-    if not isinstance(twin, MechanicalTwin | FreeTwin):
-        raise InputError(f"twin {file}: {NAME}", got=type(twin).__name__, allowed="MechanicalTwin or FreeTwin")
+        raise InputError(
+            f"twin {file}", got=f"no {NAME}", allowed=f"{NAME} = EquationTwin(…), MechanicalTwin(…) or FreeTwin(…)"
+        )
+    if not isinstance(twin, UserTwin):
+        allowed = "EquationTwin, MechanicalTwin or FreeTwin"
+        raise InputError(f"twin {file}: {NAME}", got=type(twin).__name__, allowed=allowed)
     try:
         require_sound(twin)
     except SloshlabError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import threading
 from collections import OrderedDict
 from collections.abc import Collection, Mapping, Sequence
@@ -10,29 +9,24 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from sloshlab.errors import AnalysisError, InputError, SloshlabError
+from sloshlab.errors import InputError, SloshlabError
 from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.diagnosed_model import Readings, Request
-from sloshlab.identification.rig_model import corrected, steps_per_sample
+from sloshlab.identification.rig_model import corrected
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
-from sloshlab.missing_physics.user_module import one_line
 from sloshlab.recording import channels
-from sloshlab.twin.excitation import Excitation, free, recorded, with_cached_inputs
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
-from sloshlab.twin.structure import single_degree_of_freedom
 from sloshlab.twin.twin import Twin
 from sloshlab.units import SI_UNITS
-from sloshlab.user_twin.added_force import AddedForce
-from sloshlab.user_twin.description import Compared, FreeTwin, Parameter, Response, TwinRun, UserTwin
+from sloshlab.user_twin.description import Compared, EquationTwin, Parameter, TwinRun, UserTwin
 from sloshlab.user_twin.extended import save_extended
-from sloshlab.user_twin.mechanism import EngineTwin, Mechanism, engine_twin, reading_of
+from sloshlab.user_twin.simulators import simulator_of
 
 FloatArray = NDArray[np.float64]
 _MOST_KEPT: Final = 400
-_MOST_EXCITATIONS: Final = 64
 
 
 class UserTwinModel:
@@ -57,9 +51,8 @@ class UserTwinModel:
         self.blocks: tuple[str, ...] = ("excitation", "structure", "sensor")
         # A user's own code may not bear several workers.
         self.executor: Executor = IN_TURN
-        self._lock, self._user_code_lock = threading.Lock(), threading.Lock()
+        self._lock = threading.Lock()
         self._truths: OrderedDict[tuple[Any, ...], tuple[dict[str, FloatArray], FloatArray]] = OrderedDict()
-        self._excitations: OrderedDict[str, Excitation] = OrderedDict()
         self._shown = {
             channel: shown if isinstance(shown, Compared) else Compared(shown)
             for channel, shown in twin.compared.items()
@@ -67,8 +60,9 @@ class UserTwinModel:
         for run in self.runs:
             self._check_channels(run)
         self._views = {run.name: _view(run, ()) for run in self.runs}
+        self._simulator = simulator_of(twin, name, len(self.runs))
+        self._starts = {run.name: self._measured_starts(run) for run in self.runs}
         self.parameters: tuple[BaselineParameter, ...] = tuple(self._parameters())
-        self._speed_m_per_s = 0.0
         self._check_that_it_runs()
 
     @property
@@ -78,20 +72,13 @@ class UserTwinModel:
 
     @property
     def twin(self) -> Twin:
-        """That of the first run; for a twin that simulates by itself a mass on a spring that stands for it."""
-        described = self.described
-        if isinstance(described, FreeTwin):
-            return Twin(single_degree_of_freedom(described.moving_mass_kg, described.stiffness_n_per_m))
-        return self._engine(self._views[self.runs[0].name], self._own(self.runs[0], {}), NOTHING)[0].twin
+        """That of the first run; for one that is no mechanism a mass on a spring that stands for it."""
+        return self._simulator.stand_in(self._views[self.runs[0].name], self._own(self.runs[0], {}))
 
     @property
     def moving_mass_kg(self) -> float:
         """What an added force accelerates."""
-        if isinstance(self.described, FreeTwin):
-            return self.described.moving_mass_kg
-        structure = self.twin.structure
-        assert structure is not None
-        return 1.0 / float((structure.mode_shape**2 / structure.masses_kg).sum())
+        return self._simulator.moving_mass_kg(self._views[self.runs[0].name], self._own(self.runs[0], {}))
 
     def compared(self, run: CaseRun) -> list[str]:
         """Channels of a run that the twin shows."""
@@ -162,118 +149,39 @@ class UserTwinModel:
                 return self._truths[key]
         is_changed = undone or extension.drives
         view = _view(run, undone, extension.drives) if is_changed else self._views[run.name]
-        found = self._of_free_twin(view, own, extension) if isinstance(self.described, FreeTwin) else None
-        found = found or self._of_engine(view, own, extension)
+        found = self._simulator.truth(view, own, extension.terms_in(run.name))
         with self._lock:
             self._truths[key] = found
             while len(self._truths) > _MOST_KEPT:
                 self._truths.popitem(last=False)
         return found
 
-    def _of_engine(
-        self, run: TwinRun, own: Mapping[str, float], extension: Extension
-    ) -> tuple[dict[str, FloatArray], FloatArray]:
-        ready, mechanism = self._engine(run, own, extension)
-        excitation = self._excitation(ready, run)
-        simulation = ready.twin.simulate(
-            excitation,
-            initial_displacement_m=mechanism.initial_displacement_m,
-            initial_velocity_m_per_s=mechanism.initial_velocity_m_per_s,
-            n_substeps=steps_per_sample(ready.twin, run.sampling_rate_hz),
-        ).require_done()
-        missing = [name for name in self._shown if name not in mechanism.readings]
-        if missing:
-            raise InputError(
-                f"{self.name}: readings", got=f"none for {', '.join(missing)}", allowed="every channel"
-            )
-        truth = {
-            name: reading_of(mechanism.readings[name], simulation, ready.modes, name)
-            for name in self._shown
-            if name in run.channels
-        }
-        return truth, simulation.places[:, 0]
-
-    def _engine(
-        self, run: TwinRun, own: Mapping[str, float], extension: Extension
-    ) -> tuple[EngineTwin, Mechanism]:
-        assert not isinstance(self.described, FreeTwin)
-        mechanism = self._call_user_code(self.described.mechanism, run, own)
-        if not isinstance(mechanism, Mechanism):
-            raise InputError(f"{self.name}: mechanism", got=type(mechanism).__name__, allowed="Mechanism")
-        return engine_twin(mechanism, extension.terms_in(run.name), run.n_samples), mechanism
-
-    def _of_free_twin(
-        self, run: TwinRun, own: Mapping[str, float], extension: Extension
-    ) -> tuple[dict[str, FloatArray], FloatArray]:
-        assert isinstance(self.described, FreeTwin)
-        # The largest speed is known once the baseline has run; that run adds no friction.
-        speed = self.described.friction_speed_m_per_s or self._speed_m_per_s or 1e-3
-        added = AddedForce(extension.terms_in(run.name), speed)
-        with self._user_code_lock:
-            response = self._call_user_code(self.described.simulate, run, own, added)
-        if not isinstance(response, Response):
-            raise InputError(f"{self.name}: simulate", got=type(response).__name__, allowed="Response")
-        truth = {
-            name: self._shaped(response.readings.get(name), (run.n_samples,), f"reading {name}")
-            for name in self._shown
-            if name in run.channels
-        }
-        return truth, self._shaped(response.motion, (run.n_samples, 3), "motion")
-
-    def _shaped(self, values: ArrayLike | None, shape: tuple[int, ...], what: str) -> FloatArray:
-        if values is None:
-            raise InputError(f"{self.name}: {what}", got="nothing", allowed=f"an array of shape {shape}")
-        try:
-            array = np.asarray(values, np.float64)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{self.name}: {what}", got="no numbers", allowed=f"shape {shape}") from error
-        if array.shape != shape:
-            raise InputError(f"{self.name}: {what}", got=f"shape {array.shape}", allowed=f"{shape}")
-        if not np.isfinite(array).all():
-            first = int(np.flatnonzero(~np.isfinite(array).reshape(shape[0], -1).all(axis=1))[0])
-            raise AnalysisError(
-                f"{self.name}: {what}", got=f"NaN or infinity, first at sample {first}", allowed="finite numbers"
-            )
-        return array
-
-    def _call_user_code(self, function: Any, *arguments: Any) -> Any:
-        try:
-            return function(*arguments)
-        except SloshlabError:
-            raise
-        except Exception as error:  # whatever a user's code raises becomes one line
-            raise AnalysisError(f"{self.name}: {arguments[0].name}", got=one_line(error)) from error
-
-    def _excitation(self, ready: EngineTwin, run: TwinRun) -> Excitation:
-        """Inputs at the engine's instants; interpolated once per series, since a fit asks again and again."""
-        rate = run.sampling_rate_hz
-        series = [part for part in (ready.force_n, ready.base) if part is not None]
-        if not series:
-            return free((run.n_samples - 1) / rate, rate)
-        # By content: the user's function makes new arrays in every call.
-        digest = hashlib.blake2b(f"{rate} {ready.force_n is None} {ready.base is None}".encode())
-        for part in series:
-            digest.update(np.ascontiguousarray(part).view(np.uint8).data)
-        key = digest.hexdigest()
-        with self._lock:
-            if key in self._excitations:
-                self._excitations.move_to_end(key)
-                return self._excitations[key]
-        excitation = with_cached_inputs(recorded(rate, acceleration=ready.base, force_n=ready.force_n))
-        with self._lock:
-            self._excitations[key] = excitation
-            while len(self._excitations) > max(_MOST_EXCITATIONS, 2 * len(self.runs)):
-                self._excitations.popitem(last=False)
-        return excitation
-
     def _own(self, run: CaseRun, values: Mapping[str, float]) -> dict[str, float]:
-        """Values of the user's parameters under the user's names."""
-        return {
+        """Values of the user's parameters, and of the states that a run starts from, under the user's names."""
+        own = {
             parameter.name: values.get(
                 f"{parameter.name} in {run.name}" if parameter.each_run else parameter.name, parameter.believed
             )
             for parameter in self.described.parameters
         }
+        starts = self._starts[run.name]
+        return own | {name: values.get(f"{name} in {run.name}", start) for name, start in starts.items()}
+
+    def _measured_starts(self, run: CaseRun) -> dict[str, float]:
+        """From which states a run is believed to start."""
+        if not isinstance(self.described, EquationTwin):
+            return {}
+        view = self._views[run.name]
+        found = {}
+        for name, state in self.described.starts.items():
+            if isinstance(state.start, str):
+                try:
+                    found[name] = view.start(state.start)[int(state.slope)]
+                except InputError as error:
+                    raise InputError(f"{self.name}: run {run.name}: {error}") from error
+            else:
+                found[name] = float(state.start)
+        return found
 
     def _parameters(self) -> list[BaselineParameter]:
         found = []
@@ -285,6 +193,15 @@ class UserTwinModel:
             ]
             if not parameter.each_run:
                 found.append(self._parameter(parameter, parameter.name))
+        if isinstance(self.described, EquationTwin):
+            found += [
+                BaselineParameter(
+                    f"{name} in {run.name}", self._starts[run.name][name], state.tolerance, state.units
+                )
+                for name, state in self.described.starts.items()
+                if state.tolerance
+                for run in self.runs
+            ]
         for name, shown in self._shown.items():
             if shown.gain_tolerance:
                 found.append(BaselineParameter(f"gain of {name}", 1.0, shown.gain_tolerance, is_reading=True))
@@ -338,14 +255,11 @@ class UserTwinModel:
     def _check_that_it_runs(self) -> None:
         for run in self.runs:
             try:
-                motion = self._truth(run, {}, NOTHING)[1]
+                self._truth(run, {}, NOTHING)
             except SloshlabError as error:
                 text = str(error).removeprefix(f"{self.name}: ")
                 text = text if text.startswith(f"{run.name}: ") else f"{run.name}: {text}"
                 raise InputError(f"{self.name} cannot run as believed: {text}") from error
-            # Below 0.002 of the largest speed friction is not dry; an explicit step has to stay below 2 × mass ×
-            # speed / friction force.
-            self._speed_m_per_s = max(self._speed_m_per_s, 2e-3 * float(np.abs(motion[:, 1]).max()))
 
 
 def _view(run: CaseRun, undone: Sequence[SensorFault], acting: tuple[ActingDrive, ...] = ()) -> TwinRun:
