@@ -17,10 +17,9 @@ from sloshlab import atomic_file
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.consistency.samples import examined_samples
 from sloshlab.diagnosis.examination import examination_facts, examined, seen_at
-from sloshlab.diagnosis.findings import explained_extension, findings_of
+from sloshlab.diagnosis.findings import findings_of
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 from sloshlab.identification.case import Case, read_case
-from sloshlab.missing_physics.extension import NOTHING
 from sloshlab.missing_physics.user_effects import load_user_effects
 from sloshlab.user_twin import UserTwinModel, load_user_twin
 
@@ -75,16 +74,21 @@ def diagnose_case(
     diagnosis = Diagnosis(found, verdict, examination, provenance, recordings)
     with result_folder(target, provenance) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
-        best = verdict.best or found.retuned
-        found.model.save_extended(best.values, explained_extension(best), complete / "extended_twin.toml")
-        found.model.save_extended(found.retuned.fit.values, NOTHING, complete / "retuned_twin.toml")
+        best = verdict.model or found.retuned
+        found.model.save_extended(best.values, best.fit.candidates, complete / "extended_twin.toml")
+        found.model.save_extended(found.retuned.values, (), complete / "retuned_twin.toml")
         if report:
             # Drawing is imported only where a report is wanted: the trial runs without.
             from pipelines.diagnosis.sections import page_of
             from pipelines.report.page import write_page
 
             write_page(page_of(diagnosis), complete, result_id=provenance[RESULT_ID])
-    lines = [verdict.statement, f"verdict: {verdict.kind}", f"written: {target / 'verdict.json'}"]
+    lines = [
+        verdict.headline,
+        verdict.statement,
+        f"verdict: {verdict.kind}",
+        f"written: {target / 'verdict.json'}",
+    ]
     if own:
         lines.append("effects of your own: " + ", ".join(f"{effect.block}.{effect.name}" for effect in own))
     return {"lines": lines + report_lines(target, written=report), "flags": list(diagnosis.flags), **facts}

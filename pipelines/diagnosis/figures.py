@@ -31,8 +31,8 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
         ("as believed", found.believed, NEUTRAL_COLOUR),
         ("retuned", found.retuned, NEUTRAL_COLOUR),
     ]
-    if diagnosis.verdict.best is not None:
-        rows.append((words(diagnosis.verdict.best, "\n+ "), diagnosis.verdict.best, REFERENCE_COLOUR))
+    if diagnosis.after is not None:
+        rows.append((words(diagnosis.after, "\n+ "), diagnosis.after, REFERENCE_COLOUR))
     values = [explanation.held_out_rms or explanation.fitted_rms for _, explanation, _ in rows]
     figure = new_figure(0.6 + 0.36 * len(rows))
     axes = figure.subplots()
@@ -107,8 +107,8 @@ def where(name: str, diagnosis: Diagnosis) -> ReportFigure:
     if worst.total <= 0:
         raise NothingToDrawError("the retuned baseline misses nothing")
     both = [("baseline retuned", worst)]
-    if diagnosis.verdict.best is not None:
-        after = mismatches(found.fitting, found.readings(diagnosis.verdict.best))
+    if diagnosis.after is not None:
+        after = mismatches(found.fitting, found.readings(diagnosis.after))
         both.append((extended_label(diagnosis), _same(after, worst)))
     top = _highest(worst)
     figure = new_figure(3.0)
@@ -152,8 +152,8 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
     steps: list[tuple[str, dict[str, FloatArray], str, Any]] = [
         ("baseline retuned", readings[run.name], NEUTRAL_COLOUR, "-")
     ]
-    if diagnosis.verdict.best is not None:
-        after = found.readings(diagnosis.verdict.best)[run.name]
+    if diagnosis.after is not None:
+        after = found.readings(diagnosis.after)[run.name]
         steps.append((extended_label(diagnosis), after, REFERENCE_COLOUR, (0, (4, 1.5))))
     time = np.asarray(run.recording["time"].values, np.float64)
     figure = new_figure(1.9 * len(shown) + 0.4)
@@ -237,7 +237,7 @@ def _left(observation: Observation, values: FloatArray) -> FloatArray:
 
 def named_channels(diagnosis: Diagnosis) -> list[str]:
     """Channels on which the named effects act."""
-    best = diagnosis.verdict.best
+    best = diagnosis.after
     return (
         [candidate.channel.partition("<")[0] for candidate in best.fit.candidates if candidate.channel]
         if best
@@ -247,11 +247,14 @@ def named_channels(diagnosis: Diagnosis) -> list[str]:
 
 def extended_label(diagnosis: Diagnosis) -> str:
     """Words for the best explanation."""
-    return "nearest known effect" if diagnosis.verdict.kind == "unknown" else "with what was left out"
+    if diagnosis.verdict.kind != "unknown":
+        return "with what was left out"
+    return "nearest known effect" if diagnosis.verdict.law is None else "with the law that was found"
 
 
 def words(explanation: ScoredModel, between: str = " + ") -> str:
     """Effects of an explanation and where they act."""
+    # products of a law are its formula
     return between.join(plain(form_and_place(candidate), 64) for candidate in explanation.fit.candidates)
 
 

@@ -68,8 +68,8 @@ def residual_profiles(name: str, diagnosis: Diagnosis) -> ReportFigure:
     before = worst_maps(diagnosis)
     found = diagnosis.findings
     after = None
-    if diagnosis.verdict.best is not None:
-        readings = found.readings(diagnosis.verdict.best)
+    if diagnosis.after is not None:
+        readings = found.readings(diagnosis.after)
         rig = getattr(found.model, "rig", None)
         after = next(
             residual_map

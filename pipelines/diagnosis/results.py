@@ -9,6 +9,7 @@ from typing import Any
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.diagnosis.examination import Examination
 from sloshlab.diagnosis.findings import Findings
+from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.verdict import Verdict
 
 
@@ -28,6 +29,11 @@ class Diagnosis:
     examination: Examination
     provenance: Mapping[str, Any] = field(default_factory=dict)
     recordings: tuple[ConsistencyExamination, ...] = ()
+
+    @property
+    def after(self) -> ScoredModel | None:
+        """The model that is shown beside the retuned baseline: named, a law that was found, or the nearest one."""
+        return self.verdict.model or self.verdict.best
 
     @property
     def flags(self) -> tuple[str, ...]:

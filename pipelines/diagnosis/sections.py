@@ -38,33 +38,43 @@ def page_of(diagnosis: Diagnosis) -> Page:
         tables.sensor_table(diagnosis),
         tables.sensor_error_table(diagnosis),
     )
+    of_force: dict[str, tuple[dict[str, Draw], tuple[Table | None, ...]]] = {
+        "What kind of force": (
+            {"missing_force": figures_force.missing_force},
+            tuple(tables.answers_table(diagnosis, place) for place in places),
+        )
+    }
+    before_and_after: dict[str, tuple[dict[str, Draw], tuple[Table | None, ...]]] = {
+        "Before and after": (
+            {"time_histories": figures.time_histories, "held_out_errors": figures.held_out_errors},
+            (tables.effect_parameter_table(diagnosis),),
+        )
+    }
+    # Who wrote the twin knows its blocks and asks for the force first.
+    is_own = diagnosis.findings.case.rig is None
     drawn: dict[str, tuple[dict[str, Draw], tuple[Table | None, ...]]] = {
+        **(of_force | before_and_after if is_own else before_and_after),
+        "For and against": (
+            {"evidence": figures.evidence},
+            (tables.evidence_table(diagnosis), tables.left_out_table(diagnosis)),
+        ),
         "Where": (
             {
                 "block_shares": figures_where.block_shares,
                 "where": figures.where,
-                "time_histories": figures.time_histories,
                 "residual_profiles": figures_where.residual_profiles,
             },
             where_tables,
         ),
-        "What kind of force": (
-            {"missing_force": figures_force.missing_force},
-            tuple(tables.answers_table(diagnosis, place) for place in places),
-        ),
-        "For and against": (
-            {"evidence": figures.evidence},
+        **({} if is_own else of_force),
+        "What remains": (
+            {},
             (
-                tables.evidence_table(diagnosis),
-                tables.explanation_table(diagnosis),
-                tables.left_out_table(diagnosis),
+                tables.remains_table(diagnosis),
+                tables.limits_table(diagnosis),
+                tables.baseline_table(diagnosis),
             ),
         ),
-        "Does it help": (
-            {"held_out_errors": figures.held_out_errors},
-            (tables.effect_parameter_table(diagnosis), tables.baseline_table(diagnosis)),
-        ),
-        "What remains": ({}, (tables.remains_table(diagnosis), tables.limits_table(diagnosis))),
         "Recordings": ({}, consistency_tables(diagnosis.recordings)[:1]),
     }
     plans = tuple(
@@ -79,7 +89,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
         title="What was left out",
         subtitle=f"{diagnosis.findings.case.name} · sloshlab {__version__}",
         flags=diagnosis.flags,
-        lead=diagnosis.verdict.statement,
+        lead=diagnosis.verdict.headline,
         summary=_sentences(diagnosis),
         plans=(*plans, SectionPlan("Provenance", (), (provenance_table(diagnosis.provenance),))),
         papers=(_TRANSFORM, _ROBUST),
@@ -88,9 +98,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
 
 def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     verdict, found = diagnosis.verdict, diagnosis.findings
-    lines = []
-    if verdict.separating_experiment:
-        lines.append(f"To tell them apart: {verdict.separating_experiment}.")
+    lines = [verdict.statement, f"Which experiment next: {_next_experiment(diagnosis)}."]
     names = [(name, p) for name, p in verdict.probabilities.items() if p >= 0.005][:4]
     lines.append(
         "Probabilities: " + ", ".join(f"{name.replace('_', ' ')} {100 * p:.0f} %" for name, p in names) + "."
@@ -101,3 +109,19 @@ def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         f"{len(found.explanations)} models fitted to the end, {len(found.failed)} failed."
     )
     return tuple(lines)
+
+
+def _next_experiment(diagnosis: Diagnosis) -> str:
+    """What to record next: what tells equals apart, what a name's look-alikes need, or what this case lacks."""
+    verdict, found = diagnosis.verdict, diagnosis.findings
+    if verdict.separating_experiment:
+        return f"to tell them apart, {verdict.separating_experiment}"
+    nearest = [] if verdict.best is None else [c.effect.separated_by for c in verdict.best.fit.candidates]
+    wanted = [words for words in dict.fromkeys(nearest) if words]
+    if verdict.kind == "unknown" and wanted:
+        return f"to see whether it is the nearest known effect, {'; or '.join(wanted)}"
+    if found.split.limits:
+        return f"what this case lacks: {'; '.join(found.split.limits)}"
+    if verdict.kind == "named" and wanted:
+        return f"to confirm it, {'; or '.join(wanted)}"
+    return "none is needed to say this; another level or frequency widens where it holds"

@@ -11,21 +11,21 @@ from pipelines.diagnosis.figures import extended_label
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.numbers import MISSING, signed, text
 from pipelines.report.tables import Table
-from sloshlab.diagnosis.inference.decision import standard_error_of_difference
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.wording import form_and_place, named_and_placed
 from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.missing_physics.evidence import CANNOT_TELL, SINGLE_CHANNEL
 from sloshlab.missing_physics.units import named_and_units
 
-_MOST_EXPLANATIONS: Final = 14
+_MOST_EXPLANATIONS: Final = 8
 _OF_THE_CHANNEL: Final = ("limit", "amplitude")
 
 
 def effect_parameter_table(diagnosis: Diagnosis) -> Table | None:
     """Numbers of the effects with their intervals."""
     best = diagnosis.verdict.best
-    if best is None:
+    # of a law its formula says everything
+    if best is None or diagnosis.verdict.law is not None:
         return None
     rows: list[tuple[str, ...]] = []
     for candidate in best.fit.candidates:
@@ -47,7 +47,7 @@ def effect_parameter_table(diagnosis: Diagnosis) -> Table | None:
 
 def baseline_table(diagnosis: Diagnosis) -> Table:
     """What retuning did to the baseline, with and without the effect."""
-    found, best = diagnosis.findings, diagnosis.verdict.best
+    found, best = diagnosis.findings, diagnosis.after
     rows = []
     for parameter in found.model.parameters:
         # They belong to single runs and say nothing of the rig.
@@ -74,40 +74,6 @@ def _moved(parameter: BaselineParameter, value: float) -> str:
     tolerances = (value - parameter.believed) / parameter.tolerance
     held = " (held)" if not -parameter.most_below + 1e-3 < tolerances < parameter.most_above - 1e-3 else ""
     return signed(tolerances if abs(tolerances) >= 0.005 else 0.0, 2) + held
-
-
-def explanation_table(diagnosis: Diagnosis) -> Table:
-    """All models, the largest evidence first."""
-    found = diagnosis.findings
-    everything = sorted((found.retuned, *found.explanations), key=lambda model: -model.evidence)
-    best = everything[0]
-    rows = []
-    for model in everything:
-        error = standard_error_of_difference(model, best)
-        place = max(model.remainder.places, key=model.remainder.gain, default="")
-        left = model.remainder.gain(place) if place else 0.0
-        rows.append(
-            (
-                _named(model) or "baseline retuned",
-                "0" if model is best else f"{signed(model.evidence - best.evidence, 0)} ± {text(error, 2)}",
-                text(model.complexity, 3),
-                text(model.held_out_rms, 3),
-                f"{place} ({text(left, 3)})" if left > 0 else "nothing",
-            )
-        )
-    header = (
-        "model",
-        "log evidence beside the best",
-        "of it cost of its freedom",
-        "held-out error / noise floor",
-        "what remains, and its log evidence",
-    )
-    caption = (
-        "Log evidence over all runs with the standard error of its difference by cells of 2 s and 4 Hz. What "
-        "remains is any force of a block, or any error of a sensor, that describes the rest better than noise and "
-        "bursts do."
-    )
-    return Table("Models", header, tuple(rows), caption)
 
 
 def left_out_table(diagnosis: Diagnosis) -> Table | None:
@@ -218,59 +184,73 @@ def _share(value: float) -> str:
 
 
 def evidence_table(diagnosis: Diagnosis) -> Table | None:
-    """For and against each explanation, the largest evidence first."""
+    """For and against the models that come first, the largest evidence first; nothing missing among them."""
     found, examination = diagnosis.findings, diagnosis.examination
     if not found.explanations:
         return None
-    chosen = found.explanations[:_MOST_EXPLANATIONS]
+    everything = sorted((found.retuned, *found.explanations), key=lambda model: -model.evidence)
+    chosen = everything[:_MOST_EXPLANATIONS]
+    if found.retuned not in chosen:
+        chosen[-1] = found.retuned
     rows = []
-    for explanation in chosen:
+    for model in chosen:
         for_: list[str] = []
         against: list[str] = []
-        open_: list[str] = []
-        for candidate in explanation.fit.candidates:
+        for candidate in model.fit.candidates:
             on = examination.evidence_on(candidate.effect)
             for_ += on.speaks_for
             against += on.speaks_against
-            open_ += on.still_open
             suspect = examination.cut.suspect if examination.cut else ""
             if candidate.effect.block == "sensor" and suspect:
                 own = candidate.channel.partition("<")[0]
                 # A fault of one channel while another one contradicts all the rest is unlikely.
                 (for_ if own == suspect else against).append(f"{suspect} contradicts the others")
-        gain = explanation.evidence - found.retuned.evidence
         rows.append(
             (
-                _named(explanation),
-                _standing(diagnosis, explanation),
-                text(gain, 3),
+                _named(model) or "nothing missing",
+                _standing(diagnosis, model),
+                _beside(model, everything[0]),
+                text(model.held_out_rms, 2),
                 "; ".join(dict.fromkeys(for_)) or MISSING,
                 "; ".join(dict.fromkeys(against)) or MISSING,
-                "; ".join(dict.fromkeys(open_)) or MISSING,
+                _what_remains(model),
             )
         )
-    return Table(
-        "Evidence for and against",
-        (
-            "explanation",
-            "standing",
-            "log evidence over nothing missing",
-            "speaks for it",
-            "speaks against it",
-            "cannot be told",
-        ),
-        tuple(rows),
-        "The tests on the missing force and on the sensors know of no candidate. Fits decide; a test that "
-        "contradicts the named effect is a reason to doubt it.",
+    header = ("explanation", "standing", "beside the best", "unseen runs / noise", "speaks for it",
+              "speaks against it", "what remains")  # fmt: skip
+    caption = (
+        f"The {len(rows)} of {len(everything)} models that come first. Differences of the logarithm of the "
+        "evidence below 1 are no difference, below 3 slight, below 5 clear, above decisive (Kass and Raftery "
+        "1995, doi:10.1080/01621459.1995.10476572). What speaks for and against are tests on the missing force and on "
+        "the sensors that know of no candidate: one that contradicts what is named is a reason to doubt it. What "
+        "remains is any force of a block or any error of a sensor that describes the rest better than noise does."
     )
+    return Table("For and against", header, tuple(rows), caption)
+
+
+def _beside(model: ScoredModel, best: ScoredModel) -> str:
+    """How far a model is behind the best, in words."""
+    if model is best:
+        return "best"
+    behind = best.evidence - model.evidence
+    for most, words in ((1.0, "as good"), (3.0, "slightly worse"), (5.0, "clearly worse")):
+        if behind < most:
+            return words
+    return "decisively worse"
+
+
+def _what_remains(model: ScoredModel) -> str:
+    """The place at which something remains beside a model."""
+    place = max(model.remainder.places, key=model.remainder.gain, default="")
+    return place if place and model.remainder.gain(place) > 0 else "nothing"
 
 
 def remains_table(diagnosis: Diagnosis) -> Table:
     """What is left of every channel on held-out runs."""
     found = diagnosis.findings
     steps = [("believed", found.believed), ("retuned", found.retuned)]
-    if diagnosis.verdict.best is not None:
-        steps.append((extended_label(diagnosis), diagnosis.verdict.best))
+    if diagnosis.after is not None:
+        steps.append((extended_label(diagnosis), diagnosis.after))
     readings = [found.readings(step) for _, step in steps]
     names = dict.fromkeys(observation.channel for run in found.held_out for observation in run)
     rows = []

@@ -19,9 +19,13 @@ from pipelines.twin.simulated_tank_model import departure_attributes, with_tank_
 from sloshlab import atomic_file
 from sloshlab.configurations import CONFIGURATIONS
 from sloshlab.errors import InputError
+from sloshlab.missing_physics import effects as vocabulary
+from sloshlab.missing_physics.extension import Extension, with_acting
+from sloshlab.missing_physics.saved_effects import saved_effects
 from sloshlab.modal.rig_beam import scale_remarks
 from sloshlab.recording import read_recording, run_attributes, write_recording
 from sloshlab.rig import Rig
+from sloshlab.toml_file import read_toml
 from sloshlab.twin.recorded_run import Block, Drive, drive_of
 from sloshlab.twin.reduced_order_model_domain import departures
 from sloshlab.twin.simulated_channels import SimulatedRun, simulated_run
@@ -29,6 +33,8 @@ from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import load_twin, save_twin
 from sloshlab.twin.structure_forces import MASS_ERROR
 from sloshlab.twin.twin import Twin
+
+assert vocabulary.__all__  # importing it makes the effects known that a saved twin may name
 
 LEAST_RATE_HZ: Final = 20_000.0
 STEPS_PER_PERIOD: Final = 60
@@ -93,7 +99,9 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
     twin = _chosen_twin(settings, rig)
     _require_free_places(settings, twin)
     recording = read_recording(settings.run)
-    drive = drive_of(recording, twin, block=cast("Block", settings.block))
+    effects = _effects(settings)
+    driven = _as_it_acts(recording, drive_of(recording, twin, block=cast("Block", settings.block)), effects)
+    drive = drive_of(driven, twin, block=cast("Block", settings.block))
     n_steps = settings.steps or steps_per_sample(twin, drive.excitation.sampling_rate_hz)
     with amounts("simulating") as watch:
         simulation = drive.twin.simulate(
@@ -106,6 +114,7 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
     attributes = _attributes(settings, recording, drive, n_steps) | departure_attributes(left)
     attributes[RESULT_ID] = _result_id(settings, twin)
     simulated = simulated_run(simulation, recording, rig, attributes=attributes, seed=settings.seed)
+    simulated = replace(simulated, recording=_as_read(simulated.recording, recording, effects))
     with atomic_file.together() as stagings:
         place = stagings.file(settings.output, overwrite=settings.overwrite)
         write_recording(simulated.recording, place, encoding=_encoding(simulated.recording))
@@ -115,6 +124,38 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
         settings, rig, recording, drive, simulation=simulation, simulated=simulated, n_steps=n_steps
     )
     return with_tank_model(summary, simulation, left)
+
+
+def _effects(settings: SimulationSettings) -> Extension:
+    """Effects of sensors and actuators that the file of a saved twin names."""
+    if settings.twin is None:
+        return Extension()
+    what = f"twin {settings.twin}"
+    return saved_effects(read_toml(settings.twin, what), what)
+
+
+def _as_it_acts(recording: xr.Dataset, drive: Drive, effects: Extension) -> xr.Dataset:
+    """The recording with what acts in its driving channels: faults of their sensors undone, commands as obeyed."""
+    rate = drive.excitation.sampling_rate_hz
+    for fault in effects.faults:
+        if fault.channel in drive.channels and fault.undone is not None:
+            own = recording[fault.channel]
+            read = {str(name): recording[name].values for name in recording.data_vars}
+            acting = fault.undone(own.values.astype(float), rate, read, own.values)
+            recording = recording.assign({fault.channel: own.copy(data=acting)})
+    return with_acting(recording, effects.drives)
+
+
+def _as_read(simulated: xr.Dataset, recording: xr.Dataset, effects: Extension) -> xr.Dataset:
+    """Simulated channels as their faulty sensors read them."""
+    rate = run_attributes(recording).sampling_rate_hz
+    for fault in effects.faults:
+        if fault.channel in simulated.data_vars:
+            own = simulated[fault.channel]
+            others = {str(name): simulated[name].values for name in simulated.data_vars}
+            read = fault.reading(own.values.astype(float), rate, others, recording[fault.channel].values)
+            simulated = simulated.assign({fault.channel: own.copy(data=read)})
+    return simulated
 
 
 def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
+from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.mismatch import mismatches, summary
-from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_force.force_character import Answer, ForceCharacter, force_character
 from sloshlab.missing_force.interface_cut import InterfaceCut, interface_cut, own_tolerances
 from sloshlab.missing_force.latent_force import EITHER, RunForces
@@ -80,8 +80,6 @@ def examined(found: Findings, seed: int = 0) -> Examination:
     rig = getattr(found.model, "rig", None)
     maps = residual_maps(found.fitting, readings, rig)
     where = summary(mismatches(found.fitting, readings))
-    if not isinstance(found.model, RigModel):
-        return Examination(None, {}, (), maps, where)
     cut = interface_cut(found.model, found.fitting, values, seed)
     characters = {}
     for place in cut.places:
@@ -99,7 +97,7 @@ def examined(found: Findings, seed: int = 0) -> Examination:
     return Examination(cut, characters, sensor, maps, where)
 
 
-def _damping_shift(model: RigModel, run: RunForces, place: str, values: Mapping[str, float]) -> float:
+def _damping_shift(model: DiagnosedModel, run: RunForces, place: str, values: Mapping[str, float]) -> float:
     """How much more damping the retuned baseline has at a place than is believed [N s/m]."""
     shift = 0.0
     if run.structure is not None and place != "tank":

@@ -22,7 +22,7 @@ from sloshlab.errors import AnalysisError, InputError
 from sloshlab.identification.case import Case
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.free_run_fit import INFLATION_STAGES, fitted, fitted_baseline
-from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
+from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.noise_floor import weighted_observations
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.readiness import require_comparable, require_one_rig
@@ -30,7 +30,7 @@ from sloshlab.identification.repeats import require_repeats
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.identification.split import Split, split
 from sloshlab.missing_physics import effects
-from sloshlab.missing_physics.candidate import Surroundings
+from sloshlab.missing_physics.candidate import Surroundings, extension_of
 from sloshlab.missing_physics.extension import Extension
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
 
@@ -146,7 +146,7 @@ def findings_of(
     nothing = next(fit for fit in fits if not fit.candidates)
     with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)
     believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), 0.0, 0.0)
-    score = _Scoring(model, fitting, held_out, nothing, case.names_by_test())
+    score = Scoring(model, fitting, held_out, nothing, case.names_by_test())
     believed, retuned = score.required(believed_fit, "as believed"), score.required(nothing, "retuned")
     explanations = [found for fit in with_effects[:_MOST_SCORED] if (found := score.of(fit, retuned)) is not None]
     return Findings(
@@ -165,8 +165,19 @@ def findings_of(
     )
 
 
-class _Scoring:
-    """Models with their likelihood over fitted and held-out runs."""
+class Scoring:
+    """Models with their likelihood over fitted and held-out runs.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+    fitting, held_out : sequence of sequences of Observation
+        Per run.
+    nothing : FreeRunFit
+        The retuned baseline, along which noise and transfers are computed.
+    tests : sequence of sequences of str
+        Names of the runs of every test.
+    """
 
     def __init__(
         self,

@@ -7,11 +7,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sloshlab.diagnosis.findings import Findings
+from sloshlab.diagnosis.found_law import FoundLaw, found_law
 from sloshlab.diagnosis.inference.decision import Decision, decided
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.interval import LEVEL, Interval, intervals_of
 from sloshlab.diagnosis.separating_experiment import separating_experiment
 from sloshlab.diagnosis.wording import (
+    headline_of,
+    law_statement,
     names_of_alternatives,
     refuted_statement,
     separating_experiment_of,
@@ -38,6 +41,10 @@ class Verdict:
         Of what has no name; empty where it is not located.
     intervals : dict
         Of the numbers of `best`, per key of the effect and name of the number.
+    law : FoundLaw or None
+        Of what has no name.
+    headline : str
+        The answer in at most forty words.
     """
 
     kind: str
@@ -48,6 +55,18 @@ class Verdict:
     probabilities: dict[str, float]
     block: str = ""
     intervals: dict[tuple[str, str], Interval] = field(default_factory=dict)
+    law: FoundLaw | None = None
+    headline: str = ""
+
+    @property
+    def model(self) -> ScoredModel | None:
+        """The model that is handed on: what is named, or the law that was found, None where neither is.
+
+        The nearest model of what has no name is no answer and is not handed on.
+        """
+        if self.kind == "unknown":
+            return None if self.law is None else self.law.model
+        return self.best
 
     def seen(self, words: str) -> Verdict:
         """The verdict with where in the cycle and at which levels it shows, such as "seen above 1.5 g"."""
@@ -69,17 +88,20 @@ def verdict_of(found: Findings) -> Verdict:
         decision = replace(decision, kind="unknown", alternatives=[])
     intervals = {} if decision.best is None else intervals_of(found, decision.best)
     refuted = refuted_statement(found, decision.best or found.retuned)
+    law = found_law(found, decision.block) if decision.kind == "unknown" else None
     alternatives = names_of_alternatives(decision)
     is_set = len(alternatives) > 1
     return Verdict(
         "indistinguishable" if is_set else decision.kind,
         decision.best,
         alternatives,
-        f"{statement_of(found, decision, intervals).removesuffix('.')}{refuted}.",
+        f"{statement_of(found, decision, intervals).removesuffix('.')}{law_statement(law)}{refuted}.",
         _separating(found, decision) if is_set else "",
         decision.probabilities,
         decision.block,
         intervals,
+        law,
+        headline_of(found, decision, intervals, law),
     )
 
 
@@ -100,8 +122,8 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
     found : Findings
     verdict : Verdict
     """
-    # The nearest effect of an unknown is no answer.
-    after = verdict.best if verdict.best is not None and verdict.kind != "unknown" else found.retuned
+    is_answer = verdict.kind != "unknown" or (verdict.law is not None and verdict.law.holds)
+    after = verdict.model if verdict.model is not None and is_answer else found.retuned
     return {
         "format": 1,
         "verdict": verdict.kind,
@@ -109,6 +131,7 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
         "alternatives": [list(names) for names in verdict.alternatives],
         "probabilities": {label: p for label, p in verdict.probabilities.items() if p > 1e-4},
         "separating_experiment": verdict.separating_experiment,
+        "headline": verdict.headline,
         "statement": verdict.statement,
         "fit": {
             "metric": "RMS of the residuals of short-time spectra over their noise, where the "
@@ -120,9 +143,17 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
             "heldout_ceiling": min(_judged(found, each) for each in (found.retuned, *found.explanations)),
             "heldout_runs": [run.name for run in found.split.held_out],
         },
+        "law": _law_facts(verdict.law),
         "limits": list(found.split.limits),
         "failed": _failed(found.failed),
     }
+
+
+def _law_facts(law: FoundLaw | None) -> dict[str, Any] | None:
+    if law is None:
+        return None
+    facts = {"formula": law.formula, "words": law.words, "block": law.block, "holds": law.holds}
+    return {**facts, "heldout_after": law.model.held_out_rms}
 
 
 def _judged(found: Findings, model: ScoredModel) -> float:

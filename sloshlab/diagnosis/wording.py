@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from sloshlab.diagnosis.findings import Findings
+from sloshlab.diagnosis.found_law import FoundLaw
 from sloshlab.diagnosis.inference.decision import Decision
 from sloshlab.diagnosis.inference.places import SENSOR
 from sloshlab.diagnosis.inference.posterior import NONE, UNKNOWN
@@ -23,6 +24,8 @@ from sloshlab.missing_physics.units import named_and_units
 _EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure, whatever is recorded."""
 
+_MOST_WORDS: Final = 40
+"""Of a headline: what one reads at a glance."""
 _SAID: Final = 0.01
 """Probability from which a name is listed in a sentence."""
 
@@ -65,6 +68,62 @@ def statement_of(found: Findings, decision: Decision, intervals: Mapping[tuple[s
     return text + "."
 
 
+def headline_of(
+    found: Findings,
+    decision: Decision,
+    intervals: Mapping[tuple[str, str], Interval],
+    law: FoundLaw | None,
+) -> str:
+    """The answer in at most forty words, with sizes.
+
+    Parameters
+    ----------
+    found : Findings
+    decision : Decision
+    intervals : mapping
+        Of the numbers of what is named.
+    law : FoundLaw or None
+        Of what has no name.
+    """
+    before = found.retuned.held_out_rms
+    if decision.kind == "nothing_missing":
+        return f"Nothing is missing: retuned, the simulation is within {before:.2g} noise floors of unseen runs."
+    if decision.kind == "unknown" or decision.best is None:
+        where = f" in the {decision.block}" if decision.block else ""
+        if law is not None and law.holds:
+            # a formula of several products is for the statement
+            what = f"{law.formula}, {law.words}" if len(law.products) == 1 else law.words
+            return f"Something without a name is missing{where}: {what}. {_unseen(before, law.model.held_out_rms)}"
+        missed = f"unseen runs are missed by {before:.2g} noise floors"
+        return f"Something is missing{where} that has no name here; {missed}."
+    named = " and ".join(_with_size(candidate, intervals) for candidate in decision.best.fit.candidates)
+    others = [" + ".join(names).replace("_", " ") for names in names_of_alternatives(decision)[1:]]
+    ways = [""]
+    if decision.kind == "indistinguishable" and others:
+        more = f" or {len(others) - 1} more" if len(others) > 1 else ""
+        ways = [
+            f"; these runs do not tell it from {how}" for how in (f"{others[0]}{more}", f"{len(others)} others")
+        ]
+    unseen = _unseen(before, decision.best.held_out_rms)
+    sentences = [f"Left out: {named}{way}. {unseen}" for way in ways]
+    return next((text for text in sentences if len(text.split()) <= _MOST_WORDS), sentences[-1])
+
+
+def _unseen(before: float, after: float) -> str:
+    return f"Error on unseen runs: {before:.2g} → {after:.2g} noise floors."
+
+
+def _with_size(candidate: Candidate, intervals: Mapping[tuple[str, str], Interval]) -> str:
+    """An effect at its place, with the first of its sizes."""
+    words = named_and_placed(candidate)
+    name = next(iter(candidate.sizes), candidate.effect.parameters[0].name)
+    its = intervals.get((candidate.key, name))
+    if its is None:
+        return words
+    what, units = named_and_units(name)
+    return f"{words} ({what} {_rounded(its.estimate, 3)}{f' {units}' if units else ''})"
+
+
 def _remaining(found: Findings, best: ScoredModel) -> str:
     """What the held-out runs show before and after."""
     return (
@@ -86,6 +145,16 @@ def _unknown(found: Findings, decision: Decision) -> str:
         nearest = f"; the nearest known effect is {named}: {_remaining(found, decision.best)}"
     why = "that has no name here" if found.split.has_held_out else "that one run alone does not tell"
     return f"Something is missing {why}, {where}{nearest}."
+
+
+def law_statement(law: FoundLaw | None) -> str:
+    """What is said of a law that was found; empty where none holds."""
+    if law is None or not law.holds:
+        return ""
+    return (
+        f"; the best law found, which the vocabulary does not have, is {law.formula}, {law.words}: "
+        f"{law.model.held_out_rms:.2f} noise floors are left"
+    )
 
 
 def _channel(place: str) -> str:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.identification.case import CaseRun
-from sloshlab.missing_physics.extension import Extension
+from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.twin.lane_preparation import Executor
 from sloshlab.twin.twin import Twin
 
@@ -89,8 +90,8 @@ class DiagnosedModel(Protocol):
     def simulate_many(self, requests: Sequence[Request]) -> list[Readings | SloshlabError]:
         """The same of many simulations; in place of those that do not reach their end, why."""
 
-    def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
+    def motion(self, run: CaseRun, values: Mapping[str, float], extension: Extension = NOTHING) -> FloatArray:
         """Displacement, velocity, acceleration of the place where effects act, shape (n, 3)."""
 
-    def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
-        """Write the simulation with retuned numbers and added forces."""
+    def save_extended(self, values: Mapping[str, float], candidates: Sequence[Candidate], path: Path) -> None:
+        """Write the simulation with retuned numbers and effects."""

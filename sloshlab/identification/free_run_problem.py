@@ -15,8 +15,7 @@ from sloshlab.identification.baseline_parameter import BaselineParameter, prior_
 from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
 from sloshlab.identification.observations import Observation
-from sloshlab.missing_physics.candidate import Candidate, channels_of
-from sloshlab.missing_physics.extension import NOTHING, Extension
+from sloshlab.missing_physics.candidate import Candidate, channels_of, extension_of
 
 FloatArray = NDArray[np.float64]
 _Label = TypeVar("_Label")
@@ -448,18 +447,6 @@ def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str,
     """Channels that alone an effect changes; none given where it changes the motion."""
     changed = channels_of(candidate.channel) if candidate.effect.block == "sensor" else ()
     return () if any(name in driving for name in changed) else changed
-
-
-def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:
-    """What the candidates add, with their parameters taken from the values."""
-    total = NOTHING
-    for candidate in candidates:
-        numbers = {
-            parameter.name: values[f"{candidate.key}.{parameter.name}"]
-            for parameter in candidate.effect.parameters
-        }
-        total = total + candidate.extension(numbers)
-    return total
 
 
 def mean_squares(observed: Sequence[Observation], residual: FloatArray) -> dict[str, float]:

@@ -30,8 +30,9 @@ from sloshlab.identification.rig_parameters import (
     retuned_term,
     rig_parameters,
 )
-from sloshlab.missing_physics.candidate import BLOCKS
+from sloshlab.missing_physics.candidate import BLOCKS, Candidate, extension_of
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
+from sloshlab.missing_physics.saved_effects import effect_lines
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
 from sloshlab.twin.excitation import with_cached_inputs
@@ -163,9 +164,9 @@ class RigModel:
             return self.twin.carried_mass_kg
         return 1.0 / float((structure.mode_shape**2 / structure.masses_kg)[0])
 
-    def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
+    def motion(self, run: CaseRun, values: Mapping[str, float], extension: Extension = NOTHING) -> FloatArray:
         """Displacement, velocity, acceleration of the tank, absolute, shape (n, 3)."""
-        return np.asarray(self.whole_simulation(Request(run, values, NOTHING)).places[:, 1])
+        return np.asarray(self.whole_simulation(Request(run, values, extension)).places[:, 1])
 
     def whole_simulation(self, request: Request) -> Simulation:
         """Motion and every force of the twin; faults of driving channels are taken out of the drive.
@@ -185,9 +186,10 @@ class RigModel:
                 return parameter == beginning + run.name
         return True
 
-    def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
-        """Write `extended_twin` as a twin."""
-        save_twin(self.extended_twin(values, extension), path)
+    def save_extended(self, values: Mapping[str, float], candidates: Sequence[Candidate], path: Path) -> None:
+        """Write `extended_twin` as a twin, and effects of sensors and actuators by their names."""
+        twin = self.extended_twin(values, extension_of(candidates, values))
+        save_twin(twin, path, effect_lines(candidates, values))
 
     def compared(self, run: CaseRun) -> list[str]:
         """Channels of a run that the twin has a counterpart for and that do not alone drive it."""
@@ -397,7 +399,7 @@ class RigModel:
     def extended_twin(self, values: Mapping[str, float], extension: Extension) -> Twin:
         """The twin with retuned numbers and the forces of an extension, for runs with moving liquid.
 
-        Faults of sensors stay out: they are no part of what is simulated.
+        Effects of sensors and actuators are no part of a twin.
         """
         # Frozen runs have no forces of the liquid, which a saved twin must not lose.
         run = next((run for run in self.runs if run.attributes.configuration == "sloshing"), self.runs[0])

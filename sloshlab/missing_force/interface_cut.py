@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.errors import SloshlabError
+from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.observations import Observation
-from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_force.latent_force import (
     EITHER,
     STRUCTURE,
@@ -129,13 +129,13 @@ class InterfaceCut:
 
 
 def interface_cut(
-    model: RigModel, runs: Sequence[Sequence[Observation]], values: Mapping[str, float], seed: int = 0
+    model: DiagnosedModel, runs: Sequence[Sequence[Observation]], values: Mapping[str, float], seed: int = 0
 ) -> InterfaceCut:
     """Cut the system open in every run.
 
     Parameters
     ----------
-    model : RigModel
+    model : DiagnosedModel
     runs : sequence of sequences of Observation
         Per run.
     values : mapping
@@ -157,7 +157,7 @@ def interface_cut(
     return InterfaceCut(blocks, sensors, suspect, remark, tuple(found))
 
 
-def _forces(model: RigModel, run: Sequence[Observation], values: Mapping[str, float]) -> RunForces | None:
+def _forces(model: DiagnosedModel, run: Sequence[Observation], values: Mapping[str, float]) -> RunForces | None:
     try:
         return run_forces(model, run, values)
     except SloshlabError:
@@ -188,7 +188,7 @@ def _disagreements(
 
 
 def _sensor_checks(
-    model: RigModel,
+    model: DiagnosedModel,
     runs: Sequence[Sequence[Observation]],
     found: Sequence[RunForces],
     values: Mapping[str, float],
@@ -244,7 +244,7 @@ def _suspect_channel(sensors: Sequence[SensorCheck]) -> tuple[str, str]:
     return "", ""
 
 
-def _missing_force_power_n2(model: RigModel, forces: RunForces) -> float:
+def _missing_force_power_n2(model: DiagnosedModel, forces: RunForces) -> float:
     """Mean square of what the blocks lack beyond noise and their own parameters; never zero."""
     sizes = [
         # Never zero, since sizes are compared by their ratio.
@@ -260,7 +260,7 @@ def _excess(ratio: float) -> float:
 
 
 def _blocks(
-    model: RigModel,
+    model: DiagnosedModel,
     runs: Sequence[Sequence[Observation]],
     found: Sequence[RunForces],
     suspect: str,
@@ -269,6 +269,8 @@ def _blocks(
     places = tuple(dict.fromkeys(force.place for forces in found for force in forces.forces))
     parts = _parts(model, runs, found, places, suspect)
     shares = _shares(parts, seed)
+    if any(run.probed is not None for run in found):
+        return (*_of_own_twin(found, shares), _sensors(parts, suspect, shares))
     cuts = [_excitation(runs, found)]
     for place in (STRUCTURE, TANK, EITHER):
         if place in places:
@@ -280,12 +282,30 @@ def _blocks(
         cuts.insert(1, _undetermined(STRUCTURE, "there is none: the tank follows its measured motion"))
     if TANK not in places and EITHER not in places:
         cuts.append(_undetermined(TANK, "no force on the tank was recorded"))
+    cuts.append(_sensors(parts, suspect, shares))
+    return tuple(cuts)
+
+
+def _of_own_twin(
+    found: Sequence[RunForces], shares: Mapping[str, tuple[float, float, float]]
+) -> tuple[BlockCut, BlockCut]:
+    """A twin of a user's own is one block between what drives it and what is read of it."""
+    own = [force for run in found if (force := run.at(STRUCTURE)) is not None]
+    driven = _undetermined("excitation", "what drives is taken as it was recorded")
+    if not own:
+        return driven, _undetermined(STRUCTURE, "an added force shows in no compared channel")
+    cut = _of_place(STRUCTURE, own, shares)
+    return driven, replace(cut, input="what drives it, as recorded", output="what is read of it")
+
+
+def _sensors(
+    parts: Sequence[Mapping[str, FloatArray]], suspect: str, shares: Mapping[str, tuple[float, float, float]]
+) -> BlockCut:
     share, low, high = shares.get(SENSOR, (float("nan"),) * 3)
     remark = "" if SENSOR in shares else "no two sensors saw the same motion"
     size = float(np.sqrt(max((part[SENSOR].max() for part in parts if SENSOR in part), default=0.0)))
     compared = suspect or "channels of the same motion"
-    cuts.append(BlockCut(SENSOR, "what the other sensors say", compared, share, low, high, size, 1.0, remark))
-    return tuple(cuts)
+    return BlockCut(SENSOR, "what the other sensors say", compared, share, low, high, size, 1.0, remark)
 
 
 def _undetermined(block: str, remark: str) -> BlockCut:
@@ -321,7 +341,7 @@ def _of_place(
 
 
 def _parts(
-    model: RigModel,
+    model: DiagnosedModel,
     runs: Sequence[Sequence[Observation]],
     found: Sequence[RunForces],
     places: Sequence[str],
@@ -338,7 +358,7 @@ def _parts(
                 # A force within its own noise explains mismatch only by fitting that noise.
                 if own.power_n2 < _RESOLVED * own.standard_error_n**2:
                     continue
-                series[place] = channel_responses(forces, observed, model.rig, own)
+                series[place] = channel_responses(forces, observed, getattr(model, "rig", None), own)
         part = {force.place: np.zeros(_N_PARTS) for force in forces.forces}
         comparable = [observation for observation in observed if observation.channel in forces.left]
         if len(comparable) > 1:
@@ -393,12 +413,12 @@ def _shares(parts: Sequence[Mapping[str, FloatArray]], seed: int) -> dict[str, t
     }
 
 
-def own_tolerances(model: RigModel, forces: RunForces, place: str) -> FloatArray:
+def own_tolerances(model: DiagnosedModel, forces: RunForces, place: str) -> FloatArray:
     """Standard deviations of what a block's own parameters may be off, per displacement, velocity, acceleration.
 
     Parameters
     ----------
-    model : RigModel
+    model : DiagnosedModel
     forces : RunForces
     place : str
     """
@@ -427,12 +447,12 @@ def own_tolerances(model: RigModel, forces: RunForces, place: str) -> FloatArray
     return own
 
 
-def beyond_own_parameters(model: RigModel, forces: RunForces, force: LatentForce) -> LatentForce:
+def beyond_own_parameters(model: DiagnosedModel, forces: RunForces, force: LatentForce) -> LatentForce:
     """A force less what the block's own parameters explain of it within their tolerances.
 
     Parameters
     ----------
-    model : RigModel
+    model : DiagnosedModel
     forces : RunForces
         Of the same run.
     force : LatentForce

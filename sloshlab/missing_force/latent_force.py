@@ -7,21 +7,17 @@ acts on the structure. Without a measured force the place stays undetermined.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.identification.case import CaseRun
-from sloshlab.identification.diagnosed_model import Request
+from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
 from sloshlab.identification.observations import Observation
-from sloshlab.identification.release import INSTANT
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_force.force_inversion import (
-    ORDERS,
     InvertedForce,
     frequencies_hz,
     in_frequency,
@@ -32,6 +28,8 @@ from sloshlab.missing_force.force_inversion import (
     sample_variance,
     wiener_gain,
 )
+from sloshlab.missing_force.probed_transfers import ProbedTransfers, probed_transfers
+from sloshlab.missing_force.residual_series import missed_series, noise_power, order_of, taper, untapered
 from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.rig import Rig
 from sloshlab.twin.blocks import Blocks
@@ -44,10 +42,6 @@ from sloshlab.twin.twin import Twin
 FloatArray = NDArray[np.float64]
 Found = tuple[tuple["LatentForce", ...], dict[str, FloatArray]]
 STRUCTURE, TANK, EITHER = "structure", "tank", "structure or tank"
-_END_SHARE: Final = 0.04
-"""Of a run: length of the tapers."""
-_SLOW_HZ: Final = 1.5
-"""Below it offsets and drift of accelerometers hide the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +99,8 @@ class RunForces:
     structure : Structure or None
         As retuned.
     carried_mass_kg : float
+    probed : ProbedTransfers or None
+        Of a twin of a user's own.
     """
 
     forces: tuple[LatentForce, ...]
@@ -112,6 +108,7 @@ class RunForces:
     left: dict[str, FloatArray]
     structure: Structure | None
     carried_mass_kg: float
+    probed: ProbedTransfers | None = None
 
     def at(self, place: str) -> LatentForce | None:
         """The force at a place, if it can be told there."""
@@ -119,7 +116,7 @@ class RunForces:
 
 
 def run_forces(
-    model: RigModel,
+    model: DiagnosedModel,
     observed: Sequence[Observation],
     values: Mapping[str, float],
     without: Collection[str] = (),
@@ -129,7 +126,8 @@ def run_forces(
 
     Parameters
     ----------
-    model : RigModel
+    model : DiagnosedModel
+        Transfers of a twin of a user's own are probed; all that it lacks is one force then.
     observed : sequence of Observation
         Of one run.
     values : mapping
@@ -145,13 +143,15 @@ def run_forces(
         If the baseline does not reach the end of the run.
     """
     run = observed[0].run
-    simulation = model.whole_simulation(Request(run, values, extension))
     readings = model.simulate(run, values, extension)
     missed = {
-        observation.channel: _missed(observation, readings[observation.channel], values, run.is_free)
+        observation.channel: missed_series(observation, readings[observation.channel], values, run.is_free)
         for observation in observed
     }
     believed = [observation for observation in observed if observation.channel not in without]
+    if not isinstance(model, RigModel):
+        return _on_probed(model, values, extension, observed, believed, missed)
+    simulation = model.whole_simulation(Request(run, values, extension))
     if simulation.twin.structure is None:
         forces, left = _on_shaker(simulation, run, observed, believed, missed)
     else:
@@ -161,7 +161,7 @@ def run_forces(
 
 
 def channel_responses(
-    forces: RunForces, observed: Sequence[Observation], rig: Rig, force: LatentForce
+    forces: RunForces, observed: Sequence[Observation], rig: Rig | None, force: LatentForce
 ) -> dict[str, FloatArray]:
     """What a force at its place adds to every channel of the run, in true units, shape (n,) each.
 
@@ -170,7 +170,8 @@ def channel_responses(
     forces : RunForces
     observed : sequence of Observation
         Of the same run.
-    rig : Rig
+    rig : Rig or None
+        None of a twin of a user's own.
     force : LatentForce
     """
     run = force.run
@@ -180,6 +181,9 @@ def channel_responses(
     series[first : first + force.force_n.size] = force.force_n
     frequency = frequencies_hz(n, rate)
     spectrum = in_frequency(series)
+    if forces.probed is not None:
+        of_channels = forces.probed.readings
+        return {each.channel: in_time(of_channels[each.channel] * spectrum, n) for each in observed}
     structure = forces.structure
     n_cells = max(1, sum(observation.channel.startswith("force_cell") for observation in observed))
     moved = np.zeros(frequency.size, complex)
@@ -196,66 +200,12 @@ def channel_responses(
             transfer = (
                 _sign(observation) * of_force / (n_cells if observation.channel.startswith("force_cell") else 1)
             )
-        elif structure is not None:
+        elif structure is not None and rig is not None:
             weights = modal_weights(structure, rig, observation.channel, attributes.get("x_m"))
             if weights is not None:
-                transfer = response(structure, weights, _order(observation.channel), frequency)
+                transfer = response(structure, weights, order_of(observation.channel), frequency)
         shown[observation.channel] = in_time(transfer * spectrum, n)
     return shown
-
-
-def _missed(
-    observation: Observation, reading: FloatArray, values: Mapping[str, float], is_free: bool
-) -> FloatArray:
-    """Recorded minus simulated in true units, zero where lost, tapered at the ends."""
-    recorded_ = np.asarray(observation.run.recording[observation.channel].values, np.float64)
-    n = min(recorded_.size, reading.size)
-    difference = np.zeros(recorded_.size)
-    known = observation.known[:n].copy()
-    first = 0
-    if is_free:
-        # From the release on, which a fit has found; the sample before may still be held.
-        instant = values.get(f"{INSTANT}{observation.run.name}", 0.0)
-        first = 1 + max(0, math.ceil(instant * observation.run.attributes.sampling_rate_hz))
-        n_disturbed = int(np.argmax(known))
-        known[first:n_disturbed] = np.isfinite(recorded_[first:n_disturbed])
-    difference[:n][known] = (recorded_[:n] - reading[:n])[known]
-    if not observation.keeps_mean:
-        # The mean of a channel whose zero means nothing would be asked for as a constant force.
-        difference[:n][known] -= difference[:n][known].mean()
-    difference[:first] = difference[first] - np.arange(first, 0, -1) * (difference[first + 1] - difference[first])
-    # Divided by the gain: forces are in true newtons, not in those of a sensor that reads too much.
-    return difference * _taper(recorded_.size, is_free) / values.get(f"gain of {observation.channel}", 1.0)
-
-
-def _taper(n: int, is_free: bool) -> FloatArray:
-    """Cosine taper at the end, and at the start of a run that was not released."""
-    m = max(2, int(_END_SHARE * n))
-    ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(m) + 0.5) / m)
-    window = np.ones(n)
-    window[n - m :] = ramp[::-1]
-    # The first cycles of a release hold most of its information.
-    if not is_free:
-        window[:m] = ramp
-    return window
-
-
-def _untapered(n: int, is_free: bool) -> slice:
-    m = max(2, int(_END_SHARE * n))
-    return slice(m // 4 if is_free else m, n - m)
-
-
-def _noise_power(observation: Observation, frequency_hz: FloatArray) -> FloatArray:
-    """E|FFT|² of the noise of a channel, by its variance per coefficient.
-
-    It grows below 1.5 Hz: accelerometers drift, and displacements of a base are integrated from accelerometers.
-    """
-    variance = np.interp(frequency_hz, observation.frequencies_hz, np.median(observation.variance, axis=0))
-    # Without this a driven base that is slowly off asks for a force which is not there. Displacements of a decay
-    # are read by a sensor of their own.
-    if _order(observation.channel) == 2 or (_order(observation.channel) == 0 and not observation.run.is_free):
-        variance = variance * (1 + (_SLOW_HZ / np.maximum(frequency_hz, 1e-3 * _SLOW_HZ)) ** 4)
-    return np.asarray(variance * observation.known.size)
 
 
 def _on_structure(
@@ -282,7 +232,7 @@ def _on_structure(
     # missing.
     on_structure = _change_of_baseline_force(simulation, simulation.twin, STRUCTURE, relative, rate)
     in_tank = _change_of_baseline_force(simulation, simulation.twin, TANK, absolute, rate)
-    kept = _untapered(n, run.is_free)
+    kept = untapered(n, run.is_free)
     kept = slice(kept.start, min(kept.stop, sampled))
     time = np.asarray(run.recording["time"].values, np.float64)
 
@@ -303,7 +253,7 @@ def _on_structure(
     inertia = simulation.twin.carried_mass_kg * orders[2]
     # What a wrong release adds to the force between structure and tank is inertia, no missing force of the
     # liquid.
-    of_release = at_release * simulation.twin.carried_mass_kg * started[:, 2] * _taper(n, run.is_free)
+    of_release = at_release * simulation.twin.carried_mass_kg * started[:, 2] * taper(n, run.is_free)
     liquid = (
         inertia * inverted.spectrum - in_frequency(missed_force - of_release) - in_frequency(_padded(in_tank, n))
     )
@@ -318,6 +268,48 @@ def _on_structure(
         latent(STRUCTURE, of_structure, inverted.noise + kept_share * noise, relative, inverted.kept_share),
         latent(TANK, in_liquid, kept_share * noise, absolute, kept_share),
     ), left
+
+
+def _on_probed(
+    model: DiagnosedModel,
+    values: Mapping[str, float],
+    extension: Extension,
+    observed: Sequence[Observation],
+    believed: Sequence[Observation],
+    missed: Mapping[str, FloatArray],
+) -> RunForces:
+    """The force that a twin of a user's own lacks, by inversion of what a pulse of force does to its channels."""
+    run, n = observed[0].run, int(observed[0].run.recording.sizes["time"])
+    rate = run.attributes.sampling_rate_hz
+    probed = probed_transfers(model, run, values, extension)
+    frequency = frequencies_hz(n, rate)
+    spectra = {name: in_frequency(series) for name, series in missed.items()}
+    seen = {
+        each.channel: (probed.readings[each.channel], noise_power(each, frequency, integrates_driven=False))
+        for each in believed
+        if probed.readings[each.channel].any()
+    }
+    inverted, _ = inverted_force(seen, spectra, frequency, rate)
+    left = {
+        name: in_time(spectrum - probed.readings[name] * inverted.spectrum, n)
+        for name, spectrum in spectra.items()
+    }
+    motion = model.motion(run, values, extension)
+    motion = motion + np.stack([in_time(transfer * inverted.spectrum, n) for transfer in probed.motion], axis=-1)
+    kept = untapered(n, run.is_free)
+    share = inverted.kept_share
+    force = LatentForce(
+        run,
+        STRUCTURE,
+        in_time(inverted.spectrum, n)[kept],
+        float(np.sqrt(sample_variance(inverted.noise, n))),
+        np.asarray(run.recording["time"].values, np.float64)[kept],
+        motion[kept],
+        motion[: kept.start],
+        share,
+        inverted.noise / np.maximum(share, 1e-300),
+    )
+    return RunForces((force,) if seen else (), dict(missed), left, None, 0.0, probed)
 
 
 def _inverted_force_at_tank(
@@ -340,16 +332,18 @@ def _inverted_force_at_tank(
             structure, rig, observation.channel, run.recording[observation.channel].attrs.get("x_m")
         )
         if weights is not None:
-            receptances[observation.channel] = response(structure, weights, _order(observation.channel), frequency)
+            receptances[observation.channel] = response(
+                structure, weights, order_of(observation.channel), frequency
+            )
             if run.is_free:
                 released[observation.channel] = in_frequency(
-                    _release(structure, weights, _order(observation.channel), n, rate) * _taper(n, True)
+                    _release(structure, weights, order_of(observation.channel), n, rate) * taper(n, True)
                 )
     # All channels have a residual after the inversion, also those that were left out of it: that is what tests
     # them.
     spectra = {name: in_frequency(missed[name]) for name in receptances}
     seen = {
-        observation.channel: (receptances[observation.channel], _noise_power(observation, frequency))
+        observation.channel: (receptances[observation.channel], noise_power(observation, frequency))
         for observation in believed
         if observation.channel in receptances
     }
@@ -388,7 +382,7 @@ def _on_shaker(
     rate, n = run.attributes.sampling_rate_hz, int(run.recording.sizes["time"])
     frequency = frequencies_hz(n, rate)
     sampled = min(n, simulation.places.shape[0])
-    motions = [observation for observation in observed if _order(observation.channel) == 2]
+    motions = [observation for observation in observed if order_of(observation.channel) == 2]
     # The tank's own motion is measured: the mean of the accelerometers that are believed is the input, and their
     # differences from it are left to the sensors.
     good = [motion for motion in motions if motion in believed] or motions
@@ -402,22 +396,18 @@ def _on_shaker(
     of_noise = np.interp(frequency, *force_noise)
     # The mean of n accelerometers has 1/n² of the sum of their noise powers.
     for observation in good:
-        of_noise = of_noise + (carried / len(good)) ** 2 * _noise_power(observation, frequency)
+        of_noise = of_noise + (carried / len(good)) ** 2 * noise_power(observation, frequency)
     wanted = in_frequency(carried * mean - missed_force)
     share = wiener_gain(np.abs(wanted) ** 2, of_noise, frequency, rate)
     force = in_time(share * wanted, n)[:sampled]
     motion = simulation.places[:sampled, 1].copy()
     motion[:, 2] += mean[:sampled]
-    kept = _untapered(n, run.is_free)
+    kept = untapered(n, run.is_free)
     kept = slice(kept.start, min(kept.stop, sampled))
     time = np.asarray(run.recording["time"].values, np.float64)
     error = float(np.sqrt(sample_variance(share * of_noise, n)))
     before = motion[: kept.start]
     return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept], before, share, of_noise),), left
-
-
-def _order(name: str) -> int:
-    return ORDERS.get(name.partition("_")[0], -1)
 
 
 def _measured(
@@ -434,7 +424,7 @@ def _measured(
     scale = n_cells / len(cells) if cells else 1.0
     total = scale * np.sum([_sign(observation) * missed[observation.channel] for observation in chosen], axis=0)
     frequency = chosen[0].frequencies_hz
-    noise = scale**2 * np.sum([_noise_power(observation, frequency) for observation in chosen], axis=0)
+    noise = scale**2 * np.sum([noise_power(observation, frequency) for observation in chosen], axis=0)
     return total, (frequency, noise)
 
 

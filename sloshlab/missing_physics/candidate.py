@@ -419,6 +419,25 @@ class Candidate:
         return replace(added, key=key)
 
 
+def extension_of(candidates: Sequence[Candidate], values: Mapping[str, float]) -> Extension:
+    """What candidates add together.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    values : mapping
+        Their numbers, named as in a fit.
+    """
+    total = Extension()
+    for candidate in candidates:
+        numbers = {
+            parameter.name: values[f"{candidate.key}.{parameter.name}"]
+            for parameter in candidate.effect.parameters
+        }
+        total = total + candidate.extension(numbers)
+    return total
+
+
 EFFECTS: Final = Registry[Effect]("effect", group="sloshlab.effects")
 """By block and name; other packages add theirs as entry points."""
 

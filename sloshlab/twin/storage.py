@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,7 +21,9 @@ from sloshlab.atomic_file import replaced, write_bytes
 from sloshlab.errors import InputError
 from sloshlab.toml_file import read_toml
 from sloshlab.twin import (  # noqa: F401  they register forces
+    external_forces,
     liquid_effects,
+    product_forces,
     rate_independent_forces,
     reduced_order_model_force,
     structure_forces,
@@ -54,17 +57,24 @@ _SENSOR_NUMBERS = (
 )
 
 
-def save_twin(twin: Twin, path: str | os.PathLike[str]) -> None:
+def save_twin(twin: Twin, path: str | os.PathLike[str], further_lines: Sequence[str] = ()) -> None:
     """Write the twin to `path` (TOML) and, where its forces have tables, to the same name with `.nc`.
 
     Each file is written completely or not at all; the text last, so that it never names arrays that are absent.
+
+    Parameters
+    ----------
+    twin : Twin
+    path : path
+    further_lines : sequence of str
+        Tables for others who read the file; `load_twin` passes over them.
     """
     file = Path(path)
     tables = {f"term_{i}": term.table for i, term in enumerate(twin.terms) if term.table.size}
     # arrays first: a text without its arrays would be a twin that cannot be loaded
     if tables:
         _write_arrays(file.with_suffix(".nc"), tables)
-    write_bytes(file, _text(twin).encode())
+    write_bytes(file, (_text(twin) + "".join(f"{line}\n" for line in further_lines)).encode())
 
 
 def load_twin(path: str | os.PathLike[str]) -> Twin:

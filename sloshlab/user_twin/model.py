@@ -16,6 +16,7 @@ from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.diagnosed_model import Readings, Request
 from sloshlab.identification.rig_model import corrected
+from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
 from sloshlab.recording import channels
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
@@ -122,14 +123,14 @@ class UserTwinModel:
         except SloshlabError as error:
             return error
 
-    def motion(self, run: CaseRun, values: Mapping[str, float]) -> FloatArray:
+    def motion(self, run: CaseRun, values: Mapping[str, float], extension: Extension = NOTHING) -> FloatArray:
         """Displacement, velocity, acceleration of the coordinate on which added forces act, shape (n, 3)."""
-        return self._truth(run, values, NOTHING)[1]
+        return self._truth(run, values, extension)[1]
 
-    def save_extended(self, values: Mapping[str, float], extension: Extension, path: Path) -> None:
-        """Write parameters and added forces as TOML; the module itself stays where it is."""
+    def save_extended(self, values: Mapping[str, float], candidates: Sequence[Candidate], path: Path) -> None:
+        """Write parameters and effects as TOML; the module itself stays where it is."""
         known = {parameter.name: values.get(parameter.name, parameter.believed) for parameter in self.parameters}
-        save_extended(self.name, known, extension, path)
+        save_extended(self.name, known, candidates, values, path)
 
     def _truth(
         self, run: CaseRun, values: Mapping[str, float], extension: Extension

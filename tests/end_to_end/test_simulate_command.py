@@ -78,6 +78,37 @@ def test_frozen_runs_of_the_virtual_laboratory_are_met(folder: Path, tmp_path: P
     assert found.attrs["experiment"] == experiment
 
 
+def test_a_saved_twin_reads_with_its_faulty_sensors(folder: Path, tmp_path: Path) -> None:
+    """A gain of 1.2 and a limit, of what the sensors without a fault show."""
+    rig, recorded = folder / "sdof.toml", folder / "sdof_free.nc"
+    plain = simulated(rig, recorded, tmp_path / "plain.nc", "--save-twin", str(tmp_path / "twin.toml"))
+    largest = float(np.abs(plain["acceleration_tip"].values).max())
+    effects = (
+        f'[[effects]]\nname = "sensor.sensor_clipping"\nchannel = "acceleration_tip"\nlimit = {0.5 * largest}\n'
+        '[[effects]]\nname = "sensor.sensor_gain"\nchannel = "force_interface"\nratio = 0.2\n'
+    )
+    text = (tmp_path / "twin.toml").read_text(encoding="utf-8")
+    (tmp_path / "faulty.toml").write_text(f"{text}\n{effects}", encoding="utf-8")
+    faulty = simulated(rig, recorded, tmp_path / "faulty.nc", "--twin", str(tmp_path / "faulty.toml"))
+    np.testing.assert_allclose(faulty["force_interface"], 1.2 * plain["force_interface"], rtol=1e-12)
+    clipped = np.clip(plain["acceleration_tip"].values, -0.5 * largest, 0.5 * largest)
+    np.testing.assert_allclose(faulty["acceleration_tip"], clipped, rtol=1e-9)
+    np.testing.assert_array_equal(faulty["displacement_tank"], plain["displacement_tank"])
+
+
+def test_an_unknown_effect_of_a_saved_twin_is_refused(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig, recorded = folder / "sdof.toml", folder / "sdof_free.nc"
+    simulated(rig, recorded, tmp_path / "plain.nc", "--save-twin", str(tmp_path / "twin.toml"))
+    text = (tmp_path / "twin.toml").read_text(encoding="utf-8")
+    (tmp_path / "twin.toml").write_text(f'{text}\n[[effects]]\nname = "sensor.magic"\n', encoding="utf-8")
+    where = ["--rig", str(rig), "--input", str(recorded), "-o", str(tmp_path / "s.nc")]
+    assert run(["simulate", *where, "--twin", str(tmp_path / "twin.toml")]) == 1
+    assert "the effect 'sensor.magic'" in capsys.readouterr().err
+    assert not (tmp_path / "s.nc").exists()
+
+
 def test_a_block_alone_on_its_measured_input_repeats_the_loop(folder: Path, tmp_path: Path) -> None:
     rig, recorded = folder / "sdof.toml", read_recording(folder / "sdof_free.nc")
     alone = simulated(rig, folder / "sdof_free.nc", tmp_path / "s.nc", "--block", "structure")

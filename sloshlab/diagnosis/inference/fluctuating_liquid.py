@@ -26,10 +26,11 @@ from scipy.ndimage import uniform_filter
 from sloshlab.diagnosis.inference.places import TANK, transfers_of
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
-from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
+from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.observations import SCATTER_AVERAGED_OVER, Observation
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.identification.rig_parameters import TOLERANCE_OF_FLUCTUATION, damps_as_liquid
+from sloshlab.missing_physics.candidate import extension_of
 
 FloatArray = NDArray[np.float64]
 _PLACES_IN_A_BAND: Final = 32

@@ -8,16 +8,21 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.identification.rig_parameters import retuned_structure
 from sloshlab.missing_force.force_inversion import ORDERS, modal_weights, response
+from sloshlab.missing_force.probed_transfers import probed_transfers
+from sloshlab.missing_physics.extension import NOTHING
 from sloshlab.twin.structure import Structure
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 SENSOR: Final = "sensor"
+ELSEWHERE: Final = "structure elsewhere"
+"""Of a user's own twin, which says of one coordinate alone how a force on it shows."""
 STRUCTURE, TANK = "structure", "tank"
 
 
@@ -43,7 +48,7 @@ def transfers_of(
     Parameters
     ----------
     model : DiagnosedModel
-        Of a user's own twin no transfer is known, and there is no such place.
+        Of a user's own twin the transfer is probed by a pulse; none is known where that does not end.
     run : sequence of Observation
     values : mapping
         Of the baseline.
@@ -51,7 +56,7 @@ def transfers_of(
         Those of the bands by default.
     """
     if not isinstance(model, RigModel):
-        return {}
+        return _probed(model, run, values)
     structure = None if model.twin.structure is None else retuned_structure(model.twin.structure, values)
     carried_kg = model.twin.carried_mass_kg * values.get("carried mass", 1.0)
     n_cells = sum(each.channel.startswith("force_cell") for each in run)
@@ -62,6 +67,27 @@ def transfers_of(
         * np.stack([_transfer(model, structure, carried_kg, each, place, at_hz) for each in run], axis=1)
         for place in (STRUCTURE, TANK)
     }
+
+
+def _probed(
+    model: DiagnosedModel, run: Sequence[Observation], values: Mapping[str, float]
+) -> dict[str, ComplexArray]:
+    """Of every band the line at which a force shows most over the noise of the channels."""
+    try:
+        probed = probed_transfers(model, run[0].run, values, NOTHING)
+    except SloshlabError:
+        return {}
+    lines = np.stack([probed.readings[each.channel] for each in run], axis=1)
+    bands = run[0].frequencies_hz
+    of_line = np.clip(np.searchsorted(bands, probed.frequency_hz - 0.5 * (bands[1] - bands[0])), 0, bands.size - 1)
+    noise = np.stack([np.median(each.variance, axis=0) for each in run], axis=1)[of_line]
+    shown = (np.abs(lines) ** 2 / noise).sum(axis=1)
+    found = np.zeros((bands.size, len(run)), np.complex128)
+    for band in range(bands.size):
+        own = np.flatnonzero(of_line == band)
+        if own.size:
+            found[band] = lines[own[np.argmax(shown[own])]]
+    return {STRUCTURE: found}
 
 
 def _transfer(

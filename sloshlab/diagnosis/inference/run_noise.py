@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from sloshlab.diagnosis.inference.places import SENSOR, STRUCTURE, TANK, transfers_of
+from sloshlab.diagnosis.inference.places import ELSEWHERE, SENSOR, STRUCTURE, TANK, transfers_of
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
@@ -89,9 +89,9 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
         parts = np.stack([transfers.real, transfers.imag], axis=-1)
         if parts.any():
             places[place] = _projections(inverse_root @ (parts[None] / noise[..., None]))
-    if not isinstance(model, RigModel):
-        # Of a user's own twin no transfer is known: a force shows in any way in all channels.
-        places[STRUCTURE] = _projections(inverse_root)
+    if not isinstance(model, RigModel) and (n > 1 or STRUCTURE not in places):
+        # A force on another coordinate of a user's own twin shows in any way in all channels.
+        places[ELSEWHERE] = _projections(inverse_root)
     for i, each in enumerate(observed):
         places[f"{SENSOR} {each.channel}"] = _projections(inverse_root @ np.eye(n)[:, i : i + 1])
     is_chaotic = isinstance(model, RigModel) and model.liquid_fluctuates(observed[0].run)

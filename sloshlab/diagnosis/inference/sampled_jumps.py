@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis.inference.places import transfers_of
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
-from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
+from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics.candidate import extension_of
 from sloshlab.twin.terms import Term
 
 FloatArray = NDArray[np.float64]

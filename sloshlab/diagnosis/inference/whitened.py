@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis.inference.run_noise import RunNoise
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel
-from sloshlab.identification.free_run_problem import extension_of
 from sloshlab.identification.observations import Observation
-from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.candidate import Candidate, extension_of
 
 FloatArray = NDArray[np.float64]
 

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel
-from sloshlab.identification.free_run_problem import FreeRunFit, extension_of
+from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.observations import Observation
-from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_force.latent_force import LatentForce, run_forces
-from sloshlab.missing_physics.candidate import MissingForces
+from sloshlab.missing_physics.candidate import MissingForces, extension_of
 
 FloatArray = NDArray[np.float64]
 
@@ -22,7 +21,7 @@ FloatArray = NDArray[np.float64]
 def latent_forces(
     model: DiagnosedModel, runs: Sequence[Sequence[Observation]], fit: FreeRunFit
 ) -> dict[str, tuple[LatentForce, ...]]:
-    """Latent forces of every run beside a fit; none of a twin of a user's own, of which they are not known.
+    """Latent forces of every run beside a fit; none of runs of which the simulation does not reach its end.
 
     Parameters
     ----------
@@ -32,13 +31,12 @@ def latent_forces(
     fit : FreeRunFit
     """
     found: dict[str, tuple[LatentForce, ...]] = {}
-    if isinstance(model, RigModel):
-        for observed in runs:
-            with suppress(SloshlabError):
-                extension = extension_of(fit.candidates, fit.values)
-                forces = run_forces(model, observed, fit.values, extension=extension).forces
-                if forces:
-                    found[observed[0].run.name] = forces
+    for observed in runs:
+        with suppress(SloshlabError):
+            extension = extension_of(fit.candidates, fit.values)
+            forces = run_forces(model, observed, fit.values, extension=extension).forces
+            if forces:
+                found[observed[0].run.name] = forces
     return found
 
 

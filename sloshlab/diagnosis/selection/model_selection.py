@@ -25,16 +25,9 @@ from sloshlab.diagnosis.selection.matched_forces import MatchedForces, matched_f
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, NO_CHANCE, halved
 from sloshlab.identification.free_run_fit import fitted, stages_for
-from sloshlab.identification.free_run_problem import (
-    TEMPERING,
-    FreeRunFit,
-    FreeRunProblem,
-    extension_of,
-    huber_cost,
-    run_of,
-)
+from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit, FreeRunProblem, huber_cost, run_of
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
-from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
+from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates, extension_of
 from sloshlab.missing_physics.units import named_and_units
 
 Said = Callable[[str, int, int], None]

@@ -7,11 +7,13 @@ from typing import Any, cast
 
 import pytest
 
+from sloshlab.diagnosis.found_law import FoundLaw
 from sloshlab.diagnosis.inference.decision import Decision
 from sloshlab.diagnosis.interval import Interval
 from sloshlab.diagnosis.wording import (
     _described,
     form_and_place,
+    headline_of,
     named_and_placed,
     refuted_statement,
     statement_of,
@@ -19,6 +21,7 @@ from sloshlab.diagnosis.wording import (
 from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate, known_effects
+from sloshlab.twin.product_forces import Factor, Product
 
 assert effects.__all__
 
@@ -138,3 +141,60 @@ def test_of_one_channel_alone_its_sensor_may_be_meant(n_channels: int) -> None:
     said = statement_of(found, Decision("unknown", None, [], "structure", {}), {})
     sensor = " or in what its only sensor makes of it" if n_channels == 1 else ""
     assert said == f"Something is missing that has no name here, in the structure{sensor}."
+
+
+def _model(keys: tuple[str, ...], held_out: float, channel: str = "acceleration_beam_1") -> Any:
+    chosen = []
+    for key in keys:
+        [effect] = [effect for effect in known_effects() if f"{effect.block}.{effect.name}" == key]
+        at = cast(Any, SimpleNamespace(runs=()))
+        chosen.append(Candidate(effect, at, channel if effect.block == "sensor" else ""))
+    names = tuple(sorted(candidate.effect.known_as for candidate in chosen))
+    return SimpleNamespace(fit=SimpleNamespace(candidates=tuple(chosen)), names=names, held_out_rms=held_out)
+
+
+LONGEST = ("tank.gradual_saturation", "sensor.sample_and_hold")
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "n_products"),
+    [
+        ("named", ("structure.coulomb_friction",), 0),
+        ("named", LONGEST, 0),
+        ("indistinguishable", LONGEST, 0),
+        ("unknown", LONGEST, 0),
+        ("unknown", LONGEST, 1),
+        ("unknown", LONGEST, 3),
+        ("nothing_missing", (), 0),
+    ],
+)
+def test_a_headline_has_at_most_forty_words_with_sizes(kind: str, keys: tuple[str, ...], n_products: int) -> None:
+    found: Any = SimpleNamespace(retuned=SimpleNamespace(held_out_rms=12.34))
+    best = _model(keys, 0.987) if keys else None
+    others = [_model(("structure.asymmetric_friction", *LONGEST[1:]), 1.0), _model(("tank.liquid_loss",), 1.0)]
+    alternatives = [best, *others] if kind == "indistinguishable" else [best]
+    decision = Decision(kind, best, alternatives if best else [], "structure", {})
+    intervals = {
+        (candidate.key, parameter.name): Interval(0.3251, 0.31, 0.34)
+        for candidate in (best.fit.candidates if best else ())
+        for parameter in candidate.effect.parameters
+    }
+    products = (Product(Factor(4), Factor(2, True)), Product(Factor(5, True)), Product(velocity=Factor(3, True)))
+    model: Any = SimpleNamespace(held_out_rms=0.9)
+    chosen, coefficients = products[:n_products], (1.0, -2.0, 3.0)[:n_products]
+    law = FoundLaw(model, "structure", chosen, coefficients, (0.01, 0.4, 12.0), True) if n_products else None
+    words = headline_of(found, decision, intervals, law)
+    assert len(words.split()) <= 40
+    assert "12" in words
+    if kind in ("named", "indistinguishable"):
+        assert words.startswith("Left out: ")
+        assert "0.325" in words
+        assert "0.99" in words
+    if kind == "indistinguishable":
+        assert "do not tell it from" in words
+        # the names of the others would be too many words
+        assert "from 3 others" in words
+    if n_products == 1:
+        assert "f = 6.25·10⁸ N s² m⁻⁶ · x⁴ · v |v|, a damping that depends on the displacement" in words
+    if n_products > 1:
+        assert "a nonlinear spring" in words

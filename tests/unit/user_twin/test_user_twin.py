@@ -18,7 +18,7 @@ from sloshlab.identification.case import CaseRun
 from sloshlab.identification.free_run_problem import FreeRunProblem
 from sloshlab.identification.observations import observations
 from sloshlab.missing_physics import effects
-from sloshlab.missing_physics.candidate import Candidate, Surroundings, known_effects
+from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates, extension_of, known_effects
 from sloshlab.missing_physics.extension import NOTHING, Extension, SensorFault
 from sloshlab.recording import run_attributes, write_recording
 from sloshlab.twin.rate_independent_forces import HYSTERESIS, STRUCTURAL_DAMPING
@@ -378,8 +378,6 @@ class TestModel:
         assert starts == pytest.approx([0.01, 0.02])
 
     def test_only_blocks_that_it_has_are_offered(self) -> None:
-        from sloshlab.missing_physics.candidate import candidates
-
         model = UserTwinModel(RELEASED, [released(np.zeros(N))])
         offered = {candidate.effect.block for candidate in candidates(surroundings(model))}
         assert offered == {"structure", "sensor"}
@@ -387,8 +385,13 @@ class TestModel:
 
     def test_it_is_saved_and_loaded(self, tmp_path: Path) -> None:
         model = UserTwinModel(RELEASED, [released(np.zeros(N))])
-        extension = Extension((COULOMB_FRICTION(force_n=0.25),), key=(("coulomb", 0.25),))
-        model.save_extended({"stiffness": 2990.0}, extension, tmp_path / "extended.toml")
+        pool = {candidate.key: candidate for candidate in candidates(surroundings(model))}
+        keys = ("structure.coulomb_friction", "sensor.sensor_gain.displacement_cart")
+        chosen = [pool[key] for key in keys]
+        numbers = {f"{keys[0]}.force_n": 0.25, f"{keys[1]}.ratio": 0.1}
+        extension = extension_of(chosen, numbers)
+        assert extension.faults
+        model.save_extended({"stiffness": 2990.0, **numbers}, chosen, tmp_path / "extended.toml")
         values, loaded = load_extended(tmp_path / "extended.toml")
         expected = model.simulate(model.runs[0], {"stiffness": 2990.0}, extension)["displacement_cart"]
         found = model.simulate(model.runs[0], values, loaded)["displacement_cart"]
