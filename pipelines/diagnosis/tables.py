@@ -221,9 +221,10 @@ def evidence_table(diagnosis: Diagnosis) -> Table | None:
     caption = (
         f"The {len(rows)} of {len(everything)} models that come first. Differences of the logarithm of the "
         "evidence below 1 are no difference, below 3 slight, below 5 clear, above decisive (Kass and Raftery "
-        "1995, doi:10.1080/01621459.1995.10476572). What speaks for and against are tests on the missing force and on "
-        "the sensors that know of no candidate: one that contradicts what is named is a reason to doubt it. What "
-        "remains is any force of a block or any error of a sensor that describes the rest better than noise does."
+        "1995, doi:10.1080/01621459.1995.10476572). What speaks for and against are tests on the missing force "
+        "and on the sensors that know of no candidate: one that contradicts what is named is a reason to doubt "
+        "it. What remains is any force of a block or any error of a sensor that describes the rest better than "
+        "noise does."
     )
     return Table("For and against", header, tuple(rows), caption)
 
