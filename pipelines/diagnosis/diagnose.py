@@ -21,7 +21,7 @@ from sloshlab.diagnosis.findings import findings_of
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 from sloshlab.identification.case import Case, read_case
 from sloshlab.missing_physics.user_effects import load_user_effects
-from sloshlab.user_twin import UserTwinModel, load_user_twin
+from sloshlab.user_twin import UserTwinModel, load_user_twin, with_known_drive
 
 
 def files_of(*, report: bool) -> tuple[str, ...]:
@@ -59,7 +59,11 @@ def diagnose_case(
     # Before the search, which takes minutes: a folder that is in the way has to be said at once.
     require_result_folder(target, files_of(report=report))
     own = [effect for file in effects for effect in load_user_effects(file)]
-    model = None if twin is None else UserTwinModel(load_user_twin(twin), case.runs, name=f"twin {twin}")
+    model, cut = None, tuple[str, ...]()
+    if twin is not None:
+        described = load_user_twin(twin)
+        case, cut = with_known_drive(case, described.driving)
+        model = UserTwinModel(described, case.runs, name=f"twin {twin}")
     with amounts("diagnosing") as advance:
         found = findings_of(
             case, lambda what, done, of: advance(done, max(of, 1), what), model, executor=WorkerThreads()
@@ -89,6 +93,7 @@ def diagnose_case(
         f"verdict: {verdict.kind}",
         f"written: {target / 'verdict.json'}",
     ]
+    lines += cut
     if own:
         lines.append("effects of your own: " + ", ".join(f"{effect.block}.{effect.name}" for effect in own))
     return {"lines": lines + report_lines(target, written=report), "flags": list(diagnosis.flags), **facts}

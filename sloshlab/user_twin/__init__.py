@@ -17,6 +17,7 @@ from sloshlab.user_twin.description import (
     TwinRun,
 )
 from sloshlab.user_twin.extended import load_extended
+from sloshlab.user_twin.known_drive import with_known_drive
 from sloshlab.user_twin.loading import load_user_twin
 from sloshlab.user_twin.mechanism import Mechanism, Reading
 from sloshlab.user_twin.model import UserTwinModel
@@ -36,4 +37,5 @@ __all__ = [
     "UserTwinModel",
     "load_extended",
     "load_user_twin",
+    "with_known_drive",
 ]
