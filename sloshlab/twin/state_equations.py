@@ -41,6 +41,7 @@ class CompiledEquations:
     ----------
     function : callable
         Returns the rates of all states and all readings, two tuples of numbers. Arguments have their names.
+        Without states, for a motion that is prescribed, the first is empty.
     states, inputs, parameters : sequence of str
         Names; `inputs` has `time_s` besides.
     n_readings : int
@@ -65,8 +66,8 @@ class CompiledEquations:
                     raise InputError(
                         f"equations: {kind}", got=repr(name)[:80], allowed="a Python name, as it is used in them"
                     )
-        if not 1 <= len(states) <= MOST_STATES:
-            raise InputError("equations: states", got=str(len(states)), allowed=f"1 … {MOST_STATES}")
+        if len(states) > MOST_STATES:
+            raise InputError("equations: states", got=str(len(states)), allowed=f"at most {MOST_STATES}")
         self.states, self.inputs, self.parameters = tuple(states), tuple(inputs), tuple(parameters)
         self.n_readings = n_readings
         self._compiled = _compiled(function, self.states, self.inputs, self.parameters, n_readings)
@@ -84,25 +85,28 @@ def _compiled(
     parameters: tuple[str, ...],
     n_readings: int,
 ) -> Any:
+    # numba has no tuple of one type that is empty
+    has_states, states = bool(states), states or ("none",)
     # mypy: these classes are made of a user's names
     state_type: Any = namedtuple("State", states)  # type: ignore[misc]
     input_type: Any = namedtuple("Inputs", ("time_s", *inputs))  # type: ignore[misc]
-    # numba has no tuple of one type that is empty
     parameters = parameters or ("none",)
     number_type: Any = namedtuple("Parameters", parameters)  # type: ignore[misc]
-    n_states, n_inputs, n_numbers = len(states), 1 + len(inputs), len(parameters)
+    n_kept, n_states = len(states), len(states) if has_states else 0
+    n_inputs, n_numbers = 1 + len(inputs), len(parameters)
     own = njit(function, error_model="numpy")
 
     def answer(drive, numbers, memory, out):  # type: ignore[no-untyped-def]
-        state = state_type(*to_fixed_tuple(carray(memory, (n_states,)), n_states))
+        state = state_type(*to_fixed_tuple(carray(memory, (n_kept,)), n_kept))
         given = input_type(*to_fixed_tuple(carray(drive, (n_inputs + 1,))[1:], n_inputs))
         known = number_type(*to_fixed_tuple(carray(numbers, (n_numbers,)), n_numbers))
         rates, readings = own(state, given, known, drive[0])
         at = 0
-        for value in literal_unroll(rates):
-            if at < n_states:
-                out[at] = value
-            at += 1
+        if has_states:
+            for value in literal_unroll(rates):
+                if at < n_states:
+                    out[at] = value
+                at += 1
         n_rates = at
         for value in literal_unroll(readings):
             if at < n_states + n_readings:

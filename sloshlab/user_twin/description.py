@@ -269,7 +269,9 @@ class EquationTwin:
         As of `MechanicalTwin`, with names that Python allows.
     moves : sequence of str
         The states that the added force sees as displacement and velocity of what it moves, or one alone, which it
-        moves by its rate. By default the first two, or the only one.
+        moves by its rate. By default the first two, or the only one. Or a driving channel that prescribes the
+        displacement, as of a damper in a testing machine: then there are no states, the first tuple is empty, and
+        `inputs` has `velocity` and `acceleration` besides.
     """
 
     equations: Callable[..., Any]
@@ -280,8 +282,12 @@ class EquationTwin:
     moves: Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        if self.is_prescribed:
+            if self.states:
+                raise InputError("twin: states", got="some beside a prescribed motion", allowed="none")
+            return
         if not self.states:
-            raise InputError("twin: states", got="none", allowed="at least one")
+            raise InputError("twin: states", got="none", allowed="at least one, or a driving channel in `moves`")
         if not self.moves:
             object.__setattr__(self, "moves", tuple(self.states)[:2])
         if not 1 <= len(self.moves) <= 2 or not set(self.moves) <= set(self.states):
@@ -291,6 +297,11 @@ class EquationTwin:
         for start in self.starts.values():
             if isinstance(start.start, str) and start.start not in self.compared:
                 raise InputError("twin: states", got=repr(start.start)[:80], allowed="a compared channel")
+
+    @property
+    def is_prescribed(self) -> bool:
+        """Whether a driving channel is the motion itself."""
+        return len(self.moves) == 1 and self.moves[0] in self.driving and self.moves[0] not in self.states
 
     @property
     def starts(self) -> dict[str, State]:

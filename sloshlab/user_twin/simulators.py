@@ -6,10 +6,13 @@ import hashlib
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import comb
 from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import UnivariateSpline
 
 from sloshlab.errors import AnalysisError, InputError, SloshlabError
 from sloshlab.identification.rig_model import steps_per_sample
@@ -29,6 +32,10 @@ Truth = tuple[dict[str, FloatArray], FloatArray]
 """What perfect sensors read, by channel; displacement, velocity, acceleration where added forces act, (n, 3)."""
 _MOST_EXCITATIONS: Final = 64
 _STEPS_TRIED: Final = (1, 2, 4, 8, 16, 32)
+_DIFFERENCE: Final = 6
+"""Order of the differences in which a sampled motion no longer shows, and its noise does."""
+_MEDIAN_OF_NOISE: Final = 0.6745
+"""Median of the absolute value of a normal variable, in standard deviations."""
 _STEP_TOLERANCE: Final = 1e-4
 """Of the RMS of a reading, by which half the step may change it: below what any sensor tells."""
 
@@ -64,7 +71,8 @@ def simulator_of(twin: UserTwin, name: str, n_runs: int) -> Simulator:
     """
     excitations = _Excitations(max(_MOST_EXCITATIONS, 2 * n_runs))
     if isinstance(twin, EquationTwin):
-        return _OfEquations(twin, name, excitations)
+        of = _OfPrescribedMotion if twin.is_prescribed else _OfEquations
+        return of(twin, name, excitations)
     if isinstance(twin, FreeTwin):
         return _OfOwnCode(twin, name)
     return _OfMechanism(twin, name, excitations)
@@ -251,6 +259,94 @@ class _OfEquations:
             coarse = fine
         # A motion that never settles, as a chaotic one does not, has no number of steps that is enough.
         return _STEPS_TRIED[-1]
+
+
+class _OfPrescribedMotion:
+    """Forces along a motion that a testing machine prescribes: there is nothing to integrate but their memory."""
+
+    def __init__(self, twin: EquationTwin, name: str, excitations: _Excitations) -> None:
+        self._twin, self._name, self._excitations = twin, name, excitations
+        names = [parameter.name for parameter in twin.parameters]
+        inputs = [*twin.driving, *(each for each in _DERIVATIVES if each not in twin.driving)]
+        self._compiled = CompiledEquations(twin.equations, (), inputs, names, len(twin.compared))
+        self._motions: dict[bytes, FloatArray] = {}
+        self._lock = threading.Lock()
+
+    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
+        motion = self._motion(run)
+        forces = np.zeros(run.n_samples)
+        if terms:
+            series = {"displacement": motion[:, 0], "velocity": motion[:, 1], "acceleration": motion[:, 2]}
+            rate = run.sampling_rate_hz
+            excitation = self._excitations.of(lambda: recorded(rate, **series), rate, series)
+            # on what moves absolutely, with steps as small as forces with memory need
+            twin = Twin(None, tuple(replace(term, place="tank") for term in terms))
+            steps = steps_per_sample(twin, rate)
+            forces = twin.simulate(excitation, n_substeps=steps).require_done().forces_n.sum(axis=1)
+        readings = self._answers(run, own, motion, forces)
+        truth = {name: readings[:, k] for k, name in enumerate(self._twin.compared) if name in run.channels}
+        for name, values in truth.items():
+            _require_finite(values, f"{self._name}: {run.name}: reading {name}", run.sampling_rate_hz)
+        return truth, motion
+
+    def stand_in(self, run: TwinRun, own: Mapping[str, float]) -> Twin:
+        mass = self.moving_mass_kg(run, own)
+        displacement, _, acceleration = self._motion(run).std(axis=0)
+        return Twin(single_degree_of_freedom(mass, mass * float(acceleration / max(displacement, 1e-300))))
+
+    def moving_mass_kg(self, run: TwinRun, own: Mapping[str, float]) -> float:
+        """A mass whose inertia would be as large as the forces that are read."""
+        motion = self._motion(run)
+        none, one = (self._answers(run, own, motion, np.full(run.n_samples, size)) for size in (0.0, 1.0))
+        per_newton = np.abs(one - none).mean(axis=0)
+        sizes = [
+            float(np.nanstd(run.channels[name])) / per_newton[k]
+            for k, name in enumerate(self._twin.compared)
+            if name in run.channels and per_newton[k] > 0
+        ]
+        if not sizes:
+            raise InputError(
+                f"{self._name}: equations",
+                got="no change of a reading by the added force",
+                allowed="a force that shows in a compared channel",
+                remedy="subtract `force` from the force that moves it",
+            )
+        return float(max(sizes) / max(float(motion[:, 2].std()), 1e-300))
+
+    def _answers(
+        self, run: TwinRun, own: Mapping[str, float], motion: FloatArray, forces: FloatArray
+    ) -> FloatArray:
+        derivatives = dict(zip(_DERIVATIVES, motion.T[1:], strict=True))
+        inputs = np.column_stack(
+            [run.channels.get(name, derivatives.get(name, forces)) for name in self._compiled.inputs]
+        )
+        numbers = named_numbers(self._compiled.parameters, own)
+        equations = StateEquations(self._compiled, numbers, np.zeros(1))
+        equations.require_sound(inputs[0])
+        return equations.answers(run.time_s, inputs, np.zeros((run.n_samples, 1)), forces)
+
+    def _motion(self, run: TwinRun) -> FloatArray:
+        """Displacement as it was read, velocity and acceleration of its smoothing spline, shape (n, 3)."""
+        series = run.channels[self._twin.moves[0]]
+        key = hashlib.blake2b(np.ascontiguousarray(series).view(np.uint8).data).digest()
+        with self._lock:
+            if key in self._motions:
+                return self._motions[key]
+        # Differences of a high order are noise: of σ² it has the central binomial coefficient (Reinsch 1967).
+        difference = np.diff(series, _DIFFERENCE)
+        variance = (float(np.median(np.abs(difference))) / _MEDIAN_OF_NOISE) ** 2 / comb(
+            2 * _DIFFERENCE, _DIFFERENCE
+        )
+        spline = UnivariateSpline(run.time_s, series, k=5, s=series.size * variance)
+        motion = np.stack([series, spline(run.time_s, 1), spline(run.time_s, 2)], axis=-1)
+        with self._lock:
+            if len(self._motions) >= _MOST_EXCITATIONS:
+                self._motions.clear()
+            self._motions[key] = motion
+        return motion
+
+
+_DERIVATIVES: Final = ("velocity", "acceleration")
 
 
 class _OfOwnCode:

@@ -227,3 +227,32 @@ def test_a_simulation_that_ends_early_says_when() -> None:
     model = UserTwinModel(twin_of_cart(), [pushed()])
     with pytest.raises(AnalysisError, match="s"):
         model.simulate(model.runs[0], {"stiffness": -3e6}, NOTHING)
+
+
+def isolator(state, inputs, parameters, force):  # type: ignore[no-untyped-def]
+    return (), (parameters.damping * inputs.velocity + 0.5 * inputs.acceleration - force,)
+
+
+def test_a_prescribed_motion_needs_no_states() -> None:
+    """c v + m a + k₃ x³ + F sgn v along x = A sin ωt, in closed form."""
+    size, omega = 0.01, 2 * np.pi * 3.0
+    x, v, a = (size * omega**k * part for k, part in enumerate((np.sin(omega * TIME), np.cos(omega * TIME),
+                                                                 -np.sin(omega * TIME))))  # fmt: skip
+    twin = EquationTwin(
+        isolator, {}, [Parameter("damping", 50.0, 10.0, "N s m-1")], ["displacement_table"], {"force_damper": "N"},
+        moves=["displacement_table"],
+    )  # fmt: skip
+    run = case_run(displacement_table=(x, "displacement"), force_damper=(50.0 * v, "force"))
+    model = UserTwinModel(twin, [run])
+    terms = (CUBIC_STIFFNESS(stiffness_n_per_m3=1e7), COULOMB_FRICTION(force_n=2.0))
+    found = model.simulate(run, {"damping": 40.0}, Extension(terms))["force_damper"]
+    expected = 40.0 * v + 0.5 * a + 1e7 * x**3 + 2.0 * np.sign(v)
+    inner = slice(10, -10)
+    away = np.abs(v[inner]) > 0.03 * size * omega
+    np.testing.assert_allclose(found[inner][away], expected[inner][away], atol=2e-3 * np.abs(expected).max())
+    assert model.moving_mass_kg == pytest.approx(50.0 * v.std() / a.std(), rel=0.02)
+
+
+def test_a_prescribed_motion_beside_states_is_refused() -> None:
+    with pytest.raises(InputError, match="some beside a prescribed motion"):
+        twin_of_cart(moves=("force_push",))
