@@ -63,7 +63,7 @@ def diagnose_case(
     if twin is not None:
         described = load_user_twin(twin)
         case, cut = with_known_drive(case, described.driving)
-        model = UserTwinModel(described, case.runs, name=f"twin {twin}")
+        model = UserTwinModel(described, case.runs, name=f"twin {twin}", executor=WorkerThreads())
     with amounts("diagnosing") as advance:
         found = findings_of(
             case, lambda what, done, of: advance(done, max(of, 1), what), model, executor=WorkerThreads()

@@ -22,7 +22,7 @@ from sloshlab.recording import channels
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
 from sloshlab.twin.twin import Twin
 from sloshlab.units import SI_UNITS
-from sloshlab.user_twin.description import Compared, EquationTwin, Parameter, TwinRun, UserTwin
+from sloshlab.user_twin.description import Compared, EquationTwin, FreeTwin, Parameter, TwinRun, UserTwin
 from sloshlab.user_twin.extended import save_extended
 from sloshlab.user_twin.simulators import simulator_of
 
@@ -39,6 +39,8 @@ class UserTwinModel:
     runs : sequence of CaseRun
     name : str
         For messages.
+    executor : Executor, optional
+        Shares fits among its workers, unless the twin simulates by itself.
 
     Raises
     ------
@@ -46,12 +48,14 @@ class UserTwinModel:
         If a run lacks a channel or has it in other units, or the twin cannot run as believed.
     """
 
-    def __init__(self, twin: UserTwin, runs: Sequence[CaseRun], *, name: str = "twin") -> None:
+    def __init__(
+        self, twin: UserTwin, runs: Sequence[CaseRun], *, name: str = "twin", executor: Executor = IN_TURN
+    ) -> None:
         self.name, self.described = name, twin
         self.runs: tuple[CaseRun, ...] = tuple(runs)
         self.blocks: tuple[str, ...] = ("excitation", "structure", "sensor")
-        # A user's own code may not bear several workers.
-        self.executor: Executor = IN_TURN
+        # A simulation of a user's own may not bear several workers.
+        self.executor: Executor = IN_TURN if isinstance(twin, FreeTwin) else executor
         self._lock = threading.Lock()
         self._truths: OrderedDict[tuple[Any, ...], tuple[dict[str, FloatArray], FloatArray]] = OrderedDict()
         self._shown = {

@@ -113,6 +113,8 @@ class _OfMechanism:
 
     def __init__(self, twin: MechanicalTwin, name: str, excitations: _Excitations) -> None:
         self._twin, self._name, self._excitations = twin, name, excitations
+        # The function that describes the mechanism is a user's own and is called by one worker at a time.
+        self._lock = threading.Lock()
 
     def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
         ready, mechanism = self._ready(run, own, terms)
@@ -154,7 +156,8 @@ class _OfMechanism:
     def _ready(
         self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]
     ) -> tuple[EngineTwin, Mechanism]:
-        mechanism = _called(self._twin.mechanism, self._name, run, own)
+        with self._lock:
+            mechanism = _called(self._twin.mechanism, self._name, run, own)
         if not isinstance(mechanism, Mechanism):
             raise InputError(f"{self._name}: mechanism", got=type(mechanism).__name__, allowed="Mechanism")
         return engine_twin(mechanism, terms, run.n_samples), mechanism
