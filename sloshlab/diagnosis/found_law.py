@@ -86,10 +86,16 @@ def found_law(found: Findings, block: str) -> FoundLaw | None:
     ----------
     found : Findings
     block : str
-        Of what is missing.
+        Of what is missing; empty where it is not located, and then structure and tank are tried.
     """
-    if block not in (STRUCTURE, TANK) or not found.split.has_held_out:
+    places = [place for place in (STRUCTURE, TANK) if place in found.model.blocks and block in ("", place)]
+    if not found.split.has_held_out:
         return None
+    laws = [law for place in places if (law := _law_at(found, place)) is not None]
+    return max(laws, key=lambda law: law.model.evidence, default=None)
+
+
+def _law_at(found: Findings, block: str) -> FoundLaw | None:
     search = _LawSearch(found, block)
     fit = found.retuned.fit
     best, evidence = found.retuned, found.retuned.evidence

@@ -87,8 +87,12 @@ def verdict_of(found: Findings) -> Verdict:
         # No run chose nothing: a name would be judged by what it was fitted to.
         decision = replace(decision, kind="unknown", alternatives=[])
     intervals = {} if decision.best is None else intervals_of(found, decision.best)
-    refuted = refuted_statement(found, decision.best or found.retuned)
     law = found_law(found, decision.block) if decision.kind == "unknown" else None
+    # Numbers of the nearest model of what has no name make up for what it lacks and refute nothing.
+    believed_in: ScoredModel | None = decision.best or found.retuned
+    if decision.kind == "unknown":
+        believed_in = law.model if law is not None and law.holds else None
+    refuted = "" if believed_in is None else refuted_statement(found, believed_in)
     alternatives = names_of_alternatives(decision)
     is_set = len(alternatives) > 1
     return Verdict(
@@ -140,7 +144,7 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
             "heldout_before": _judged(found, found.believed),
             "heldout_retuned": _judged(found, found.retuned),
             "heldout_after": _judged(found, after),
-            "heldout_ceiling": min(_judged(found, each) for each in (found.retuned, *found.explanations)),
+            "heldout_ceiling": min(_judged(found, each) for each in (found.retuned, after, *found.explanations)),
             "heldout_runs": [run.name for run in found.split.held_out],
         },
         "law": _law_facts(verdict.law),

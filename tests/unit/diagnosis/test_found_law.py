@@ -13,6 +13,7 @@ from sloshlab.diagnosis import findings
 from sloshlab.diagnosis.findings import Findings, findings_of
 from sloshlab.diagnosis.found_law import found_law
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
+from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 from sloshlab.identification.case import Case
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_physics.candidate import extension_of
@@ -82,6 +83,19 @@ def test_the_law_is_saved_as_a_twin_that_simulates(found, tmp_path: Path) -> Non
     assert np.abs(slow.displacement_m[-300:]).max() < 0.9 * np.abs(fast[-300:]).max()
     rate = 3e4 * 0.018**2 / (8 * 2.241)
     assert np.abs(fast[-300:]).max() < 0.018 / np.sqrt(1 + 2 * rate * 1.7) * 1.05
+
+
+def test_the_verdict_says_the_law_also_where_its_place_is_not_located(found) -> None:  # type: ignore[no-untyped-def]
+    everything = found(lambda t, x, v: -3e4 * x**2 * v)
+    verdict = verdict_of(everything)
+    assert (verdict.kind, verdict.block) == ("unknown", "")
+    for text in (verdict.headline, verdict.statement):
+        assert "f = −3·10⁴ N s m⁻³ · x² · v, a damping that depends on the displacement" in text
+    assert "refuted" not in verdict.statement
+    facts = verdict_facts(everything, verdict)
+    assert facts["law"]["holds"]
+    assert facts["effects"][0]["name"] == "unknown"
+    assert facts["fit"]["heldout_after"] == facts["fit"]["heldout_ceiling"] < 1.0
 
 
 def test_where_nothing_is_missing_there_is_no_law(found) -> None:  # type: ignore[no-untyped-def]
