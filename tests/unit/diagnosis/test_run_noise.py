@@ -11,6 +11,7 @@ import pytest
 from recorded_oscillators import RATE_HZ, rig, run_of
 
 from sloshlab.diagnosis.inference.run_noise import run_noise, sums_of_cells
+from sloshlab.errors import AnalysisError
 from sloshlab.identification.rig_model import RigModel
 
 SHAPE = (8, 12)
@@ -18,8 +19,24 @@ SHAPE = (8, 12)
 
 def observed(of_drive: np.ndarray | None, channel: str, variance: float = 1.0) -> Any:
     return SimpleNamespace(
-        channel=channel, spectra=np.zeros(SHAPE), variance=np.full(SHAPE, variance), of_drive=of_drive
+        channel=channel,
+        spectra=np.zeros(SHAPE),
+        variance=np.full(SHAPE, variance),
+        of_drive=of_drive,
+        run=SimpleNamespace(
+            attributes=SimpleNamespace(sampling_rate_hz=RATE_HZ), recording=SimpleNamespace(sizes={"time": 500})
+        ),
     )
+
+
+class OwnTwin:
+    """A twin of a user's own that does not reach its end, so that no transfer can be probed."""
+
+    def motion(self, *request: Any) -> None:
+        raise AnalysisError("twin", got="no end")
+
+
+OWN_TWIN = cast(Any, OwnTwin())
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
@@ -27,7 +44,7 @@ def test_what_a_drive_shares_is_the_correlation(share: float) -> None:
     """Noise of the drive has this share of the variance of both channels, with opposite signs."""
     drawn = np.sqrt(share) * np.random.default_rng(1).normal(size=(4000, *SHAPE))
     channels = [observed(drawn, "acceleration_tip"), observed(-2.0 * drawn, "force_interface", variance=4.0)]
-    found = run_noise(cast(Any, None), channels, {})
+    found = run_noise(OWN_TWIN, channels, {})
     covariance = np.linalg.inv(np.swapaxes(found.inverse_root, -1, -2) @ found.inverse_root).mean(axis=(0, 1))
     # Sensors have noise of their own: at most 0.95 of it is shared. 4000 × 96 draws tell the share to 0.3 %.
     np.testing.assert_allclose(covariance, [[1.0, -0.95 * share], [-0.95 * share, 1.0]], atol=0.01)
@@ -35,7 +52,7 @@ def test_what_a_drive_shares_is_the_correlation(share: float) -> None:
 
 def test_noise_through_a_narrow_resonance_is_shared_in_its_band_alone() -> None:
     drawn = np.random.default_rng(3).normal(size=(4000, *SHAPE)) * (np.arange(SHAPE[1]) == 5)
-    found = run_noise(cast(Any, None), [observed(drawn, "a"), observed(drawn, "b")], {})
+    found = run_noise(OWN_TWIN, [observed(drawn, "a"), observed(drawn, "b")], {})
     covariance = np.linalg.inv(np.swapaxes(found.inverse_root, -1, -2) @ found.inverse_root).mean(axis=0)
     np.testing.assert_allclose(covariance[5, 0, 1], 0.95, atol=0.01)
     np.testing.assert_allclose(np.delete(covariance[:, 0, 1], 5), 0.0, atol=1e-12)
@@ -46,19 +63,19 @@ def test_whitened_noise_of_the_drive_is_independent() -> None:
     root = np.linalg.cholesky(np.array([[1.0, 0.95], [0.95, 1.0]]))
     # Draws of exactly the size of the noise: what is left of one channel beside the other is a tenth of it.
     drawn = generator.choice([-1.0, 1.0], size=(40, *SHAPE))
-    found = run_noise(cast(Any, None), [observed(drawn, "a"), observed(drawn, "b")], {})
+    found = run_noise(OWN_TWIN, [observed(drawn, "a"), observed(drawn, "b")], {})
     x = np.stack([np.einsum("cd,dbk->cbk", root, generator.normal(size=(2, *SHAPE))) for _ in range(2000)])
     white = np.stack([found.whitened(each) for each in x])
     np.testing.assert_allclose(np.einsum("ncbk,ndbk->cd", white, white) / (2000 * 96), np.eye(2), atol=0.02)
 
 
 def test_an_error_of_a_sensor_shows_along_its_channel() -> None:
-    found = run_noise(cast(Any, None), [observed(None, "a"), observed(None, "b")], {})
+    found = run_noise(OWN_TWIN, [observed(None, "a"), observed(None, "b")], {})
     rows, shares = found.places["sensor b"]
     np.testing.assert_allclose(np.abs(rows[0, 0, 0]), [0.0, 1.0])
     np.testing.assert_allclose(shares, 1.0)
     # Of a twin of a user's own a force shows in any way in all channels.
-    rows, shares = found.places["structure"]
+    rows, shares = found.places["structure elsewhere"]
     np.testing.assert_allclose(shares, 0.5)
     np.testing.assert_allclose(rows[0, 0] @ rows[0, 0].T, np.eye(2), atol=1e-12)
 
