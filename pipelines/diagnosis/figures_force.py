@@ -110,4 +110,6 @@ def _work(axes: Axes, character: ForceCharacter) -> None:
         color=NEUTRAL_COLOUR, ecolor="#b8c4d0",
     )  # fmt: skip
     axes.axhline(0.0, color="black", lw=0.8)
+    # levels that differ by little have long labels
+    axes.locator_params(axis="x", nbins=5)
     axes.set(xlabel="amplitude of the acceleration [g]", ylabel="work per cycle [mJ]")

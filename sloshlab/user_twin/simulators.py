@@ -12,7 +12,7 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import UnivariateSpline
+from scipy.interpolate import splev, splrep
 
 from sloshlab.errors import AnalysisError, InputError, SloshlabError
 from sloshlab.identification.rig_model import steps_per_sample
@@ -340,8 +340,10 @@ class _OfPrescribedMotion:
         variance = (float(np.median(np.abs(difference))) / _MEDIAN_OF_NOISE) ** 2 / comb(
             2 * _DIFFERENCE, _DIFFERENCE
         )
-        spline = UnivariateSpline(run.time_s, series, k=5, s=series.size * variance)
-        motion = np.stack([series, spline(run.time_s, 1), spline(run.time_s, 2)], axis=-1)
+        # quiet: where a smoothing as small as that is not reached, the spline is nearly that of all samples
+        spline = splrep(run.time_s, series, k=5, s=series.size * variance, quiet=1)
+        derivatives = [splev(run.time_s, spline, order) for order in (1, 2)]
+        motion = np.stack([series, *derivatives], axis=-1)
         with self._lock:
             if len(self._motions) >= _MOST_EXCITATIONS:
                 self._motions.clear()
