@@ -254,7 +254,6 @@ def extended_label(diagnosis: Diagnosis) -> str:
 
 def words(explanation: ScoredModel, between: str = " + ") -> str:
     """Effects of an explanation and where they act."""
-    # products of a law are its formula
     return between.join(plain(form_and_place(candidate), 64) for candidate in explanation.fit.candidates)
 
 

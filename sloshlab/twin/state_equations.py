@@ -13,9 +13,10 @@ from __future__ import annotations
 import re
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from keyword import iskeyword
+from types import FunctionType
 from typing import Any, Final
 
 import numpy as np
@@ -49,7 +50,7 @@ class CompiledEquations:
     Raises
     ------
     InputError
-        If a name is none in Python, or numba cannot compile the function.
+        If a name is none in Python or stands twice, or numba cannot compile the function.
     """
 
     def __init__(
@@ -60,7 +61,11 @@ class CompiledEquations:
         parameters: Sequence[str],
         n_readings: int,
     ) -> None:
-        for kind, names in (("state", states), ("input", inputs), ("parameter", parameters)):
+        if not isinstance(function, FunctionType):
+            raise InputError("equations", got=type(function).__name__, allowed="a function that Python defines")
+        for kind, names in (("state", states), ("input", ("time_s", *inputs)), ("parameter", parameters)):
+            if len(set(names)) < len(names):
+                raise InputError(f"equations: {kind}s", got=", ".join(names)[:120], allowed="each name once")
             for name in names:
                 if not name.isidentifier() or iskeyword(name) or name.startswith("_"):
                     raise InputError(
@@ -164,10 +169,6 @@ class StateEquations:
             self.compiled.address, numbers, len(self.compiled.states), self.displacement, self.velocity
         )
 
-    def starting(self, start: FloatArray) -> StateEquations:
-        """The same from another start."""
-        return replace(self, start=start)
-
     def require_sound(self, first_inputs: FloatArray) -> None:
         """Ask once, and see whether the answer is one.
 
@@ -201,19 +202,13 @@ class StateEquations:
     def _moved(self) -> int:
         return self.velocity if self.velocity >= 0 else self.displacement
 
-    def rates_under(self, inputs: FloatArray, forces_n: Sequence[float], state: FloatArray | None = None) -> Any:
-        """Rates of a state, by default the start, under each of some forces, shape (n_forces, n_states)."""
+    def rates_under(self, inputs: FloatArray, forces_n: Sequence[float]) -> FloatArray:
+        """Rates of the start under each of some forces, shape (n_forces, n_states)."""
         answer = np.zeros(len(self.compiled.states) + self.compiled.n_readings)
         found = []
         for force in forces_n:
             drive = np.concatenate([[force, 0.0], inputs])
-            _asked(
-                self.compiled.address,
-                drive,
-                self.for_engine.numbers,
-                self.start if state is None else state,
-                answer,
-            )
+            _asked(self.compiled.address, drive, self.for_engine.numbers, self.start, answer)
             found.append(answer[: len(self.compiled.states)].copy())
         return np.array(found)
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from sloshlab.errors import InputError
 from sloshlab.identification.case import Case, CaseRun
 
-_FEWEST_SAMPLES = 50
+_FEWEST_SAMPLES: Final = 50
 """Of a run, that are worth a simulation."""
 
 

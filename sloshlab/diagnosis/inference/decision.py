@@ -16,8 +16,6 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from sloshlab.diagnosis.inference.places import block_of
 from sloshlab.diagnosis.inference.posterior import NONE, UNKNOWN, Posterior
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, difference
@@ -111,14 +109,3 @@ def equals_of(best: ScoredModel, found: Posterior) -> list[ScoredModel]:
         and difference(best, model) / found.tempering < TOLD_APART
     ]
     return sorted(alike, key=lambda model: -model.evidence)
-
-
-def standard_error_of_difference(first: ScoredModel, other: ScoredModel) -> float:
-    """Standard error of the difference of two log-likelihoods, by its scatter over cells.
-
-    Parameters
-    ----------
-    first, other : ScoredModel
-    """
-    by_cell = first.remainder.noise - other.remainder.noise
-    return float(np.sqrt(by_cell.size) * by_cell.std(ddof=1))

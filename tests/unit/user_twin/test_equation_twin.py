@@ -189,6 +189,9 @@ def reads_nothing(state, inputs, parameters, force):  # type: ignore[no-untyped-
         ({"equations": explodes, "parameters": []}, "run: .*state "),
         ({"equations": reads_nothing, "parameters": []}, "run: reading displacement_cart: got NaN"),
         ({"parameters": [Parameter("spring rate", 1.0, 1.0)]}, "parameter: got 'spring rate'"),
+        ({"parameters": [Parameter("stiffness", 1.0, 1.0)] * 2}, "parameters: got stiffness, stiffness"),
+        ({"driving": ["force_push", "force_push"]}, "inputs: got time_s, force_push, force_push"),
+        ({"equations": 3}, "equations: got int"),
     ],
 )
 def test_what_cannot_run_is_refused_in_one_line(changes: dict[str, object], words: str) -> None:
