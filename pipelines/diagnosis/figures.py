@@ -249,7 +249,7 @@ def extended_label(diagnosis: Diagnosis) -> str:
     """Words for the best explanation."""
     if diagnosis.verdict.kind != "unknown":
         return "with what was left out"
-    return "nearest known effect" if diagnosis.verdict.law is None else "with the law that was found"
+    return "with the law that was found" if diagnosis.verdict.has_law else "nearest known effect"
 
 
 def words(explanation: ScoredModel, between: str = " + ") -> str:

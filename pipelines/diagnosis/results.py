@@ -32,8 +32,8 @@ class Diagnosis:
 
     @property
     def after(self) -> ScoredModel | None:
-        """The model that is shown beside the retuned baseline: named, a law that was found, or the nearest one."""
-        return self.verdict.model or self.verdict.best
+        """The model that is shown beside the retuned baseline: named, a law that holds, or the nearest one."""
+        return self.verdict.model if self.verdict.has_law else self.verdict.best
 
     @property
     def flags(self) -> tuple[str, ...]:

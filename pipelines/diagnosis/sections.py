@@ -118,6 +118,8 @@ def _next_experiment(diagnosis: Diagnosis) -> str:
         return f"to tell them apart, {verdict.separating_experiment}"
     nearest = [] if verdict.best is None else [c.effect.separated_by for c in verdict.best.fit.candidates]
     wanted = [words for words in dict.fromkeys(nearest) if words]
+    if verdict.has_law:
+        return "another level and another frequency, at which the law must hold as well"
     if verdict.kind == "unknown" and wanted:
         return f"to see whether it is the nearest known effect, {'; or '.join(wanted)}"
     if found.split.limits:

@@ -25,7 +25,7 @@ def effect_parameter_table(diagnosis: Diagnosis) -> Table | None:
     """Numbers of the effects with their intervals."""
     best = diagnosis.verdict.best
     # of a law its formula says everything
-    if best is None or diagnosis.verdict.law is not None:
+    if best is None or diagnosis.verdict.has_law:
         return None
     rows: list[tuple[str, ...]] = []
     for candidate in best.fit.candidates:

@@ -59,6 +59,11 @@ class Verdict:
     headline: str = ""
 
     @property
+    def has_law(self) -> bool:
+        """Whether a law is part of the answer: it was found, and it holds."""
+        return self.law is not None and self.law.holds
+
+    @property
     def model(self) -> ScoredModel | None:
         """The model that is handed on: what is named, or the law that was found, None where neither is.
 
@@ -126,7 +131,7 @@ def verdict_facts(found: Findings, verdict: Verdict) -> dict[str, Any]:
     found : Findings
     verdict : Verdict
     """
-    is_answer = verdict.kind != "unknown" or (verdict.law is not None and verdict.law.holds)
+    is_answer = verdict.kind != "unknown" or verdict.has_law
     after = verdict.model if verdict.model is not None and is_answer else found.retuned
     return {
         "format": 1,

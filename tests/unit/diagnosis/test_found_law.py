@@ -92,6 +92,8 @@ def test_the_verdict_says_the_law_also_where_its_place_is_not_located(found) -> 
     for text in (verdict.headline, verdict.statement):
         assert "f = −3·10⁴ N s m⁻³ · x² · v, a damping that depends on the displacement" in text
     assert "refuted" not in verdict.statement
+    assert verdict.has_law
+    assert verdict.model is verdict.law.model
     facts = verdict_facts(everything, verdict)
     assert facts["law"]["holds"]
     assert facts["effects"][0]["name"] == "unknown"

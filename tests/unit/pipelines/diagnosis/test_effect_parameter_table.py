@@ -18,7 +18,7 @@ def test_numbers_of_runs_that_were_not_fitted_have_no_row() -> None:
     candidate = Candidate(drift.of_runs(("first", "held out")), cast(Any, None), "acceleration_tip")
     intervals = {(candidate.key, "rate in first"): Interval(0.2, 0.1, 0.3)}
     best = SimpleNamespace(fit=SimpleNamespace(candidates=(candidate,)))
-    verdict = SimpleNamespace(best=best, kind="named", intervals=intervals, law=None)
+    verdict = SimpleNamespace(best=best, kind="named", intervals=intervals, has_law=False)
     diagnosis: Any = SimpleNamespace(verdict=verdict)
     table = effect_parameter_table(diagnosis)
     assert table is not None
