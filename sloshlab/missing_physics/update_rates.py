@@ -33,8 +33,9 @@ def _squared_differences(values: FloatArray) -> FloatArray:
 def update_rates_hz(values: FloatArray, sampling_rate_hz: float, lowest_hz: float) -> tuple[float, ...]:
     """Rates at which a reading may have been updated, the likeliest first; none where nothing shows any.
 
-    They are the strongest line of the comb and the lowest that is about as strong, where that is another; and of
-    both what is as far below the sampling rate, as updates of more than half of it are seen there.
+    They are the strongest line and all that are about as strong: multiples of the rate and, as steps are higher
+    where the motion is faster, lines beside them at twice its frequency. And of each what is as far below the
+    sampling rate, as updates of more than half of it are seen there.
 
     Parameters
     ----------
@@ -48,16 +49,14 @@ def update_rates_hz(values: FloatArray, sampling_rate_hz: float, lowest_hz: floa
     squares = _squared_differences(values)
     power = np.abs(np.fft.rfft(squares)) ** 2
     frequency = np.fft.rfftfreq(squares.size, 1.0 / sampling_rate_hz)
-    # the power is distributed exponentially, where readings have white noise about at most this mean
-    mean = _CORRELATION * float(np.sum(squares**2))
     power[frequency < lowest_hz] = 0.0
-    strongest = int(np.argmax(power))
-    if power[strongest] <= mean * log(power.size / _FALSE_ALARM):
-        return ()
-    fundamental = int(np.flatnonzero(power >= _EQUAL * power[strongest])[0])
+    # the power is distributed exponentially, where readings have white noise about at most this mean
+    mean = _CORRELATION * float(np.mean(power[frequency >= lowest_hz]))
+    least = max(mean * log(power.size / _FALSE_ALARM), _EQUAL * float(power.max()))
+    beside = np.pad(power, 1)
     # neighbours are one line between two frequencies of the transform
-    found = (strongest, fundamental) if strongest - fundamental > 1 else (strongest,)
-    rates = [_refined(squares, sampling_rate_hz, float(frequency[k])) for k in found]
+    lines = np.flatnonzero((power > least) & (power >= beside[:-2]) & (power > beside[2:]))
+    rates = [_refined(squares, sampling_rate_hz, float(frequency[k])) for k in lines[np.argsort(-power[lines])]]
     return (*rates, *(sampling_rate_hz - rate for rate in rates))
 
 

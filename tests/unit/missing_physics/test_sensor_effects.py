@@ -221,6 +221,21 @@ def test_the_rate_of_updates_is_read_from_a_noisy_recording(update_rate_hz: floa
     assert min(abs(rate - update_rate_hz) for rate in found) < 0.1 * RATE / N
 
 
+@pytest.mark.parametrize("update_rate_hz", [143.3, 137.0])
+def test_the_rate_is_read_beside_a_motion_that_is_larger_than_the_steps(update_rate_hz: float) -> None:
+    """A line of the motion that has most of the power of the second differences says nothing of the noise.
+
+    Steps are higher where the motion is faster, so that lines beside the rate may be stronger than its own.
+    """
+    fast = 9.4 * 2 * np.pi
+    signal = AMPLITUDE * np.sin(fast * T)
+    updates = (np.floor(T * update_rate_hz - 0.3) + 0.3) / update_rate_hz
+    noise = 0.05 * AMPLITUDE * np.random.default_rng(3).standard_normal(N)
+    found = update_rates_hz(AMPLITUDE * np.sin(fast * updates) + noise, RATE, 2.5 * 9.4)
+    assert min(abs(rate - update_rate_hz) for rate in found) < 0.1 * RATE / N
+    assert update_rates_hz(signal + noise, RATE, 2.5 * 9.4) == ()
+
+
 @pytest.mark.parametrize("noise", [1e-3, 0.01, 0.1])
 def test_a_reading_that_is_not_held_has_no_rate(noise: float) -> None:
     generator = np.random.default_rng(4)
