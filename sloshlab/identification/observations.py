@@ -59,6 +59,9 @@ class Observation:
         Of the recording, in the lowest bands.
     variance : ndarray, shape (n_blocks, n_kept)
         Of each coefficient, by noise and by what does not repeat.
+    without_scatter : ndarray of shape of `variance`, or None
+        The variance but for the scatter of repeats, where this was added: what differs from one to the other may
+        be physics.
     n_transformed : int
         Bands of the transform, if not all of them are kept.
     is_rough : bool
@@ -82,6 +85,7 @@ class Observation:
     simulated: FloatArray | None = None
     of_drive: FloatArray | None = None
     ignored: NDArray[np.bool_] | None = None
+    without_scatter: FloatArray | None = None
 
     @property
     def n_bands(self) -> int:
@@ -277,6 +281,9 @@ def within_informative_bands(observed: Sequence[Observation]) -> list[Observatio
             if observation.of_drive is None
             else np.ascontiguousarray(observation.of_drive[:, :, :n_kept]),
             ignored=None if observation.ignored is None else observation.ignored[:, :n_kept],
+            without_scatter=None
+            if observation.without_scatter is None
+            else np.ascontiguousarray(observation.without_scatter[:, :n_kept]),
             n_transformed=n_bands,
         )
         for observation in observed
@@ -380,7 +387,8 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
 
 def _weighted(observation: Observation, variance: FloatArray) -> Observation:
     # Repeats that agree by chance must not make a coefficient better known than its sensor.
-    return replace(observation, variance=np.maximum(variance, observation.variance))
+    least = observation.variance
+    return replace(observation, variance=np.maximum(variance, least), without_scatter=least)
 
 
 def _spectra_of(variable: xr.DataArray, known: NDArray[np.bool_], keeps_mean: bool, run: CaseRun) -> FloatArray:

@@ -57,6 +57,18 @@ class FittedRuns:
             return self
         return FittedRuns(self.model, list(first.values()), self.tests)
 
+    @cached_property
+    def without_scatter(self) -> FittedRuns:
+        """The same runs known to the noise of their sensors: what differs from repeat to repeat may be physics."""
+        quiet = [
+            [
+                each if each.without_scatter is None else replace(each, variance=each.without_scatter)
+                for each in run
+            ]
+            for run in self.runs
+        ]
+        return FittedRuns(self.model, quiet, self.tests)
+
     @property
     def n_coefficients(self) -> int:
         """Of all runs and channels."""

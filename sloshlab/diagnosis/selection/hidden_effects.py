@@ -65,7 +65,9 @@ def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
     """
     problem = runs.problem_of(fit)
     about = _AboutFit(problem, problem.theta_of(fit.values))
-    places = Places.beside(runs, fit, about.residual)
+    quiet = runs.without_scatter
+    of_quiet = quiet.problem_of(fit)
+    places = Places.beside(quiet, fit, of_quiet.residual(of_quiet.theta_of(fit.values)))
 
     def of_candidate(candidate: Candidate) -> HiddenEffect | None:
         extended = runs.problem((*fit.candidates, candidate))
