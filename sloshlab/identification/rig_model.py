@@ -146,7 +146,7 @@ class RigModel:
         return RunOfRig(
             run,
             self.compared(run),
-            self._compared_drives(run),
+            self._scaling_drives(run),
             drive.initial_displacement_m,
             self.liquid_fluctuates(run),
         )
@@ -370,7 +370,7 @@ class RigModel:
         drive = self._drive(run, undone, request.extension.drives)
         fluctuation = values.get(FLUCTUATION + run.name, 1.0)
         twin = self._retuned(run, values, request.extension, fluctuation=fluctuation)
-        trusted = self._compared_drives(run, undone)
+        trusted = self._scaling_drives(run, undone)
         gains = [values.get(f"gain of {name}", 1.0) for name in trusted]
         excitation = drive.excitation
         if gains:
@@ -390,11 +390,17 @@ class RigModel:
             twin = replace(twin, structure=twin.structure.for_steps_of(1.0 / (rate * n_substeps)))
         return Lane(twin, excitation, (start, 0.0), n_substeps)
 
-    def _compared_drives(self, run: CaseRun, undone: Sequence[SensorFault] = ()) -> list[str]:
-        """Channels whose mean drives the tank and which are compared, too: their gains scale the drive."""
+    def _scaling_drives(self, run: CaseRun, undone: Sequence[SensorFault] = ()) -> list[str]:
+        """Accelerometers whose mean drives, so that their gains scale the drive.
+
+        One that drives alone is not compared, and its gain is in no reading but in every motion.
+        """
+        if run.is_free:
+            return []
         faulty = {fault.channel for fault in undone}
-        compared = self._channels[run.name].compared
-        return [name for name in self.driving(run) if name in compared and name not in faulty and not run.is_free]
+        driving, compared = self.driving(run), self._channels[run.name].compared
+        is_alone = len(driving) == 1 and run.recording[driving[0]].attrs["quantity"] == "acceleration"
+        return [name for name in driving if (name in compared or is_alone) and name not in faulty]
 
     def extended_twin(self, values: Mapping[str, float], extension: Extension) -> Twin:
         """The twin with retuned numbers and the forces of an extension, for runs with moving liquid.

@@ -41,7 +41,7 @@ class RunOfRig:
     compared : sequence of str
         Channels that the twin has a counterpart for.
     scaling : sequence of str
-        Of these the ones whose gains scale the drive.
+        Accelerometers whose gains scale the drive: of several those that are compared, or the only one.
     initial_displacement_m : float
         Of a release, as recorded.
     liquid_fluctuates : bool
@@ -79,7 +79,8 @@ def rig_parameters(
     # Without a measured force nothing tells the carried mass from the modal masses.
     if any(name.startswith("force") for name in names):
         found.append(BaselineParameter("carried mass", 1.0, 0.01))
-    found += _sensor_parameters(names, {name for each in runs for name in each.scaling})
+    scaling = {name for each in runs for name in each.scaling}
+    found += _sensor_parameters(sorted({*names, *scaling}), scaling)
     found += [
         BaselineParameter(shape, 0.0, _TOLERANCE_OF_SHAPE, is_reading=True, channel=name)
         for name, of_channel in shapes.items()
@@ -94,8 +95,7 @@ def _sensor_parameters(names: Sequence[str], scaling: set[str]) -> list[Baseline
     """Gains, and shares of the force cells.
 
     Several accelerometers drive the tank by their mean, over the mean of their gains: these gains change the
-    motion. The one at the root has none: it is not observable for a base at rest, and part of the participations
-    otherwise.
+    motion, and so does that of the one at the root. For a base at rest it has none, as nothing tells it.
     """
     cells = cells_of(names)
     return [
@@ -110,7 +110,7 @@ def _sensor_parameters(names: Sequence[str], scaling: set[str]) -> list[Baseline
                 channel="" if name in scaling else name,
             )
             for name in names
-            if not name.endswith("_root")
+            if not name.endswith("_root") or name in scaling
         ),
         *(
             BaselineParameter(f"share of {name}", 1 / len(cells), 0.3 / len(cells), is_reading=True)
@@ -145,10 +145,7 @@ def cells_of(names: Iterable[str]) -> list[str]:
 
 
 def _structure_parameters(structure: Structure, *, moves: bool) -> list[BaselineParameter]:
-    """Frequencies, losses, masses and participations of the modes.
-
-    The gain of the sensor at the base is part of the participations, as it drives the twin and is not compared.
-    """
+    """Frequencies, losses, masses and participations of the modes."""
     n = structure.masses_kg.size
     found = []
     for i in range(n):
@@ -156,7 +153,6 @@ def _structure_parameters(structure: Structure, *, moves: bool) -> list[Baseline
         found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02))
         found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2, most_above=_CLOSE_TOLERANCES))
     found += [BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01) for i in range(n)]
-    # The gain of the sensor at the base is in these; leaks into it and gains of others would stand in for it.
     if moves:
         found += [
             BaselineParameter(
