@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -29,7 +29,8 @@ class MatchedForces:
     Attributes
     ----------
     starts : dict
-        Of every candidate that explains some of what is missing, the best first; by key.
+        Of every candidate that was matched the numbers that explain some of what is missing, the best first; by
+        key.
     left : dict
         Squares that each leaves of what is missing at all places, in noise variances; by key. None of forces that
         are linear in the motion, as what the baseline is off by hides them.
@@ -40,10 +41,25 @@ class MatchedForces:
     starts: dict[str, list[dict[str, float]]] = field(default_factory=dict)
     left: dict[str, float] = field(default_factory=dict)
     leading: list[tuple[Candidate, Numbers]] = field(default_factory=list)
+    _matches: _Matches | None = None
+
+    def evolved(self) -> MatchedForces:
+        """The same where the leading ones evolve; leading are those alone that this has brought nearer."""
+        if self._matches is None:
+            return replace(self, leading=[])
+        matches, leading = self._matches, [candidate for candidate, _ in self.leading]
+        before = {candidate.key: matches.of[candidate.key][0].misfit for candidate in leading}
+        matches.improve(leading, matches.evolved)
+        nearer = [
+            candidate
+            for candidate in leading
+            if matches.of[candidate.key][0].misfit < (1.0 - _LEAST_MATCHED) * before[candidate.key]
+        ]
+        return matches.found(nearer)
 
 
 def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate], n_leading: int) -> MatchedForces:
-    """Candidates matched to the force that is missing beside a fit.
+    """Candidates matched to the force that is missing beside a fit, by least squares from the best of many draws.
 
     Parameters
     ----------
@@ -57,21 +73,10 @@ def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate],
     residual = problem.residual(problem.theta_of(fit.values))
     if not np.isfinite(residual).all():
         return MatchedForces()
-    executor = runs.model.executor
-    found = _Matches(Places.beside(runs, fit, residual), missing_from(fit, pool))
-    found.improve(found.candidates, found.ranked, executor)
-    found.improve(found.hopeful(), found.refined, executor)
-    leading = [candidate for candidate in found.hopeful() if found.explains(candidate)][:n_leading]
-    found.improve(leading, found.evolved, executor)
-    return MatchedForces(
-        {
-            candidate.key: [match.numbers for match in found.of[candidate.key][:_N_STARTS]]
-            for candidate in found.candidates
-            if found.explains(candidate)
-        },
-        {candidate.key: found.left(candidate) for candidate in found.candidates if found.is_compared(candidate)},
-        [(candidate, found.of[candidate.key][0].numbers) for candidate in sorted(leading, key=found.left)],
-    )
+    matches = _Matches(Places.beside(runs, fit, residual), missing_from(fit, pool), runs.model.executor)
+    matches.improve(matches.candidates, matches.ranked)
+    matches.improve(matches.hopeful(), matches.refined)
+    return matches.found([candidate for candidate in matches.hopeful() if matches.explains(candidate)][:n_leading])
 
 
 class _Matches:
@@ -81,6 +86,8 @@ class _Matches:
     ----------
     places : Places
     pool : sequence of Candidate
+    executor : Executor
+        Of the matches of several candidates.
 
     Attributes
     ----------
@@ -90,22 +97,34 @@ class _Matches:
         The best first; none of what is no force, or at a place at which nothing is missing.
     """
 
-    def __init__(self, places: Places, pool: Sequence[Candidate]) -> None:
-        self._places = places
+    def __init__(self, places: Places, pool: Sequence[Candidate], executor: Executor) -> None:
+        self._places, self._executor = places, executor
         self._matching = matchings(list(places.forces.values()))
         self.candidates = [candidate for candidate in pool if candidate.effect.block in self._matching]
         self.of: dict[str, list[Match]] = {}
         self._population: dict[str, list[Match]] = {}
         self._everything = sum(each.power for each in self._matching.values() if each.is_more_than_noise)
 
-    def improve(
-        self,
-        candidates: Sequence[Candidate],
-        matches_of: Callable[[Candidate], list[Match]],
-        executor: Executor,
-    ) -> None:
+    def found(self, leading: Sequence[Candidate]) -> MatchedForces:
+        """All matches as they are now.
+
+        Parameters
+        ----------
+        leading : sequence of Candidate
+        """
+        return MatchedForces(
+            {
+                key: [match.numbers for match in matches[:_N_STARTS] if match.misfit < 1.0 - _LEAST_MATCHED]
+                for key, matches in self.of.items()
+            },
+            {candidate.key: self.left(candidate) for candidate in self.candidates if self.is_compared(candidate)},
+            [(candidate, self.of[candidate.key][0].numbers) for candidate in sorted(leading, key=self.left)],
+            self,
+        )
+
+    def improve(self, candidates: Sequence[Candidate], matches_of: Callable[[Candidate], list[Match]]) -> None:
         """Replace the matches of some candidates."""
-        found = zip(candidates, executor.map(matches_of, candidates), strict=True)
+        found = zip(candidates, self._executor.map(matches_of, candidates), strict=True)
         self.of |= {candidate.key: matches for candidate, matches in found if matches}
 
     def ranked(self, candidate: Candidate) -> list[Match]:

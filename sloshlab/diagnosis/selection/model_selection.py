@@ -205,7 +205,8 @@ class ModelSelection:
         kept = [Base.of(few, base) for base in bases]
         stages = self._stages(bases[-1])
         inflations = sorted({stages[0], stages[-1]}, reverse=True)
-        proposed = proposals(few, kept, pool, inflations, promising or self._promising, matched.starts)
+        promising = promising or self._promising
+        proposed = proposals(few, kept, pool, inflations, promising, matched.starts, matched.left)
         self._left -= (len(proposed) + _EVALUATIONS_OF_FITS) * few.n_coefficients
         ran = {proposal.candidates[-1].key for proposal in proposed}
         tried = {candidate.key for candidate in pool} - {c.key for base in bases for c in base.candidates}
@@ -247,18 +248,26 @@ class ModelSelection:
     ) -> None:
         """One effect more: forces that match what is missing beside a fit, until one leaves nothing; then any.
 
-        Beside a force that leaves nothing others come only if they are not far worse: a mass or a spring that
-        retuning has hidden may be more probable, and so may a sensor.
+        The leading ones evolve only where none of them has left nothing by least squares. Beside a force that
+        leaves nothing others come only if they are not far worse: a mass or a spring that retuning has hidden may
+        be more probable, and so may a sensor.
         """
-        enough = None
         matched = self._matched_beside(best, what)
+        enough = self._leaving_nothing(best, matched)
+        if enough is None and matched.leading:
+            self.said(f"{what}: matching forces", 0, 1)
+            matched = matched.evolved()
+            enough = self._leaving_nothing(best, matched)
+        self._grown(bases, what, only, matched=matched, against=enough)
+
+    def _leaving_nothing(self, best: FreeRunFit, matched: MatchedForces) -> Candidate | None:
+        """The first of the leading forces that leaves nothing beside a fit; those before it are kept, too."""
         for candidate, numbers in matched.leading:
             fit = self._compensated(best, (candidate, numbers))
             self._keep([fit])
             if not fit.trouble and not self._remains(fit):
-                enough = candidate
-                break
-        self._grown(bases, what, only, matched=matched, against=enough)
+                return candidate
+        return None
 
     def _matched_beside(self, fit: FreeRunFit, what: str) -> MatchedForces:
         """Forces matched to what is missing beside a fit."""
@@ -288,7 +297,7 @@ class ModelSelection:
         found = self._best_of(n + 1)
         if (found is None or self._remains(found)) and self._has_budget():
             matched = self._matched_beside(leading[0], what)
-            forces = [each for each in self._pool_beside(leading[:1]) if each.key in matched.starts]
+            forces = [each for each in self._pool_beside(leading[:1]) if matched.starts.get(each.key)]
             if forces:
                 self._added(leading, what, leading[0], forces)
 

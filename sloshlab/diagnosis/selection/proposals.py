@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -82,6 +82,7 @@ def proposals(
     inflations: Sequence[float],
     promising: Mapping[str, Sequence[Mapping[str, float]]] = NO_STARTS,
     matched: Mapping[str, Sequence[Mapping[str, float]]] = NO_STARTS,
+    compared: Collection[str] = (),
 ) -> list[Proposal]:
     """Starts of all candidates beside all bases, each with what a first step promises.
 
@@ -101,13 +102,15 @@ def proposals(
         Starts of candidates that promised most before, in the place of draws from their priors.
     matched : mapping of key to sequence of mapping
         Starts of candidates that are forces, matched to the missing one.
+    compared : collection of str
+        Keys of those of which draws have been compared along the recorded motion, so that none is simulated.
     """
     least = [min(_cost(runs, base, inflation) for base in bases) for inflation in inflations]
     found: list[Proposal] = []
     for base in bases:
         # Where an effect shows beside the first base it is looked for beside the others.
         places = promising or most_promising(found)
-        found += _beside(runs, base, pool, dict(zip(inflations, least, strict=True)), places, matched)
+        found += _beside(runs, base, pool, dict(zip(inflations, least, strict=True)), places, matched, compared)
     return found
 
 
@@ -124,6 +127,7 @@ def _beside(
     least: Mapping[float, float],
     promising: Mapping[str, Sequence[Mapping[str, float]]],
     matched: Mapping[str, Sequence[Mapping[str, float]]],
+    compared: Collection[str],
 ) -> list[Proposal]:
     problem = runs.problem_of(base.fit)
     theta = problem.theta_of(base.fit.values)
@@ -139,9 +143,10 @@ def _beside(
     first_weights = problem.inflation_weights(first)
 
     def of_candidate(candidate: Candidate) -> list[Proposal]:
-        sets = [*places.of(candidate, promising.get(candidate.key)), *matched.get(candidate.key, ())]
-        if candidate.key not in matched and candidate.key not in promising:
-            sets += candidate.sought_at()
+        key = candidate.key
+        is_drawn = key not in promising and key not in compared
+        sets = places.of(candidate, None if is_drawn else promising.get(key, ()))
+        sets += [*map(dict, matched.get(key, ())), *(candidate.sought_at() if is_drawn else ())]
         extended = runs.problem((*base.fit.candidates, candidate))
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.

@@ -67,7 +67,7 @@ def _search(tmp_path: Path) -> tuple[ModelSelection, FreeRunFit]:
 
 def test_a_mass_that_retuning_hides_is_fitted_from_its_force(search: tuple[ModelSelection, FreeRunFit]) -> None:
     selection, retuned = search
-    found = matched_forces(selection.runs, retuned, selection.pool, 3)
+    found = matched_forces(selection.runs, retuned, selection.pool, 3).evolved()
     leading = {candidate.key: (candidate, numbers) for candidate, numbers in found.leading}
     candidate, numbers = leading[CUSHION]
     # as far as what a spring, a damper and a mass could do is set aside
