@@ -9,6 +9,7 @@ from typing import Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.diagnosis.inference.diverging_motions import DivergingMotions
 from sloshlab.diagnosis.inference.fluctuating_liquid import with_fluctuation
 from sloshlab.diagnosis.inference.posterior import Posterior, posterior
 from sloshlab.diagnosis.inference.run_noise import run_noise
@@ -30,7 +31,7 @@ from sloshlab.identification.repeats import require_repeats
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.identification.split import Split, split
 from sloshlab.missing_physics import effects
-from sloshlab.missing_physics.candidate import Surroundings, extension_of
+from sloshlab.missing_physics.candidate import Candidate, Surroundings, extension_of
 from sloshlab.missing_physics.extension import Extension
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
 
@@ -159,10 +160,19 @@ def findings_of(
         believed,
         retuned,
         sorted(explanations, key=lambda explanation: -explanation.evidence),
-        posterior([retuned, *explanations], len(selection.pool)),
+        posterior([retuned, *explanations], len(selection.pool), names=_names_by_block(selection.pool)),
         selection.failed,
         len(selection.pool),
     )
+
+
+def _names_by_block(pool: Sequence[Candidate]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for candidate in pool:
+        names = found.setdefault(candidate.effect.block, [])
+        if candidate.effect.known_as not in names:
+            names.append(candidate.effect.known_as)
+    return found
 
 
 class Scoring:
@@ -188,13 +198,13 @@ class Scoring:
         tests: Sequence[Sequence[str]],
     ) -> None:
         self.model, self.held_out, self.everything = model, held_out, [*fitting, *held_out]
-        self.tests = tests
+        self.tests, self._motions = tests, DivergingMotions(model)
         self.noise = [run_noise(model, run, nothing.values) for run in self.everything]
 
     def of(self, fit: FreeRunFit, nothing: ScoredModel | None = None) -> ScoredModel | None:
         """A model; None where it does not reach the end of a run that it was not fitted to."""
         values = values_of_runs(self.model, self.held_out, fit)
-        runs = whitened(self.model, self.everything, fit.candidates, values, self.noise)
+        runs = whitened(self.model, self.everything, fit.candidates, values, self.noise, self._motions)
         if runs is None:
             return None
         return scored(fit, values, runs, {run[0].run.name for run in self.held_out}, nothing, self.tests)

@@ -116,7 +116,7 @@ class RigModel:
     """
 
     def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun], *, executor: Executor = IN_TURN) -> None:
-        self.rig, self.executor = rig, executor
+        self.rig, self.folder, self.executor = rig, folder, executor
         self.blocks: tuple[str, ...] = BLOCKS
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)

@@ -36,7 +36,7 @@ class Decision:
     place : str
         Of what has no name; empty where it is not located.
     probabilities : dict
-        Of everything that might be said, the largest first.
+        Of everything that may be true, names that the search has missed included; the largest first.
     wider : list of ScoredModel
         Models of what is named and something besides, which cannot be told from it.
     """
@@ -61,34 +61,34 @@ def decided(found: Posterior) -> Decision:
     ----------
     found : Posterior
     """
-    labels = found.by_label()
+    labels, stated = found.by_label(), found.with_missed()
     named = {label: p for label, p in labels.items() if label not in (NONE, UNKNOWN)}
     none = labels.get(NONE, 0.0)
     if none > 1 - NAMED and none >= labels.get(UNKNOWN, 0.0):
-        return Decision("nothing_missing", None, [], "", labels)
+        return Decision("nothing_missing", None, [], "", stated)
     chosen: list[str] = []
     for label in named:
         chosen.append(label)
         if sum(named[each] for each in chosen) >= NAMED:
             break
     if sum(named[each] for each in chosen) < NAMED:
-        return _unknown(found, next(iter(named), ""), labels)
+        return _unknown(found, next(iter(named), ""), stated)
     best = found.best(chosen[0]).model
     models = [found.best(label).model for label in chosen]
     models += [model for model in equals_of(best, found) if all(model.names != m.names for m in models)]
     for model in models:
         wider = [other for other in models if other is not model]
         if all(Counter(model.names) < Counter(other.names) for other in wider):
-            return Decision("named", model, [model], "", labels, wider)
-    return Decision("indistinguishable", best, models, "", labels)
+            return Decision("named", model, [model], "", stated, wider)
+    return Decision("indistinguishable", best, models, "", stated)
 
 
-def _unknown(found: Posterior, nearest: str, labels: dict[str, float]) -> Decision:
+def _unknown(found: Posterior, nearest: str, stated: dict[str, float]) -> Decision:
     blocks = found.by_block()
     block, p = next(iter(blocks.items()), ("", 0.0))
     places = [h.place for h in found.of_label(UNKNOWN) if block_of(h.place) == block]
     best = found.best(nearest).model if nearest else None
-    return Decision("unknown", best, [], next(iter(places), block) if p >= LOCATED else "", labels)
+    return Decision("unknown", best, [], next(iter(places), block) if p >= LOCATED else "", stated)
 
 
 def equals_of(best: ScoredModel, found: Posterior) -> list[ScoredModel]:

@@ -31,6 +31,9 @@ class IndependentResiduals:
         What is simulated of every repeat, of the same shape.
     lacking : list of ndarray
         Residuals of every repeat with nothing added; empty where these are the residuals themselves.
+    diverging : list of ndarray
+        By what motions differ that are as likely as the simulated one, of every repeat: these are as independent
+        as two draws.
     places : dict of str to (ndarray, ndarray)
         Directions of places and shares of power in them, as in `RunNoise`.
     exactness : dict of str to float
@@ -42,6 +45,7 @@ class IndependentResiduals:
     residual: FloatArray
     simulated: list[FloatArray]
     lacking: list[FloatArray]
+    diverging: list[FloatArray]
     places: Mapping[str, tuple[FloatArray, FloatArray]]
     exactness: Mapping[str, float]
     is_informative: NDArray[np.bool_]
@@ -75,6 +79,7 @@ def _of_run(run: WhitenedRun, missing: WhitenedRun | None) -> IndependentResidua
         run.noise.whitened(run.residual),
         [run.noise.whitened(run.simulated)],
         [] if missing is None else [run.noise.whitened(missing.residual)],
+        [run.noise.whitened(change) for change in run.diverging],
         run.noise.places,
         run.noise.exactness,
         np.any([each.informative for each in run.observed], axis=0),
@@ -93,6 +98,7 @@ def _combined(repeats: Sequence[IndependentResiduals]) -> list[IndependentResidu
             np.einsum("r,rcbk->cbk", row, residuals),
             [signal[..., :n] for each in repeats for signal in each.simulated],
             [signal[..., :n] for each in repeats for signal in each.lacking],
+            [change[..., :n] for each in repeats for change in each.diverging],
             {place: (rows[:, :n], shares[:, :n]) for place, (rows, shares) in first.places.items()},
             first.exactness,
             np.any([each.is_informative[:, :n] for each in repeats], axis=0),

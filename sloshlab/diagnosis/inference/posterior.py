@@ -8,7 +8,7 @@ few of them is no certainty (Yao, Vehtari, Simpson and Gelman 2018, doi:10.1214/
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -30,6 +30,9 @@ from sloshlab.missing_physics.candidate import BLOCKS
 FloatArray = NDArray[np.float64]
 NONE, UNKNOWN = "none", "unknown"
 _N_DRAWS: Final = 1000
+_MISSED: Final = 6 / 69
+"""Of the effects with a name, those whose numbers no search finds: of the sixteenth blind trial, those that were
+said to have no name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +73,35 @@ class Posterior:
     probabilities : ndarray, shape (n_hypotheses,)
     tempering : float
         By which log-likelihoods were divided.
+    names : dict
+        All names of the effects of a block, by block.
     """
 
     hypotheses: tuple[Hypothesis, ...]
     probabilities: FloatArray
     tempering: float
+    names: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def by_label(self) -> dict[str, float]:
         """Probability of everything that may be said, the largest first."""
         return self._summed([hypothesis.label for hypothesis in self.hypotheses])
+
+    def with_missed(self) -> dict[str, float]:
+        """The same, with what has a name and was not found; the largest first.
+
+        What no model describes has either no name or one whose numbers the search has missed. Prior and rate of
+        these say which is how probable; all names of its block are alike.
+        """
+        without_name = PRIOR_OF_REMAINDER / (PRIOR_OF_REMAINDER + (1.0 - PRIOR_OF_REMAINDER) * _MISSED)
+        sums: dict[str, float] = {}
+        for hypothesis, p in zip(self.hypotheses, self.probabilities.tolist(), strict=True):
+            names = self.names.get(block_of(hypothesis.place), ()) if hypothesis.label == UNKNOWN else ()
+            shares = {hypothesis.label: without_name if names else 1.0}
+            for name in names:
+                shares[name] = (1.0 - without_name) / len(names)
+            for label, share in shares.items():
+                sums[label] = sums.get(label, 0.0) + share * p
+        return dict(sorted(sums.items(), key=lambda item: -item[1]))
 
     def by_block(self) -> dict[str, float]:
         """Probability of each block of what is missing, given that something is; the largest first.
@@ -127,7 +150,11 @@ def _block_of_hypothesis(hypothesis: Hypothesis) -> str:
 
 
 def posterior(
-    models: Sequence[ScoredModel], n_candidates: int, tempering: float = TEMPERING, seed: int = 0
+    models: Sequence[ScoredModel],
+    n_candidates: int,
+    tempering: float = TEMPERING,
+    seed: int = 0,
+    names: Mapping[str, Sequence[str]] | None = None,
 ) -> Posterior:
     """Posterior of all models, each with noise alone and with a remainder at every place.
 
@@ -140,6 +167,8 @@ def posterior(
     tempering : float, optional
         Log-likelihoods are divided by it.
     seed : int
+    names : mapping of str to sequence of str, optional
+        Names of the effects that may be in a block, by block.
     """
     labels = _labels(models, tempering)
     found = [
@@ -151,7 +180,7 @@ def posterior(
     weights = np.random.default_rng(seed).dirichlet(np.ones(n_cells), _N_DRAWS) * n_cells
     fixed = np.array([h.log_prior - h.model.complexity for h in found])
     scores = weights @ np.stack([h.by_cell for h in found], axis=1) + fixed
-    return Posterior(tuple(found), np.asarray(softmax(scores, axis=1).mean(axis=0)), tempering)
+    return Posterior(tuple(found), np.asarray(softmax(scores, axis=1).mean(axis=0)), tempering, names or {})
 
 
 def _labels(models: Sequence[ScoredModel], tempering: float) -> list[str]:

@@ -153,6 +153,11 @@ def _powers_of_inexactness(each: IndependentResiduals) -> dict[str, FloatArray]:
             shown = _power(signal, projections)[each.is_informative]
             everywhere = float(shown.mean()) if shown.size else 0.0
             found[place] = found[place] + LAW**2 * np.maximum(_power_of_cells(signal, projections), everywhere)
+        if each.diverging:
+            # The motion of the rig is one more of those that are as likely, which part at other times; by contacts
+            # in other bands, too.
+            powers = [_power_of_cells(difference, projections) for difference in each.diverging]
+            found[place] = found[place] + maximum_filter1d(np.max(powers, axis=(0, 1)), 3)
     return found
 
 

@@ -88,19 +88,25 @@ def jumps_of(model: RigModel, request: Request) -> dict[str, FloatArray]:
     AnalysisError
         If the simulation does not reach its end.
     """
-    if not any(map(_jumps, (*model.twin.terms, *request.extension.terms_in(request.run.name)))):
+    if not any(map(jumps, (*model.twin.terms, *request.extension.terms_in(request.run.name)))):
         return {}
     simulation = model.whole_simulation(request)
     found: dict[str, FloatArray] = {}
     for term, force in zip(simulation.twin.terms, simulation.forces_n.T, strict=True):
-        if _jumps(term):
+        if jumps(term):
             uncertain = np.zeros(force.size)
             uncertain[1:-1] = force[1:-1] - 0.5 * (force[:-2] + force[2:])
             found[term.place] = found.get(term.place, 0.0) + uncertain
     return found
 
 
-def _jumps(term: Term) -> bool:
+def jumps(term: Term) -> bool:
+    """Whether a force may jump: by dry friction, or by what it meets.
+
+    Parameters
+    ----------
+    term : Term
+    """
     return term.kind.dry_friction or term.kind.events is not None
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.diagnosis.inference.diverging_motions import DivergingMotions
 from sloshlab.diagnosis.inference.run_noise import RunNoise
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel
@@ -29,11 +30,14 @@ class WhitenedRun:
         Recorded minus simulated spectra over the standard deviation of the noise.
     noise : RunNoise
         Of its channels together.
+    diverging : list of ndarray
+        By what motions differ that are as likely as the simulated one, each of the shape of `residual`.
     """
 
     observed: Sequence[Observation]
     residual: FloatArray
     noise: RunNoise
+    diverging: list[FloatArray] = field(default_factory=list)
 
     @property
     def simulated(self) -> FloatArray:
@@ -58,6 +62,7 @@ def whitened(
     candidates: Sequence[Candidate],
     values: Mapping[str, float],
     noise: Sequence[RunNoise],
+    motions: DivergingMotions,
 ) -> list[WhitenedRun] | None:
     """Runs under a model; None where its simulation does not reach the end of each.
 
@@ -71,6 +76,7 @@ def whitened(
         All numbers, those of single runs too.
     noise : sequence of RunNoise
         Per run.
+    motions : DivergingMotions
     """
     extension, found = extension_of(candidates, values), []
     for observed, of_run in zip(runs, noise, strict=True):
@@ -81,5 +87,6 @@ def whitened(
         except SloshlabError:
             return None
         residual = np.stack([each.residual(readings[each.channel]) for each in observed])
-        found.append(WhitenedRun(observed, residual, of_run))
+        diverging = motions.differences(observed, candidates, values)
+        found.append(WhitenedRun(observed, residual, of_run, diverging))
     return found

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from scipy.stats import norm, qmc
 
+from sloshlab.diagnosis.inference.diverging_motions import DivergingMotions
 from sloshlab.diagnosis.inference.posterior import log_prior
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
@@ -60,7 +61,7 @@ class ModelSelection:
 
     def __init__(self, runs: FittedRuns, at: Surroundings, said: Said) -> None:
         self._quiet, self.runs, self.at, self.said = runs, runs, at, said
-        self.pool = candidates(at)
+        self._motions, self.pool = DivergingMotions(runs.model), candidates(at)
         self.fits: dict[frozenset[str], FreeRunFit] = {}
         self.failed: dict[str, str] = {}
         self._matched: dict[frozenset[str], MatchedForces] = {}
@@ -148,7 +149,7 @@ class ModelSelection:
         """Whether something is left in the fitted runs that noise and bursts do not explain."""
         model, runs = self.runs.model, self.runs.runs
         noise = [run_noise(model, run, fit.values) for run in runs]
-        residuals = whitened(model, runs, fit.candidates, fit.values, noise)
+        residuals = whitened(model, runs, fit.candidates, fit.values, noise, self._motions)
         if residuals is None:
             return True
         return is_worth_a_word(residuals) and remainder(residuals, tests=self.runs.tests).is_probable

@@ -133,6 +133,19 @@ def test_a_number_that_nothing_tells_costs_nothing() -> None:
     assert complexity(fit) == 0.0
 
 
+def test_what_no_model_describes_may_have_a_name_that_was_not_found() -> None:
+    # one in ten has no name, and of the others the search misses 6 of 69
+    without_name = 0.1 / (0.1 + 0.9 * 6 / 69)
+    names = {"tank": ["air_cushion", "ceiling_impact"], "sensor": ["sensor_gain"]}
+    found = posterior([model(0.0, places={"tank": 80.0})], 10, 1.0, names=names)
+    assert found.by_label()["unknown"] == pytest.approx(1.0)
+    stated = found.with_missed()
+    assert list(stated) == ["unknown", "air_cushion", "ceiling_impact", "none"]
+    assert stated["unknown"] == pytest.approx(without_name, rel=1e-6)
+    assert stated["ceiling_impact"] == pytest.approx(0.5 * (1.0 - without_name), rel=1e-6)
+    assert sum(stated.values()) == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize(
     ("models", "kind", "names"),
     [
