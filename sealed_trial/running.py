@@ -27,6 +27,7 @@ from sloshlab.errors import InputError
 DIAGNOSES: Final = "diagnoses"
 OUTCOME: Final = "outcome.json"
 _LOOKED_THROUGH_BYTES: Final = 4096
+_LARGEST_OUTCOME_BYTES: Final = 65536
 _MEMORY_EVERY_S: Final = 0.3
 """What the system keeps as the peak of a process, ru_maxrss, begins with that of the process which started it."""
 _SESSION: Final = 3
@@ -131,16 +132,48 @@ def run_trial(
     names = chosen.of(list(published))
     for name in names:
         check_data(trial, published[name])
-    outputs = {name: trial / diagnoses / name for name in names}
+    return run_folders(
+        [trial / "cases" / name for name in names],
+        trial / diagnoses,
+        n_workers=n_workers,
+        time_limit_s=time_limit_s,
+        command=command,
+        perturbation=perturbation,
+        finished=finished,
+    )
+
+
+def run_folders(
+    cases: Sequence[Path],
+    answers: Path,
+    *,
+    n_workers: int,
+    time_limit_s: float,
+    command: Sequence[str] = DIAGNOSE,
+    options_of: Callable[[Path], Sequence[str]] = lambda case: (),
+    perturbation: int | None = None,
+    finished: Callable[[Outcome], None] = lambda outcome: None,
+) -> list[Outcome]:
+    """Diagnose case folders that have not been; what was done before stays.
+
+    Parameters
+    ----------
+    cases : sequence of Path
+        Folders of different names.
+    answers : Path
+        Takes a folder of the name of each case.
+    n_workers, time_limit_s, command, perturbation, finished
+        As of `run_trial`.
+    options_of : callable
+        (folder of a case) → more words for the command.
+    """
+    outputs = {case.name: answers / case.name for case in cases}
     outcomes = {name: outcome for name, output in outputs.items() if (outcome := _known(output)) is not None}
-    waiting = [name for name in names if name not in outcomes]
+    waiting = [case for case in cases if case.name not in outcomes]
     stopping = threading.Event()
-    watched = _Watched(command, time_limit_s, stopping)
+    watched = _Watched(command, options_of, time_limit_s, stopping)
     with ThreadPoolExecutor(n_workers) as pool:
-        tasks = [
-            pool.submit(_answered, trial / "cases" / name, outputs[name], perturbation, watched)
-            for name in waiting
-        ]
+        tasks = [pool.submit(_answered, case, outputs[case.name], perturbation, watched) for case in waiting]
         try:
             for task in as_completed(tasks):
                 outcome = task.result()
@@ -150,7 +183,7 @@ def run_trial(
             stopping.set()
             pool.shutdown(cancel_futures=True)
             raise
-    return [outcomes[name] for name in names]
+    return [outcomes[case.name] for case in cases]
 
 
 @dataclass(frozen=True)
@@ -158,16 +191,32 @@ class _Watched:
     """How every case is diagnosed: by which command, how long at most, and until when at all."""
 
     command: Sequence[str]
+    options_of: Callable[[Path], Sequence[str]]
     time_limit_s: float
     stopping: threading.Event
 
 
 def _known(output: Path) -> Outcome | None:
     path = output / OUTCOME
-    if not path.exists():
-        return None
-    stored: dict[str, Any] = json.loads(path.read_bytes())
-    return Outcome(**stored)
+    return read_outcome(path) if path.exists() else None
+
+
+def read_outcome(path: Path) -> Outcome:
+    """How the diagnosis of a case ended, from its file.
+
+    Raises
+    ------
+    InputError
+        If it is something else: it may have come with a folder from anywhere.
+    """
+    try:
+        if path.stat().st_size > _LARGEST_OUTCOME_BYTES:
+            raise ValueError("too large")
+        stored: dict[str, Any] = json.loads(path.read_bytes())
+        return Outcome(**stored)
+    except (ValueError, TypeError, RecursionError) as error:
+        allowed = "the file that `sloshlab trial run` wrote"
+        raise InputError(f"{path}", got="something else", allowed=allowed, remedy="remove it") from error
 
 
 def _answered(case: Path, output: Path, perturbation: int | None, watched: _Watched) -> Outcome:
@@ -192,7 +241,7 @@ def _as_given_or_moved(case: Path, perturbation: int | None) -> Iterator[Path]:
 def _diagnosed(case: Path, output: Path, watched: _Watched) -> Outcome:
     """One case in a process of its own, watched."""
     output.mkdir(parents=True, exist_ok=True)
-    words = [*watched.command, str(case), "-o", str(output)]
+    words = [*watched.command, str(case), "-o", str(output), *watched.options_of(case)]
     with (output / "stderr.txt").open("w+b") as errors:
         started = time.monotonic()
         process = subprocess.Popen(

@@ -76,10 +76,7 @@ def run_cases(
     InputError
         If a key is in reach, or data are not those that were published.
     """
-    if not 1 <= n_workers <= MOST_WORKERS:
-        raise InputError("--workers", got=str(n_workers), allowed=f"1 … {MOST_WORKERS}")
-    if not time_limit_s > 0:
-        raise InputError("--time-limit", got=f"{time_limit_s:g}", allowed="> 0")
+    require_effort(n_workers, time_limit_s)
     require_folder_of_answers(diagnoses)
     # A process that could open the truths must not diagnose.
     require_no_key(folder, sys.argv, os.environ)
@@ -100,12 +97,30 @@ def run_cases(
             perturbation=perturbation,
             finished=finished,
         )
+    return summary_of(outcomes, folder / place)
+
+
+def summary_of(outcomes: Sequence[Outcome], place: Path) -> dict[str, Any]:
+    """How the diagnoses of cases ended, for the summary of a command."""
     bad = [outcome.case for outcome in outcomes if outcome.status != "done"]
     flags = (
         [f"{len(bad)} of {len(outcomes)} cases crashed or ran out of time: {', '.join(bad[:8])}"] if bad else []
     )
-    lines = [f"{len(outcomes)} cases diagnosed, answers in {folder / place}"]
+    lines = [f"{len(outcomes)} cases diagnosed, answers in {place}"]
     return {"lines": lines, "flags": flags, "cases": len(outcomes), "failed": bad}
+
+
+def require_effort(n_workers: int, time_limit_s: float) -> None:
+    """Refuse numbers of workers and seconds that mean nothing.
+
+    Raises
+    ------
+    InputError
+    """
+    if not 1 <= n_workers <= MOST_WORKERS:
+        raise InputError("--workers", got=str(n_workers), allowed=f"1 … {MOST_WORKERS}")
+    if not time_limit_s > 0:
+        raise InputError("--time-limit", got=f"{time_limit_s:g}", allowed="> 0")
 
 
 def require_folder_of_answers(name: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
@@ -124,14 +125,15 @@ def _words(name: str) -> str:
 def detection(score: Score) -> Figure | None:
     """Every effect's strength and what became of it, with the fitted curve."""
     kinds = ("single", "masked", "pair", "look_alike", "outside")
-    if not any(mark.kind in kinds for mark in score.marks):
+    known = [mark for mark in score.marks if not math.isnan(mark.strength)]
+    if not any(mark.kind in kinds for mark in known):
         return None
     figure = new_figure(2.9)
     axes = figure.subplots()
     # Apart by a little, as all marks lie at zero or one; the same for the same trial.
-    offsets = np.random.default_rng(0).uniform(-0.03, 0.03, len(score.marks))
+    offsets = np.random.default_rng(0).uniform(-0.03, 0.03, len(known))
     for number, kind in enumerate(kinds):
-        chosen = [(mark, offsets[k]) for k, mark in enumerate(score.marks) if mark.kind == kind]
+        chosen = [(mark, offsets[k]) for k, mark in enumerate(known) if mark.kind == kind]
         for right in (True, False):
             points = [(mark.strength, mark.detected + offset) for mark, offset in chosen if mark.right == right]
             if points:

@@ -31,9 +31,9 @@ CAPTIONS: Final = {
 
 def page_text(score: Score, figures: Sequence[str], about: str = "") -> str:
     """The whole page; `about` says which trials and cases were scored."""
-    title = "sealed" if score.purpose == "sealed" else "development"
+    titles = {"sealed": "Blind trial (sealed set)", "challenge": "Blind trial (a challenge)"}
     parts = [
-        f"# Blind trial ({title} set)",
+        f"# {titles.get(score.purpose, 'Blind trial (development set)')}",
         about,
         f"{len(score.marks)} cases. Intervals are at 95 %, those of shares Wilson's.",
         _acceptance(score.acceptance),
@@ -49,7 +49,13 @@ def page_text(score: Score, figures: Sequence[str], about: str = "") -> str:
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+    return "\n".join([*lines, *("| " + " | ".join(map(_cell, row)) + " |" for row in rows)])
+
+
+def _cell(text: str) -> str:
+    """A cell that ends no row and opens no tag: names may be those of somebody's own effects."""
+    plain = "".join(letter if letter.isprintable() else "?" for letter in text)
+    return plain.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
 
 
 def _percent(value: float) -> str:
@@ -141,7 +147,7 @@ def _failures(score: Score) -> str:
     rows = []
     for mark in score.failures:
         outcome = score.outcomes[mark.case]
-        strength = f"{mark.strength:.1f}" if mark.strength else "–"
+        strength = f"{mark.strength:.1f}" if mark.strength > 0 else "–"  # NaN is not stated
         answer = mark.answered if outcome.status == "done" else outcome.status.replace("_", " ")
         rows.append([mark.case, CLASS_WORDS[mark.kind], mark.truth, strength, answer, mark.column])
     text = _table(["case", "class", "hidden", "strength", "answered", "which is"], rows) if rows else "None."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from pipelines.diagnosis.trial import require_folder_of_answers
 from pipelines.diagnosis.trial_report import FILES, write_report
 from pipelines.report.outputs import provenance_of, sha256_of
 from pipelines.report.result_folder import require_result_folder
-from sealed_trial.running import DIAGNOSES, OUTCOME, Outcome
+from sealed_trial.running import DIAGNOSES, OUTCOME, Outcome, read_outcome
 from sealed_trial.scoring.answer import Answer, read_answer
 from sealed_trial.scoring.comparison import compared
 from sealed_trial.scoring.looks import note_look
@@ -145,7 +144,7 @@ def _outcome(place: Path, remedy: str) -> Outcome:
     path = place / OUTCOME
     if not path.is_file():
         raise InputError(f"{place}", got="not diagnosed", allowed="all cases", remedy=remedy)
-    return Outcome(**json.loads(path.read_bytes()))
+    return read_outcome(path)
 
 
 def compare_diagnoses(folders: Sequence[Path]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ A wrong name is a `named` with any name that no right answer has. A crash or a t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -51,7 +52,7 @@ class Mark:
     right, wrong_name, false_alarm, detected, right_block : bool
         Detected: anything but 'nothing missing' and no answer.
     strength : float
-        Of the strongest effect; 0 where nothing is missing.
+        Of the strongest effect; 0 where nothing is missing, NaN where nobody stated it.
     """
 
     case: str
@@ -85,8 +86,12 @@ def marked(truth: dict[str, Any], answer: Answer) -> Mark:
         false_alarm=truth["kind"] in NOTHING_HIDDEN and detected and column != "right name",
         detected=detected,
         right_block=blocks_are_right,
-        strength=max((effect["strength"] for effect in effects), default=0.0),
+        strength=_strongest([effect["strength"] for effect in effects]),
     )
+
+
+def _strongest(strengths: list[float]) -> float:
+    return math.nan if any(map(math.isnan, strengths)) else max(strengths, default=0.0)
 
 
 def _answered(answer: Answer) -> str:

@@ -27,8 +27,8 @@ def commonest(classes: Sequence[str]) -> Rate:
 def metadata_features(case: Path) -> dict[str, float]:
     """Everything about a case that is not a sample: numbers of the rig, attributes, sizes of files, ranges."""
     features: dict[str, float] = {}
-    rig = read_toml(case / "rig.toml", f"rig {case / 'rig.toml'}")
-    _collect(rig, "rig", features)
+    if (case / "rig.toml").is_file():  # a twin of somebody's own has none
+        _collect(read_toml(case / "rig.toml", f"rig {case / 'rig.toml'}"), "rig", features)
     recordings = sorted((case / "recordings").glob("*.nc"))
     features["n_recordings"] = len(recordings)
     for number, path in enumerate(recordings):

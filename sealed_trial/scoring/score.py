@@ -173,7 +173,8 @@ def scored(
     gains = tuple(gain for mark in marks if (gain := _gain(mark, given[mark.case])) is not None)
     right = {mark.case for mark in marks if mark.column == "right name"}
     ratios = [gain.after / gain.ceiling for gain in gains if gain.case in right and gain.ceiling > 0]
-    visible = [mark for mark in marks if mark.kind in ("single", "masked", "look_alike", "outside")]
+    kinds = ("single", "masked", "look_alike", "outside")
+    visible = [mark for mark in marks if mark.kind in kinds and not math.isnan(mark.strength)]
     rates = _rates(marks, held)
     return Score(
         purpose=purpose,
@@ -208,7 +209,8 @@ def _rates(marks: Sequence[Mark], held: Sequence[Held]) -> dict[str, Rate]:
     def kind(name: str) -> list[Mark]:
         return [mark for mark in marks if mark.kind == name]
 
-    clear = [mark for mark in kind("single") if mark.strength > CLEAR]
+    # who states no strength says that the effect shows: a masked one has a class of its own
+    clear = [mark for mark in kind("single") if math.isnan(mark.strength) or mark.strength > CLEAR]
     complete = [mark for mark in marks if mark.kind in NOTHING_HIDDEN]
     return {
         FALSE_ALARMS: of(complete, "false_alarm"),

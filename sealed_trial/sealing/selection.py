@@ -46,8 +46,11 @@ class Selection:
         strange = [name for name in self.names if name not in cases]
         if strange:
             raise InputError("--cases", got=strange[0], allowed=f"{cases[0]} … {cases[-1]}")
+        # names of a challenge have no number: they are asked for a half only where one is chosen
         chosen = [
-            case for case in cases if self.half in (None, half_of(case)) and (not self.names or case in self.names)
+            case
+            for case in cases
+            if (self.half is None or self.half == half_of(case)) and (not self.names or case in self.names)
         ]
         if not chosen:
             raise InputError("--half and --cases", got="no case in both", allowed="at least one case")
