@@ -79,14 +79,19 @@ def _root(
 
 
 def finish(summary: dict[str, Any], as_json: bool) -> None:
-    """Say what a command has to say: ``lines`` for people; ``flags`` make the exit code 3."""
+    """Say what a command has to say: ``lines`` for people; ``flags`` make the exit code 3, ``defects`` 1."""
     for line in summary.pop("lines", []):
         say(line)
+    defects = summary.get("defects", [])
+    for defect in defects:
+        say(f"sloshlab: {defect}", error=True)
     flags = summary.get("flags", [])
     for flag in flags:
         say(f"flagged: {flag}", error=True)
     if as_json:
         say(json.dumps(summary, sort_keys=True, default=str))
+    if defects:
+        raise typer.Exit(INPUT_IS_BAD)
     if flags:
         raise typer.Exit(DONE_BUT_FLAGGED)
 

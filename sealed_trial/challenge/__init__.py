@@ -1,0 +1,1 @@
+"""Cases whose truths somebody else holds: folder, truths, commitments to them, and answers that are frozen."""
