@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Final
 
-from sloshlab.errors import InputError
+from sloshlab.errors import InputError, SloshlabError
 
 PREFIX: Final = "sloshlab_user_"
 _LARGEST_BYTES: Final = 1_000_000
@@ -61,6 +61,8 @@ def user_module(path: str | Path, what: str) -> ModuleType:
         specification.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # whatever a user's code raises becomes one line
         del sys.modules[name]
+        if isinstance(error, SloshlabError):  # it says itself what is allowed
+            raise InputError(f"{what} {file}{_line_of(error)}: {error}") from error
         raise InputError(
             f"{what} {file}",
             got=one_line(error),
@@ -85,6 +87,12 @@ def module_name(file: Path, what: str) -> str:
 
 def one_line(error: BaseException) -> str:
     """Kind, place and text of an error of a user's code."""
+    text = " ".join(str(error).split())[:300]
+    return f"{type(error).__name__}{_line_of(error)}: {text}"
+
+
+def _line_of(error: BaseException) -> str:
+    """Where in a user's code an error came from, in words; empty where it did not."""
     place = ""
     trace = error.__traceback__
     while trace is not None:
@@ -94,5 +102,4 @@ def one_line(error: BaseException) -> str:
         ):
             place = f" in line {trace.tb_lineno}"
         trace = trace.tb_next
-    text = " ".join(str(error).split())[:300]
-    return f"{type(error).__name__}{place}: {text}"
+    return place

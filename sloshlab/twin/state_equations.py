@@ -10,6 +10,7 @@ displacement and, where there is one, another as its velocity; their sum is `for
 
 from __future__ import annotations
 
+import math
 import re
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
@@ -196,7 +197,9 @@ class StateEquations:
     def mobility_per_kg(self) -> float:
         """Acceleration per force at the start: what the forces of terms move."""
         n_inputs = len(self.compiled.inputs)
-        return float(np.diff(self.rates_under(np.zeros(n_inputs), [0.0, 1.0])[:, self._moved])[0])
+        rates = self.rates_under(np.zeros(n_inputs), [0.0, 1.0])[:, self._moved]
+        # of rates that are infinite it is none, which whoever asks says in words
+        return float(rates[1] - rates[0]) if np.isfinite(rates).all() else math.nan
 
     @property
     def _moved(self) -> int:

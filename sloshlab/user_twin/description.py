@@ -142,8 +142,11 @@ class TwinRun:
         Raises
         ------
         InputError
-            If more samples are lost at the beginning than the cubic passes through.
+            If there is no such channel, or more samples are lost at its beginning than the cubic passes through.
         """
+        if channel not in self.channels:
+            got = f"no such channel in run {self.name}"
+            raise InputError(f"{channel}: beginning"[:120], got=got, allowed=", ".join(self.channels))
         values = self.channels[channel]
         known = np.flatnonzero(np.isfinite(values))[:n_samples]
         if not known.size or known[0] > n_samples:
@@ -323,7 +326,8 @@ def require_sound(twin: UserTwin) -> None:
     InputError
         On the first thing that cannot be.
     """
-    names = [parameter.name for parameter in _of_kind(twin.parameters, Parameter, "parameters")]
+    _require_kinds(twin)
+    names = [parameter.name for parameter in twin.parameters]
     if len(set(names)) < len(names):
         raise InputError("twin: parameters", got="a name twice", allowed="each name once")
     if not twin.compared:
@@ -342,8 +346,34 @@ def _function_of(twin: UserTwin) -> Any:
     return twin.mechanism if isinstance(twin, MechanicalTwin) else twin.simulate
 
 
-def _of_kind(values: Sequence[Parameter], kind: type, what: str) -> Sequence[Parameter]:
-    for value in values:
-        if not isinstance(value, kind):
-            raise InputError(f"twin: {what}", got=type(value).__name__, allowed=kind.__name__)
-    return values
+def _require_kinds(twin: UserTwin) -> None:
+    """Refuse lists that are none, and what does not belong into them."""
+    for what, values, kind in (
+        ("parameters", twin.parameters, Parameter),
+        ("driving", twin.driving, str),
+    ):
+        # a text is a sequence, too: of letters
+        if isinstance(values, str) or not isinstance(values, Sequence):
+            raise InputError(f"twin: {what}", got=type(values).__name__, allowed=f"a list of {kind.__name__}")
+        for value in values:
+            if not isinstance(value, kind):
+                raise InputError(f"twin: {what}", got=type(value).__name__, allowed=kind.__name__)
+    if not isinstance(twin.compared, Mapping):
+        allowed = 'channels with their units, as {"force_motor": "N"}'
+        raise InputError("twin: compared", got=type(twin.compared).__name__, allowed=allowed)
+    for channel, shown in twin.compared.items():
+        if not isinstance(channel, str) or not isinstance(shown, str | Compared):
+            got = f"{type(shown).__name__} for {channel!r}"[:120]
+            raise InputError("twin: compared", got=got, allowed="Compared, or the units as text")
+    if isinstance(twin, FreeTwin):
+        _require_scales(twin)
+
+
+def _require_scales(twin: FreeTwin) -> None:
+    """Refuse scales by which no effect could choose its first size."""
+    for name in ("moving_mass_kg", "stiffness_n_per_m", "friction_speed_m_per_s"):
+        value = getattr(twin, name)
+        if value is None and name == "friction_speed_m_per_s":
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | float) or not (isfinite(value) and value > 0):
+            raise InputError(f"twin: {name}", got=repr(value)[:80], allowed="a finite number > 0")

@@ -26,6 +26,7 @@ from sloshlab.twin.twin import Twin
 from sloshlab.user_twin.added_force import AddedForce
 from sloshlab.user_twin.description import EquationTwin, FreeTwin, MechanicalTwin, Response, TwinRun, UserTwin
 from sloshlab.user_twin.mechanism import EngineTwin, Mechanism, engine_twin, reading_of
+from sloshlab.user_twin.raised_errors import require_no_raise
 
 FloatArray = NDArray[np.float64]
 Truth = tuple[dict[str, FloatArray], FloatArray]
@@ -67,12 +68,16 @@ def simulator_of(twin: UserTwin, name: str, n_runs: int) -> Simulator:
     Raises
     ------
     InputError
-        If its equations cannot be compiled.
+        If its equations cannot be compiled, or raise errors.
     """
     excitations = _Excitations(max(_MOST_EXCITATIONS, 2 * n_runs))
     if isinstance(twin, EquationTwin):
+        require_no_raise(twin.equations, name)
         of = _OfPrescribedMotion if twin.is_prescribed else _OfEquations
-        return of(twin, name, excitations)
+        try:
+            return of(twin, name, excitations)
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from error
     if isinstance(twin, FreeTwin):
         return _OfOwnCode(twin, name)
     return _OfMechanism(twin, name, excitations)
@@ -371,6 +376,9 @@ class _OfOwnCode:
             response = _called(self._twin.simulate, self._name, run, own, added)
         if not isinstance(response, Response):
             raise InputError(f"{self._name}: simulate", got=type(response).__name__, allowed="Response")
+        if not isinstance(response.readings, Mapping):
+            got = type(response.readings).__name__
+            raise InputError(f"{self._name}: readings", got=got, allowed="an array for every compared channel")
         truth = {
             name: self._shaped(response.readings.get(name), (run.n_samples,), f"reading {name}", run)
             for name in self._twin.compared
@@ -395,8 +403,14 @@ class _OfOwnCode:
         if values is None:
             raise InputError(f"{self._name}: {what}", got="nothing", allowed=f"an array of shape {shape}")
         try:
-            array = np.asarray(values, np.float64)
+            given = np.asarray(values)
+            # the imaginary part would be dropped without a word
+            if given.dtype.kind == "c":
+                raise InputError(f"{self._name}: {what}", got="complex numbers", allowed="real ones")
+            array = np.asarray(given, np.float64)
         except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
             raise InputError(f"{self._name}: {what}", got="no numbers", allowed=f"shape {shape}") from error
         if array.shape != shape:
             raise InputError(f"{self._name}: {what}", got=f"shape {array.shape}", allowed=f"{shape}")
@@ -420,5 +434,5 @@ def _called(function: Callable[..., Any], name: str, run: TwinRun, *arguments: A
         return function(run, *arguments)
     except SloshlabError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # code that ends its process ends one simulation here
         raise AnalysisError(f"{name}: {run.name}", got=one_line(error)) from error
