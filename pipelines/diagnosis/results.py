@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from pipelines.diagnosis.tolerance_bounds import at_their_bounds
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.diagnosis.examination import Examination
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.verdict import Verdict
+from sloshlab.user_twin import UserTwinModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,4 +40,13 @@ class Diagnosis:
     @property
     def flags(self) -> tuple[str, ...]:
         """What a reader must know before using the verdict."""
-        return (*self.findings.split.limits, *(flag for one in self.recordings for flag in one.flags))
+        of_recordings = (flag for one in self.recordings for flag in one.flags)
+        return (*self.findings.split.limits, *of_recordings, *self._of_tolerances)
+
+    @property
+    def _of_tolerances(self) -> tuple[str, ...]:
+        # a rig has the tolerances of the format, a twin of a user those that its author chose
+        if not isinstance(self.findings.model, UserTwinModel):
+            return ()
+        shown = self.verdict.model or self.findings.retuned
+        return at_their_bounds(self.findings.model.parameters, shown.values)
