@@ -139,7 +139,13 @@ def _text(twin: Twin) -> str:
 
 
 def _document(file: Path) -> dict[str, Any]:
+    remedy = "a module of a user's own is run by UserTwinModel.simulate, what was found by load_extended beside it"
+    if file.suffix == ".py":
+        raise InputError(f"twin {file}", got="a Python module", allowed="a saved twin of a rig", remedy=remedy)
     document = read_toml(file, f"twin {file}")
+    if "sloshlab_user_twin" in document:
+        got = "what was found of a Python module"
+        raise InputError(f"twin {file}", got=got, allowed="a saved twin of a rig", remedy=remedy)
     if document.get("sloshlab_twin") != FORMAT:
         raise InputError(
             f"twin {file}: sloshlab_twin", got=repr(document.get("sloshlab_twin"))[:80], allowed=str(FORMAT)

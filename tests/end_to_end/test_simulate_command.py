@@ -373,3 +373,19 @@ def test_missing_options_are_usage_errors(capsys: Any) -> None:
     ):
         assert run(arguments) == USAGE
         assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("own_twin.py", "raise SystemExit('this code was run')", "own_twin.py: got a Python module"),
+        ("extended_twin.toml", "sloshlab_user_twin = 1\n[parameters]\n", "got what was found of a Python module"),
+    ],
+)
+def test_a_twin_of_a_users_own_is_not_taken_for_one_of_a_rig(
+    name: str, text: str, said: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    command = ["simulate", "--rig", str(folder / "sdof.toml"), "--input", str(folder / "sdof_free.nc")]
+    command += ["--twin", str(tmp_path / name), "-o", str(tmp_path / "sim.nc")]
+    refusal(capsys, command, tmp_path / "sim.nc", said, "UserTwinModel.simulate", "load_extended")
