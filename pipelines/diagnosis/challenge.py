@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from sealed_trial.challenge.challenge_folder import (
     truths_in_reach,
 )
 from sealed_trial.challenge.frozen_answers import freeze
+from sealed_trial.challenge.stated_truth import StatedTruth
 from sealed_trial.challenge.truths_file import kept_document, read_truths
 from sealed_trial.running import DIAGNOSE, DIAGNOSES, OUTCOME, Outcome, require_no_key, run_folders
 from sealed_trial.scoring.looks import revision
@@ -70,6 +71,7 @@ def commit_truths(folder: Path, truths: Path, output: Path, *, key: Path | None)
     cases = require_cases(folder)
     stated = {case: kept.truth for case, kept in read_truths(truths).items()}
     require_same_cases([case.name for case in cases], list(stated))
+    _require_blocks(cases, stated)
     vocabulary = known_vocabulary()
     kinds = {case: marked_truth(case, truth, vocabulary)["kind"] for case, truth in stated.items()}
     commitments, kept = committed(cases, stated)
@@ -92,6 +94,14 @@ def commit_truths(folder: Path, truths: Path, output: Path, *, key: Path | None)
         f"keep {output}" + (f" and the key {key}" if key else "") + " away from whoever diagnoses",
     ]
     return {"lines": lines, "cases": len(cases), "classes": kinds}
+
+
+def _require_blocks(cases: Sequence[ChallengeCase], stated: Mapping[str, StatedTruth]) -> None:
+    """Refuse truths in a block that no answer can name."""
+    for case in cases:
+        if case.twin is not None and any(effect.block == "tank" for effect in stated[case.name].effects):
+            allowed = "excitation, structure or sensor: a twin of your own has no tank"
+            raise InputError(f"truth of {case.name}: block", got="tank", allowed=allowed)
 
 
 def check_challenge(folder: Path) -> dict[str, Any]:

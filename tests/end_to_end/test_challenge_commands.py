@@ -213,6 +213,11 @@ REFUSED = {
         ["commit", "c", "kept/t.toml", "-o", "kept/t.json"],
         "case cart: structure.cubic_stiffness: force_n: got no parameter of this effect",
     ),
+    "a tank of a twin that has none": (
+        lambda: Path("kept/t.toml").write_text(TRUTHS.replace("structure", "tank").replace("cubic_s", "s")),
+        ["commit", "c", "kept/t.toml", "-o", "kept/t.json"],
+        "truth of cart: block: got tank; allowed: excitation, structure or sensor",
+    ),
     "no truths": (lambda: None, ["score", "c", "-o", "scores"], "or no --truths"),
     "a part": (
         lambda: None,
