@@ -26,6 +26,9 @@ from pipelines.commands import models
 from pipelines.commands import diagnosis
 
 # isort: split
+from pipelines.commands import field_benchmarks
+
+# isort: split
 from pipelines.commands import trial
 
 # isort: split
@@ -45,6 +48,7 @@ __all__ = [
     "analysis",
     "app",
     "diagnosis",
+    "field_benchmarks",
     "laboratory",
     "main",
     "models",

@@ -1,0 +1,1 @@
+"""Twins of the benchmarks, each a module that ``sloshlab diagnose --twin`` takes."""
