@@ -81,10 +81,20 @@ class _Prepared:
     plain: list[Signals]
     scales: Scales
     sensors: dict[str, Sensor]
+    told: dict[str, float] = field(default_factory=dict)
 
     @cached_property
     def floor(self) -> NoiseFloor:
         return NoiseFloor(self.laboratory, self.plain, self.sensors)
+
+    def told_from_damping(self, effect: DrawnEffect) -> float:
+        """Part of the strength of an effect that is left with damping free; of its usual magnitude, once."""
+        if effect.name not in self.told:
+            self.floor.start_anew()
+            changed = self.laboratory.signals([effect.change(1.0)], relative_tolerance=QUICK)
+            known, free = (self.floor.strength(changed, damping_is_known=known) for known in (True, False))
+            self.told[effect.name] = free / known if known > 0 else 1.0
+        return self.told[effect.name]
 
 
 class CaseDrawing:
@@ -294,10 +304,7 @@ def _scaled(
 
 def _require_within_noise(alike: DrawnEffect, wanted: float, prepared: _Prepared) -> None:
     """Equals of a look-alike predict the same: what damping leaves of one of them is no more than is masked."""
-    laboratory, floor = prepared.laboratory, prepared.floor
-    change, _ = _scaled(alike, wanted, laboratory, floor, prepared.plain)
-    floor.start_anew()
-    left = floor.strength(laboratory.signals([change], relative_tolerance=QUICK), damping_is_known=False)
+    left = prepared.told_from_damping(alike) * wanted
     if not left < WEAKEST_MASKED:
         raise LookupError(f"{alike.name} is told from damping by {left:.2g} noise floors")
 
