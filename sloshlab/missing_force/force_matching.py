@@ -37,8 +37,15 @@ _N_REFINED: Final = 3
 _MOST_STEPS: Final = 30
 _LEAST_GAIN: Final = 1e-3
 """Of the misfit, relative, at which a refinement ends."""
-_POPULATION, _GENERATIONS = 32, 16
-"""Of differential evolution: some five hundred forces."""
+_POPULATION, _GENERATIONS, _GENERATIONS_OF_AMPLITUDES = 32, 16, 64
+"""Of differential evolution: some five hundred forces, and two thousand where amplitudes alone tell them apart."""
+_EXACTNESS: Final = 0.01
+"""Relative to its numbers, to which a simulation describes a rig."""
+_PARTED: Final = 0.5
+"""Of the size of a force, by which it differs where bounces part; a smooth one differs by some hundredths."""
+_STRETCH_S: Final = 0.5
+_LINES_OF_A_CELL: Final = 4
+"""Two hertz apart: cells in which amplitudes are compared, as long as the blocks of a short-time spectrum."""
 _FEWEST: Final = 5
 """Of a population that evolves."""
 _STEP: Final = 1e-3
@@ -135,7 +142,9 @@ class ForceMatching:
         """The best of some matches, and of a population that evolves from them, by least squares; the best first.
 
         Contacts and friction make the misfit rough (differential evolution, Storn and Price 1997,
-        doi:10.1023/A:1008202821328).
+        doi:10.1023/A:1008202821328). Where bounces part, two motions that are as likely have other phases, and the
+        misfit says nothing: what evolves are then the amplitudes of short stretches. Of the population those are
+        refined that match best.
 
         Parameters
         ----------
@@ -146,8 +155,8 @@ class ForceMatching:
         scales = self._scales(candidate, ranked[0].numbers)
         if len(ranked) < _FEWEST or (scales and self._is_linear(candidate)):
             return refined
-        best = self._evolution(candidate, ranked[:_POPULATION], scales=scales)
-        return sorted([*refined, best, self._by_least_squares(candidate, best)], key=_misfit)
+        best = sorted(self._evolution(candidate, ranked, scales=scales), key=_misfit)[:_N_REFINED]
+        return sorted([*refined, *best, *(self._by_least_squares(candidate, each) for each in best)], key=_misfit)
 
     @staticmethod
     def _is_linear(candidate: Candidate) -> bool:
@@ -186,25 +195,57 @@ class ForceMatching:
             return False
         return bool(np.linalg.norm(force - 2.0 * half) < _EXACTLY * np.linalg.norm(force))
 
-    def _evolution(self, candidate: Candidate, population: Sequence[Match], *, scales: bool) -> Match:
-        logarithms = _Logarithms(candidate, population[0].numbers)
+    def _evolution(self, candidate: Candidate, ranked: Sequence[Match], *, scales: bool) -> list[Match]:
+        """The last population."""
+        logarithms = _Logarithms(candidate, ranked[0].numbers)
+        parts = self._parts(candidate, ranked[0].numbers)
+
+        def matches(x: FloatArray) -> list[Match]:
+            return self._matches(candidate, [logarithms.numbers(each) for each in x], scales=scales)
 
         def misfits(x: FloatArray) -> FloatArray:
-            sets = [logarithms.numbers(each) for each in x.T]
-            return np.array([match.misfit for match in self._matches(candidate, sets, scales=scales)])
+            if parts:
+                return self._misfits_of_amplitudes(candidate, [logarithms.numbers(each) for each in x.T])
+            return np.array([match.misfit for match in matches(x.T)])
 
+        places = np.array([logarithms.of(match.numbers) for match in ranked])
+        order = np.argsort(misfits(places.T), kind="stable") if parts else np.arange(len(ranked))
         found = differential_evolution(
             misfits,
             list(zip(logarithms.low, logarithms.high, strict=True)),
-            init=np.array([logarithms.of(match.numbers) for match in population]),
-            maxiter=_GENERATIONS,
+            init=places[order[:_POPULATION]],
+            maxiter=_GENERATIONS_OF_AMPLITUDES if parts else _GENERATIONS,
             vectorized=True,
             updating="deferred",
             polish=False,
             rng=np.random.default_rng(0),
         )
-        [best] = self._matches(candidate, [logarithms.numbers(found.x)], scales=scales)
-        return best
+        return matches(found.population)
+
+    def _parts(self, candidate: Candidate, numbers: Numbers) -> bool:
+        """Whether two forces part whose numbers differ by no more than a simulation is exact."""
+        other = {name: value * (1.0 + _EXACTNESS) for name, value in numbers.items()}
+        force, moved = self._forces(candidate, [numbers, other])
+        if force is None or moved is None:
+            return False
+        return bool(np.linalg.norm(moved - force) > _PARTED * np.linalg.norm(force))
+
+    def _misfits_of_amplitudes(self, candidate: Candidate, sets: Sequence[Numbers]) -> FloatArray:
+        """Mean square by which amplitudes are missed, over that of the missing force."""
+        missing = self._amplitudes(self._missing)
+        scale = max(_mean_square(missing), 1e-300)
+        return np.array(
+            [
+                _FAILED**2 if force is None else _mean_square(self._amplitudes(force) - missing) / scale
+                for force in self._forces(candidate, sets)
+            ]
+        )
+
+    def _amplitudes(self, joined: FloatArray) -> FloatArray:
+        """Of stretches of all runs, whose phases do not count."""
+        ends = np.cumsum([whitener.n_values for whitener in self._whiteners])
+        parts = zip(self._whiteners, np.split(joined, ends[:-1]), strict=True)
+        return np.concatenate([whitener.amplitudes(part) for whitener, part in parts])
 
     def _matches(self, candidate: Candidate, sets: Sequence[Numbers], *, scales: bool) -> list[Match]:
         """How well numbers match, each set with the best multiple of its sizes where these scale the force."""
@@ -311,11 +352,26 @@ class _Whitener:
         power = np.where(known, force.noise_power, 1.0) * self._length / (2 * (force.kept_share.size - 1))
         self._weights = _at_lines(np.where(known, 1.0 / np.sqrt(power), 0.0), self._length)
         self._share = _at_lines(np.where(known, force.kept_share, 0.0), self._whole)
+        self._stretch = max(round(_STRETCH_S * force.run.attributes.sampling_rate_hz), 2 * _LINES_OF_A_CELL)
 
     @property
     def noise(self) -> float:
         """Squares that are expected of noise alone."""
         return float(self._kept.stop - self._kept.start) * float(np.mean(self._share**2))
+
+    @property
+    def n_values(self) -> int:
+        """Of a whitened force."""
+        return int(2 * (self._length // 2 + 1))
+
+    def amplitudes(self, whitened: FloatArray) -> FloatArray:
+        """Root of the power of a whitened force in cells of time and frequency."""
+        real, imaginary = np.split(whitened, 2)
+        series = irfft(real + 1j * imaginary, self._length)[: self._kept.stop - self._kept.start]
+        n = min(self._stretch, series.size)
+        stretches = series[: series.size // n * n].reshape(-1, n) * np.hanning(n)
+        power = np.abs(rfft(stretches)) ** 2
+        return np.sqrt(np.add.reduceat(power, np.arange(0, power.shape[1], _LINES_OF_A_CELL), axis=1)).ravel()
 
     def whitened(self, series: FloatArray) -> FloatArray:
         """Of a force as it acts, from the start of the run: what the regularisation took is no misfit."""

@@ -184,6 +184,11 @@ class Term:
         return self.kind.name
 
     @property
+    def jumps(self) -> bool:
+        """Whether it may jump: by dry friction, or by what it meets."""
+        return self.kind.dry_friction or self.kind.events is not None
+
+    @property
     def mass_kg(self) -> float:
         """Mass that it adds at its place [kg]."""
         return self.kind.mass(self.values)

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.inference.run_noise import EXACT
-from sloshlab.diagnosis.inference.sampled_jumps import jumps
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Readings
@@ -76,7 +75,7 @@ class DivergingMotions:
         rough = [
             f"{candidate.key}.{parameter.name}"
             for candidate in candidates
-            if any(map(jumps, extension_of([candidate], values).terms_in(run.name)))
+            if any(term.jumps for term in extension_of([candidate], values).terms_in(run.name))
             for parameter in candidate.effect.parameters
         ]
         driving = () if run.is_free else self._model.driving(run)

@@ -22,7 +22,6 @@ from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics.candidate import extension_of
-from sloshlab.twin.terms import Term
 
 FloatArray = NDArray[np.float64]
 _LOW_BANDS: Final = 4
@@ -88,26 +87,16 @@ def jumps_of(model: RigModel, request: Request) -> dict[str, FloatArray]:
     AnalysisError
         If the simulation does not reach its end.
     """
-    if not any(map(jumps, (*model.twin.terms, *request.extension.terms_in(request.run.name)))):
+    if not any(term.jumps for term in (*model.twin.terms, *request.extension.terms_in(request.run.name))):
         return {}
     simulation = model.whole_simulation(request)
     found: dict[str, FloatArray] = {}
     for term, force in zip(simulation.twin.terms, simulation.forces_n.T, strict=True):
-        if jumps(term):
+        if term.jumps:
             uncertain = np.zeros(force.size)
             uncertain[1:-1] = force[1:-1] - 0.5 * (force[:-2] + force[2:])
             found[term.place] = found.get(term.place, 0.0) + uncertain
     return found
-
-
-def jumps(term: Term) -> bool:
-    """Whether a force may jump: by dry friction, or by what it meets.
-
-    Parameters
-    ----------
-    term : Term
-    """
-    return term.kind.dry_friction or term.kind.events is not None
 
 
 def _recorded(observation: Observation, gain: FloatArray) -> FloatArray:

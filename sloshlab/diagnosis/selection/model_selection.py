@@ -33,7 +33,8 @@ from sloshlab.missing_physics.units import named_and_units
 
 Said = Callable[[str, int, int], None]
 N_KEPT: Final = 4
-"""Models that are fitted to the end at every step of the search; two, four and eight times as many are begun."""
+"""Models that are fitted to the end at every step of the search; eight times as many are begun, half of them where
+one is known that explains as much, so that the others are only compared with it."""
 _MOST_EFFECTS: Final = 2
 _BUDGET: Final = 1.2e9
 """Coefficients that may be simulated, two minutes on two cores; what is begun is finished, no more is begun."""
@@ -215,7 +216,13 @@ class ModelSelection:
         if not self._promising:
             # Beside an effect the same places of a candidate are worth a look; to draw anew takes most time.
             self._promising = most_promising(proposed)
-        coarse = halved(few, proposed, stages, N_KEPT, lambda name, i, n: self.said(f"{what}: {name}", i, n))
+        coarse = halved(
+            few,
+            proposed,
+            stages if against is None else stages[1:],
+            N_KEPT,
+            lambda name, i, n: self.said(f"{what}: {name}", i, n),
+        )
         self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))
 
     def _has_budget(self) -> bool:

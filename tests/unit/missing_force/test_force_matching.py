@@ -92,11 +92,9 @@ def test_numbers_that_are_no_sizes_are_refined(tmp_path: Path) -> None:
     assert best.misfit < 1e-4
 
 
-def test_impacts_are_met_by_a_population(tmp_path: Path) -> None:
-    """A mass that flies between floor and ceiling, by SciPy; its numbers come from far away."""
-    known = candidate(tmp_path, "tank.ceiling_impact")
-    motion = motion_of(0.03)
-    mass, gap, stiffness, damping = 0.2 * known.surroundings.rig.liquid_mass_kg, 0.015, 2000.0, 1.5
+def bounced(known: Candidate, motion: np.ndarray, gap: float, stiffness: float, damping: float) -> np.ndarray:
+    """Force of a fifth of the liquid that flies between floor and ceiling, by SciPy."""
+    mass = 0.2 * known.surroundings.rig.liquid_mass_kg
 
     def contact(z: float, speed: float) -> float:
         if z < 0:
@@ -111,7 +109,14 @@ def test_impacts_are_met_by_a_population(tmp_path: Path) -> None:
 
     flown = solve_ivp(rate, (0.0, TIME[-1]), [-mass * 9.81 / stiffness, 0.0], t_eval=TIME, max_step=2e-4).y
     pushed = np.array([contact(z, speed) for z, speed in flown.T])
-    force = pushed + mass * motion[:, 2] + mass * 9.81
+    return np.asarray(pushed + mass * motion[:, 2] + mass * 9.81)
+
+
+def test_impacts_are_met_by_a_population(tmp_path: Path) -> None:
+    """A mass that flies between floor and ceiling; its numbers come from far away."""
+    known = candidate(tmp_path, "tank.ceiling_impact")
+    motion, gap = motion_of(0.03), 0.015
+    force = bounced(known, motion, gap, 2000.0, 1.5)
     matching = ForceMatching([latent(force, motion, "run_1", TANK)])
     starts = [*starts_of(known), *known.sought_at()[:100]]
     ranked = matching.ranked(known, starts)
@@ -119,6 +124,23 @@ def test_impacts_are_met_by_a_population(tmp_path: Path) -> None:
     assert best.misfit < 0.9 * matching.refined(known, ranked)[0].misfit
     assert best.numbers["tank.ceiling_impact.gap_m"] == pytest.approx(gap, rel=0.05)
     assert best.numbers["tank.ceiling_impact.share"] == pytest.approx(0.2, rel=0.3)
+
+
+def test_amplitudes_tell_bounces_that_have_parted(tmp_path: Path) -> None:
+    """Numbers that are off by a hundredth have other phases and nearly the same amplitudes."""
+    known = candidate(tmp_path, "tank.ceiling_impact")
+    motion = motion_of(0.02)
+    true = {"gap_m": 0.015, "stiffness_n_per_m": 2000.0, "damping_kg_per_s": 0.3, "share": 0.2}
+    force = bounced(known, motion, true["gap_m"], true["stiffness_n_per_m"], true["damping_kg_per_s"])
+    matching = ForceMatching([latent(force, motion, "run_1", TANK)])
+    named = {f"{known.key}.{name}": value for name, value in true.items()}
+    near, far = ({name: factor * value for name, value in named.items()} for factor in (1.01, 0.5))
+    assert matching._parts(known, named)
+    # worse than no force at all
+    assert matching._matches(known, [near], scales=False)[0].misfit > 1.5
+    of_near, of_far = matching._misfits_of_amplitudes(known, [near, far])
+    assert of_near < 0.25
+    assert of_far > 2.0 * of_near
 
 
 def test_forces_are_compared_over_their_noise(tmp_path: Path) -> None:
