@@ -219,8 +219,8 @@ class ModelSelection:
         coarse = halved(
             few,
             proposed,
-            stages if against is None else stages[1:],
-            N_KEPT,
+            stages,
+            (N_KEPT * 2 ** len(stages) // (1 if against is None else 2), N_KEPT),
             lambda name, i, n: self.said(f"{what}: {name}", i, n),
         )
         self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))

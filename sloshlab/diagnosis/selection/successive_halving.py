@@ -43,7 +43,7 @@ def halved(
     runs: FittedRuns,
     proposed: Sequence[Proposal],
     stages: Sequence[float],
-    n_kept: int,
+    n_models: tuple[int, int],
     said: Callable[[str, int, int], None] = lambda what, done, of: None,
 ) -> list[FreeRunFit]:
     """The best models of those proposed, coarsely fitted.
@@ -54,12 +54,13 @@ def halved(
     proposed : sequence of Proposal
     stages : sequence of float
         Noise inflation of each rung.
-    n_kept : int
-        Models that are left at the end.
+    n_models : (int, int)
+        Starts that are begun at most, and models that are left at the end.
     said : callable, optional
         Told model, number and number of all.
     """
-    waiting = _best_starts(proposed, n_kept * 2 ** len(stages))
+    n_begun, n_kept = n_models
+    waiting = _best_starts(proposed, n_begun)
     running = [_Running(proposal, proposal.start, None, np.inf) for proposal in waiting]
     for rung, inflation in enumerate(stages):
 
