@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
 from pipelines.ball.settings import BallSettings
+from pipelines.inputs.recordings import RunSource
+from pipelines.inputs.rigs import RigSource
 from sloshlab.bouncing_ball.free_decay import DampingCurve
 from sloshlab.bouncing_ball.frequency_error import FrequencyBand
 from sloshlab.bouncing_ball.from_work_line import WorkLine
@@ -106,7 +107,7 @@ class BallExperiment:
 
     rig: Rig
     rig_name: str
-    inputs: tuple[Path, ...]
+    inputs: tuple[RunSource | RigSource, ...]
     identified: IdentifiedBall
     omega_bar: float
     result: DecayResult | LineResult

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -123,19 +122,18 @@ def beam(
     """Beam or guided tank, frozen and sloshing: modal accelerations, damping, spectra and a report."""
     from pipelines.structure.analysis import analyse_beam, checked_settings
     from pipelines.structure.outputs import files_of, write_beam
-    from pipelines.structure.twins import tank_models, twins_of_runs
+    from pipelines.structure.with_twins import analyse_beam_with_twins
 
     settings = checked_settings(modes=modes, n_cycles=cycles, segment_s=segment_s)
     require_result_folder(output, files_of(report=not no_report))
-    command, simulated = command_as_given(), None
-    # apart until everything is there: twins beside results of another run would be taken for theirs
-    with tempfile.TemporaryDirectory(prefix="sloshlab-twins-") as place:
-        if twins or rom or ball_table:
-            simulated = Path(place)
-            models = tank_models(rom or [], ball_table or [], simulated)
-            runs = [*twins_of_runs(runs, rig, simulated, models), *runs]
+    simulated: dict[str, bytes] = {}
+    if twins or rom or ball_table:
+        experiment, simulated = analyse_beam_with_twins(
+            runs, rig, settings, roms=rom or [], balls=ball_table or []
+        )
+    else:
         experiment = analyse_beam(runs, rig, settings)
-        summary = write_beam(experiment, output, command=command, report=not no_report, twins=simulated)
+    summary = write_beam(experiment, output, command=command_as_given(), report=not no_report, twins=simulated)
     finish(summary, as_json)
 
 

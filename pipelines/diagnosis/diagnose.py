@@ -5,22 +5,27 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.diagnosis.worker_threads import WorkerThreads
+from pipelines.inputs.recordings import RunSource, recording_of
+from pipelines.inputs.rigs import RigSource, folder_of, rig_of
 from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines
 from pipelines.report.progress import amounts
 from pipelines.report.result_folder import require_result_folder, result_folder
 from sloshlab import atomic_file
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.consistency.samples import examined_samples
-from sloshlab.diagnosis.examination import examination_facts, examined, seen_at
+from sloshlab.diagnosis.examination import examined, seen_at
 from sloshlab.diagnosis.findings import findings_of
-from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
-from sloshlab.identification.case import Case, read_case
+from sloshlab.diagnosis.verdict import verdict_of
+from sloshlab.errors import InputError
+from sloshlab.identification.case import MOST_RUNS, Case, CaseRun, read_case
 from sloshlab.missing_physics.user_effects import load_user_effects
+from sloshlab.recording import run_attributes
 from sloshlab.user_twin import UserTwinModel, load_user_twin, with_known_drive
 
 
@@ -55,9 +60,89 @@ def diagnose_case(
         Python modules with effects of a user's own; their code is run.
     """
     target = output or folder / "diagnosis"
-    case, recordings = _examined(read_case(folder, with_rig=twin is None))
+    opened = opened_folder(folder, with_rig=twin is None)
     # Before the search, which takes minutes: a folder that is in the way has to be said at once.
     require_result_folder(target, files_of(report=report))
+    diagnosis = diagnosed(opened, command=command, twin=twin, effects=effects)
+    return write_diagnosis(diagnosis, target, report=report)
+
+
+@dataclass(frozen=True, eq=False)
+class OpenedCase:
+    """A case without the samples that were not measured.
+
+    Attributes
+    ----------
+    case : Case
+    recordings : tuple of ConsistencyExamination
+        Whether each recording agrees with itself.
+    sources : tuple of Path, RecordingInMemory or RigInMemory
+        What it was read from: the rig, where it has one, and the recordings.
+    """
+
+    case: Case
+    recordings: tuple[ConsistencyExamination, ...]
+    sources: tuple[RunSource | RigSource, ...]
+
+
+def opened_folder(folder: Path, *, with_rig: bool = True) -> OpenedCase:
+    """The case in a folder with ``rig.toml`` and ``recordings/*.nc``.
+
+    Raises
+    ------
+    InputError
+        If the folder is no case, or holds more than can be judged.
+    """
+    case = read_case(folder, with_rig=with_rig)
+    files = sorted((folder / "recordings").glob("*.nc"))
+    return _examined(case, (*([folder / "rig.toml"] if with_rig else []), *files))
+
+
+def opened_recordings(name: str, runs: Sequence[RunSource], rig: RigSource | None) -> OpenedCase:
+    """A case of recordings that lie in no folder together, or in memory.
+
+    Parameters
+    ----------
+    name : str
+        What the case is called.
+    runs : sequence of Path or RecordingInMemory
+    rig : Path or RigInMemory, optional
+        None where a twin of the user's own stands for it.
+
+    Raises
+    ------
+    InputError
+        If a recording or the rig is bad, two recordings have one name, or there are too many.
+    """
+    if not 1 <= len(runs) <= MOST_RUNS:
+        raise InputError(f"case {name}", got=f"{len(runs)} recordings", allowed=f"1 … {MOST_RUNS}")
+    found: dict[str, CaseRun] = {}
+    for run in runs:
+        called = run.stem if isinstance(run, Path) else run.name
+        if called in found:
+            raise InputError(f"case {name}", got=f"two recordings {called}", allowed="one of each name")
+        recording = recording_of(run)
+        found[called] = CaseRun(called, recording, run_attributes(recording))
+    described, folder = (None, None) if rig is None else (rig_of(rig), folder_of(rig))
+    in_order = tuple(found[called] for called in sorted(found))
+    case = Case(name, folder or Path(), described, in_order)
+    return _examined(case, (*([] if rig is None else [rig]), *runs))
+
+
+def diagnosed(
+    opened: OpenedCase, *, command: str, twin: Path | None = None, effects: Sequence[Path] = ()
+) -> Diagnosis:
+    """Search what physics the simulation of a case left out.
+
+    Parameters
+    ----------
+    opened : OpenedCase
+    command : str
+        What the user typed, for the report.
+    twin, effects : Path, sequence of Path
+        As of `diagnose_case`.
+    """
+    case, remarks = opened.case, list[str]()
     own = [effect for file in effects for effect in load_user_effects(file)]
     model, cut = None, tuple[str, ...]()
     if twin is not None:
@@ -72,11 +157,27 @@ def diagnose_case(
     examination = examined(found)
     named = verdict.best if verdict.kind != "unknown" else None
     verdict = verdict.seen(seen_at(examination, named, verdict.block))
-    provenance = _provenance(case, command, twin, effects)
-    facts = {RESULT_ID: provenance[RESULT_ID], **verdict_facts(found, verdict)}
-    facts |= examination_facts(examination, found)
-    diagnosis = Diagnosis(found, verdict, examination, provenance, recordings)
-    with result_folder(target, provenance) as complete:
+    remarks += cut
+    if own:
+        remarks.append("effects of your own: " + ", ".join(f"{effect.block}.{effect.name}" for effect in own))
+    inputs = (*([] if twin is None else [twin]), *_in_order(opened, effects))
+    provenance = provenance_of(command, inputs, settings="diagnosis")
+    return Diagnosis(found, verdict, examination, provenance, opened.recordings, tuple(remarks))
+
+
+def write_diagnosis(diagnosis: Diagnosis, target: Path, *, report: bool = True) -> dict[str, Any]:
+    """Write ``verdict.json``, the twins and the report; return the summary of the command.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    target : Path
+        All files appear together, complete, or none does.
+    report : bool
+        False leaves the report and its figures out.
+    """
+    found, verdict, facts = diagnosis.findings, diagnosis.verdict, diagnosis.facts
+    with result_folder(target, diagnosis.provenance) as complete:
         atomic_file.write_bytes(complete / "verdict.json", (json.dumps(facts, indent=1) + "\n").encode())
         best = verdict.model or found.retuned
         found.model.save_extended(best.values, best.fit.candidates, complete / "extended_twin.toml")
@@ -86,20 +187,24 @@ def diagnose_case(
             from pipelines.diagnosis.sections import page_of
             from pipelines.report.page import write_page
 
-            write_page(page_of(diagnosis), complete, result_id=provenance[RESULT_ID])
+            write_page(page_of(diagnosis), complete, result_id=diagnosis.provenance[RESULT_ID])
     lines = [
         verdict.headline,
         verdict.statement,
         f"verdict: {verdict.kind}",
         f"written: {target / 'verdict.json'}",
+        *diagnosis.remarks,
     ]
-    lines += cut
-    if own:
-        lines.append("effects of your own: " + ", ".join(f"{effect.block}.{effect.name}" for effect in own))
     return {"lines": lines + report_lines(target, written=report), "flags": list(diagnosis.flags), **facts}
 
 
-def _examined(case: Case) -> tuple[Case, tuple[ConsistencyExamination, ...]]:
+def _in_order(opened: OpenedCase, effects: Sequence[Path]) -> list[RunSource | RigSource]:
+    """What a case was read from, with the user's own effects between rig and recordings."""
+    n_rigs = int(opened.case.rig is not None)
+    return [*opened.sources[:n_rigs], *effects, *opened.sources[n_rigs:]]
+
+
+def _examined(case: Case, sources: tuple[RunSource | RigSource, ...]) -> OpenedCase:
     """The case without samples that were not measured, and what was found of them.
 
     Delays, gains and limits of sensors stay: they are effects that the diagnosis finds by itself.
@@ -110,9 +215,4 @@ def _examined(case: Case) -> tuple[Case, tuple[ConsistencyExamination, ...]]:
         examination = ConsistencyExamination(run.name, tuple(found), (), wrong)
         runs.append(dataclasses.replace(run, recording=examination.measured_only(run.recording)))
         examinations.append(examination)
-    return dataclasses.replace(case, runs=tuple(runs)), tuple(examinations)
-
-
-def _provenance(case: Case, command: str, twin: Path | None, effects: Sequence[Path]) -> dict[str, Any]:
-    files = [twin or case.folder / "rig.toml", *effects, *sorted((case.folder / "recordings").glob("*.nc"))]
-    return provenance_of(command, files, settings="diagnosis")
+    return OpenedCase(dataclasses.replace(case, runs=tuple(runs)), tuple(examinations), sources)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +13,15 @@ from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.axes import power_of_ten
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.style import NEUTRAL_COLOUR, REFERENCE_COLOUR, WORK_COLOURS, new_figure, plain, png_bytes
+from sloshlab.diagnosis.findings import explained_extension
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.wording import form_and_place
+from sloshlab.identification.case import CaseRun
 from sloshlab.identification.mismatch import ChannelMismatch, mismatches
 from sloshlab.identification.observations import Observation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FloatArray = NDArray[np.float64]
 _MOST_ROWS = 14
@@ -26,6 +33,18 @@ _EXCESS_OF_NOISE = 1.0
 
 def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
     """Believed, retuned and named on runs that chose nothing."""
+    figure = new_figure(0.6 + 0.36 * (2 + (diagnosis.after is not None)))
+    draw_held_out_errors(figure.subplots(), diagnosis)
+    runs = ", ".join(run.name for run in diagnosis.findings.split.held_out)
+    caption = (
+        "Root mean square of the residuals of short-time spectra over their noise, where the recording stands out "
+        f"of the noise, on runs that chose nothing ({runs}). The dashed line is the noise floor."
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def draw_held_out_errors(axes: Axes, diagnosis: Diagnosis) -> None:
+    """Draw the errors on held-out runs over the noise floor."""
     found = diagnosis.findings
     rows: list[tuple[str, ScoredModel, str]] = [
         ("as believed", found.believed, NEUTRAL_COLOUR),
@@ -34,8 +53,6 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
     if diagnosis.after is not None:
         rows.append((words(diagnosis.after, "\n+ "), diagnosis.after, REFERENCE_COLOUR))
     values = [explanation.held_out_rms or explanation.fitted_rms for _, explanation, _ in rows]
-    figure = new_figure(0.6 + 0.36 * len(rows))
-    axes = figure.subplots()
     axes.barh(range(len(rows)), values, color=[colour for _, _, colour in rows], height=0.6)
     axes.axvline(1.0, color="black", lw=1.0, ls="--")
     axes.set_yticks(range(len(rows)), [label for label, _, _ in rows])
@@ -50,12 +67,6 @@ def held_out_errors(name: str, diagnosis: Diagnosis) -> ReportFigure:
         # A label just below one would lie on the line of the noise floor.
         beside = max(value, 1.0) if 0.75 < value < 1.0 else value
         axes.annotate(f"{value:.2f}", (beside, i), (4, 0), textcoords="offset points", va="center", fontsize=8)
-    runs = ", ".join(run.name for run in found.split.held_out)
-    caption = (
-        "Root mean square of the residuals of short-time spectra over their noise, where the recording stands out "
-        f"of the noise, on runs that chose nothing ({runs}). The dashed line is the noise floor."
-    )
-    return ReportFigure(name, caption, "", png_bytes(figure))
 
 
 def evidence(name: str, diagnosis: Diagnosis) -> ReportFigure:
@@ -139,39 +150,23 @@ def where(name: str, diagnosis: Diagnosis) -> ReportFigure:
 
 def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
     """The held-out run that is missed most, recorded and simulated, with what is left."""
-    found = diagnosis.findings
-    readings = found.readings(found.retuned)
-    named = named_channels(diagnosis)
-
-    def missed(observation: Observation) -> float:
-        return float((observation.residual(readings[observation.run.name][observation.channel]) ** 2).sum())
-
-    observed = max(found.held_out, key=lambda run: sum(missed(observation) for observation in run))
-    run = observed[0].run
-    shown = sorted(observed, key=lambda observation: (observation.channel not in named, -missed(observation)))[:2]
-    steps: list[tuple[str, dict[str, FloatArray], str, Any]] = [
-        ("baseline retuned", readings[run.name], NEUTRAL_COLOUR, "-")
-    ]
-    if diagnosis.after is not None:
-        after = found.readings(diagnosis.after)[run.name]
-        steps.append((extended_label(diagnosis), after, REFERENCE_COLOUR, (0, (4, 1.5))))
+    shown = most_missed_observations(diagnosis)[:2]
+    run = shown[0].run
+    steps = _steps(diagnosis, run)
     time = np.asarray(run.recording["time"].values, np.float64)
     figure = new_figure(1.9 * len(shown) + 0.4)
     grid = np.atleast_2d(figure.subplots(len(shown), 2, sharex="col"))
     for (left, right), observation in zip(grid, shown, strict=True):
         recorded = np.asarray(run.recording[observation.channel].values, np.float64)
-        factor, units = _handy(recorded, str(run.recording[observation.channel].attrs.get("units", "")))
+        factor, _ = handy_units(run, observation.channel)
         if observation is shown[0]:
-            lacking = recorded - steps[0][1][observation.channel]
-            stretch = _stretch(time, found.surroundings.frequency_hz, _left(observation, lacking))
-        left.plot(time[stretch], factor * recorded[stretch], color=FAINT_COLOUR, lw=2.6, label="recorded")
-        for label, simulated, colour, line in steps:
-            values = simulated[observation.channel]
-            left.plot(time[stretch], factor * values[stretch], color=colour, lw=0.9, ls=line, label=label)
+            stretch = _most_missed(diagnosis, observation, steps)
+        _draw_stretch(left, observation, steps, stretch)
+        for step in steps:
             # A sample that is not judged, such as the one of a release, would squash all others.
-            left_over = np.where(observation.known, _left(observation, recorded - values), np.nan)
-            right.plot(time, factor * left_over, color=colour, lw=0.6)
-        left.set_ylabel(f"{plain(observation.channel)}\n[{plain(units)}]", fontsize=7)
+            lacking = recorded - step.readings[observation.channel]
+            left_over = np.where(observation.known, _left(observation, lacking), np.nan)
+            right.plot(time, factor * left_over, color=step.colour, lw=0.6)
         right.axvspan(time[stretch][0], time[stretch][-1], color="#f0ead8", zorder=0)
     grid[0, 0].set_title("recorded and simulated, a stretch")
     grid[0, 1].set_title("recorded − simulated")
@@ -184,6 +179,74 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
         "fit, or believed where the run was not fitted."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What a model says of one run, and how it is drawn."""
+
+    label: str
+    readings: dict[str, FloatArray]
+    colour: str
+    line: Any
+
+
+def most_missed_observations(diagnosis: Diagnosis) -> list[Observation]:
+    """Channels of the held-out run that is missed most; those on which named effects act come first."""
+    found, named = diagnosis.findings, named_channels(diagnosis)
+    readings = found.readings(found.retuned)
+
+    def missed(observation: Observation) -> float:
+        return float((observation.residual(readings[observation.run.name][observation.channel]) ** 2).sum())
+
+    observed = max(found.held_out, key=lambda run: sum(missed(observation) for observation in run))
+    return sorted(observed, key=lambda observation: (observation.channel not in named, -missed(observation)))
+
+
+def _steps(diagnosis: Diagnosis, run: CaseRun) -> list[_Step]:
+    """The retuned baseline, and the model that is shown beside it."""
+    before = simulated_channels(diagnosis, diagnosis.findings.retuned, run)
+    steps = [_Step("baseline retuned", before, NEUTRAL_COLOUR, "-")]
+    if diagnosis.after is not None:
+        after = simulated_channels(diagnosis, diagnosis.after, run)
+        steps.append(_Step(extended_label(diagnosis), after, REFERENCE_COLOUR, (0, (4, 1.5))))
+    return steps
+
+
+def simulated_channels(diagnosis: Diagnosis, model: ScoredModel, run: CaseRun) -> dict[str, FloatArray]:
+    """What every channel of one run reads in a model, each of shape (n,)."""
+    return diagnosis.findings.model.simulate(run, model.values, explained_extension(model))
+
+
+def _most_missed(diagnosis: Diagnosis, observation: Observation, steps: Sequence[_Step]) -> slice:
+    """The cycles in which the retuned baseline misses a channel most."""
+    recording = observation.run.recording
+    time = np.asarray(recording["time"].values, np.float64)
+    recorded = np.asarray(recording[observation.channel].values, np.float64)
+    lacking = _left(observation, recorded - steps[0].readings[observation.channel])
+    return _stretch(time, diagnosis.findings.surroundings.frequency_hz, lacking)
+
+
+def _draw_stretch(axes: Axes, observation: Observation, steps: Sequence[_Step], stretch: slice) -> None:
+    """Recorded and simulated, one line each."""
+    recording, channel = observation.run.recording, observation.channel
+    time = np.asarray(recording["time"].values, np.float64)
+    recorded = np.asarray(recording[channel].values, np.float64)
+    factor, units = handy_units(observation.run, channel)
+    axes.plot(time[stretch], factor * recorded[stretch], color=FAINT_COLOUR, lw=2.6, label="recorded")
+    for step in steps:
+        values = step.readings[channel]
+        axes.plot(
+            time[stretch], factor * values[stretch], color=step.colour, lw=0.9, ls=step.line, label=step.label
+        )
+    axes.set_ylabel(f"{plain(channel)}\n[{plain(units)}]", fontsize=7)
+
+
+def draw_before_after(axes: Axes, diagnosis: Diagnosis, observation: Observation) -> None:
+    """Draw one channel of one run, recorded and simulated, over the cycles that the baseline misses most."""
+    steps = _steps(diagnosis, observation.run)
+    _draw_stretch(axes, observation, steps, _most_missed(diagnosis, observation, steps))
+    axes.set_xlabel("time [s]")
 
 
 def plain_ticks_within_decades(axis: Any) -> None:
@@ -257,8 +320,10 @@ def words(explanation: ScoredModel, between: str = " + ") -> str:
     return between.join(plain(form_and_place(candidate), 64) for candidate in explanation.fit.candidates)
 
 
-def _handy(values: FloatArray, units: str) -> tuple[float, str]:
-    """Factor and unit in which values are handy, units as people write them."""
+def handy_units(run: CaseRun, channel: str) -> tuple[float, str]:
+    """Factor and unit in which the values of a channel are handy, units as people write them."""
+    recorded = run.recording[channel]
+    values, units = np.asarray(recorded.values, np.float64), str(recorded.attrs.get("units", ""))
     if units == "m" and float(np.nanmax(np.abs(values))) < 0.1:
         return 1e3, "mm"
     return 1.0, {"m s-2": "m/s²", "m s-1": "m/s"}.get(units, units)

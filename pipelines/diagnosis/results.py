@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pipelines.diagnosis.tolerance_bounds import at_their_bounds
+from pipelines.report.outputs import RESULT_ID
 from sloshlab.consistency.finding import ConsistencyExamination
-from sloshlab.diagnosis.examination import Examination
+from sloshlab.diagnosis.examination import Examination, examination_facts
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
-from sloshlab.diagnosis.verdict import Verdict
+from sloshlab.diagnosis.verdict import Verdict, verdict_facts
 from sloshlab.user_twin import UserTwinModel
 
 
@@ -24,6 +25,8 @@ class Diagnosis:
     findings, verdict, examination, provenance
     recordings : tuple of ConsistencyExamination
         Whether each recording agrees with itself. What is an effect of a sensor is the diagnosis's own to find.
+    remarks : tuple of str
+        What was done to the case before the search: runs that were cut, effects of a user's own.
     """
 
     findings: Findings
@@ -31,6 +34,7 @@ class Diagnosis:
     examination: Examination
     provenance: Mapping[str, Any] = field(default_factory=dict)
     recordings: tuple[ConsistencyExamination, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def after(self) -> ScoredModel | None:
@@ -50,3 +54,12 @@ class Diagnosis:
             return ()
         shown = self.verdict.model or self.findings.retuned
         return at_their_bounds(self.findings.model.parameters, shown.values)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The content of ``verdict.json``."""
+        return {
+            RESULT_ID: self.provenance[RESULT_ID],
+            **verdict_facts(self.findings, self.verdict),
+            **examination_facts(self.examination, self.findings),
+        }

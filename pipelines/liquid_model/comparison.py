@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource
 from pipelines.liquid_model.results import (
     CeilingPair,
     ComparedMaps,
@@ -51,7 +51,7 @@ _MOTION: Final = ("experiment", "acceleration_g", "sweep_start_hz", "sweep_stop_
 class _Read:
     """A recording with its signals as recorded."""
 
-    path: Path
+    path: RunSource
     recording: xr.Dataset
     signals: LiquidSignals
 
@@ -64,7 +64,7 @@ class _Read:
 def validated(
     model: ReducedOrderModel,
     runs: TrainingRuns,
-    test: Sequence[Path],
+    test: Sequence[RunSource],
     *,
     training: Training | None = None,
     advance: Callable[[str], None] = lambda step: None,
@@ -76,7 +76,7 @@ def validated(
     model : ReducedOrderModel
     runs : TrainingRuns
         Those it was trained and validated on.
-    test : sequence of Path
+    test : sequence of Path or RecordingInMemory
         Further runs; those with the same motion set the ceiling.
     training : Training, optional
     advance : callable

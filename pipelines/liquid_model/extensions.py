@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Final
 
+from pipelines.inputs.recordings import RunSource
 from pipelines.liquid_model.training_runs import TrainingRuns, require_new_runs, signals_of, sloshing_run
 from pipelines.report.progress import amounts
 from sloshlab.reduced_order_model.break_up_fit import with_break_up
@@ -19,14 +19,14 @@ REST_S: Final = 1.0
 """Of rest before a sudden start, so that delay lines and memory are filled from the first instant on."""
 
 
-def remembering(model: ReducedOrderModel, starts: Sequence[Path], runs: TrainingRuns) -> ReducedOrderModel:
+def remembering(model: ReducedOrderModel, starts: Sequence[RunSource], runs: TrainingRuns) -> ReducedOrderModel:
     """Return a model whose break-up follows recordings of sudden starts.
 
     Parameters
     ----------
     model : ReducedOrderModel
         Trained on the training runs.
-    starts : sequence of Path
+    starts : sequence of Path or RecordingInMemory
         Recordings that begin with the liquid at rest; on the rig of the runs.
     runs : TrainingRuns
 

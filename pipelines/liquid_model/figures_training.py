@@ -15,6 +15,8 @@ from pipelines.report.style import DISTINCT_COLOURS, NEUTRAL_COLOUR, REFERENCE_C
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from sloshlab.reduced_order_model.training import TrainingRecord
+
 FloatArray = npt.NDArray[np.float64]
 _BINS_PER_OCTAVE: Final = 6
 _FEWEST_CYCLES: Final = 5
@@ -29,6 +31,19 @@ def training_curve(name: str, validated: ValidatedModel) -> ReportFigure:
     record = validated.training.record
     figure = new_figure(2.8)
     axes = figure.subplots()
+    draw_training_curve(axes, record)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    n_starts = len({epoch.start for epoch in record.epochs})
+    others = " Other starts are faint." if n_starts > 1 else ""
+    caption = (
+        "RMS error of the force on the training and validation runs after every epoch of Levenberg–Marquardt; the "
+        f"circle is the model that was kept. Training ended: {record.ended}.{others}"
+    )
+    return ReportFigure(name, caption, "", png_bytes(figure))
+
+
+def draw_training_curve(axes: Axes, record: TrainingRecord) -> None:
+    """Draw the errors over the epochs, the kept one marked."""
     for start, epochs in itertools.groupby(record.epochs, key=lambda epoch: epoch.start):
         own = list(epochs)
         number = [epoch.number for epoch in own]
@@ -43,14 +58,6 @@ def training_curve(name: str, validated: ValidatedModel) -> ReportFigure:
     axes.set(xlabel="epoch", ylabel="RMS error of Δf [N]")
     axes.set_xlim(0, max(epoch.number for epoch in record.epochs) or 1)
     axes.set_ylim(bottom=0)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    n_starts = len({epoch.start for epoch in record.epochs})
-    others = " Other starts are faint." if n_starts > 1 else ""
-    caption = (
-        "RMS error of the force on the training and validation runs after every epoch of Levenberg–Marquardt; the "
-        f"circle is the model that was kept. Training ended: {record.ended}.{others}"
-    )
-    return ReportFigure(name, caption, "", png_bytes(figure))
 
 
 def ceiling(name: str, validated: ValidatedModel) -> ReportFigure:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource
 from pipelines.liquid_model.comparison import validated
 from pipelines.liquid_model.results import Training, ValidatedModel
 from pipelines.liquid_model.sections import page_of
@@ -20,6 +21,7 @@ from pipelines.report.progress import progress
 from pipelines.report.result_folder import result_folder
 from sloshlab.quantities import described
 from sloshlab.reduced_order_model.model import ReducedOrderModel
+from sloshlab.reduced_order_model.training import TrainingRecord
 
 _N_FIGURES = 11
 """Of the page, for the progress."""
@@ -28,7 +30,7 @@ _N_FIGURES = 11
 def write_validation(
     model: ReducedOrderModel,
     runs: TrainingRuns,
-    test: Sequence[Path],
+    test: Sequence[RunSource],
     folder: Path,
     *,
     provenance: Mapping[str, Any],
@@ -40,7 +42,7 @@ def write_validation(
     ----------
     model : ReducedOrderModel
     runs : TrainingRuns
-    test : sequence of Path
+    test : sequence of Path or RecordingInMemory
         Further runs.
     folder : Path
         All files appear in it together, complete, or none does.
@@ -69,7 +71,7 @@ def datasets(found: ValidatedModel) -> dict[str, xr.Dataset]:
     """What is written beside the page, by file name."""
     written = {}
     if found.training is not None:
-        written["training_curve.nc"] = _training_curve(found.training)
+        written["training_curve.nc"] = training_curve(found.training.record)
     if found.maps is not None:
         written["maps.nc"] = _maps(found)
     if found.tests:
@@ -78,17 +80,19 @@ def datasets(found: ValidatedModel) -> dict[str, xr.Dataset]:
     return {name: described(dataset).assign_attrs(stamp) for name, dataset in written.items()}
 
 
-def _training_curve(training: Training) -> xr.Dataset:
-    epochs = training.record.epochs
-    return xr.Dataset(
+def training_curve(record: TrainingRecord) -> xr.Dataset:
+    """Errors on training and validation runs over the epochs, described."""
+    epochs = record.epochs
+    curve = xr.Dataset(
         {
             "start_number": ("epoch_index", np.array([epoch.start for epoch in epochs])),
             "epoch_number": ("epoch_index", np.array([epoch.number for epoch in epochs])),
             "training_rms_n": ("epoch_index", np.sqrt([epoch.training_mse for epoch in epochs])),
             "validation_rms_n": ("epoch_index", np.sqrt([epoch.validation_mse for epoch in epochs])),
-            "is_kept": ("epoch_index", np.array([epoch is training.record.best for epoch in epochs], np.int8)),
+            "is_kept": ("epoch_index", np.array([epoch is record.best for epoch in epochs], np.int8)),
         }
     )
+    return described(curve)
 
 
 def _maps(found: ValidatedModel) -> xr.Dataset:

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from pipelines.inputs.recordings import RunSource, attributes_of
 from pipelines.liquid_model.extensions import remembering, trained_ensemble
 from pipelines.liquid_model.training_runs import RunFiles, TrainingRuns, require_new_runs, training_runs
 from pipelines.report.free_place import require_free_place
-from pipelines.report.outputs import RESULT_ID, provenance_of, sha256_of
+from pipelines.report.outputs import RESULT_ID, InMemory, provenance_of, sha256_of
 from pipelines.report.progress import amounts
 from pipelines.report.result_folder import require_result_folder, withdraw_result
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
-from sloshlab.recording import read_attributes
 from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.ensemble import Ensemble
 from sloshlab.reduced_order_model.ensemble_storage import load_ensemble, save_ensemble
@@ -52,7 +52,7 @@ class ModelSettings:
         By default chosen from the data.
     memory_s : float, optional
         Time constant of a slow state of the speed that the network sees, too.
-    sudden_starts : tuple of Path
+    sudden_starts : tuple of Path or RecordingInMemory
         Recordings from rest, to which a break-up of the liquid is fitted.
     n_members : int
         Of an ensemble trained besides; 0 for none.
@@ -65,7 +65,7 @@ class ModelSettings:
     network: str = "normalised_rbf"
     rate_hz: float | None = None
     memory_s: float | None = None
-    sudden_starts: tuple[Path, ...] = ()
+    sudden_starts: tuple[RunSource, ...] = ()
     n_members: int = 0
 
     def checked(self) -> ModelSettings:
@@ -113,6 +113,8 @@ class TrainedModel:
     model : ReducedOrderModel
     record : TrainingRecord
     runs : TrainingRuns
+    wanted : ModelSettings
+        What was to be trained.
     settings : TrainingSettings
     quality : FitQuality
         Of the free run over all validation runs together.
@@ -122,6 +124,7 @@ class TrainedModel:
     model: ReducedOrderModel
     record: TrainingRecord
     runs: TrainingRuns
+    wanted: ModelSettings
     settings: TrainingSettings
     quality: FitQuality
     ensemble: Ensemble | None = None
@@ -173,7 +176,7 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
     ensemble = trained_ensemble(model, wanted.n_members, runs, settings) if wanted.n_members else None
     if wanted.sudden_starts:
         model = remembering(model, wanted.sudden_starts, runs)
-    return TrainedModel(model, record, runs, settings, _quality(model, runs.validation), ensemble)
+    return TrainedModel(model, record, runs, wanted, settings, _quality(model, runs.validation), ensemble)
 
 
 def write_model(trained: TrainedModel, output: Path, place: Path) -> dict[str, Any]:
@@ -219,7 +222,7 @@ def write_model(trained: TrainedModel, output: Path, place: Path) -> dict[str, A
 
 def train_and_report(
     files: RunFiles,
-    test: Sequence[Path],
+    test: Sequence[RunSource],
     wanted: ModelSettings,
     settings: TrainingSettings,
     output: Path,
@@ -232,7 +235,7 @@ def train_and_report(
     Parameters
     ----------
     files : RunFiles
-    test : sequence of Path
+    test : sequence of Path or RecordingInMemory
         Further runs, for the report.
     wanted : ModelSettings
     settings : TrainingSettings
@@ -248,20 +251,68 @@ def train_and_report(
     InputError
         If a recording, the rig or their combination is bad, or there is no place for the report.
     """
-    folder = report_folder(output)
     # what can be refused is refused before hours of training
     require_new_runs(test, files)
-    require_free_place(output, overwrite=overwrite, described="model")
-    if wanted.n_members:
-        require_free_place(ensemble_file(output), overwrite=overwrite, described="ensemble")
-    if command is not None:
-        require_result_folder(folder, REPORT_FILES)
-    ensemble = _ensemble_of(output)
-    for path in test if command is not None else ():
-        read_attributes(path)  # before hours of training, not after them
+    require_places(output, has_ensemble=wanted.n_members > 0, report=command is not None, overwrite=overwrite)
+    for run in test if command is not None else ():
+        attributes_of(run)  # before hours of training, not after them
     trained = trained_model(files, wanted, settings)
+    return write_training(trained, test, output, command=command, overwrite=overwrite)
+
+
+def require_places(output: Path, *, has_ensemble: bool, report: bool, overwrite: bool) -> None:
+    """Refuse places that a model, its ensemble and its report cannot take.
+
+    Parameters
+    ----------
+    output : Path
+        The model.
+    has_ensemble, report : bool
+        Whether they will be written, too.
+    overwrite : bool
+        Whether a model that is there may be replaced.
+
+    Raises
+    ------
+    InputError
+        If something is in the way.
+    """
+    require_free_place(output, overwrite=overwrite, described="model")
+    if has_ensemble:
+        require_free_place(ensemble_file(output), overwrite=overwrite, described="ensemble")
+    if report:
+        require_result_folder(report_folder(output), REPORT_FILES)
+
+
+def write_training(
+    trained: TrainedModel,
+    test: Sequence[RunSource],
+    output: Path,
+    *,
+    command: str | None,
+    overwrite: bool = False,
+    known_sha256: Mapping[Path | InMemory, str] | None = None,
+) -> dict[str, Any]:
+    """Write a trained model, and the report into a folder of its name beside it; return the summary.
+
+    Parameters
+    ----------
+    trained : TrainedModel
+    test : sequence of Path or RecordingInMemory
+        Further runs, for the report.
+    output : Path
+        The model.
+    command : str, optional
+        What the user typed, for the report; without it there is no report.
+    overwrite : bool
+        Whether a model that is there may be replaced.
+    known_sha256 : mapping, optional
+        Hashes of inputs that need not be computed again.
+    """
+    files, wanted, settings = trained.runs.files, trained.wanted, trained.settings
+    folder, ensemble = report_folder(output), _ensemble_of(output)
     inputs = (*files.training, *files.validation, *test, *files.still, files.rig, *wanted.sudden_starts)
-    provenance = provenance_of(command or "", inputs, settings=(wanted, settings))
+    provenance = provenance_of(command or "", inputs, known_sha256, settings=(wanted, settings))
     # model, ensemble and report of one training belong together
     for facts in (trained.model.facts, *([trained.ensemble.facts] if trained.ensemble is not None else [])):
         facts[RESULT_ID] = provenance[RESULT_ID]
@@ -335,7 +386,7 @@ def report_folder(model: Path) -> Path:
 
 
 def validate_model(
-    path: Path, files: RunFiles, test: Sequence[Path], folder: Path, command: str
+    path: Path, files: RunFiles, test: Sequence[RunSource], folder: Path, command: str
 ) -> dict[str, Any]:
     """Write the report of a model that is there already.
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource
+from pipelines.inputs.rigs import RigSource, rig_of
 from pipelines.report.outputs import sha256_of
 from pipelines.sweep.still_runs import StillRuns, examined_run, read_still_runs
 from sloshlab.conditioning.calibration import DryMass
@@ -25,24 +26,24 @@ from sloshlab.rig import Rig
 
 @dataclass(frozen=True)
 class RunFiles:
-    """Files of a training.
+    """Recordings and rig of a training, files or in memory.
 
     Attributes
     ----------
-    training, validation : tuple of Path
+    training, validation : tuple of Path or RecordingInMemory
         Runs of the moving liquid; none for training where a model is only validated.
-    still : tuple of Path
+    still : tuple of Path or RecordingInMemory
         Empty or frozen runs, for the dry mass.
-    rig : Path
+    rig : Path or RigInMemory
     """
 
-    training: tuple[Path, ...]
-    validation: tuple[Path, ...]
-    still: tuple[Path, ...]
-    rig: Path
+    training: tuple[RunSource, ...]
+    validation: tuple[RunSource, ...]
+    still: tuple[RunSource, ...]
+    rig: RigSource
 
     @classmethod
-    def of(cls, runs: Sequence[Path], still: Sequence[Path], rig: Path) -> RunFiles:
+    def of(cls, runs: Sequence[RunSource], still: Sequence[RunSource], rig: RigSource) -> RunFiles:
         """Take the last run for validation and the others for training.
 
         Raises
@@ -144,7 +145,7 @@ def training_runs(files: RunFiles, rate_hz: float | None = None) -> TrainingRuns
     InputError
         If a recording, the rig or their combination is bad.
     """
-    rig = Rig.from_toml(files.rig)
+    rig = rig_of(files.rig)
     still = read_still_runs(files.still, rig, files.rig.name)
     read = {path: sloshing_run(path, still.reference) for path in (*files.training, *files.validation)}
     training, validation = (
@@ -165,7 +166,7 @@ def training_runs(files: RunFiles, rate_hz: float | None = None) -> TrainingRuns
     )
 
 
-def require_new_runs(test: Sequence[Path], files: RunFiles) -> None:
+def require_new_runs(test: Sequence[RunSource], files: RunFiles) -> None:
     """Refuse test runs that the model is trained on or chosen by, and runs given twice.
 
     Raises
@@ -181,7 +182,7 @@ def require_new_runs(test: Sequence[Path], files: RunFiles) -> None:
         known[digest] = path
 
 
-def sloshing_run(path: Path, reference: Reference) -> tuple[xr.Dataset, ConsistencyExamination]:
+def sloshing_run(path: RunSource, reference: Reference) -> tuple[xr.Dataset, ConsistencyExamination]:
     """Read and examine a usable recording of the moving liquid.
 
     Raises

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import tempfile
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -22,11 +23,13 @@ from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLi
 from acquisition.virtual_laboratory.sensors import Laboratory
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from acquisition.virtual_laboratory.structure_rig import StructureLaboratory, structure_laboratory
+from pipelines.inputs.rigs import RigSource, rig_of
 from pipelines.report.free_place import require_free_file, require_free_place
 from pipelines.report.progress import amounts, progress
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
+from sloshlab.recording import read_recording
 from sloshlab.registry import loaded
 from sloshlab.rig import Rig
 
@@ -127,10 +130,7 @@ def make_virtual_run(
     InputError
         If the experiment is unknown, no rig is given, or an argument is out of range.
     """
-    if run.experiment not in virtual_experiments():
-        allowed = (*virtual_experiments(), CAMPAIGN)
-        raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join(allowed))
-    _check_liquid(run.liquid)
+    _check_run(run)
     if rig is None:
         raise InputError("--rig", got="nothing", allowed="a rig description", remedy="give --rig RIG.toml")
     saved = checkpoint or output.with_suffix(".checkpoint")
@@ -140,9 +140,7 @@ def make_virtual_run(
         got = f"{checkpoint.parent}, which is not there"
         raise InputError(f"--checkpoint {checkpoint}", got=got, allowed="a file in a folder that exists")
     require_free_place(output, overwrite=overwrite)
-    with amounts(run.experiment) as advance:
-        numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
-        recording = _recorded(run, rig, numerical)
+    recording = _computed(run, rig, saved)
     with atomic_file.replaced(output, overwrite=overwrite) as place:
         write_virtual_run(recording, place)
     saved.unlink(missing_ok=True)
@@ -160,9 +158,44 @@ def make_virtual_run(
     }
 
 
-def _recorded(run: VirtualRun, rig: Path, numerical: NumericalLiquid) -> xr.Dataset:
+def virtual_recording(run: VirtualRun, rig: RigSource) -> xr.Dataset:
+    """Make one run, and keep it in memory as `read_recording` would give it.
+
+    Parameters
+    ----------
+    run : VirtualRun
+    rig : Path or RigInMemory
+
+    Raises
+    ------
+    InputError
+        If the experiment is unknown or an argument is out of range.
+    """
+    _check_run(run)
+    with tempfile.TemporaryDirectory(prefix="sloshlab-virtual-") as folder:
+        place = Path(folder) / "run.nc"
+        # as counts of a converter, which is what a recorder would have written
+        write_virtual_run(_computed(run, rig, place.with_suffix(".checkpoint")), place)
+        return read_recording(place)
+
+
+def _check_run(run: VirtualRun) -> None:
+    if run.experiment not in virtual_experiments():
+        allowed = (*virtual_experiments(), CAMPAIGN)
+        raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join(allowed))
+    _check_liquid(run.liquid)
+
+
+def _computed(run: VirtualRun, rig: RigSource, saved: Path) -> xr.Dataset:
+    """The run, with progress; a computed liquid is saved meanwhile."""
+    with amounts(run.experiment) as advance:
+        numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
+        return _recorded(run, rig, numerical)
+
+
+def _recorded(run: VirtualRun, rig: RigSource, numerical: NumericalLiquid) -> xr.Dataset:
     """The liquid follows its law where there is one and nothing else is asked for."""
-    described, experiment = Rig.from_toml(rig), EXPERIMENTS[run.experiment]
+    described, experiment = rig_of(rig), EXPERIMENTS[run.experiment]
     # no law is known for the liquid in a tank that moves with a structure
     computed = numerical if run.liquid == "numerical" or experiment.structure else None
     make: Callable[..., xr.Dataset] = loaded(experiment.virtual_run)

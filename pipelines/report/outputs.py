@@ -7,7 +7,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 import xarray as xr
@@ -20,6 +20,21 @@ _SMALLEST_COMPRESSED_SIZE = 1000
 _IDENTIFIER_DIGITS = 16
 RESULT_ID: Final = "result_id"
 """Name of the identifier in every file of a result."""
+
+
+@runtime_checkable
+class InMemory(Protocol):
+    """What was handed over in memory instead of as a file: it has a name, and says what it holds."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        ...
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of its content, in hexadecimal."""
+        ...
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
@@ -38,8 +53,10 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
         stored.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
 
 
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's bytes, in hexadecimal."""
+def sha256_of(path: Path | InMemory) -> str:
+    """SHA-256 of a file's bytes, or of what is in memory, in hexadecimal."""
+    if not isinstance(path, Path):
+        return path.sha256
     digest = hashlib.sha256()
     with path.open("rb") as source:
         while block := source.read(_HASH_BLOCK):
@@ -58,8 +75,8 @@ def versions() -> dict[str, str]:
 
 def provenance_of(
     command: str,
-    inputs: Iterable[Path],
-    known_sha256: Mapping[Path, str] | None = None,
+    inputs: Iterable[Path | InMemory],
+    known_sha256: Mapping[Path | InMemory, str] | None = None,
     *,
     settings: object,
 ) -> dict[str, Any]:
@@ -69,9 +86,9 @@ def provenance_of(
     ----------
     command : str
         What the user typed.
-    inputs : iterable of Path
-        Every file that the results depend on.
-    known_sha256 : mapping of Path to str, optional
+    inputs : iterable of Path or InMemory
+        Every file that the results depend on, and what was handed over in memory.
+    known_sha256 : mapping of Path or InMemory to str, optional
         Hashes that need not be computed again.
     settings : object
         Everything that was chosen: data classes, mappings, sequences and plain values.
@@ -97,6 +114,8 @@ def provenance_of(
 
 def _plain(value: object) -> Any:
     """A value as JSON has it; files by their names, as their contents are hashed."""
+    if isinstance(value, Path | InMemory):
+        return value.name
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
         return {type(value).__name__: fields}
@@ -104,8 +123,6 @@ def _plain(value: object) -> Any:
         return {str(name): _plain(part) for name, part in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(part) for part in value]
-    if isinstance(value, Path):
-        return value.name
     return value if value is None or isinstance(value, bool | int | float | str) else repr(value)
 
 

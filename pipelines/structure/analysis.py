@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from pipelines.inputs.recordings import RunSource, recording_of
+from pipelines.inputs.rigs import RigSource, rig_of
 from pipelines.report.progress import progress
 from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, FrozenMode, group_of
 from pipelines.structure.stages import Loaded, analysed, has_spectra, loaded
@@ -20,7 +21,7 @@ from sloshlab.modal.instantaneous_damping import mean_over_decay
 from sloshlab.modal.pooled_decays import PooledDamping, pooled_damping
 from sloshlab.modal.rig_modes import stated_modes, structure_of, uniform_beam
 from sloshlab.modal.structural_update import UpdatedBeam, update_beam
-from sloshlab.recording import channels, read_recording
+from sloshlab.recording import channels
 from sloshlab.rig import Rig
 
 _TITLES: Final = {"beam": "Sloshing beam", "sdof": "Tank on a guide"}
@@ -48,14 +49,14 @@ def checked_settings(*, modes: int | None, n_cycles: int, segment_s: float | Non
     return BeamSettings(modes, n_cycles, segment_s)
 
 
-def analyse_beam(paths: Sequence[Path], rig_path: Path, settings: BeamSettings) -> BeamExperiment:
+def analyse_beam(paths: Sequence[RunSource], rig_path: RigSource, settings: BeamSettings) -> BeamExperiment:
     """Analyse the runs of one beam or one guided tank.
 
     Parameters
     ----------
-    paths : sequence of Path
+    paths : sequence of Path or RecordingInMemory
         Recordings of experiment ``beam_free`` and ``beam_random``, or ``sdof_free``, frozen, sloshing or empty.
-    rig_path : Path
+    rig_path : Path or RigInMemory
         The rig that all of them belong to.
     settings : BeamSettings
         Modes, stretches, segments.
@@ -69,7 +70,7 @@ def analyse_beam(paths: Sequence[Path], rig_path: Path, settings: BeamSettings) 
     InputError
         If a run, the rig or their combination is bad; nothing has been written then.
     """
-    rig = Rig.from_toml(rig_path)
+    rig = rig_of(rig_path)
     structure, modes = structure_of(rig), stated_modes(rig, settings.n_modes)
     runs = _loaded(paths, rig)
     settings = dataclasses.replace(settings, segment_s=settings.segment_s or _segment_s(runs))
@@ -99,10 +100,10 @@ def analyse_beam(paths: Sequence[Path], rig_path: Path, settings: BeamSettings) 
     )
 
 
-def _loaded(paths: Sequence[Path], rig: Rig) -> list[Loaded]:
+def _loaded(paths: Sequence[RunSource], rig: Rig) -> list[Loaded]:
     runs: list[Loaded] = []
     for path in paths:
-        run = loaded(path, read_recording(path), rig)
+        run = loaded(path, recording_of(path), rig)
         own = run.attributes.run_id, group_of(run.attributes)
         same = next((run for run in runs if (run.attributes.run_id, group_of(run.attributes)) == own), None)
         if same is not None:

@@ -45,7 +45,7 @@ def over_amplitude(name: str, experiment: BeamExperiment, quantity: Quantity) ->
     figure = new_figure(3.6)
     grid = figure.subplots(1, len(runs), sharey=quantity == "frequency", squeeze=False)[0]
     for number, (axes, run) in enumerate(zip(grid, runs, strict=True)):
-        _draw_readings(axes, run, quantity)
+        draw_readings(axes, run, quantity)
         panel_letter(axes, number, run.label)
         axes.set_xlabel("amplitude of acceleration a [g]")
     grid[0].set_ylabel(_LABELS[quantity])
@@ -65,7 +65,8 @@ def over_amplitude(name: str, experiment: BeamExperiment, quantity: Quantity) ->
     return ReportFigure(name, caption, like + _SOURCE_FIGURES[experiment.kind], png_bytes(figure))
 
 
-def _draw_readings(axes: Axes, run: BeamRun, quantity: Quantity) -> None:
+def draw_readings(axes: Axes, run: BeamRun, quantity: Quantity) -> None:
+    """Draw one quantity along one decay, by all methods."""
     decay = run.first_decay
     if decay is None:
         raise NothingToDrawError("the first mode was not read")
@@ -96,19 +97,9 @@ def _arrange(axes: Axes, values: FloatArray, quantity: Quantity) -> None:
 
 def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> ReportFigure:
     """All free runs by the sine fit, with mean and 90 % interval over repeats (Fig. 2.39)."""
-    if not experiment.free_runs:
-        raise NothingToDrawError("there is no free run")
     figure = new_figure(3.8)
     axes = figure.subplots()
-    shown = []
-    for group in experiment.groups:
-        if group in CONFIGURATIONS:
-            shown += _draw_runs(axes, experiment, group, quantity)
-        shown += _draw_pooled(axes, experiment, group, quantity)
-    axes.set_xlabel("amplitude of acceleration a [g]")
-    axes.set_ylabel(_LABELS[quantity])
-    _arrange(axes, np.concatenate(shown) if shown else np.array([]), quantity)
-    _limit_to_measured(axes, experiment)
+    draw_repeats(axes, experiment, quantity)
     legend_above(figure, axes, columns=4)
     caption = (
         "The first mode in every measured free run, by the local sine fit. Lines are means over the repeats "
@@ -119,6 +110,21 @@ def repeats(name: str, experiment: BeamExperiment, quantity: Quantity) -> Report
     sources = _SOURCE_FIGURES_OF_TWINS if has_twins else _SOURCE_FIGURES
     like = "" if quantity == "damping" else "like "
     return ReportFigure(name, caption, like + sources[experiment.kind], png_bytes(figure))
+
+
+def draw_repeats(axes: Axes, experiment: BeamExperiment, quantity: Quantity) -> None:
+    """Draw one quantity of all free runs, with means over repeats."""
+    if not experiment.free_runs:
+        raise NothingToDrawError("there is no free run")
+    shown = []
+    for group in experiment.groups:
+        if group in CONFIGURATIONS:
+            shown += _draw_runs(axes, experiment, group, quantity)
+        shown += _draw_pooled(axes, experiment, group, quantity)
+    axes.set_xlabel("amplitude of acceleration a [g]")
+    axes.set_ylabel(_LABELS[quantity])
+    _arrange(axes, np.concatenate(shown) if shown else np.array([]), quantity)
+    _limit_to_measured(axes, experiment)
 
 
 def _draw_runs(axes: Axes, experiment: BeamExperiment, group: str, quantity: Quantity) -> list[FloatArray]:

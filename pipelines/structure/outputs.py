@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import xarray as xr
 
-from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
+from pipelines.report.outputs import InMemory, provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.report.result_folder import require_result_folder, result_folder
 from pipelines.structure.analysis import analyse_beam
 from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, ModeDecay
+from sloshlab import atomic_file
 from sloshlab.errors import InputError
 from sloshlab.modal.instantaneous_damping import InstantaneousDamping
 from sloshlab.quantities import described
@@ -218,7 +218,13 @@ def files_of(*, report: bool) -> tuple[str, ...]:
 
 
 def write_beam(
-    experiment: BeamExperiment, folder: Path, *, command: str, report: bool = True, twins: Path | None = None
+    experiment: BeamExperiment,
+    folder: Path,
+    *,
+    command: str,
+    report: bool = True,
+    twins: Mapping[str, bytes] | None = None,
+    known_sha256: Mapping[Path | InMemory, str] | None = None,
 ) -> dict[str, Any]:
     """Write `modal.nc`, `spectra.nc` and the report; return the summary of the command.
 
@@ -232,30 +238,43 @@ def write_beam(
         What the user typed, for the report.
     report : bool
         False leaves the report and its figures out.
-    twins : Path, optional
-        Folder of what the twins are and simulated, which is kept with the results.
+    twins : mapping of str to bytes, optional
+        Files of what the twins are and simulated, which are kept with the results.
+    known_sha256 : mapping, optional
+        Hashes of inputs that need not be computed again, beside those of the runs.
 
     Returns
     -------
     dict
         ``lines`` for people, ``flags``, and numbers for machines.
     """
-    known = {run.path: run.sha256 for run in experiment.runs}
-    provenance = provenance_of(command, experiment.inputs, known, settings=experiment.settings)
-    stamp = {"title": experiment.title, **stamp_of(provenance)}
+    provenance = provenance_of_beam(experiment, command, known_sha256)
     with result_folder(folder, provenance) as complete:
-        if twins is not None:
-            shutil.copytree(twins, complete / TWINS_FOLDER)
-        for name, dataset in (
-            ("modal.nc", modal_dataset(experiment)),
-            ("spectra.nc", spectra_dataset(experiment)),
-        ):
-            write_dataset(dataset.assign_attrs(stamp), complete / name)
+        for name, content in (twins or {}).items():
+            atomic_file.write_bytes(complete / TWINS_FOLDER / name, content)
+        for name, dataset in stamped_results(experiment, provenance).items():
+            write_dataset(dataset, complete / name)
         if report:
             from pipelines.structure.sections import write_beam_report
 
             write_beam_report(dataclasses.replace(experiment, provenance=provenance), complete)
     return _summary(experiment, folder, report)
+
+
+def provenance_of_beam(
+    experiment: BeamExperiment, command: str, known_sha256: Mapping[Path | InMemory, str] | None = None
+) -> dict[str, Any]:
+    """What the results of an experiment rest on."""
+    known: dict[Path | InMemory, str] = dict(known_sha256 or {})
+    known.update({run.path: run.sha256 for run in experiment.runs})
+    return provenance_of(command, experiment.inputs, known, settings=experiment.settings)
+
+
+def stamped_results(experiment: BeamExperiment, provenance: Mapping[str, Any]) -> dict[str, xr.Dataset]:
+    """The contents of `modal.nc` and `spectra.nc` by these names, with what they rest on as attributes."""
+    stamp = {"title": experiment.title, **stamp_of(provenance)}
+    contents = {"modal.nc": modal_dataset(experiment), "spectra.nc": spectra_dataset(experiment)}
+    return {name: dataset.assign_attrs(stamp) for name, dataset in contents.items()}
 
 
 def _summary(experiment: BeamExperiment, folder: Path, report: bool) -> dict[str, Any]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.inputs.recordings import RunSource
+from pipelines.inputs.rigs import RigSource
 from sloshlab.conditioning.calibration import ApparentMass
 from sloshlab.conditioning.quality import RunQuality
 from sloshlab.configurations import EMPTY, FROZEN, SLOSHING
@@ -114,7 +116,7 @@ class BeamRun:
 
     Attributes
     ----------
-    path, sha256 : Path, str
+    path, sha256 : Path or RecordingInMemory, str
         The recording and the hash of its bytes.
     attributes : RunAttributes
         Its global attributes.
@@ -140,7 +142,7 @@ class BeamRun:
         Whether the run agrees with itself, with the rig and with physics.
     """
 
-    path: Path
+    path: RunSource
     sha256: str
     attributes: RunAttributes
     quality: RunQuality
@@ -240,7 +242,7 @@ class BeamExperiment:
         Why there is none.
     pooled : dict of (group, method) to PooledDamping
         First mode over repeats of the free runs.
-    inputs : tuple of Path
+    inputs : tuple of Path, RecordingInMemory or RigInMemory
         Recordings and rig.
     provenance : dict
         Input hashes, versions and the command.
@@ -260,7 +262,7 @@ class BeamExperiment:
     updated: UpdatedBeam | None
     update_reason: str
     pooled: dict[tuple[str, str], PooledDamping]
-    inputs: tuple[Path, ...]
+    inputs: tuple[RunSource | RigSource, ...]
     provenance: dict[str, Any] = field(default_factory=dict)
     flags: tuple[str, ...] = ()
 

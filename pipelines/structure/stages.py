@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource
 from pipelines.report.outputs import sha256_of
 from pipelines.structure.random_runs import random_response, rms
 from pipelines.structure.results import BeamRun, BeamSettings, ModeDecay, RandomResponse, group_of
@@ -56,7 +56,7 @@ _LARGEST_RESIDUAL_SHARE: Final = 0.1
 class Loaded:
     """A recording with what is known about it before the analysis."""
 
-    path: Path
+    path: RunSource
     recording: xr.Dataset
     attributes: RunAttributes
     quality: RunQuality
@@ -81,7 +81,7 @@ def has_spectra(attributes: RunAttributes) -> bool:
     return "spectra" in EXPERIMENTS[attributes.experiment].stages
 
 
-def loaded(path: Path, recording: xr.Dataset, rig: Rig) -> Loaded:
+def loaded(path: RunSource, recording: xr.Dataset, rig: Rig) -> Loaded:
     """A recording whose experiment suits the structure of a rig, with working sensors, examined.
 
     Raises

@@ -164,13 +164,8 @@ def work_map(
     name: str, maps: EnergyMaps, runs: Sequence[RunResult], counterpart: str, *, with_points: bool = True
 ) -> ReportFigure:
     """W over displacement and frequency with iso-acceleration lines and run paths (Fig. 1.11)."""
-    field = work_field(maps.dataset)
     figure = new_figure(4.6)
-    axes = figure.subplots()
-    arrange_plane(axes, field.plane, field.abscissa, field.ordinate)
-    draw_map(figure, axes, field, shades(field.values, signed=False))
-    draw_runs(axes, field.plane, runs)
-    draw_iso_acceleration(axes, field.plane, iso_levels_g(runs))
+    draw_work(figure, figure.subplots(), maps, runs, with_points=with_points)
     caption = (
         "Dissipated work per cycle over displacement amplitude and frequency, interpolated with radial basis "
         "functions between the windows (black dots) and drawn only inside the measured region (grey: not "
@@ -178,10 +173,22 @@ def work_map(
         "Dashed lines are lines of constant acceleration."
     )
     if with_points:
-        draw_points(axes, field.plane, reference_points(runs))
         caption += " Red bullets are the reference points, whose bars are red above."
-    print_error(axes, error_text(maps, "work_j", "W/(u₀Ω)²", "kg"))
     return ReportFigure(name, caption, counterpart, png_bytes(figure))
+
+
+def draw_work(
+    figure: Figure, axes: Axes, maps: EnergyMaps, runs: Sequence[RunResult], *, with_points: bool = False
+) -> None:
+    """Arrange and draw W over amplitude and frequency."""
+    field = work_field(maps.dataset)
+    arrange_plane(axes, field.plane, field.abscissa, field.ordinate)
+    draw_map(figure, axes, field, shades(field.values, signed=False))
+    draw_runs(axes, field.plane, runs)
+    draw_iso_acceleration(axes, field.plane, iso_levels_g(runs))
+    if with_points:
+        draw_points(axes, field.plane, reference_points(runs))
+    print_error(axes, error_text(maps, "work_j", "W/(u₀Ω)²", "kg"))
 
 
 def scaled_map(

@@ -57,12 +57,21 @@ def signal_panels(runs: Sequence[RunResult], liquid_mass_kg: float | None) -> Si
     shown = [run for run in _shown_runs(runs, liquid_mass_kg) if run.excerpts]
     if not shown:
         raise NothingToDrawError("no run keeps an excerpt of its signals")
-    excerpts = [excerpt for run in shown for excerpt in run.excerpts]
+    return _panels([sorted(run.excerpts, key=lambda e: e.frequency_hz) for run in shown], liquid_mass_kg)
+
+
+def panel_of(excerpt: Excerpt, liquid_mass_kg: float | None) -> SignalPanels:
+    """Compute the one panel of an excerpt."""
+    return _panels([[excerpt]], liquid_mass_kg)
+
+
+def _panels(columns: Sequence[Sequence[Excerpt]], liquid_mass_kg: float | None) -> SignalPanels:
+    excerpts = [excerpt for column in columns for excerpt in column]
     force_factor, force_unit = prefixed_unit([np.nanmax(np.abs(e.force_n)) for e in excerpts], "N")
     length_factor, length_unit = prefixed_unit([np.nanmax(np.abs(e.displacement_m)) for e in excerpts], "m")
     panels = []
-    for column, run in enumerate(shown):
-        for row, excerpt in enumerate(sorted(run.excerpts, key=lambda e: e.frequency_hz)):
+    for column, of_run in enumerate(columns):
+        for row, excerpt in enumerate(of_run):
             force, displacement = force_factor * excerpt.force_n, length_factor * excerpt.displacement_m
             if liquid_mass_kg is not None:
                 force, displacement = _normalised(excerpt, liquid_mass_kg)
@@ -72,7 +81,7 @@ def signal_panels(runs: Sequence[RunResult], liquid_mass_kg: float | None) -> Si
     return SignalPanels(
         tuple(panels),
         max(panel.row for panel in panels) + 1,
-        len(shown),
+        len(columns),
         "F_S/(m_l a₀)" if normalised else f"force F [{force_unit}]",
         "u/u₀" if normalised else f"displacement u [{length_unit}]",
     )

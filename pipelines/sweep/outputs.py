@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pipelines.report.outputs import provenance_of, report_lines, stamp_of, write_dataset
+import xarray as xr
+
+from pipelines.report.outputs import InMemory, provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.report.result_folder import require_result_folder, result_folder
 from pipelines.sweep.results import SweepExperiment
 from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
@@ -19,7 +21,12 @@ def files_of(*, report: bool) -> tuple[str, ...]:
 
 
 def write_experiment(
-    experiment: SweepExperiment, folder: Path, *, command: str, report: bool = True
+    experiment: SweepExperiment,
+    folder: Path,
+    *,
+    command: str,
+    report: bool = True,
+    known_sha256: Mapping[Path | InMemory, str] | None = None,
 ) -> dict[str, Any]:
     """Write `windows.nc`, `maps.nc` and the report; return the summary of the command.
 
@@ -33,19 +40,18 @@ def write_experiment(
         What the user typed, for the report.
     report : bool
         False leaves the report and its figures out.
+    known_sha256 : mapping, optional
+        Hashes of inputs that need not be computed again, beside those of the runs.
 
     Returns
     -------
     dict
         ``lines`` for people, ``flags``, and numbers for machines.
     """
-    known = {run.path: run.sha256 for run in experiment.runs}
-    provenance = {
-        **provenance_of(command, experiment.inputs, known, settings=experiment.settings),
-        "n_unsteady_windows": sum(int(run.windows.attrs["n_unsteady_windows"]) for run in experiment.runs),
-    }
+    provenance = provenance_of_sweeps(experiment, command, known_sha256)
     with result_folder(folder, provenance) as complete:
-        _write_results(experiment, complete, provenance)
+        for name, dataset in stamped_results(experiment, provenance).items():
+            write_dataset(dataset, complete / name)
         if report:
             from pipelines.sweep.report import write_report
 
@@ -72,16 +78,29 @@ def write_experiment(
     }
 
 
-def _write_results(experiment: SweepExperiment, folder: Path, provenance: dict[str, Any]) -> None:
-    for name, dataset in (("windows.nc", experiment.windows), ("maps.nc", experiment.maps)):
-        stamped = dataset.assign_attrs(
-            title=experiment.title,
-            **stamp_of(provenance),
-            half_width_cycles=experiment.settings.windows.half_width_cycles,
-            spacing_cycles=experiment.settings.windows.spacing_cycles,
-            n_unsteady_windows=provenance["n_unsteady_windows"],
-        )
-        write_dataset(stamped, folder / name)
+def provenance_of_sweeps(
+    experiment: SweepExperiment, command: str, known_sha256: Mapping[Path | InMemory, str] | None = None
+) -> dict[str, Any]:
+    """What the results of an experiment rest on."""
+    known: dict[Path | InMemory, str] = dict(known_sha256 or {})
+    known.update({run.path: run.sha256 for run in experiment.runs})
+    return {
+        **provenance_of(command, experiment.inputs, known, settings=experiment.settings),
+        "n_unsteady_windows": sum(int(run.windows.attrs["n_unsteady_windows"]) for run in experiment.runs),
+    }
+
+
+def stamped_results(experiment: SweepExperiment, provenance: Mapping[str, Any]) -> dict[str, xr.Dataset]:
+    """The contents of `windows.nc` and `maps.nc` by these names, with what they rest on as attributes."""
+    stamp = {
+        "title": experiment.title,
+        **stamp_of(provenance),
+        "half_width_cycles": experiment.settings.windows.half_width_cycles,
+        "spacing_cycles": experiment.settings.windows.spacing_cycles,
+        "n_unsteady_windows": provenance["n_unsteady_windows"],
+    }
+    contents = {"windows.nc": experiment.windows, "maps.nc": experiment.maps}
+    return {name: dataset.assign_attrs(stamp) for name, dataset in contents.items()}
 
 
 def analyse_and_write(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource
+from pipelines.inputs.rigs import RigSource
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.quality import RunQuality
 from sloshlab.consistency.finding import NOT_EXAMINED, ConsistencyExamination
@@ -20,6 +21,7 @@ from sloshlab.sweep.law import SweepLaw
 from sloshlab.sweep.windows import WindowSettings
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,37 @@ class SweepOptions:
     windows: WindowSettings = field(default_factory=WindowSettings)
     boundaries: str = "measured"
     allow_incomplete: bool = False
+
+
+@dataclass(frozen=True)
+class SweepSignals:
+    """Force and motion of one run, ready to be evaluated; all arrays of shape (n_samples,).
+
+    Attributes
+    ----------
+    force_n : ndarray
+        On the structure or tank, upward positive, NaN where lost.
+    motion : ndarray
+        Acceleration [m s-2] or velocity [m s-1], NaN where lost.
+    motion_is_velocity : bool
+        Which of the two.
+    phase_motion : ndarray, optional
+        What the phase is taken from, as an acceleration; None means `motion`.
+    not_measured : ndarray of bool, optional
+        True where a sample that enters `force_n` or `motion` is clipped, lost, repaired or stuck.
+    inertia_kg : float
+        Mass removed to get the dynamic force.
+    noise_power : float
+        Mean square of the dynamic force from sensor noise [N²].
+    """
+
+    force_n: FloatArray
+    motion: FloatArray
+    motion_is_velocity: bool = False
+    phase_motion: FloatArray | None = None
+    not_measured: BoolArray | None = None
+    inertia_kg: float = 0.0
+    noise_power: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +90,7 @@ class RunResult:
 
     Attributes
     ----------
-    path, sha256 : Path, str
+    path, sha256 : Path or RecordingInMemory, str
         The recording and the hash of its bytes.
     attributes : RunAttributes
         Its global attributes.
@@ -80,9 +113,13 @@ class RunResult:
         What losses a reader must know before using the numbers; empty is good.
     examination : ConsistencyExamination
         Whether the run agrees with itself, with other runs and with physics.
+    start_time_s : float
+        Of the first sample.
+    signals : SweepSignals, optional
+        What the windows were evaluated from, if it was to be kept.
     """
 
-    path: Path
+    path: RunSource
     sha256: str
     attributes: RunAttributes
     rig_name: str
@@ -96,6 +133,8 @@ class RunResult:
     excerpts: tuple[Excerpt, ...] = ()
     flags: tuple[str, ...] = ()
     examination: ConsistencyExamination = NOT_EXAMINED
+    start_time_s: float = 0.0
+    signals: SweepSignals | None = None
 
 
 @dataclass(frozen=True)
@@ -129,8 +168,8 @@ class SweepExperiment:
         The contents of `maps.nc`.
     settings : SweepOptions
         P and M among them.
-    inputs : tuple of Path
-        Every file that the results depend on: recordings, dry runs among them, and rigs.
+    inputs : tuple of Path, RecordingInMemory or RigInMemory
+        Everything that the results depend on: recordings, dry runs among them, and rigs.
     work_maps : EnergyMaps, optional
         For ``"work"``: the map without a tank.
     provenance : dict
@@ -148,7 +187,7 @@ class SweepExperiment:
     windows: xr.Dataset
     maps: xr.Dataset
     settings: SweepOptions
-    inputs: tuple[Path, ...] = ()
+    inputs: tuple[RunSource | RigSource, ...] = ()
     work_maps: EnergyMaps | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     still_runs: tuple[ConsistencyExamination, ...] = ()

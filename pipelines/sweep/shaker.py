@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource, attributes_of, recording_of
+from pipelines.inputs.rigs import RigSource, rig_of
 from pipelines.report.progress import progress
-from pipelines.sweep.results import RigResult, RunResult, SweepExperiment, SweepOptions
+from pipelines.sweep.results import RigResult, RunResult, SweepExperiment, SweepOptions, SweepSignals
 from pipelines.sweep.stages import (
-    SweepSignals,
     analyse_sweep,
     examined_recording,
     naming,
@@ -39,7 +40,7 @@ from sloshlab.errors import AnalysisError, InputError
 from sloshlab.experiments import experiment_names
 from sloshlab.maps.energy_maps import energy_maps
 from sloshlab.quantities import described
-from sloshlab.recording import RunAttributes, channels, read_attributes, read_recording
+from sloshlab.recording import RunAttributes, channels
 from sloshlab.rig import Rig
 from sloshlab.sweep.windows import WindowSettings
 
@@ -65,23 +66,31 @@ class ShakerSettings(SweepOptions):
 
 @dataclass(frozen=True)
 class _Run:
-    path: Path
+    path: RunSource
     attributes: RunAttributes
     rig_name: str
 
 
-def analyse_shaker(paths: Sequence[Path], rig_paths: Sequence[Path], settings: ShakerSettings) -> SweepExperiment:
+def analyse_shaker(
+    paths: Sequence[RunSource],
+    rig_paths: Sequence[RigSource],
+    settings: ShakerSettings,
+    *,
+    keep_signals: bool = False,
+) -> SweepExperiment:
     """Analyse the runs of one or several rigs that differ in fill level.
 
     Parameters
     ----------
-    paths : sequence of Path
+    paths : sequence of Path or RecordingInMemory
         Recordings; those of configuration ``empty`` and ``frozen`` identify the dry mass, the others
         are analysed.
-    rig_paths : sequence of Path
+    rig_paths : sequence of Path or RigInMemory
         Rig descriptions. With more than one, the attribute `rig` of every run must name one of them.
     settings : ShakerSettings
         Windows, boundaries, what to do with incomplete sweeps.
+    keep_signals : bool
+        Whether force and motion of every run stay in memory, so that the loop of any window can be drawn.
 
     Returns
     -------
@@ -104,19 +113,19 @@ def analyse_shaker(paths: Sequence[Path], rig_paths: Sequence[Path], settings: S
             for run in own:
                 if run.attributes.configuration == SLOSHING:
                     with naming(run.path):
-                        results[name].append(_analysed(run, rig, still[name].reference, settings))
+                        results[name].append(_analysed(run, rig, still[name].reference, settings, keep_signals))
                 advance(run.path.name)
             results[name] = compared_with_siblings(results[name], rig)
         inputs = [*(run.path for run in runs), *rig_paths]
         return _experiment(results, rigs, still, settings, inputs)
 
 
-def _rigs(paths: Sequence[Path]) -> dict[str, Rig]:
+def _rigs(paths: Sequence[RigSource]) -> dict[str, Rig]:
     rigs: dict[str, Rig] = {}
     for path in paths:
         if path.name in rigs:
             raise InputError("--rig", got=f"{path.name} twice", allowed="rig files with different names")
-        rigs[path.name] = Rig.from_toml(path)
+        rigs[path.name] = rig_of(path)
     first = next(iter(rigs.values()))
     for name, rig in rigs.items():
         box = ("height_m", "length_m", "width_m")
@@ -130,9 +139,9 @@ def _rigs(paths: Sequence[Path]) -> dict[str, Rig]:
     return rigs
 
 
-def _assigned(paths: Sequence[Path], rigs: Mapping[str, Rig]) -> list[_Run]:
+def _assigned(paths: Sequence[RunSource], rigs: Mapping[str, Rig]) -> list[_Run]:
     """Runs with the rig each belongs to; runs of different rigs must not be mixed under one."""
-    described = [(path, read_attributes(path)) for path in paths]
+    described = [(path, attributes_of(path)) for path in paths]
     swept = experiment_names(lambda experiment: experiment.moves == "shaker" and experiment.is_recorded)
     for path, attributes in described:
         if attributes.experiment not in swept:
@@ -142,7 +151,7 @@ def _assigned(paths: Sequence[Path], rigs: Mapping[str, Rig]) -> list[_Run]:
                 allowed=" or ".join(swept),
                 remedy="use `sloshlab work` for other sweeps",
             )
-    seen: dict[str, Path] = {}
+    seen: dict[str, RunSource] = {}
     for path, attributes in described:
         if attributes.run_id in seen:
             raise AnalysisError(f"{path}: run_id", got=f"{attributes.run_id!r}, as in {seen[attributes.run_id]}",
@@ -162,7 +171,7 @@ def _assigned(paths: Sequence[Path], rigs: Mapping[str, Rig]) -> list[_Run]:
     return [_Run(path, attributes, attributes.rig) for path, attributes in described]
 
 
-def _another_rig_lies_beside(described: Sequence[tuple[Path, RunAttributes]], rig: Rig) -> bool:
+def _another_rig_lies_beside(described: Sequence[tuple[RunSource, RunAttributes]], rig: Rig) -> bool:
     """True if the rig that a run names lies beside it and describes another tank or filling.
 
     A rig file that was only renamed is no reason to refuse its runs.
@@ -170,17 +179,28 @@ def _another_rig_lies_beside(described: Sequence[tuple[Path, RunAttributes]], ri
     own = {
         path.parent / attributes.rig
         for path, attributes in described
-        if attributes.rig == Path(attributes.rig).name
+        if isinstance(path, Path) and attributes.rig == Path(attributes.rig).name
     }
     return any(file.is_file() and Rig.from_toml(file) != rig for file in own)
 
 
-def _analysed(run: _Run, rig: Rig, reference: Reference, settings: ShakerSettings) -> RunResult:
-    recording = read_recording(run.path)
+def _analysed(
+    run: _Run, rig: Rig, reference: Reference, settings: ShakerSettings, keep_signals: bool
+) -> RunResult:
+    recording = recording_of(run.path)
     quality = require_usable(recording, run.path)
     recording, examination = examined_recording(recording, run.path, reference)
     signals = sweep_signals(recording, rig, reference.dry, quality)
-    result = analyse_sweep(recording, run.path, signals, settings, quality=quality, rig=rig, rig_name=run.rig_name)
+    result = analyse_sweep(
+        recording,
+        run.path,
+        signals,
+        settings,
+        quality=quality,
+        rig=rig,
+        rig_name=run.rig_name,
+        keep_signals=keep_signals,
+    )
     examination = examination.with_findings(window_findings(result.windows))
     return dataclasses.replace(result, examination=examination)
 
@@ -247,7 +267,7 @@ def _experiment(
     rigs: Mapping[str, Rig],
     still: Mapping[str, StillRuns],
     settings: ShakerSettings,
-    inputs: Sequence[Path],
+    inputs: Sequence[RunSource | RigSource],
 ) -> SweepExperiment:
     windows = {name: _windows_of(name, results[name]) for name in rigs}
     everything = xr.concat(list(windows.values()), dim="window", combine_attrs="drop")

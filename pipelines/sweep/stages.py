@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource
 from pipelines.report.outputs import sha256_of
-from pipelines.sweep.results import Excerpt, RunResult, SweepOptions
+from pipelines.sweep.results import Excerpt, RunResult, SweepOptions, SweepSignals
 from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import displacement_of_part
 from sloshlab.conditioning.quality import RunQuality, quality_of
@@ -38,39 +37,8 @@ _SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE = 8
 """Below it the quadrature of the loop errs by more than 0.1 %."""
 
 
-@dataclass(frozen=True)
-class SweepSignals:
-    """Force and motion of one run, ready to be evaluated; all arrays of shape (n_samples,).
-
-    Attributes
-    ----------
-    force_n : ndarray
-        On the structure or tank, upward positive, NaN where lost.
-    motion : ndarray
-        Acceleration [m s-2] or velocity [m s-1], NaN where lost.
-    motion_is_velocity : bool
-        Which of the two.
-    phase_motion : ndarray, optional
-        What the phase is taken from, as an acceleration; None means `motion`.
-    not_measured : ndarray of bool, optional
-        True where a sample that enters `force_n` or `motion` is clipped, lost, repaired or stuck.
-    inertia_kg : float
-        Mass removed to get the dynamic force.
-    noise_power : float
-        Mean square of the dynamic force from sensor noise [N²].
-    """
-
-    force_n: FloatArray
-    motion: FloatArray
-    motion_is_velocity: bool = False
-    phase_motion: FloatArray | None = None
-    not_measured: BoolArray | None = None
-    inertia_kg: float = 0.0
-    noise_power: float = 0.0
-
-
 @contextlib.contextmanager
-def naming(path: Path) -> Iterator[None]:
+def naming(path: RunSource) -> Iterator[None]:
     """Name the recording in every error that an analysis of it raises."""
     try:
         yield
@@ -82,7 +50,7 @@ def naming(path: Path) -> Iterator[None]:
         ) from error
 
 
-def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
+def require_usable(recording: xr.Dataset, path: RunSource) -> RunQuality:
     """Quality of a recording; refuse one that no analysis may rest on.
 
     Raises
@@ -97,7 +65,7 @@ def require_usable(recording: xr.Dataset, path: Path) -> RunQuality:
 
 
 def examined_recording(
-    recording: xr.Dataset, path: Path, reference: Reference | None = None, names: Sequence[str] | None = None
+    recording: xr.Dataset, path: RunSource, reference: Reference | None = None, names: Sequence[str] | None = None
 ) -> tuple[xr.Dataset, ConsistencyExamination]:
     """The recording with NaN where nothing was measured, and everything that was found in it.
 
@@ -133,15 +101,16 @@ def not_measured(recording: xr.Dataset, names: list[str], quality: RunQuality) -
 
 def analyse_sweep(
     recording: xr.Dataset,
-    path: Path,
+    path: RunSource,
     signals: SweepSignals,
     options: SweepOptions,
     *,
     quality: RunQuality,
     rig: Rig | None = None,
     rig_name: str = "",
+    keep_signals: bool = False,
 ) -> RunResult:
-    """Take one recording from its signals to its windows.
+    """Take one recording from its signals to its windows; its signals stay in memory if they are to be kept.
 
     Raises
     ------
@@ -200,10 +169,12 @@ def analyse_sweep(
         n_cycles_lost=n_lost,
         excerpts=_excerpts(windows, signals, rig, rate_hz, start_time_s),
         flags=tuple(flags),
+        start_time_s=start_time_s,
+        signals=signals if keep_signals else None,
     )
 
 
-def _phase(path: Path, signals: SweepSignals, rate_hz: float) -> MotionPhase:
+def _phase(path: RunSource, signals: SweepSignals, rate_hz: float) -> MotionPhase:
     reference = signals.motion if signals.phase_motion is None else signals.phase_motion
     # cycles are counted by the phase of the acceleration, a quarter of a cycle ahead of the velocity
     lead = np.pi / 2 if signals.motion_is_velocity and signals.phase_motion is None else 0.0
@@ -218,7 +189,7 @@ def _stated(attributes: RunAttributes) -> SweepLaw | None:
 
 
 def _early_stop(
-    path: Path, phase: MotionPhase, n_samples: int, attributes: RunAttributes, options: SweepOptions
+    path: RunSource, phase: MotionPhase, n_samples: int, attributes: RunAttributes, options: SweepOptions
 ) -> list[str]:
     """A flag, or an error, if the motion ends before the recording or before the stated end of the sweep."""
     if "end_of_sweep" not in EXPERIMENTS[attributes.experiment].stages:
@@ -241,7 +212,7 @@ def _early_stop(
 
 
 def _boundaries(
-    path: Path, measured: FloatArray, stated: SweepLaw | None, start_time_s: float, options: SweepOptions
+    path: RunSource, measured: FloatArray, stated: SweepLaw | None, start_time_s: float, options: SweepOptions
 ) -> FloatArray:
     if options.boundaries == "measured":
         return measured
@@ -272,12 +243,13 @@ def _excerpts(
         wanted = np.quantile(frequency, [0.25, 0.5, 0.75])
     # two places may have the same nearest window, which is shown once
     nearest = sorted({int(np.abs(frequency - wanted_hz).argmin()) for wanted_hz in wanted})
-    return tuple(_excerpt(windows.isel(window=at), signals, rig, rate_hz, start_time_s) for at in nearest)
+    return tuple(excerpt_of(windows.isel(window=at), signals, rig, rate_hz, start_time_s) for at in nearest)
 
 
-def _excerpt(
+def excerpt_of(
     window: xr.Dataset, signals: SweepSignals, rig: Rig | None, rate_hz: float, start_time_s: float
 ) -> Excerpt:
+    """Signals of twelve cycles about the middle of one window; the motion must be an acceleration."""
     frequency = float(window["frequency_hz"])
     middle = (float(window["time_s"]) - start_time_s) * rate_hz
     half = 6.0 / frequency * rate_hz

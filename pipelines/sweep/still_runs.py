@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource, recording_of
 from pipelines.sweep.stages import examined_recording, naming, require_usable
 from sloshlab.conditioning.calibration import DryMass, check_signs, identify_dry_mass
 from sloshlab.conditioning.combined_channels import acceleration_channels, force_channels
@@ -17,7 +17,6 @@ from sloshlab.consistency.effect import Inertia
 from sloshlab.consistency.examination import Reference, like_series
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.errors import AnalysisError
-from sloshlab.recording import read_recording
 from sloshlab.rig import Rig
 
 HIGHEST_SWEEP_HZ = 20.0
@@ -45,7 +44,7 @@ class StillRuns:
         return self.reference.dry
 
 
-def read_still_runs(paths: Sequence[Path], rig: Rig, rig_name: str) -> StillRuns:
+def read_still_runs(paths: Sequence[RunSource], rig: Rig, rig_name: str) -> StillRuns:
     """Read empty and frozen runs and identify the dry mass.
 
     Raises
@@ -82,7 +81,7 @@ def read_still_runs(paths: Sequence[Path], rig: Rig, rig_name: str) -> StillRuns
     return StillRuns(Reference(rig, dry, series), tuple(examinations))
 
 
-def examined_run(path: Path, reference: Reference) -> tuple[xr.Dataset, ConsistencyExamination]:
+def examined_run(path: RunSource, reference: Reference) -> tuple[xr.Dataset, ConsistencyExamination]:
     """A recording with working sensors, the right signs and no contradiction that forbids its use.
 
     Raises
@@ -91,7 +90,7 @@ def examined_run(path: Path, reference: Reference) -> tuple[xr.Dataset, Consiste
         If it is anything else.
     """
     with naming(path):
-        recording = read_recording(path)
+        recording = recording_of(path)
         # a dead force cell in an empty run would halve the dry mass unnoticed
         require_usable(recording, path)
         check_signs(recording, reference.rig)

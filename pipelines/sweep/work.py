@@ -5,16 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource, recording_of
 from pipelines.report.progress import progress
-from pipelines.sweep.results import RunResult, SweepExperiment, SweepOptions
+from pipelines.sweep.results import RunResult, SweepExperiment, SweepOptions, SweepSignals
 from pipelines.sweep.stages import (
-    SweepSignals,
     analyse_sweep,
     examined_recording,
     naming,
@@ -24,7 +23,7 @@ from pipelines.sweep.stages import (
 from sloshlab.conditioning.differentiation import differentiated
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.energy_maps import energy_maps
-from sloshlab.recording import channels, read_recording
+from sloshlab.recording import channels
 from sloshlab.sweep.passivity import gives_energy
 from sloshlab.sweep.windows import WindowSettings
 
@@ -73,8 +72,10 @@ class WorkSettings(SweepOptions):
         return cls(windows, "measured", True, force, motion, quantity, phase_reference)
 
 
-def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperiment:
-    """Analyse sweeps with one force and one motion channel.
+def analyse_work(
+    paths: Sequence[RunSource], settings: WorkSettings, *, keep_signals: bool = False
+) -> SweepExperiment:
+    """Analyse sweeps with one force and one motion channel; their signals stay in memory if they are to be kept.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
     with progress("work", len(paths)) as advance:
         for path in paths:
             with naming(path):
-                results.append(_analysed(path, settings))
+                results.append(_analysed(path, settings, keep_signals))
             advance(path.name)
     windows = xr.concat([result.windows for result in results], dim="window", combine_attrs="drop")
     _check_energy_sign(windows, settings)
@@ -104,8 +105,8 @@ def analyse_work(paths: Sequence[Path], settings: WorkSettings) -> SweepExperime
     )
 
 
-def _analysed(path: Path, settings: WorkSettings) -> RunResult:
-    recording = read_recording(path)
+def _analysed(path: RunSource, settings: WorkSettings, keep_signals: bool) -> RunResult:
+    recording = recording_of(path)
     quality = require_usable(recording, path)
     used = [name for name in (settings.force, settings.motion, settings.phase_reference) if name in recording]
     recording, examination = examined_recording(recording, path, names=used)
@@ -123,11 +124,11 @@ def _analysed(path: Path, settings: WorkSettings) -> RunResult:
         phase_motion=reference,
         not_measured=not_measured(recording, [settings.force, settings.motion], quality),
     )
-    result = analyse_sweep(recording, path, signals, settings, quality=quality)
+    result = analyse_sweep(recording, path, signals, settings, quality=quality, keep_signals=keep_signals)
     return dataclasses.replace(result, examination=examination)
 
 
-def _channel(recording: xr.Dataset, path: Path, name: str, quantity: str | None) -> FloatArray:
+def _channel(recording: xr.Dataset, path: RunSource, name: str, quantity: str | None) -> FloatArray:
     available = channels(recording, quantity)
     if name not in available:
         raise AnalysisError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, cast
@@ -12,6 +13,8 @@ from typing import Any, Final, cast
 import numpy as np
 import xarray as xr
 
+from pipelines.inputs.recordings import RunSource, recording_of
+from pipelines.inputs.rigs import RigSource, folder_of, rig_of
 from pipelines.report.free_place import require_free_place
 from pipelines.report.outputs import RESULT_ID, provenance_of, sha256_of, versions
 from pipelines.report.progress import amounts
@@ -23,11 +26,11 @@ from sloshlab.missing_physics import effects as vocabulary
 from sloshlab.missing_physics.extension import Extension, with_acting
 from sloshlab.missing_physics.saved_effects import saved_effects
 from sloshlab.modal.rig_beam import scale_remarks
-from sloshlab.recording import read_recording, run_attributes, write_recording
+from sloshlab.recording import run_attributes, write_recording
 from sloshlab.rig import Rig
 from sloshlab.toml_file import read_toml
 from sloshlab.twin.recorded_run import Block, Drive, drive_of
-from sloshlab.twin.reduced_order_model_domain import departures
+from sloshlab.twin.reduced_order_model_domain import Departure, departures
 from sloshlab.twin.simulated_channels import SimulatedRun, simulated_run
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import load_twin, save_twin
@@ -52,7 +55,10 @@ class SimulationSettings:
 
     Attributes
     ----------
-    rig, run, output : Path
+    rig : Path or RigInMemory
+    run : Path or RecordingInMemory
+    output : Path
+        Where the simulated recording goes.
     block : str
         ``all``, ``tank`` or ``structure``.
     configuration : str
@@ -69,8 +75,8 @@ class SimulationSettings:
         Whether files that are there may be replaced.
     """
 
-    rig: Path
-    run: Path
+    rig: RigSource
+    run: RunSource
     output: Path
     block: str = "all"
     configuration: str = "sloshing"
@@ -95,10 +101,73 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
         If the run cannot drive the twin, or the twin leaves what can be simulated; nothing is written then.
     """
     _check(settings)
-    rig = Rig.from_toml(settings.rig)
+    rig = rig_of(settings.rig)
     twin = _chosen_twin(settings, rig)
     _require_free_places(settings, twin)
-    recording = read_recording(settings.run)
+    return write_simulation(_simulated(settings, rig, twin), settings)
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedTwin:
+    """A run of a twin with all that is to be told of it.
+
+    Attributes
+    ----------
+    settings : SimulationSettings
+    rig : Rig
+    twin : Twin
+        The one that was to run; `drive.twin` has what the run drives in it.
+    recording : xarray.Dataset
+        What drove it.
+    drive : Drive
+    simulation : Simulation
+    simulated : SimulatedRun
+        Its channels, under the names of the recording.
+    n_steps : int
+        Integration steps per sample.
+    left : sequence of Departure
+        Where the tank model was beyond what it was trained on.
+    """
+
+    settings: SimulationSettings
+    rig: Rig
+    twin: Twin
+    recording: xr.Dataset
+    drive: Drive
+    simulation: Simulation
+    simulated: SimulatedRun
+    n_steps: int
+    left: Sequence[Departure]
+
+    def summary(self) -> dict[str, Any]:
+        """``lines`` for people, ``flags``, and numbers for machines."""
+        summary = _summary(
+            self.settings,
+            self.rig,
+            self.recording,
+            self.drive,
+            simulation=self.simulation,
+            simulated=self.simulated,
+            n_steps=self.n_steps,
+        )
+        return with_tank_model(summary, self.simulation, self.left)
+
+
+def simulated_twin(settings: SimulationSettings) -> SimulatedTwin:
+    """Simulate, and write nothing; `output`, `save_twin` and `overwrite` of the settings mean nothing here.
+
+    Raises
+    ------
+    InputError
+        If the run cannot drive the twin, or the twin leaves what can be simulated.
+    """
+    _check_configuration(settings)
+    rig = rig_of(settings.rig)
+    return _simulated(settings, rig, _chosen_twin(settings, rig))
+
+
+def _simulated(settings: SimulationSettings, rig: Rig, twin: Twin) -> SimulatedTwin:
+    recording = recording_of(settings.run)
     effects = _effects(settings)
     driven = _as_it_acts(recording, drive_of(recording, twin, block=cast("Block", settings.block)), effects)
     drive = drive_of(driven, twin, block=cast("Block", settings.block))
@@ -115,15 +184,24 @@ def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
     attributes[RESULT_ID] = _result_id(settings, twin)
     simulated = simulated_run(simulation, recording, rig, attributes=attributes, seed=settings.seed)
     simulated = replace(simulated, recording=_as_read(simulated.recording, recording, effects))
+    return SimulatedTwin(settings, rig, twin, recording, drive, simulation, simulated, n_steps, left)
+
+
+def write_simulation(found: SimulatedTwin, settings: SimulationSettings) -> dict[str, Any]:
+    """Write what was simulated, and the twin where it is to be saved; return the summary of the command.
+
+    Raises
+    ------
+    InputError
+        If a file is in the way; nothing is written then.
+    """
+    recording = found.simulated.recording
     with atomic_file.together() as stagings:
         place = stagings.file(settings.output, overwrite=settings.overwrite)
-        write_recording(simulated.recording, place, encoding=_encoding(simulated.recording))
+        write_recording(recording, place, encoding=_encoding(recording))
         if settings.save_twin is not None:
-            save_twin(twin, stagings.file(settings.save_twin, overwrite=settings.overwrite))
-    summary = _summary(
-        settings, rig, recording, drive, simulation=simulation, simulated=simulated, n_steps=n_steps
-    )
-    return with_tank_model(summary, simulation, left)
+            save_twin(found.twin, stagings.file(settings.save_twin, overwrite=settings.overwrite))
+    return replace(found, settings=settings).summary()
 
 
 def _effects(settings: SimulationSettings) -> Extension:
@@ -180,16 +258,20 @@ def steps_per_sample(twin: Twin, sampling_rate_hz: float) -> int:
     return steps
 
 
-def _check(settings: SimulationSettings) -> None:
+def _check_configuration(settings: SimulationSettings) -> None:
     if settings.configuration not in CONFIGURATIONS:
         raise InputError(
             "--configuration", got=repr(settings.configuration)[:80], allowed=", ".join(CONFIGURATIONS)
         )
+
+
+def _check(settings: SimulationSettings) -> None:
+    _check_configuration(settings)
     for option, path in (("--output", settings.output), ("--save-twin", settings.save_twin)):
         if path is None:
             continue
         for given in (settings.run, settings.rig, settings.twin):
-            if given is not None and path.exists() and given.exists() and path.samefile(given):
+            if isinstance(given, Path) and path.exists() and given.exists() and path.samefile(given):
                 raise InputError(f"{option} {path}", got="a file that is read", remedy="choose another name")
 
 
@@ -207,9 +289,7 @@ def _require_free_places(settings: SimulationSettings, twin: Twin) -> None:
 
 def _chosen_twin(settings: SimulationSettings, rig: Rig) -> Twin:
     twin = (
-        Twin.from_rig(rig, folder=settings.rig.absolute().parent)
-        if settings.twin is None
-        else load_twin(settings.twin)
+        Twin.from_rig(rig, folder=folder_of(settings.rig)) if settings.twin is None else load_twin(settings.twin)
     )
     if settings.configuration == "sloshing":
         return twin
