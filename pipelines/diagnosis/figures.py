@@ -173,8 +173,9 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
     grid[-1, 0].set_xlabel("time [s]")
     grid[-1, 1].set_xlabel("time [s]")
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    role = "Held-out" if diagnosis.findings.held_out else "Fitted"
     caption = (
-        f"Held-out run {plain(run.name)}, the channels that are missed most; on the left the stretch that is "
+        f"{role} run {plain(run.name)}, the channels that are missed most; on the left the stretch that is "
         "shaded on the right. The mean is taken off where it means nothing. Releases and offsets are those of the "
         "fit, or believed where the run was not fitted."
     )
@@ -192,14 +193,19 @@ class _Step:
 
 
 def most_missed_observations(diagnosis: Diagnosis) -> list[Observation]:
-    """Channels of the held-out run that is missed most; those on which named effects act come first."""
+    """Channels of the held-out run that is missed most; those on which named effects act come first.
+
+    One run alone is fitted, and shown all the same.
+    """
     found, named = diagnosis.findings, named_channels(diagnosis)
     readings = found.readings(found.retuned)
 
     def missed(observation: Observation) -> float:
         return float((observation.residual(readings[observation.run.name][observation.channel]) ** 2).sum())
 
-    observed = max(found.held_out, key=lambda run: sum(missed(observation) for observation in run))
+    observed = max(
+        found.held_out or found.fitting, key=lambda run: sum(missed(observation) for observation in run)
+    )
     return sorted(observed, key=lambda observation: (observation.channel not in named, -missed(observation)))
 
 

@@ -259,8 +259,11 @@ def test_a_verdict_in_python_is_that_of_the_command(
     shown = found._repr_html_()
     assert found.headline in shown
     assert "the fitted runs, as there is no other" in shown
+    page = found.report("reported").read_text(encoding="utf-8")
+    assert "Fitted run run_0, the channels that are missed most" in page
     axes = Figure().subplots()
     assert found.plot.before_after(ax=axes) is axes
+    assert axes.get_title() == "run_0, fitted"
     assert axes.get_ylabel().startswith("acceleration_tip")
     recorded, retuned = (line.get_ydata() for line in axes.lines)
     assert np.std(retuned - recorded) == pytest.approx(0.02, rel=0.3)  # the noise of the sensor
