@@ -82,7 +82,8 @@ def train(
     as_json: Json = False,
 ) -> None:
     """Reduced-order model of the liquid from runs on the shaker, and its validation report."""
-    from pipelines.liquid_model.train import ModelSettings, train_and_report
+    from pipelines.liquid_model.model_settings import ModelSettings
+    from pipelines.liquid_model.train import train_and_report
     from pipelines.liquid_model.training_runs import RunFiles
     from sloshlab.reduced_order_model.training import TrainingSettings
 

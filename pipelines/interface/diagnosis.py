@@ -17,7 +17,7 @@ from pipelines.diagnosis.results import Diagnosis
 from pipelines.inputs.recordings import RecordingInMemory, RunsLike, run_sources
 from pipelines.inputs.rigs import RigLike, rig_source
 from pipelines.interface import html
-from pipelines.interface.drawing import axes_to_draw_on, in_words
+from pipelines.interface.drawing import axes_to_draw_on, in_words, legend_below
 from pipelines.interface.provenance import call_text
 from sloshlab.errors import InputError
 from sloshlab.identification.observations import Observation
@@ -78,8 +78,8 @@ class DiagnosisPlots:
         with axes_to_draw_on(ax) as axes:
             draw_before_after(axes, self.diagnosis, observation)
             axes.set_title(f"{in_words(observation.run.name)}, {role}")
-            axes.set_ylabel(axes.get_ylabel().replace("$", r"\$"))
-            axes.legend()
+            axes.set_ylabel(axes.get_ylabel().replace("$", r"\$"), fontsize=axes.xaxis.label.get_fontsize())
+            legend_below(axes)
         return axes
 
     def errors(self, *, ax: Axes | None = None) -> Axes:

@@ -44,6 +44,11 @@ def _new_axes() -> Axes:
     return figure.subplots()
 
 
+def legend_below(axes: Axes) -> None:
+    """A legend that covers no line."""
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, frameon=False)
+
+
 def in_words(name: object) -> str:
     """A name from a file as a title or label can show it.
 

@@ -13,7 +13,7 @@ import xarray as xr
 from pipelines.inputs.recordings import RunLike, run_source
 from pipelines.inputs.rigs import RigLike, rig_source
 from pipelines.interface import html
-from pipelines.interface.drawing import axes_to_draw_on, in_words
+from pipelines.interface.drawing import axes_to_draw_on, in_words, legend_below
 from pipelines.report.free_place import require_free_place
 from pipelines.twin.simulate import SimulatedTwin, SimulationSettings, simulated_twin, write_simulation
 from sloshlab.errors import InputError
@@ -64,7 +64,7 @@ class SimulationPlots:
                 part = one.sel(time=slice(start_s, stop_s))
                 axes.plot(part["time"].values, np.asarray(part.values), color=colour, lw=width, label=label)
             axes.set(xlabel="time [s]", ylabel=in_words(f"{chosen} [{recorded[chosen].attrs['units']}]"))
-            axes.legend()
+            legend_below(axes)
         return axes
 
 

@@ -16,9 +16,9 @@ from pipelines.inputs.rigs import RigLike, rig_source
 from pipelines.interface import html
 from pipelines.interface.drawing import axes_to_draw_on
 from pipelines.interface.provenance import call_text, hashes_of
+from pipelines.liquid_model.model_settings import ModelSettings
 from pipelines.liquid_model.outputs import training_curve
 from pipelines.liquid_model.train import (
-    ModelSettings,
     TrainedModel,
     report_folder,
     require_places,

@@ -11,6 +11,7 @@ import numpy as np
 
 from pipelines.inputs.recordings import RunSource, attributes_of
 from pipelines.liquid_model.extensions import remembering, trained_ensemble
+from pipelines.liquid_model.model_settings import ModelSettings
 from pipelines.liquid_model.training_runs import RunFiles, TrainingRuns, require_new_runs, training_runs
 from pipelines.report.free_place import require_free_place
 from pipelines.report.outputs import RESULT_ID, InMemory, provenance_of, sha256_of
@@ -18,14 +19,11 @@ from pipelines.report.progress import amounts
 from pipelines.report.result_folder import require_result_folder, withdraw_result
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
-from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.ensemble import Ensemble
 from sloshlab.reduced_order_model.ensemble_storage import load_ensemble, save_ensemble
 from sloshlab.reduced_order_model.fit_quality import FitQuality, fit_quality
 from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.model import ReducedOrderModel
-from sloshlab.reduced_order_model.network_list import NETWORKS
-from sloshlab.reduced_order_model.regressors import Delays
 from sloshlab.reduced_order_model.stability import stability
 from sloshlab.reduced_order_model.storage import load_model, save_model
 from sloshlab.reduced_order_model.training import Epoch, TrainingRecord, TrainingSettings, fit
@@ -33,75 +31,6 @@ from sloshlab.reduced_order_model.validity_domain import ValidityDomain
 
 REPORT_FILES: Final = ("report.html", "training_curve.nc", "maps.nc", "residual.nc")
 """Of a validation; some are written only if the runs allow it, but nothing may be in their way after hours."""
-
-
-@dataclass(frozen=True)
-class ModelSettings:
-    """What is to be trained.
-
-    Attributes
-    ----------
-    structure : {"nfir", "noe"}
-        Without feedback, or with its own outputs fed back.
-    delays, output_delays : int
-        Length of the delay lines; output delays of NOE only.
-    neurons : int
-    network : str
-        One of `NETWORKS`.
-    rate_hz : float, optional
-        By default chosen from the data.
-    memory_s : float, optional
-        Time constant of a slow state of the speed that the network sees, too.
-    sudden_starts : tuple of Path or RecordingInMemory
-        Recordings from rest, to which a break-up of the liquid is fitted.
-    n_members : int
-        Of an ensemble trained besides; 0 for none.
-    """
-
-    structure: str
-    delays: int
-    output_delays: int
-    neurons: int
-    network: str = "normalised_rbf"
-    rate_hz: float | None = None
-    memory_s: float | None = None
-    sudden_starts: tuple[RunSource, ...] = ()
-    n_members: int = 0
-
-    def checked(self) -> ModelSettings:
-        """Return self if nothing is impossible.
-
-        Raises
-        ------
-        InputError
-            If something is.
-        """
-        if self.structure not in ("nfir", "noe"):
-            raise InputError("--model", got=repr(self.structure), allowed="nfir, noe")
-        if self.network not in NETWORKS:
-            raise InputError("--network", got=repr(self.network), allowed=", ".join(NETWORKS.names))
-        if self.structure == "noe" and self.network == "multilayer":
-            raise InputError("--network with feedback", got="multilayer", allowed="normalised_rbf, rbf")
-        if self.structure == "noe" and (self.memory_s is not None or self.sudden_starts):
-            raise InputError("memory of the liquid", got="--model noe", allowed="--model nfir")
-        if self.n_members == 1:
-            raise InputError("--ensemble", got="1", allowed="0, or at least 2")
-        self.delay_lines(), self.agitation()
-        return self
-
-    def agitation(self) -> Agitation | None:
-        """Return the slow state, if there shall be one."""
-        return None if self.memory_s is None else Agitation("speed", (self.memory_s,))
-
-    def delay_lines(self) -> Delays:
-        """Return the delays of the model."""
-        return Delays.tapped(self.delays, self.output_delays if self.structure == "noe" else 0)
-
-    def network_settings(self) -> dict[str, Any]:
-        """Return what the network is made of beside its inputs."""
-        if self.network == "multilayer":
-            return {"layers": str(self.neurons)}
-        return {"n_neurons": self.neurons}
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ import pytest
 
 from acquisition.virtual_laboratory.campaign import rig_text
 from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run, write_virtual_run
-from pipelines.liquid_model.train import ModelSettings, train_and_report
+from pipelines.liquid_model.model_settings import ModelSettings
+from pipelines.liquid_model.train import train_and_report
 from pipelines.liquid_model.training_runs import RunFiles
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.ensemble_storage import load_ensemble
