@@ -133,6 +133,9 @@ def test_what_does_not_repeat_is_not_believed() -> None:
     variance = first[0].variance
     half = shape[1] // 2
     assert np.median(variance[:, : half - 9]) == pytest.approx(0.25, rel=0.05)
+    # what scatters may be physics, and is looked for by the noise of the sensor
+    assert first[0].without_scatter is not None
+    np.testing.assert_array_equal(first[0].without_scatter, group[0][0].variance)
     np.testing.assert_allclose(variance[:, half + 9 :], group[0][0].variance.min())
 
 

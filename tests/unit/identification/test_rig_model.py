@@ -179,6 +179,18 @@ def test_gains_of_the_sensors_that_drive_say_how_far_the_tank_moved(
     )
 
 
+def test_a_lone_sensor_that_drives_has_a_gain_in_every_motion(tmp_path: Path) -> None:
+    """It reads two per cent too much: the base, and all that it moves, moved as much less."""
+    [run] = driven()
+    model = RigModel(rig(tmp_path), tmp_path, [run])
+    assert "gain of acceleration_root" in model.believed
+    believed = model.simulate(run, model.believed, NOTHING)["acceleration_tip"]
+    found = model.simulate(run, {**model.believed, "gain of acceleration_root": 1.02}, NOTHING)["acceleration_tip"]
+    np.testing.assert_allclose(found, believed / 1.02, rtol=1e-6, atol=1e-9)
+    decay = RigModel(rig(tmp_path), tmp_path, decays())
+    assert not any("root" in name for name in decay.believed)
+
+
 def test_sensors_drive_by_their_noise(tmp_path: Path) -> None:
     """A loud one beside a quiet one adds a hundredth of its noise, where the mean of both has half of it."""
     model = shaken(tmp_path, {"acceleration_roof_1": 1.0, "acceleration_roof_2": 0.1})
