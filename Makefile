@@ -12,6 +12,7 @@ UPGRADE := --upgrade
 RESULTS := results
 TRIAL_SEED ?= 1
 TRIAL_KEY ?= $(HOME)/.config/sloshlab/trial_$(TRIAL_SEED).key
+RIVALS_SEED ?= 4101
 RECORDINGS := raw_data/numerical_tank/shaker
 ROM := $(RESULTS)/rom/ROM.nc
 BALLS :=
@@ -19,7 +20,7 @@ PATIENCE ?= 30
 FUZZ_SECONDS ?= 600
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial test test-newest test-all lint format type bench fuzz soak docs clean
+.PHONY: help setup lock shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -87,6 +88,12 @@ trial: setup  ## a blind trial, sealed, diagnosed and scored (hours; goes on whe
 	test -f $(RESULTS)/trial/commitments.json || $(BIN)/sloshlab trial seal -o $(RESULTS)/trial --seed $(TRIAL_SEED) --key $(TRIAL_KEY)
 	env -u MAKEFLAGS -u TRIAL_KEY $(BIN)/sloshlab trial run $(RESULTS)/trial || test $$? -eq 3
 	$(BIN)/sloshlab trial score $(RESULTS)/trial --key $(TRIAL_KEY) -o $(RESULTS)/trial_scores
+
+rivals: setup  ## other ways to answer the cases of `make trial`, marked alike; needs the extra peers (hours)
+	test -f $(RESULTS)/trial_development/commitments.json || \
+	  $(BIN)/sloshlab trial seal --development --seed $(RIVALS_SEED) --cases 60 -o $(RESULTS)/trial_development
+	$(BIN)/python -m studies.rivals $(RESULTS)/trial --key $(TRIAL_KEY) --training $(RESULTS)/trial_development \
+	  -o $(RESULTS)/rivals
 
 test: setup  ## the tests, at most 10 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"

@@ -11,7 +11,7 @@ import pytest
 from pipelines.command_line import run
 from sealed_trial.running import Outcome
 from sealed_trial.sealing.key import PREFIX
-from tests.unit.sealed_trial.hand_made_trials import KEY, truth, written_trial
+from tests.unit.hand_made_trials import KEY, truth, written_trial
 
 
 @pytest.mark.slow
