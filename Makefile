@@ -10,6 +10,7 @@ comma := ,
 PIP = $(BIN)/python -m pip --quiet --disable-pip-version-check
 UPGRADE := --upgrade
 RESULTS := results
+DEMO ?= friction
 TRIAL_SEED ?= 1
 TRIAL_KEY ?= $(HOME)/.config/sloshlab/trial_$(TRIAL_SEED).key
 RIVALS_SEED ?= 4101
@@ -20,7 +21,7 @@ PATIENCE ?= 30
 FUZZ_SECONDS ?= 600
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak docs clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak docs clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -46,6 +47,9 @@ lock:  ## requirements.lock anew, with the newest versions; UPGRADE= keeps those
 	echo 'setuptools>=77' | build/lock/bin/uv pip compile --quiet --universal --python-version 3.11 $(UPGRADE) \
 	  $(addprefix --extra ,$(subst $(comma), ,$(EXTRAS))) --generate-hashes --no-annotate \
 	  --custom-compile-command 'make lock' --output-file requirements.lock pyproject.toml -
+
+demo: setup  ## physics hidden in a laboratory run, found, and shown beside the truth (or DEMO=name)
+	$(BIN)/sloshlab demo $(DEMO) -o $(RESULTS)/demo/$(DEMO) || test $$? -eq 3
 
 shaker: setup  ## the shaker experiment on the numerical tank (or RECORDINGS=folder): maps and report
 	$(BIN)/python -m pipelines.experiments shaker $(RECORDINGS) $(RESULTS)/shaker
@@ -74,6 +78,9 @@ replay: setup  ## every recording of raw_data/shaker through simulated serial an
 
 campaign: setup  ## make the recordings of raw_data/shaker again
 	$(BIN)/sloshlab virtual campaign -o raw_data/shaker
+
+demo-cases: setup  ## draw the sealed cases of raw_data/cases again (a minute)
+	$(BIN)/python -m pipelines.demonstration.ready_made raw_data/cases
 
 tank-campaign: setup  ## compute the recordings of raw_data/numerical_tank again (hours; goes on where it was stopped)
 	$(BIN)/sloshlab virtual campaign --liquid numerical -o raw_data/numerical_tank

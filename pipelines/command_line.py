@@ -14,7 +14,10 @@ from typing import Any, NoReturn
 
 import typer
 
-from pipelines.commands import recordings  # they register themselves, in the order of the help
+from pipelines.commands import demo  # they register themselves, in the order of the help
+
+# isort: split
+from pipelines.commands import recordings
 
 # isort: split
 from pipelines.commands import analysis
@@ -47,6 +50,7 @@ __all__ = [
     "USAGE",
     "analysis",
     "app",
+    "demo",
     "diagnosis",
     "field_benchmarks",
     "laboratory",

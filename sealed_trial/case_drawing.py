@@ -104,10 +104,25 @@ class CaseDrawing:
     ----------
     seed : sequence of int
         Separates trials, and development from sealed ones.
+    plans : sequence of str
+        Those that may be measured; all by default.
+    effects : sequence of HiddenEffect
+        The vocabulary from which effects are drawn; all of it by default.
+    n_rigs : int
+        Rigs that are tried with each plan.
     """
 
-    def __init__(self, seed: Sequence[int]) -> None:
+    def __init__(
+        self,
+        seed: Sequence[int],
+        *,
+        plans: Sequence[str] = PLANS,
+        effects: Sequence[HiddenEffect] = SINGLES,
+        n_rigs: int = 3,
+    ) -> None:
         self._seed = [int(value) for value in seed]
+        self._possible_plans, self._vocabulary = tuple(plans), tuple(effects)
+        self._n_attempts = n_rigs * _HIDDEN_DRAWS
         self._used: Counter[str] = Counter()
         # an effect that a plan cannot show strongly enough comes last in its case, then another plan is tried
         self._failed: Counter[str] = Counter()
@@ -120,8 +135,12 @@ class CaseDrawing:
     def _next_plan(self, number: int) -> str:
         """Plans in random order, each as often as any other."""
         if not self._plans:
-            self._plans = [PLANS[k] for k in self._generator(number, 1).permutation(len(PLANS))]
+            self._plans = self._shuffled_plans(number, 1)
         return self._plans.pop()
+
+    def _shuffled_plans(self, number: int, purpose: int) -> list[str]:
+        plans = self._possible_plans
+        return [plans[k] for k in self._generator(number, purpose).permutation(len(plans))]
 
     def case(self, number: int, name: str, kind: str) -> DrawnCase:
         """Draw a case of a class; with another plan where nothing of the class fits the one whose turn it is.
@@ -132,15 +151,15 @@ class CaseDrawing:
             If no draw of any plan gives a motion that can be measured.
         """
         first = self._next_plan(number)
-        others = [PLANS[k] for k in self._generator(number, 5).permutation(len(PLANS)) if PLANS[k] != first]
+        others = [plan for plan in self._shuffled_plans(number, 5) if plan != first]
         self._failed.clear()
         for plan_name in (first, *others):
-            for attempt in range(3 * _HIDDEN_DRAWS):
+            for attempt in range(self._n_attempts):
                 try:
                     return self._attempted(number, attempt, name, kind, plan_name)
                 except (ArithmeticError, LookupError):
                     continue
-        raise ArithmeticError(f"no draw of class {kind} in {3 * _HIDDEN_DRAWS} attempts with each plan")
+        raise ArithmeticError(f"no draw of class {kind} in {self._n_attempts} attempts with each plan")
 
     def _laboratory(self, number: int, redrawn: int, plan_name: str) -> _Prepared:
         """Rig, plan and sensors, the same for every hidden draw."""
@@ -225,7 +244,7 @@ class CaseDrawing:
             effect = chosen.truth.draw(scales, generator)
             alike = None if chosen.but_for_damping is None else chosen.but_for_damping.draw(scales, generator)
             return [effect], [list(names) for names in chosen.equals], [_clear(generator)], alike
-        vocabulary = UNKNOWN_PHYSICS if kind == "outside" else SINGLES
+        vocabulary = UNKNOWN_PHYSICS if kind == "outside" else self._vocabulary
         effects = self._chosen(possible(vocabulary, plan, rig), 2 if kind == "pair" else 1, generator)
         drawn = [effect.draw(scales, generator) for effect in effects]
         if kind == "masked":

@@ -21,6 +21,9 @@ PLANS: Final = (
     "shaker_stepped",
     "shaker_one_frequency",
 )
+"""Of trials."""
+SHORT_DECAYS: Final = "sdof_short"
+"""Of demonstrations: a quarter of the samples of `sdof_decays`, for an answer within a minute."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,11 @@ def drawn_plan(name: str, rig: HiddenRig, generator: np.random.Generator) -> Tes
     random = [RunPlan("random", 10 + k, float(f"{level * s:.2g}"), 1, band) for k, s in enumerate((1.0, 0.5, 0.2))]
     steps = tuple(float(f"{first_hz * r:.3g}") for r in (0.6, 0.85, 1.3, 1.9, 3.0))
     stepped = RunPlan("stepped", 20, float(f"{4 * level:.2g}"), 1, steps, (1.0,) * 5, 10.0)
-    if name.endswith("decays"):
+    if name == SHORT_DECAYS:
+        rate = 256.0
+        short = [replace(run, duration_s=5.0) for run in free]
+        runs = [short[0], _again(short[0], 2), short[1], short[2]]
+    elif name.endswith("decays"):
         runs = [free[0], _again(free[0], 2), free[1], _again(free[1], 2), free[2]]
     elif name in ("sdof_base", "beam_base"):
         runs = [random[0], _again(random[0], 2), random[1], random[2], stepped]

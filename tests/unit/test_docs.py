@@ -148,7 +148,7 @@ def test_the_first_screen_of_the_readme_has_two_commands_and_a_picture() -> None
     first_screen = (REPOSITORY / "README.md").read_text(encoding="utf-8").partition("\n## ")[0]
     [(language, code)] = FENCE.findall(first_screen)
     assert language == "sh"
-    assert [line.split("#")[0].strip() for line in code.splitlines()] == ["make shaker", "make test"]
+    assert [line.split("#")[0].strip() for line in code.splitlines()] == ["make demo", "make shaker"]
     assert len(re.findall(r"!\[", first_screen)) == 1
     assert len(first_screen.splitlines()) <= 25
 
