@@ -26,6 +26,9 @@ from pipelines.commands import analysis
 from pipelines.commands import models
 
 # isort: split
+from pipelines.commands import case
+
+# isort: split
 from pipelines.commands import diagnosis
 
 # isort: split
@@ -50,6 +53,7 @@ __all__ = [
     "USAGE",
     "analysis",
     "app",
+    "case",
     "demo",
     "diagnosis",
     "field_benchmarks",

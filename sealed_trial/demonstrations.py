@@ -17,7 +17,7 @@ DOMAIN: Final = b"sloshlab demonstration"
 """Another than those of trials: a demonstration shares no random number with them."""
 _NOISE: Final = 4
 _MOST_RIGS: Final = 16
-"""Four of ten have neither friction nor a moving liquid in their simulation; all 16 have one in 1 of 5000 cases."""
+"""Four of ten have neither friction nor a moving liquid in their simulation; of 16 none has in 1 of 5000 cases."""
 
 
 @dataclass(frozen=True)

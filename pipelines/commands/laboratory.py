@@ -20,6 +20,7 @@ from pipelines.commands.application import (
 from pipelines.report.free_place import require_free_folder, require_free_place
 from pipelines.report.terminal import say
 from sloshlab.configurations import CONFIGURATIONS, SLOSHING
+from sloshlab.errors import InputError
 from sloshlab.experiments import experiment_names
 
 
@@ -54,6 +55,17 @@ def virtual(
         float | None, typer.Option(help="Sampling rate in Hz; on the shaker 512.", show_default=False)
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of noise, drive and liquid.")] = 0,
+    repeats: Annotated[
+        int, typer.Option(min=1, help="Runs of every level, each with the next seed; the output is a folder.")
+    ] = 1,
+    levels: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B,...",
+            help="Levels in g, or deflections in m; the output is a folder.",
+            show_default=False,
+        ),
+    ] = "",
     laboratory: Annotated[
         str,
         typer.Option(
@@ -87,7 +99,7 @@ def virtual(
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
-    """A run of the virtual laboratory."""
+    """A run of the virtual laboratory, or repeats and levels of one."""
     from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
     from pipelines.recording.virtual import (
         CAMPAIGN,
@@ -96,6 +108,7 @@ def virtual(
         make_campaign_folder,
         make_virtual_run,
     )
+    from pipelines.recording.virtual_repeats import make_repeats, parsed_levels
 
     of_laboratory = laboratory_seed_of(laboratory, laboratory_seed, is_campaign=experiment == CAMPAIGN)
     if experiment == CAMPAIGN:
@@ -103,7 +116,6 @@ def virtual(
         computed = CampaignSettings(seed, layers, workers, only, checkpoints, of_laboratory, overwrite)
         finish(make_campaign_folder(output, liquid, computed, say), as_json)
         return
-    require_free_place(output, overwrite=overwrite, described="--output")
     run = VirtualRun(
         experiment=experiment,
         configuration=configuration,
@@ -121,6 +133,24 @@ def virtual(
         second_frequency_hz=second_frequency_hz,
         laboratory_seed=of_laboratory,
     )
+    if repeats > 1 or levels:
+        if checkpoint is not None:
+            raise InputError(
+                "--checkpoint", got="with --repeats or --levels", allowed="one run", remedy="leave it out"
+            )
+        finish(
+            make_repeats(
+                run,
+                rig,
+                output,
+                n_repeats=repeats,
+                levels=parsed_levels(levels) if levels else (),
+                overwrite=overwrite,
+            ),
+            as_json,
+        )
+        return
+    require_free_place(output, overwrite=overwrite, described="--output")
     finish(make_virtual_run(run, rig, output, checkpoint, overwrite=overwrite), as_json)
 
 

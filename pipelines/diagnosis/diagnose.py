@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from pipelines.inputs.rigs import RigSource, folder_of, rig_of
 from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines
 from pipelines.report.progress import amounts
 from pipelines.report.result_folder import require_result_folder, result_folder
+from pipelines.report.terminal import say
 from sloshlab import atomic_file
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.consistency.samples import examined_samples
@@ -24,6 +25,7 @@ from sloshlab.diagnosis.findings import findings_of
 from sloshlab.diagnosis.verdict import verdict_of
 from sloshlab.errors import InputError
 from sloshlab.identification.case import MOST_RUNS, Case, CaseRun, read_case
+from sloshlab.informative_runs import informative_runs
 from sloshlab.missing_physics.user_effects import load_user_effects
 from sloshlab.recording import run_attributes
 from sloshlab.user_twin import UserTwinModel, load_user_twin, with_known_drive
@@ -63,7 +65,7 @@ def diagnose_case(
     opened = opened_folder(folder, with_rig=twin is None)
     # Before the search, which takes minutes: a folder that is in the way has to be said at once.
     require_result_folder(target, files_of(report=report))
-    diagnosis = diagnosed(opened, command=command, twin=twin, effects=effects)
+    diagnosis = diagnosed(opened, command=command, twin=twin, effects=effects, told=say)
     return write_diagnosis(diagnosis, target, report=report)
 
 
@@ -130,7 +132,12 @@ def opened_recordings(name: str, runs: Sequence[RunSource], rig: RigSource | Non
 
 
 def diagnosed(
-    opened: OpenedCase, *, command: str, twin: Path | None = None, effects: Sequence[Path] = ()
+    opened: OpenedCase,
+    *,
+    command: str,
+    twin: Path | None = None,
+    effects: Sequence[Path] = (),
+    told: Callable[[str], None] = lambda line: None,
 ) -> Diagnosis:
     """Search what physics the simulation of a case left out.
 
@@ -141,6 +148,8 @@ def diagnosed(
         What the user typed, for the report.
     twin, effects : Path, sequence of Path
         As of `diagnose_case`.
+    told : callable
+        Takes what these runs can decide, a line each, before the search.
     """
     case, remarks = opened.case, list[str]()
     own = [effect for file in effects for effect in load_user_effects(file)]
@@ -149,10 +158,17 @@ def diagnosed(
         described = load_user_twin(twin)
         case, cut = with_known_drive(case, described.driving)
         model = UserTwinModel(described, case.runs, name=f"twin {twin}", executor=WorkerThreads())
+    # Before the search: who reads that a run is lacking may record it instead of waiting for an answer.
+    untold = iter(informative_runs(case).lines)
     with amounts("diagnosing") as advance:
-        found = findings_of(
-            case, lambda what, done, of: advance(done, max(of, 1), what), model, executor=WorkerThreads()
-        )
+
+        def progressed(what: str, done: int, of: int) -> None:
+            # At the first step, when nothing refuses the case any more.
+            for line in untold:
+                told(line)
+            advance(done, max(of, 1), what)
+
+        found = findings_of(case, progressed, model, executor=WorkerThreads())
         verdict = verdict_of(found)
     examination = examined(found)
     named = verdict.best if verdict.kind != "unknown" else None

@@ -109,7 +109,13 @@ def laboratory_seed_of(how: str, seed: int | None, *, is_campaign: bool) -> int 
 
 
 def make_virtual_run(
-    run: VirtualRun, rig: Path | None, output: Path, checkpoint: Path | None = None, *, overwrite: bool = False
+    run: VirtualRun,
+    rig: Path | None,
+    output: Path,
+    checkpoint: Path | None = None,
+    *,
+    overwrite: bool = False,
+    attributes: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Make one run and write it.
 
@@ -124,6 +130,8 @@ def make_virtual_run(
         Where a computed liquid is saved meanwhile; by default beside the recording. Removed at the end.
     overwrite : bool
         Whether a recording that is there may be replaced.
+    attributes : mapping, optional
+        Global attributes beside and instead of those that the laboratory states.
 
     Raises
     ------
@@ -141,6 +149,7 @@ def make_virtual_run(
         raise InputError(f"--checkpoint {checkpoint}", got=got, allowed="a file in a folder that exists")
     require_free_place(output, overwrite=overwrite)
     recording = _computed(run, rig, saved)
+    recording.attrs.update(attributes or {})
     with atomic_file.replaced(output, overwrite=overwrite) as place:
         write_virtual_run(recording, place)
     saved.unlink(missing_ok=True)
