@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from pipelines.report.free_place import require_free_folder
+from pipelines.report.progress import progress
 from sealed_trial.demonstrations import (
     DEMONSTRATIONS,
     DOMAIN,
@@ -60,7 +61,8 @@ def conceal(name: str, seed: int | None, folder: Path, ready_made: Path = READY_
         _copy(ready_made / name, published, folder)
         return published, DEMONSTRATIONS[name].seed
     chosen = DEMONSTRATIONS[name].seed if seed is None else seed
-    return draw(name, chosen, folder), chosen
+    with progress("drawing the case", 1):
+        return draw(name, chosen, folder), chosen
 
 
 def draw(name: str, seed: int, folder: Path) -> PublishedCase:

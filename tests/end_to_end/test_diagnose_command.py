@@ -124,7 +124,10 @@ def test_one_run_alone_is_answered_and_what_it_cannot_decide_is_said(lone: Path,
     assert verdict["verdict"] == "nothing_missing"
     assert verdict["effects"] == []
     assert len(verdict["limits"]) == 2
-    assert verdict["statement"] in decided_terms.out
+    # what is lacking comes before the answer, in the order of what a person does next
+    lacking = decided_terms.out.index("to record: ")
+    assert "how far the rig repeats itself (no test was repeated)" in decided_terms.out
+    assert lacking < decided_terms.out.index(verdict["statement"])
     assert {"format", "alternatives", "probabilities", "separating_experiment"} <= verdict.keys()
     assert {
         "metric",
