@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import INPUT_IS_BAD, Json, app, finish
-from pipelines.report.terminal import say
+from pipelines.commands.application import Json, app, finish
 
 case = typer.Typer(
     help="Case folders for the diagnosis: made, checked, and what their runs can decide.", no_args_is_help=True
@@ -38,7 +37,7 @@ def new(
     """Make a case of a rig file and recordings, and say what they can decide."""
     from pipelines.diagnosis.case_builder import new_case
 
-    _finish(new_case(folder, rig, [*recordings, *(more or ())], link=link), as_json)
+    finish(new_case(folder, rig, [*recordings, *(more or ())], link=link), as_json)
 
 
 @case.command()
@@ -52,13 +51,4 @@ def check(
     """Say whether a case can be diagnosed, what its runs can decide, and which are lacking."""
     from pipelines.diagnosis.case_builder import check_case
 
-    _finish(check_case(folder), as_json)
-
-
-def _finish(summary: dict[str, Any], as_json: bool) -> None:
-    """Every defect is a line of its own on stderr, and the input is bad."""
-    for defect in summary["defects"]:
-        say(f"sloshlab: {defect}", error=True)
-    finish(summary, as_json)
-    if summary["defects"]:
-        raise typer.Exit(INPUT_IS_BAD)
+    finish(check_case(folder), as_json)

@@ -22,6 +22,7 @@ FOLDERS: dict[str, list[str]] = {
     "validate -o": ["validate", "absent_rom.nc", *RUN, *RIG],
     "study -o": ["study", *RUN, *RUN, *RIG],
     "diagnose -o": ["diagnose", "absent"],
+    "benchmark -o": ["benchmark", "silverbox", "--data", "absent"],
     "trial seal -o": ["trial", "seal", "--key", "absent.key"],
     "trial score -o": ["trial", "score", "absent"],
     "virtual campaign -o": ["virtual", "campaign"],
