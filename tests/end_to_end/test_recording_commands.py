@@ -182,7 +182,7 @@ def test_a_device_that_dies(bench: Path, lab: Path) -> None:
                              bench, lab / "new.nc", "--json", "--keep-journal"), lab,
         ) as recorder,
     ):  # fmt: skip
-        wait_until(lambda: n_bytes(lab / "new.journal") > 10_000, "samples in the journal")
+        wait_until(lambda: n_bytes(lab / "new.journal") > 20_000, "samples in the journal")
         devices.command.send(signal.SIGKILL)
         assert recorder.exit_code() == DONE_BUT_FLAGGED, recorder.stderr
         assert recorder.summary["reason"] == "sources_failed"
