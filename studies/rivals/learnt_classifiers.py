@@ -7,6 +7,7 @@ the class away.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
@@ -90,10 +91,13 @@ class LearntClassifier:
         kept = tuple(name for name, is_varied in zip(names, varied, strict=True) if is_varied)
         found = cls(features, kept, middle[varied], spread[varied], made("kind"), made("effect"), _equals(cases))
         table = np.array([found._row(case.seen) for case in cases])
-        found.kinds.fit(table, [_kind(case) for case in cases], np.ones(len(cases)))
         rows = [(i, effect, 1 / len(case.effects)) for i, case in enumerate(cases) for effect in case.effects]
         places, labels, weights = zip(*rows, strict=True)
-        found.effects.fit(table[list(places)], [".".join(effect) for effect in labels], np.array(weights))
+        with warnings.catch_warnings():
+            # It warns that there are many effects for so few cases, which is so.
+            warnings.simplefilter("ignore", UserWarning)
+            found.kinds.fit(table, [_kind(case) for case in cases], np.ones(len(cases)))
+            found.effects.fit(table[list(places)], [".".join(effect) for effect in labels], np.array(weights))
         return found
 
     def _row(self, seen: Seen) -> FloatArray:
