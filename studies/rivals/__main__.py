@@ -9,15 +9,19 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Final
 
 from sealed_trial.running import DIAGNOSES
 from sealed_trial.sealing.trial_folder import check_data, read_commitments
 from sloshlab.atomic_file import write_bytes
 from sloshlab.errors import InputError, SloshlabError
-from studies.rivals.comparison import Row, answered, of_diagnoses, rivals_of, to_document
-from studies.rivals.page import held_out_lines, pairwise_lines, table_lines, write_figure
+from studies.rivals.comparison import Row, answered, learning_curve, of_diagnoses, rivals_of, to_document
+from studies.rivals.page import held_out_lines, learning_lines, pairwise_lines, table_lines, write_figure
 from studies.rivals.seen import seen_cases
 from studies.rivals.training import Known, opened, require_apart
+
+_PARTS: Final = 3
+"""Of the development cases, in their order: how much more of them would help."""
 
 
 def main() -> int:
@@ -58,7 +62,9 @@ def _compared(arguments: argparse.Namespace) -> list[Row]:
     truths = opened(trial, arguments.truths, arguments.key)
     rows = [of_diagnoses(trial / arguments.diagnoses, truths)]
     rows += [answered(rival, judged, truths, output / "answers" / rival.name) for rival in rivals]
-    parts = [table_lines(rows), held_out_lines(rows, truths), pairwise_lines(rows)]
+    sizes = sorted({-(-len(known) * part // _PARTS) for part in range(1, _PARTS + 1)})
+    curve = learning_curve(known, sizes, judged, truths)
+    parts = [table_lines(rows), held_out_lines(rows, truths), pairwise_lines(rows), learning_lines(curve, sizes)]
     parts.append([f"{row.name}: {row.learnt}" for row in rows if row.learnt])
     write_bytes(output / "rivals.md", ("\n\n".join("\n".join(lines) for lines in parts) + "\n").encode())
     write_bytes(output / "rivals.json", (json.dumps(to_document(rows), indent=1) + "\n").encode())

@@ -13,8 +13,8 @@ import numpy as np
 
 from sealed_trial.running import OUTCOME, Outcome
 from sealed_trial.scoring.acceptance import CLEAR_SINGLES, FALSE_ALARMS, LOOK_ALIKES, OUTSIDE, PAIRS, WRONG_NAMES
-from sealed_trial.scoring.answer import Answer, read_answer
-from sealed_trial.scoring.mark import NOTHING_HIDDEN
+from sealed_trial.scoring.answer import Answer, answer_of, read_answer
+from sealed_trial.scoring.mark import NOTHING_HIDDEN, marked
 from sealed_trial.scoring.score import Score, scored
 from sealed_trial.scoring.statistics import Rate, rate
 from sloshlab.atomic_file import write_bytes
@@ -173,6 +173,29 @@ def _row(name: str, score: Score, held_out: dict[str, float], learnt: str = "") 
     return Row(name, {key: rates[key] for key in COLUMNS}, held_out, error, right, learnt)
 
 
+def learning_curve(
+    known: Sequence[Known], sizes: Sequence[int], seen: Sequence[Seen], truths: Mapping[str, Truth]
+) -> dict[str, list[int]]:
+    """Right answers to the judged cases, by rival, after learning from the first of the development cases.
+
+    Parameters
+    ----------
+    known : sequence of Known
+    sizes : sequence of int
+        How many of them.
+    seen : sequence of Seen
+        Every judged case.
+    truths : mapping
+        By case.
+    """
+    found: dict[str, list[int]] = {}
+    for size in sizes:
+        for rival in rivals_of(known[:size]):
+            marks = [marked(truths[case.case], answer_of(rival.say(case))) for case in seen if not case.trouble]
+            found.setdefault(rival.name, []).append(sum(mark.right for mark in marks))
+    return found
+
+
 def held_out_quantiles(row: Row, truths: Mapping[str, Truth], cases: Sequence[str]) -> dict[str, float]:
     """Median and 90 % quantile of the error on held-out runs where something is hidden, and where nothing is.
 
@@ -194,15 +217,15 @@ def held_out_quantiles(row: Row, truths: Mapping[str, Truth], cases: Sequence[st
     return found
 
 
-def compared_pairwise(first: Row, other: Row) -> tuple[int, int]:
-    """Cases that only the first answers right, and that only the other does.
+def compared_pairwise(first: Row, other: Row) -> tuple[list[str], list[str]]:
+    """Cases that only the first answers right, and those that only the other does.
 
     Parameters
     ----------
     first, other : Row
     """
-    only = sum(first.right[case] and not other.right[case] for case in first.right)
-    return only, sum(other.right[case] and not first.right[case] for case in first.right)
+    only = [case for case in first.right if first.right[case] and not other.right[case]]
+    return only, [case for case in first.right if other.right[case] and not first.right[case]]
 
 
 def to_document(rows: Sequence[Row]) -> list[dict[str, Any]]:

@@ -65,9 +65,27 @@ def pairwise_lines(rows: Sequence[Row]) -> list[str]:
     lines = ["| | only sloshlab right | only the rival right | calibration error |", "|---|---|---|---|"]
     for row in rows:
         error = "–" if math.isnan(row.calibration) else f"{row.calibration:.2f}"
-        counts = ("–", "–") if row is own else compared_pairwise(own, row)
+        only, others = compared_pairwise(own, row)
+        listed = f"{len(others)}: {', '.join(others)}" if others else "0"
+        counts = ("–", "–") if row is own else (len(only), listed)
         lines.append(f"| {row.name} | {counts[0]} | {counts[1]} | {error} |")
     return lines
+
+
+def learning_lines(curve: Mapping[str, Sequence[int]], sizes: Sequence[int]) -> list[str]:
+    """Right answers after so many development cases.
+
+    Parameters
+    ----------
+    curve : mapping
+        By rival.
+    sizes : sequence of int
+    """
+    lines = [
+        "| right after | " + " | ".join(f"{size} cases" for size in sizes) + " |",
+        "|---" * (len(sizes) + 1) + "|",
+    ]
+    return lines + [f"| {name} | " + " | ".join(map(str, right)) + " |" for name, right in curve.items()]
 
 
 def write_figure(rows: Sequence[Row], path: Path) -> None:
@@ -90,7 +108,7 @@ def write_figure(rows: Sequence[Row], path: Path) -> None:
                 axes.plot([100 * its.low, 100 * its.high], [place, place], color=colour)
                 axes.plot([100 * its.value], [place], "o", color=colour)
             n = rows[0].rates[key].n
-            axes.set_title(f"{word}{' ↓' if key in _SMALL_IS_GOOD else ''}, of {n}", fontsize=8)
+            axes.set_title(f"{word}{' ↓' if key in _SMALL_IS_GOOD else ''}, of {n}", fontsize=7.5)
             axes.set_xlim(-4, 104)
             axes.set_yticks(range(len(rows)), [row.name for row in reversed(rows)], fontsize=7)
         for axes in grid[-1]:

@@ -239,4 +239,8 @@ def test_one_command_marks_all_rivals_and_goes_on_with_what_was_seen(
     kept = json.loads((output / "answers" / "sparse regression" / "case_041" / "verdict.json").read_bytes())
     assert kept["effects"] == [{"name": "cubic_stiffness", "block": "structure"}]
     assert (output / "rivals.png").is_file()
+    # Four cases of development, every other with a spring, teach it as well as twelve do.
+    page = (output / "rivals.md").read_text()
+    assert "| right after | 4 cases | 8 cases | 12 cases |" in page
+    assert "| sparse regression | 12 | 12 | 12 |" in page
     assert "| sloshlab | 6 of 12" in capsys.readouterr().out
