@@ -15,6 +15,7 @@ from pipelines.inputs.recordings import RunsLike, run_sources
 from pipelines.inputs.rigs import RigLike, rig_source
 from pipelines.interface import html
 from pipelines.interface.drawing import axes_to_draw_on, in_words
+from pipelines.interface.folder_result import FolderResult
 from pipelines.interface.provenance import call_text, hashes_of
 from pipelines.structure.analysis import analyse_beam as analysed
 from pipelines.structure.analysis import checked_settings
@@ -109,8 +110,10 @@ class BeamPlots:
 
 
 @dataclass(frozen=True, eq=False)
-class BeamAnalysis:
+class BeamAnalysis(FolderResult):
     """Runs of a beam or a guided tank, analysed: what `analyse_beam` returns.
+
+    Its data are ``modal.nc`` and ``spectra.nc``.
 
     Attributes
     ----------
@@ -157,32 +160,6 @@ class BeamAnalysis:
     def to_datatree(self) -> xr.DataTree:
         """Modal results and spectra as one tree."""
         return xr.DataTree.from_dict({"modal": self.modal, "spectra": self.spectra}, name=self.experiment.kind)
-
-    def report(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``modal.nc``, ``spectra.nc``, ``report.html`` and ``figures/*.png``, all together or none.
-
-        Parameters
-        ----------
-        folder : path-like
-            Made if it is not there; files of an earlier result go.
-
-        Returns
-        -------
-        Path
-            The report.
-
-        Raises
-        ------
-        InputError
-            If a file of somebody's own is in the way.
-        """
-        self._write(Path(folder), report=True)
-        return Path(folder) / "report.html"
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``modal.nc`` and ``spectra.nc`` only, as `report` does; return the folder."""
-        self._write(Path(folder), report=False)
-        return Path(folder)
 
     def _write(self, folder: Path, *, report: bool) -> None:
         write_beam(

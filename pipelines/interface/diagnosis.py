@@ -18,6 +18,7 @@ from pipelines.inputs.recordings import RecordingInMemory, RunsLike, run_sources
 from pipelines.inputs.rigs import RigLike, rig_source
 from pipelines.interface import html
 from pipelines.interface.drawing import axes_to_draw_on, in_words, legend_below
+from pipelines.interface.folder_result import FolderResult
 from pipelines.interface.provenance import call_text
 from sloshlab.errors import InputError
 from sloshlab.identification.observations import Observation
@@ -110,8 +111,10 @@ class DiagnosisPlots:
 
 
 @dataclass(frozen=True, eq=False)
-class CaseVerdict:
+class CaseVerdict(FolderResult):
     """What physics a simulation left out, with size, place and evidence: what `diagnose` returns.
+
+    Its data are ``verdict.json`` and the extended and retuned twins.
 
     Attributes
     ----------
@@ -202,31 +205,8 @@ class CaseVerdict:
             parts[run.name] = xr.Dataset(variables, coordinates, {"held_out": int(run.name in held_out)})
         return xr.DataTree.from_dict(parts, name=found.case.name)
 
-    def report(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``verdict.json``, ``report.html``, its figures and the extended twin, all together or none.
-
-        Parameters
-        ----------
-        folder : path-like
-            Made if it is not there; files of an earlier result go.
-
-        Returns
-        -------
-        Path
-            The report.
-
-        Raises
-        ------
-        InputError
-            If a file of somebody's own is in the way.
-        """
-        write_diagnosis(self.diagnosis, Path(folder), report=True)
-        return Path(folder) / "report.html"
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``verdict.json`` and the twins only, as `report` does; return the folder."""
-        write_diagnosis(self.diagnosis, Path(folder), report=False)
-        return Path(folder)
+    def _write(self, folder: Path, *, report: bool) -> None:
+        write_diagnosis(self.diagnosis, folder, report=report)
 
     def __repr__(self) -> str:
         return f"<CaseVerdict {self.kind}: {self.headline}>"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,6 +13,7 @@ import xarray as xr
 from pipelines.inputs.recordings import RunsLike, run_sources
 from pipelines.inputs.rigs import RigsLike, rig_sources
 from pipelines.interface import html
+from pipelines.interface.folder_result import FolderResult
 from pipelines.interface.provenance import call_text, hashes_of
 from pipelines.interface.sweep_plots import SweepPlots
 from pipelines.sweep.outputs import provenance_of_sweeps, stamped_results, write_experiment
@@ -25,8 +25,10 @@ from sloshlab.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
-class SweepAnalysis:
+class SweepAnalysis(FolderResult):
     """Sweeps, analysed: what `analyse_sweep` returns.
+
+    Its data are ``windows.nc`` and ``maps.nc``.
 
     Attributes
     ----------
@@ -80,32 +82,6 @@ class SweepAnalysis:
             name = Path(rig.name).stem
             parts |= {f"{name}/windows": rig.windows, f"{name}/maps": rig.maps.dataset}
         return xr.DataTree.from_dict(parts, name=self.experiment.kind)
-
-    def report(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``windows.nc``, ``maps.nc``, ``report.html`` and ``figures/*.png``, all together or none.
-
-        Parameters
-        ----------
-        folder : path-like
-            Made if it is not there; files of an earlier result go.
-
-        Returns
-        -------
-        Path
-            The report.
-
-        Raises
-        ------
-        InputError
-            If a file of somebody's own is in the way.
-        """
-        self._write(Path(folder), report=True)
-        return Path(folder) / "report.html"
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``windows.nc`` and ``maps.nc`` only, as `report` does; return the folder."""
-        self._write(Path(folder), report=False)
-        return Path(folder)
 
     def _write(self, folder: Path, *, report: bool) -> None:
         write_experiment(self.experiment, folder, command=self.call, report=report, known_sha256=self.hashes)

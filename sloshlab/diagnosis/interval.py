@@ -11,10 +11,10 @@ import numpy as np
 from scipy.stats import norm
 
 from sloshlab.diagnosis.findings import Findings
-from sloshlab.diagnosis.inference.run_noise import EXACT
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.identification.cluster_robust_errors import cluster_robust_errors
+from sloshlab.identification.diagnosed_model import EXACT
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, robust_weights
 from sloshlab.identification.profile_likelihood import profiled_distance
 from sloshlab.missing_physics.candidate import Candidate

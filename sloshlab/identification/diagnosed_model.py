@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from sloshlab.twin.lane_preparation import Executor
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
+EXACT: Final = 0.01
+"""Of a motion and of its numbers, to which a simulation describes a rig: as gains are known. Less is no physics of
+its own."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,8 +63,6 @@ _LEAST_STEPS_PER_S: Final = 500.0
 
 At 64 Hz the memory of the liquid's damping was integrated in steps of a seventh of a cycle and diverged.
 """
-_MOST_KEPT_BYTES: Final = 5e7
-"""Of simulated channels; answers do not depend on it."""
 _MOST_BYTES_AT_ONCE: Final = 2e8
 """Of the motions of lanes that are simulated together; answers do not depend on it."""
 
@@ -108,6 +106,8 @@ class RigModel:
     runs : sequence of CaseRun
     executor : Executor, optional
         Shares simulations and fits among its workers; results do not depend on it.
+    most_kept_bytes : float, optional
+        Of simulated channels that are kept in case they are asked for again; answers do not depend on it.
 
     Raises
     ------
@@ -115,8 +115,17 @@ class RigModel:
         If a run cannot drive the twin.
     """
 
-    def __init__(self, rig: Rig, folder: Path, runs: Sequence[CaseRun], *, executor: Executor = IN_TURN) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        folder: Path,
+        runs: Sequence[CaseRun],
+        *,
+        executor: Executor = IN_TURN,
+        most_kept_bytes: float = 5e7,
+    ) -> None:
         self.rig, self.folder, self.executor = rig, folder, executor
+        self._most_kept_bytes = most_kept_bytes
         self.blocks: tuple[str, ...] = BLOCKS
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
@@ -361,7 +370,7 @@ class RigModel:
                 self._kept_bytes -= self._truths.pop(key).n_bytes
             self._truths[key] = truth
             self._kept_bytes += truth.n_bytes
-            while self._kept_bytes > _MOST_KEPT_BYTES and len(self._truths) > 1:
+            while self._kept_bytes > self._most_kept_bytes and len(self._truths) > 1:
                 self._kept_bytes -= self._truths.popitem(last=False)[1].n_bytes
 
     def _lane(self, request: Request) -> Lane:

@@ -20,6 +20,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.optimize import differential_evolution, least_squares
 
 from sloshlab.errors import SloshlabError
+from sloshlab.identification.diagnosed_model import EXACT
 from sloshlab.identification.rig_model import steps_per_sample
 from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce, along, forces_alone
 from sloshlab.missing_physics.candidate import Candidate, Numbers
@@ -39,8 +40,6 @@ _LEAST_GAIN: Final = 1e-3
 """Of the misfit, relative, at which a refinement ends."""
 _POPULATION, _GENERATIONS, _GENERATIONS_OF_AMPLITUDES = 32, 16, 64
 """Of differential evolution: some five hundred forces, and two thousand where amplitudes alone tell them apart."""
-_EXACTNESS: Final = 0.01
-"""Relative to its numbers, to which a simulation describes a rig."""
 _PARTED: Final = 0.5
 """Of the size of a force, by which it differs where bounces part; a smooth one differs by some hundredths."""
 _STRETCH_S: Final = 0.5
@@ -224,7 +223,7 @@ class ForceMatching:
 
     def _parts(self, candidate: Candidate, numbers: Numbers) -> bool:
         """Whether two forces part whose numbers differ by no more than a simulation is exact."""
-        other = {name: value * (1.0 + _EXACTNESS) for name, value in numbers.items()}
+        other = {name: value * (1.0 + EXACT) for name, value in numbers.items()}
         force, moved = self._forces(candidate, [numbers, other])
         if force is None or moved is None:
             return False

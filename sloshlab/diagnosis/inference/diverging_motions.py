@@ -16,10 +16,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.diagnosis.inference.run_noise import EXACT
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.case import CaseRun
-from sloshlab.identification.diagnosed_model import DiagnosedModel, Readings
+from sloshlab.identification.diagnosed_model import EXACT, DiagnosedModel, Readings
 from sloshlab.identification.observations import Observation, noise_of_sensor
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics.candidate import Candidate, extension_of
@@ -51,8 +50,10 @@ class DivergingMotions:
         for seed in range(_N_DRAWS):
             generator = np.random.default_rng(seed)
             runs = [_with_noise(run, self._model.driving(run), generator) for run in self._model.runs]
-            # A model of its own, as drives are kept by the name of a run.
-            model = RigModel(self._model.rig, self._model.folder, runs, executor=self._model.executor)
+            # A model of its own, as drives are kept by the name of a run; no motion is asked for twice.
+            model = RigModel(
+                self._model.rig, self._model.folder, runs, executor=self._model.executor, most_kept_bytes=0.0
+            )
             found.append((model, {run.name: run for run in runs}))
         return found
 
@@ -77,6 +78,7 @@ class DivergingMotions:
             for candidate in candidates
             if any(term.jumps for term in extension_of([candidate], values).terms_in(run.name))
             for parameter in candidate.effect.parameters
+            if f"{candidate.key}.{parameter.name}" in values
         ]
         driving = () if run.is_free else self._model.driving(run)
         names = [each.channel for each in observed if each.channel not in driving]
@@ -87,11 +89,7 @@ class DivergingMotions:
             plain = self._model.simulate(run, values, extension_of(candidates, values), names)
             for seed, (model, runs) in enumerate(self._noisy):
                 scatter = EXACT * np.random.default_rng(seed).standard_normal(len(rough))
-                numbers = {
-                    name: values[name] * (1.0 + z)
-                    for name, z in zip(rough, scatter, strict=True)
-                    if name in values
-                }
+                numbers = {name: values[name] * (1.0 + z) for name, z in zip(rough, scatter, strict=True)}
                 with suppress(SloshlabError):
                     extension = extension_of(candidates, {**values, **numbers})
                     drawn = model.simulate(runs[run.name], values, extension, names)

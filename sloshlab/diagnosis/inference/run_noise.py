@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from sloshlab.diagnosis.inference.places import ELSEWHERE, SENSOR, STRUCTURE, TANK, transfers_of
-from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.diagnosed_model import EXACT, DiagnosedModel
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 
@@ -28,8 +28,6 @@ FloatArray = NDArray[np.float64]
 BLOCKS_OF_A_CELL: Final = 4
 BANDS_OF_A_CELL: Final = 4
 """Two seconds and four hertz of the transform, within which powers and correlations are constant."""
-EXACT: Final = 0.01
-"""Of the motion, to which a simulation describes a rig: as gains are known. Less is no physics of its own."""
 _EXACT_BESIDE_CHAOS: Final = 0.05
 """The same where a liquid moves chaotically: to this its damping is believed to be that of the run's mean."""
 _STEADY_BLOCKS: Final = 9
