@@ -179,8 +179,10 @@ class _Pack:
             first.law.size,
             ready[0].prepared.memory.size,
         )
-        self.steps_together = len(lanes) >= _FEWEST_TOGETHER and not (first.uses_acceleration or first.updates)
-        laws = np.array([term.kind.law.address_of_lanes for term in lanes[0].twin.terms], np.int64)
+        self.steps_together = len(lanes) >= _FEWEST_TOGETHER and not first.updates
+        kinds = [term.kind for term in lanes[0].twin.terms]
+        # the acceleration is solved for in each lane by itself
+        laws = np.array([0 if kind.uses_acceleration else kind.law.address_of_lanes for kind in kinds], np.int64)
         self.twins = engine.Lanes(
             len(lanes),
             int(first.frame.min(initial=1)),
@@ -208,7 +210,8 @@ class _Pack:
         side_by_side, scratches = self._side_by_side(), self._scratch()
         status, filled, where = (np.full(N_LANES, value) for value in (int(Status.DONE), n_rows, -1))
         out = Outputs(np.empty((0, 0)), np.empty((0, 4)), np.zeros(1, np.int64))
-        ends = engine.LaneEnds(status, filled, where, np.zeros(N_LANES, np.int64), out)
+        alone, unsolved = np.zeros(N_LANES, np.int64), np.zeros(N_LANES, np.int64)
+        ends = engine.LaneEnds(status, filled, where, alone, unsolved, out)
         largest = bounds_of_states(self.n_modes, self.n_memory)
         step = 1.0 / (self.excitation.sampling_rate_hz * self.n_substeps)
         inputs = _Inputs(self.lanes)
@@ -237,11 +240,13 @@ class _Pack:
         n_values = most_event_functions(self.lanes[0].twin.terms)
         own = [scratch(ready.prepared.model, ready.start, n_values) for ready in self.ready]
         rows = {}
-        for name in engine.LaneScratch._fields[:-2]:
+        for name in engine.LaneScratch._fields[:-3]:
             values = [getattr(s, name) for s in own]
             rows[name] = np.zeros((N_LANES, *values[0].shape))
             rows[name][: len(values)] = values
-        return engine.LaneScratch(**rows, nothing=np.zeros(0), no_powers=np.zeros((5, 0)))
+        return engine.LaneScratch(
+            **rows, nothing=np.zeros(0), no_powers=np.zeros((5, 0)), slope_before=np.zeros(N_LANES)
+        )
 
     def _motion(self, i: int, series: FloatArray, ends: engine.LaneEnds, inputs: _Inputs) -> Motion:
         lane, filled, status = self.lanes[i], int(ends.filled[i]), Status(int(ends.status[i]))

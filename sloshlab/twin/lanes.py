@@ -1,10 +1,10 @@
 """Eight simulations side by side in one compiled loop: what they have in common is read and decided once.
 
 Lanes differ in every number and in what drives them; modes, kinds of terms, steps and length are the same.
-The modes of all lanes advance together, one instruction for eight of them; laws are called lane by lane. A lane
-whose step has an event takes that step by itself, by the engine for one twin. So do all steps of lanes
-whose laws depend on the acceleration, or whose terms are models in discrete time. Each lane gives what
-the engine gives for it alone, bit for bit.
+The modes of all lanes advance together, one instruction for eight of them; laws that have a memory or depend on
+the acceleration are called lane by lane. A lane whose step has an event, or finds no acceleration, takes that step
+by itself, by the engine for one twin. So do all steps of lanes whose terms are models in discrete time. Each lane
+gives what the engine gives for it alone, bit for bit.
 """
 
 from __future__ import annotations
@@ -35,14 +35,17 @@ from sloshlab.twin.model import (
     N_OF_BASE_MOTION,
     NO_FRICTION,
     STICKS,
+    USES_ACCELERATION,
     Excited,
     FloatArray,
     IntArray,
     Model,
     Outputs,
     Scratch,
+    Stage,
     Stretch,
 )
+from sloshlab.twin.rates import implicit_force
 
 _N_INPUTS = len(INPUTS)
 _FREE, _TOTAL = range(2)
@@ -120,6 +123,7 @@ class LaneScratch(NamedTuple):
     trial: FloatArray  # (8, n_states)
     nothing: FloatArray  # (0,) in place of works
     no_powers: FloatArray  # (5, 0)
+    slope_before: FloatArray  # (8,) `slope` at the start of the step
 
 
 class Series(NamedTuple):
@@ -136,6 +140,7 @@ class LaneEnds(NamedTuple):
     filled: IntArray  # (8,) rows
     where: IntArray  # (8,) term or state
     alone: IntArray  # (8,) whether the present step was taken alone
+    unsolved: IntArray  # (8,) whether the present step found no acceleration in any of its stages
     out: Outputs  # of the engine for one twin, with room for nothing
 
 
@@ -227,6 +232,8 @@ def _add_forces(
         for lane in range(lanes.n_used):
             _take_motion(lanes, lane, b, s)
     for i in range(m.law.size):
+        if m.kind[i] & USES_ACCELERATION:
+            continue
         if lanes.laws[i]:
             rows = (m.frame[i] * N_MOTION, m.parameters_at[i])
             put(b.force, i, call_law_together(lanes.laws[i], (b.motion, b.parameters), rows))
@@ -240,13 +247,36 @@ def _add_forces(
                 if s.friction[lane, 0] == STICKS:
                     b.force[i * N_LANES + lane] = 0.0
         total = total + numbers_of(b.force, i)
-    if sticks:
+    if m.uses_acceleration:
+        put(b.place, _TOTAL, total)
+        for lane in range(lanes.n_used):
+            if ends.status[lane] == DONE:
+                _solve_lane(lanes, lane, stage, b, s, ends)
+        total = numbers_of(b.place, _TOTAL)
+    elif sticks:
         put(b.place, _TOTAL, total)
         for lane in range(lanes.n_used):
             if s.friction[lane, 0] == STICKS and ends.status[lane] == DONE:
                 b.place[_TOTAL * N_LANES + lane] += _holding_force(lanes, lane, stage, b, s)
         total = numbers_of(b.place, _TOTAL)
     return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+def _solve_lane(lanes: Lanes, lane: int, stage: int, b: SideBySide, s: LaneScratch, ends: LaneEnds) -> None:
+    """Sum of the forces of a lane where some depend on the acceleration, by the engine for one twin."""
+    m, own = _model(lanes, lane), _scratch(s, lane)
+    own.inputs[2] = b.inputs[2 * N_LANES + lane]
+    free, known = b.place[_FREE * N_LANES + lane], b.place[_TOTAL * N_LANES + lane]
+    at = Stage(own.trial, s.slopes[lane, stage], stage)
+    total, good = implicit_force(m, m.mobility, free, known, at, own)
+    b.place[_TOTAL * N_LANES + lane] = total
+    later = USES_ACCELERATION | DRY_FRICTION if own.friction[0] == STICKS else USES_ACCELERATION
+    for i in range(m.law.size):
+        if m.kind[i] & later:
+            b.force[i * N_LANES + lane] = own.force[i]
+    if not good:
+        ends.unsolved[lane] = 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
@@ -497,17 +527,21 @@ def integrate_together(
     series: Series,
 ) -> None:
     """Integrate all lanes on, and fill their rows of a stretch."""
-    cares = lanes.of_first.friction_frame >= 0
+    cares = lanes.of_first.friction_frame >= 0 or lanes.of_first.uses_acceleration
     for i in range(lanes.of_first.law.size):
         cares |= lanes.of_first.events[i] != 0
     for row in range(stretch.first_row, stretch.last_row):
         for substep in range(stretch.n_substeps):
             index = (row - 1) * stretch.n_substeps + substep
+            if cares:
+                for lane in range(lanes.n_used):
+                    ends.unsolved[lane], s.slope_before[lane] = 0, s.slope[lane, 0]
             _advance(lanes, drives, (index, stretch.step_s), b, s, ends)
             if cares:
                 for lane in range(lanes.n_used):
-                    alone = ends.status[lane] == DONE and _has_event(lanes, lane, b, s)
+                    alone = ends.status[lane] == DONE and (ends.unsolved[lane] or _has_event(lanes, lane, b, s))
                     if alone:
+                        s.slope[lane, 0] = s.slope_before[lane]
                         _take_out(lanes, lane, b, s)
                         m, excited, own = _model(lanes, lane), _excited(drives, lane), _scratch(s, lane)
                         status, where, _ = take_step(m, excited, own, stretch, ends.out, index, np.inf)

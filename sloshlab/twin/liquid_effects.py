@@ -82,8 +82,7 @@ def _oscillator(motion, parameters, memory, rates):
     stretch, closing = memory[0] - motion[DISPLACEMENT], memory[1] - motion[VELOCITY]
     pull = omega * omega * stretch + 2 * parameters[2] * omega * closing
     rates[0], rates[1] = memory[1], -pull
-    # instead of m frozen, whose inertia the structure already has: that one is given back
-    return parameters[1] * (pull + motion[ACCELERATION])
+    return parameters[1] * pull
 
 
 LATERAL_MODE = register(
@@ -97,8 +96,9 @@ LATERAL_MODE = register(
         ),
         _oscillator,
         memory=lambda values, table: (0.0, 0.0),
+        # instead of m frozen, whose inertia the structure already has: that one is given back
+        mass=lambda values: -values["mass_kg"],
         moves_with_place=True,
-        uses_acceleration=True,
         equation="m (ω² s + 2ζω ṡ + a), s the mode's motion in the tank, instead of m frozen",
     )
 )
@@ -114,7 +114,7 @@ def _cushion(motion, parameters, memory, rates):
     omega = sqrt(parameters[0] / mass)
     push = omega * omega * stretch / left + 2.0 * parameters[3] * omega * closing
     rates[0], rates[1] = memory[1], -push
-    return mass * (push + motion[ACCELERATION])
+    return mass * push
 
 
 AIR_CUSHION = register(
@@ -129,8 +129,9 @@ AIR_CUSHION = register(
         ),
         _cushion,
         memory=lambda values, table: (0.0, 0.0),
+        # given back, as of the wave above
+        mass=lambda values: -values["mass_kg"],
         moves_with_place=True,
-        uses_acceleration=True,
         equation="m (k/m · s/(1 − hs) + 2ζω ṡ + a), liquid of mass m on trapped gas that s > 0 compresses",
     )
 )

@@ -202,7 +202,7 @@ def _known_force(m: Model, stage: Stage, s: Scratch) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
-def _implicit_force(
+def implicit_force(
     m: Model, mobility: float, free: float, known: float, stage: Stage, s: Scratch
 ) -> tuple[float, bool]:
     """Sum of all forces where some depend on the acceleration or friction holds, and whether there is one."""
@@ -251,7 +251,7 @@ def _rates_of_equations(m: Model, now: Time, stage: Stage, s: Scratch) -> bool:
         _ask(e, 1.0, y, s)
         mobility = s.answer[e.velocity] - free
         if m.uses_acceleration or s.friction[0] == STICKS:
-            total, good = _implicit_force(m, mobility, free, total, stage, s)
+            total, good = implicit_force(m, mobility, free, total, stage, s)
         total -= m.added_mass * (free + mobility * total) / (1.0 + m.added_mass * mobility)
     _ask(e, total, y, s)
     for j in range(e.n_states):
@@ -282,7 +282,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
     _set_motion(s, now.seconds, x, v)
     total, good = _known_force(m, stage, s), True
     if m.uses_acceleration or s.friction[0] == STICKS:
-        total, good = _implicit_force(m, m.mobility, free, total, stage, s)
+        total, good = implicit_force(m, m.mobility, free, total, stage, s)
     # all forces act at one place of the modes, so that the mass they add needs no system of equations
     a = (free + m.mobility * total) * m.inverse_inertia
     # inertia of the added masses; a negative one takes out of the frozen liquid what a ball or a wave moves by

@@ -12,6 +12,7 @@ import pytest
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.twin.excitation import Excitation, free, harmonic, recorded
 from sloshlab.twin.lane_preparation import Lane, done, motions
+from sloshlab.twin.liquid_effects import FARADAY_WAVE, LATERAL_MODE, LIQUID_LOSS
 from sloshlab.twin.motion import Motion
 from sloshlab.twin.rate_independent_forces import FRICTION_BEHIND_PLAY
 from sloshlab.twin.status import Status
@@ -67,6 +68,17 @@ TERMS: dict[str, Callable[[float], tuple[Term, ...]]] = {
     "clearance": lambda size: (CLEARANCE(gap_m=0.004 * size, stiffness_n_per_m=2e4),),
     "contacts": lambda size: (BOUNCING_BALL(**BALL, hardening_per_m=500.0, beta=0.002 * size, height_m=0.0272),),
     "acceleration": lambda size: (FADING_MASS(beta=0.5 * size, liquid_mass_kg=0.2, fade_g=1.5, averaging_s=0.8),),
+    "acceleration and friction": lambda size: (
+        LATERAL_MODE(frequency_hz=8.0 * size, mass_kg=0.15, damping_ratio=0.02),
+        COULOMB_FRICTION(place="tank", force_n=0.5 * size),
+        LIQUID_LOSS(rate_kg_per_s=0.01 * size),
+        QUADRATIC_DRAG(place="tank", drag_n_s2_per_m2=2.0),
+    ),
+    "acceleration and contacts": lambda size: (
+        FARADAY_WAVE(frequency_hz=3.0, force_n=0.2 * size),
+        FADING_MASS(beta=0.5 * size, liquid_mass_kg=0.2, fade_g=1.5, averaging_s=0.8),
+        BOUNCING_BALL(**BALL, hardening_per_m=500.0, beta=0.002 * size, height_m=0.0272),
+    ),
     "discrete time": lambda size: (LINEAR_RESPONSE(n_delays=3, table=[1.0 * size, -2.0, 0.5]),),
 }
 
@@ -154,7 +166,7 @@ def test_a_long_run_is_cut_into_stretches_alike() -> None:
     assert_as_alone(lanes, motions(lanes))
 
 
-@pytest.mark.parametrize("terms", ["nothing", "together", "memory", "friction", "contacts"])
+@pytest.mark.parametrize("terms", ["nothing", "together", "memory", "friction", "contacts", "acceleration"])
 def test_a_lane_that_diverges_or_leaves_its_range_disturbs_no_other(terms: str) -> None:
     grows = replace(OSCILLATOR, stiffnesses_n_per_m=np.array([-1e5]))
     lanes = [
