@@ -33,8 +33,11 @@ TEMPERING: Final = 10.0
 """Factor by which log-likelihoods are too large: coefficients of a cell share what is wrong with their noise."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel up to which nothing but noise is left."""
-_MOST_BYTES_AT_ONCE: Final = 1e8
-"""Of the readings of simulations that are weighted together; results do not depend on it."""
+_MOST_BYTES_AT_ONCE: Final = 3e7
+"""Of the readings of simulations that are weighted together; results do not depend on it.
+
+Motions and spectra take four times as much beside them, in every worker at once; so many still fill the lanes.
+"""
 
 
 @dataclass(frozen=True, eq=False)
