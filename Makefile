@@ -19,9 +19,11 @@ ROM := $(RESULTS)/rom/ROM.nc
 BALLS :=
 PATIENCE ?= 30
 FUZZ_SECONDS ?= 600
+VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
+DOCS_BRANCH ?= gh-pages
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak docs clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak docs docs-publish clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -136,6 +138,10 @@ soak: setup  ## ten minutes of recording at full load, by serial, socketcand and
 docs: setup  ## the documentation as a web site in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
+docs-publish: docs  ## the site as VERSION and as the latest into the local branch DOCS_BRANCH (gh-pages)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mike deploy --branch $(DOCS_BRANCH) --update-aliases $(VERSION) latest
+	$(BIN)/mike set-default --branch $(DOCS_BRANCH) latest
+
 clean:  ## remove everything that make made, the environment included
-	rm -rf $(VENV) .venv-newest $(RESULTS) site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-newest $(RESULTS) site docs/generated build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
