@@ -8,7 +8,7 @@ from typing import Any
 __all__ = ["on_page_markdown", "without_clutter"]
 
 NOTE = re.compile(r"!!! note\n\n(?:    .*\n)+\n*")
-PROGRESS = re.compile(r"^[\w ]+, \d+ (?:s|min) so far.*\n", re.MULTILINE)
+PROGRESS = re.compile(r"^[\w ]+, [\d hmins]+ so far.*\n", re.MULTILINE)
 
 
 def on_page_markdown(markdown: str, page: Any, **_: object) -> str:

@@ -265,6 +265,26 @@ def test_a_row_that_begins_with_an_ellipsis_goes_on_with_the_row_above() -> None
     assert hook(page) == f"{head}| `x`<br>y | one, two \\| 2<br>three |\n{code}"
 
 
+def test_a_page_of_the_gallery_shows_what_its_script_says_and_no_progress() -> None:
+    hook = runpy.run_path(str(DOCS / "gallery_pages.py"))["without_clutter"]
+    made = "\n!!! note\n\n    Click [here](#x)\n    to download\n\n# Title\n\n!!! note\n\n    Mine\n"
+    said = "fit, 4 min so far: epoch 8, 100 %\nmotion, 35 s\nshaker, 35 s so far: a.nc, 57 %\n0.3 N\n"
+    assert hook(made + said) == "\n# Title\n\n!!! note\n\n    Mine\nmotion, 35 s\n0.3 N\n"
+
+
+def test_formulas_are_drawn_and_options_are_whole() -> None:
+    pytest.importorskip("latex2mathml", reason="the extra docs is not installed")
+    hook = runpy.run_path(str(DOCS / "inline_text.py"))["on_page_content"]
+    formula = hook(r'<p><span class="arithmatex">\(\frac{a}{b} &lt; 1\)</span></p>')
+    assert re.search(r"<math[^>]*>.*<mfrac>.*a.*b.*</mfrac>.*&#x0003C;.*</math>", formula)
+    assert 'display="block"' in hook('<div class="arithmatex">\n\\[x\\]</div>'.replace("\n", ""))
+    code = "<code>shaker --no-report RUN-1.nc -o OUT</code>"
+    whole = code.replace("--no-report", '<span class="option">--no-report</span>')
+    assert hook(code) == whole.replace("-o OUT", '<span class="option">-o</span> OUT')
+    block = "<pre><span></span><code>a --b</code></pre>"
+    assert hook(block) == block
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_rows_of_a_table_have_as_many_cells_as_its_head(page: Path) -> None:
     joined = runpy.run_path(str(DOCS / "table_rows.py"))["joined_rows"](page.read_text(encoding="utf-8"))
