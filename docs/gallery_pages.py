@@ -1,4 +1,4 @@
-"""Hook of mkdocs: pages of the gallery begin with their title and show only what a script says."""
+"""Hook of mkdocs: pages of the gallery begin with their title, show what a script says, and find its figures."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Any
 __all__ = ["on_page_markdown", "without_clutter"]
 
 NOTE = re.compile(r"!!! note\n\n(?:    .*\n)+\n*")
+SOURCES = re.compile(r' srcset="\.\./[^"]*"')
+"""Where figures would lie if every page were a folder (`use_directory_urls`)."""
 PROGRESS = re.compile(r"^[\w ]+, [\d hmins]+ so far.*\n", re.MULTILINE)
 
 
@@ -17,5 +19,5 @@ def on_page_markdown(markdown: str, page: Any, **_: object) -> str:
 
 
 def without_clutter(markdown: str) -> str:
-    """The same page without the note above its title, and without lines of progress in what was printed."""
-    return PROGRESS.sub("", NOTE.sub("", markdown, count=1))
+    """The same page without the note above its title, lines of progress, and second places of figures."""
+    return SOURCES.sub("", PROGRESS.sub("", NOTE.sub("", markdown, count=1)))

@@ -22,7 +22,7 @@ print(*found.summary, sep="\n")
 
 # %%
 # With the liquid frozen, damping is the same at every amplitude, and the three readings agree.
-# With the liquid free it rises many times over once the acceleration passes that of gravity.
+# With the liquid free it is ten times that near 3 g, where the liquid is thrown from floor to roof.
 frozen = {}
 for reading in found.experiment.free_runs[0].first_decay.readings:
     frozen[reading.method] = 100 * float(np.median(reading.damping_ratio[reading.used]))

@@ -8,6 +8,8 @@ and what to record for the others.
 
 from pathlib import Path
 
+from matplotlib import pyplot as plt
+
 from pipelines.diagnosis.case_builder import check_case
 
 raw_data = Path("../../raw_data")  # in docs/gallery of a checkout
@@ -22,13 +24,26 @@ print(*decays["lines"][1:], sep="\n")
 import shutil
 import tempfile
 
-lacking = {}
+checked = {}
 with tempfile.TemporaryDirectory() as made:
     for n_runs in (4, 2, 1):
         fewer = Path(made) / f"{n_runs}_runs"
         shutil.copytree(raw_data / "cases" / "friction" / "case", fewer)
         for file in sorted((fewer / "recordings").glob("*.nc"))[n_runs:]:
             file.unlink()
-        lacking[n_runs] = check_case(fewer)["lacking"]
-for n_runs, wanted in lacking.items():
-    print(f"{n_runs} of the runs; to record besides:", *wanted, sep="\n  - ")
+        checked[n_runs] = check_case(fewer)
+for n_runs, found in checked.items():
+    print(f"{n_runs} of the runs; to record besides:", *found["lacking"], sep="\n  - ")
+
+# %%
+# A dot is a question that can be answered.
+questions = checked[4]["possible"] + checked[4]["impossible"]
+figure, axes = plt.subplots(figsize=(9, 3.8), layout="constrained")
+for column, found in enumerate(checked.values()):
+    rows = [row for row, question in enumerate(questions) if question in found["possible"]]
+    axes.plot([column] * len(rows), rows, "o", ms=10, color="C2")
+axes.set(xlim=(-0.5, 2.5), ylim=(len(questions) - 0.5, -0.5), xlabel="runs of the case")
+axes.set_xticks(range(3), list(checked))
+axes.set_yticks(range(len(questions)), questions)
+axes.grid(alpha=0.4)
+plt.show()

@@ -41,7 +41,7 @@ TWIN = EquationTwin(
 #
 # The "machine" is integrated by SciPy, with 0.02 mm of noise.
 # Its spring hardens: k x + k₃ x³ with k₃ = 4·10⁶ N/m³, which the twin does not know.
-# Three levels of a slow sweep are recorded; the middle one chooses nothing.
+# Three levels of a slow sweep are recorded; one of them will choose nothing.
 K3, RATE_HZ, NOISE_M = 4.0e6, 250.0, 2e-5
 time = np.arange(round(8.0 * RATE_HZ)) / RATE_HZ
 rng = np.random.default_rng(1)

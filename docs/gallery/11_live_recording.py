@@ -74,5 +74,6 @@ time = original["time"].values
 axes.plot(time[shown], original["force_cell_1"].values[shown], color="0.75", lw=3, label="played")
 axes.plot(time[shown], np.where(lost, np.nan, counts)[shown], "C0.-", lw=0.8, label="recorded over the bad line")
 axes.set(xlabel="time [s]", ylabel="force_cell_1 [counts]")
-axes.legend(loc="upper right")
+axes.margins(y=0.25)
+axes.legend(loc="upper right", ncols=2)
 plt.show()

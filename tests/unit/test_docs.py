@@ -270,6 +270,7 @@ def test_a_page_of_the_gallery_shows_what_its_script_says_and_no_progress() -> N
     made = "\n!!! note\n\n    Click [here](#x)\n    to download\n\n# Title\n\n!!! note\n\n    Mine\n"
     said = "fit, 4 min so far: epoch 8, 100 %\nmotion, 35 s\nshaker, 35 s so far: a.nc, 57 %\n0.3 N\n"
     assert hook(made + said) == "\n# Title\n\n!!! note\n\n    Mine\nmotion, 35 s\n0.3 N\n"
+    assert hook('![a](./images/a.png){: .b srcset="../images/a.png"}') == "![a](./images/a.png){: .b}"
 
 
 def test_formulas_are_drawn_and_options_are_whole() -> None:
