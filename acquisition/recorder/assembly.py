@@ -15,6 +15,7 @@ from typing import Any, Final, Literal
 
 from acquisition.recorder.assembly_summary import AssemblySummary, acquisition_record, summarised
 from acquisition.recorder.journal import Journal
+from acquisition.recorder.mark_placement import packed_marks, place_of
 from acquisition.recorder.placed_samples import PlacedSamples
 from acquisition.recorder.placement import Loss, SourcePlacement, placed_source
 from acquisition.recorder.recording_file import require_readable_size, written_recording
@@ -126,7 +127,7 @@ def assemble(
     doubts = doubtful_sensors(parts, str(attributes["experiment"]))
     record = acquisition_record(journal, parts, losses)
     variables = variables_of(parts)
-    everything = {**attributes, "acquisition": json.dumps(record, allow_nan=False)}
+    everything = {**attributes, **_marks(journal, base), "acquisition": json.dumps(record, allow_nan=False)}
     with written_recording(output, dimensions_of(parts, n_samples), variables, everything) as file:
         n_lost = write_samples(file, parts, n_samples, rate_hz, advance)
     return summarised(
@@ -198,6 +199,13 @@ def _attributes(journal: Journal, output: Path, base: SourcePlacement, options: 
         "sloshlab_format": FORMAT,
         "sampling_rate_hz": base.info.sampling_rate_hz,
     }
+
+
+def _marks(journal: Journal, base: SourcePlacement) -> dict[str, str]:
+    """Attribute `marks`, where any were set."""
+    places = [(place_of(mark, base), mark.text) for mark in journal.marks]
+    inside = [(place / base.info.sampling_rate_hz, text) for place, text in places if place is not None]
+    return {"marks": packed_marks(inside)} if inside else {}
 
 
 def _start_time_utc(base: SourcePlacement) -> str:

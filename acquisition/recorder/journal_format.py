@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 
+from acquisition.recorder.mark import LONGEST_TEXT, Mark
 from acquisition.samples.channel import MOST_CHANNELS, Channel
 from acquisition.samples.delivery import End, Trouble, TroubleKind
 from acquisition.sources.interface import SourceInfo
@@ -71,6 +72,7 @@ class BlockType(enum.IntEnum):
     END = 5
     FAILURE = 6
     CLOSING = 7
+    MARK = 8
 
 
 class BlockHeader(NamedTuple):
@@ -247,6 +249,23 @@ def trouble_from(content: Mapping[str, Any]) -> Trouble:
         return Trouble(kind, str(content["detail"])[:1000], *numbers)
     except (KeyError, TypeError, ValueError) as error:
         raise MalformedBlockError(f"a trouble that is described wrongly ({error})") from error
+
+
+def described_mark(mark: Mark) -> dict[str, Any]:
+    """JSON object of a mark; the inverse of `mark_from`."""
+    return dataclasses.asdict(mark)
+
+
+def mark_from(content: Mapping[str, Any]) -> Mark:
+    """The mark that a journal describes; MalformedBlockError if it is none."""
+    try:
+        text = " ".join(str(content["text"]).split())[:LONGEST_TEXT]
+        moments = int(content["host_monotonic_ns"]), int(content["host_utc_ns"])
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise MalformedBlockError(f"a mark that is described wrongly ({error})") from error
+    if not is_in_file_range(*moments):
+        raise MalformedBlockError("a mark at an impossible moment")
+    return Mark(text, *moments)
 
 
 def end_from(content: Mapping[str, Any]) -> End:

@@ -25,11 +25,13 @@ from acquisition.recorder.journal_format import (
     BlockType,
     MalformedBlockError,
     end_from,
+    mark_from,
     source_from,
     trouble_from,
     unpacked_text,
 )
 from acquisition.recorder.journal_scanning import Damage, OpenFile, Scan
+from acquisition.recorder.mark import MOST_MARKS, Mark
 from acquisition.recorder.samples_index import IndexedBlocks, SamplesIndex, SamplesPlace
 from acquisition.samples.channel import MOST_CHANNELS
 from acquisition.samples.delivery import CountArray, End, Trouble
@@ -137,6 +139,8 @@ class Journal:
         Source and end.
     failures : tuple of (int, str)
         Source and why it delivered nothing more.
+    marks : tuple of Mark
+        In the order of writing; the first `MOST_MARKS`.
     closing : dict or None
         What the recorder wrote when it closed the journal; None if it did not.
     n_bytes, n_bytes_left_out : int
@@ -153,6 +157,7 @@ class Journal:
     trouble_counts: dict[tuple[int, str], int]
     ends: tuple[tuple[int, End], ...]
     failures: tuple[tuple[int, str], ...]
+    marks: tuple[Mark, ...]
     closing: dict[str, Any] | None
     n_bytes: int
     n_bytes_left_out: int
@@ -229,6 +234,7 @@ class _Collected:
     trouble_counts: dict[tuple[int, str], int] = field(default_factory=lambda: defaultdict(int))
     ends: list[tuple[int, End]] = field(default_factory=list)
     failures: list[tuple[int, str]] = field(default_factory=list)
+    marks: list[Mark] = field(default_factory=list)
     closing: dict[str, Any] | None = None
     n_blocks: int = 0
     n_metadata_bytes: int = 0
@@ -259,6 +265,7 @@ def _indexed(file: OpenFile) -> Journal:
         trouble_counts=dict(found.trouble_counts),
         ends=tuple(found.ends),
         failures=tuple(found.failures),
+        marks=tuple(found.marks[:MOST_MARKS]),
         closing=found.closing,
         n_bytes=file.n_bytes,
         n_bytes_left_out=scan.n_bytes_left_out,
@@ -285,6 +292,8 @@ def _collect(found: _Collected, start: int, header: BlockHeader, payload: bytes)
         _keep(found.ends, (header.source, end_from(content)))
     elif header.block_type == BlockType.FAILURE:
         _keep(found.failures, (header.source, str(content.get("message", ""))[:1000]))
+    elif header.block_type == BlockType.MARK:
+        _keep(found.marks, mark_from(content))
     elif header.block_type == BlockType.CLOSING:
         found.closing = content
     else:

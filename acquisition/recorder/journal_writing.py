@@ -18,6 +18,7 @@ from acquisition.recorder.journal_format import (
     NO_CLOCK,
     SAMPLES_HEAD,
     BlockType,
+    described_mark,
     described_source,
     described_trouble,
     is_in_file_range,
@@ -26,6 +27,7 @@ from acquisition.recorder.journal_format import (
     packed_text,
 )
 from acquisition.recorder.journal_lock import is_live, live_journal, lock_new_journal, remove_dead_journal
+from acquisition.recorder.mark import Mark
 from acquisition.samples.delivery import Block, CountArray, Delivery, End, Trouble
 from acquisition.sources.interface import SourceInfo
 from sloshlab.errors import JournalError
@@ -159,6 +161,11 @@ class JournalWriter:
             raise
         return file
 
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What is needed to make a recording of it, as it stands now; a copy."""
+        return dict(self._metadata)
+
     def update_metadata(self, more: Mapping[str, Any]) -> None:
         """Add to the metadata; later values take the place of earlier ones."""
         self._metadata.update(more)
@@ -194,6 +201,10 @@ class JournalWriter:
     def append_failure(self, source: int, message: str) -> None:
         """Note that nothing more comes from source number `source`, and why."""
         self._append(BlockType.FAILURE, source, packed_text({"message": message[:1000]}))
+
+    def append_mark(self, mark: Mark) -> None:
+        """Note a mark that a person set."""
+        self._append(BlockType.MARK, 0, packed_text(described_mark(mark)))
 
     def close(self, closing: Mapping[str, Any] | None = None) -> None:
         """Describe once more and close cleanly with a last block that says so; may be called twice."""

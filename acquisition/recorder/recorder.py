@@ -17,6 +17,8 @@ from typing import Final
 from acquisition.recorder.block_joining import BlockJoiner
 from acquisition.recorder.delivery_queue import BYTES_PER_SOURCE, Delivered, DeliveryQueue, Finished
 from acquisition.recorder.journal_writing import JournalWriter
+from acquisition.recorder.listener import Listener, NobodyListening
+from acquisition.recorder.mark import LONGEST_TEXT, MOST_MARKS, Mark
 from acquisition.recorder.reader_thread import ReaderThread
 from acquisition.recorder.source_record import SourceRecord
 from acquisition.recorder.status import (
@@ -99,6 +101,8 @@ class Recorder:
     journal : JournalWriter
         Made with the same sources in the same order; closed at the end.
     settings : RecorderSettings, optional
+    listener : Listener, optional
+        Gets everything that arrives, before it is written.
     monotonic_ns : callable
         Clock; given by tests.
     """
@@ -109,9 +113,11 @@ class Recorder:
         journal: JournalWriter,
         settings: RecorderSettings | None = None,
         *,
+        listener: Listener | None = None,
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._settings = settings or RecorderSettings()
+        self._listener = listener or NobodyListening()
         self._journal, self._monotonic_ns = journal, monotonic_ns
         self._queue = DeliveryQueue(len(sources), self._settings.bytes_per_source)
         together = threading.Barrier(len(sources))
@@ -123,6 +129,8 @@ class Recorder:
         ]
         self._records = [SourceRecord(source.info, monotonic_ns) for source in sources]
         self._joiner = BlockJoiner(journal, monotonic_ns, self._written)
+        self._marks: queue.SimpleQueue[Mark] = queue.SimpleQueue()
+        self._n_marks = 0
         self._lock = threading.Lock()
         self._began_ns = 0
         self._first_done_ns: int | None = None
@@ -136,6 +144,11 @@ class Recorder:
         # a plain attribute: a lock could be held by the very thread that the signal interrupts
         self._is_stop_requested = True
 
+    def mark(self, text: str) -> None:
+        """Put a mark of this moment into the recording; may be called from any thread."""
+        # stamped here: it may wait for the writer
+        self._marks.put(Mark(" ".join(text.split())[:LONGEST_TEXT], time.monotonic_ns(), time.time_ns()))
+
     def run(self, observer: Observer | None = None) -> RecordingOutcome:
         """Record until something ends it, then close the journal.
 
@@ -144,6 +157,7 @@ class Recorder:
         """
         watching = observer or NobodyWatching()
         self._began_ns = self._monotonic_ns()
+        self._listener.begins([record.info for record in self._records], self._journal.metadata, self.mark)
         # no daemon: the interpreter must not end within a write
         writer = threading.Thread(target=self._write, name="journal writer")
         try:
@@ -201,6 +215,7 @@ class Recorder:
             self._write_until_finished()
             # what still waits to be joined, before the last block says that all is there
             self._joiner.write_all()
+            self._write_marks()
             # only here is the journal closed with its last block: it vouches that everything is in it
             reason = self._reason or StopReason.SOURCES_FAILED
             self._journal.close({"reason": reason.name, "duration_s": self._settings.duration_s})
@@ -229,16 +244,29 @@ class Recorder:
                     self._take(item)
             with self._lock:
                 self._joiner.write_due()
+            self._write_marks()
             self._decide()
             # a driver that does not return keeps only its own samples from being complete
             if self._stopped_ns is not None and self._monotonic_ns() - self._stopped_ns > _READER_DEADLINE_NS:
                 self._leave_hanging_readers()
+
+    def _write_marks(self) -> None:
+        with contextlib.suppress(queue.Empty):
+            while True:
+                mark = self._marks.get_nowait()
+                self._n_marks += 1
+                if self._n_marks > MOST_MARKS:
+                    self._tell(None, f"mark not kept: a recording has {MOST_MARKS} at most", is_failure=False)
+                    continue
+                self._journal.append_mark(mark)
+                self._tell_event(Event(None, f"mark: {mark.text}", False, mark.host_monotonic_ns))
 
     def _take(self, item: Delivered | Finished) -> None:
         record = self._records[item.source]
         if isinstance(item, Finished):
             self._finish(item.source, item.error)
             return
+        self._listener.delivered(item.source, item.deliveries)
         for delivery in item.deliveries:
             self._joiner.add(item.source, delivery)
             message = record.take(delivery)
@@ -257,7 +285,10 @@ class Recorder:
         self._records[source].meters.update_levels(blocks)
 
     def _tell(self, source: int | None, message: str, *, is_failure: bool) -> None:
-        self._events.put(Event(source, message, is_failure))
+        self._tell_event(Event(source, message, is_failure))
+
+    def _tell_event(self, event: Event) -> None:
+        self._events.put(event)
 
     def _decide(self) -> None:
         """Stop everything, or single sources that have recorded enough."""

@@ -37,11 +37,15 @@ class StopReason(enum.Enum):
 
 @dataclass(frozen=True)
 class Event:
-    """Something a person must see at once; `source` is None if it concerns all."""
+    """Something a person must see at once; `source` is None if it concerns all.
+
+    `mark_ns` is the moment of a mark that was set, on the monotonic clock.
+    """
 
     source: int | None
     message: str
     is_failure: bool
+    mark_ns: int | None = None
 
 
 @dataclass(frozen=True)
@@ -101,3 +105,20 @@ class NobodyWatching:
 
     def status(self, status: RecorderStatus) -> None:
         """Nothing."""
+
+
+class SeveralWatching:
+    """Passes everything on to several observers, in their order."""
+
+    def __init__(self, *observers: Observer) -> None:
+        self._observers = observers
+
+    def event(self, event: Event) -> None:
+        """Tell each."""
+        for observer in self._observers:
+            observer.event(event)
+
+    def status(self, status: RecorderStatus) -> None:
+        """Show each."""
+        for observer in self._observers:
+            observer.status(status)

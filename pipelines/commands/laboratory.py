@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -22,6 +22,10 @@ from pipelines.report.terminal import say
 from sloshlab.configurations import CONFIGURATIONS, SLOSHING
 from sloshlab.errors import InputError
 from sloshlab.experiments import experiment_names
+
+if TYPE_CHECKING:
+    from pipelines.live_page.live_page import LivePage
+    from pipelines.recording.record import RecordSettings
 
 
 @app.command()
@@ -179,12 +183,19 @@ def record(
     redundant: Redundant = None,
     keep_journal: Annotated[bool, typer.Option("--keep-journal", help="Keep RUN.journal.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
+    page: Annotated[bool, typer.Option("--page", help="Serve a live page to a browser.")] = False,
+    page_port: Annotated[
+        int,
+        typer.Option("--page-port", metavar="N", min=0, max=65535, help="Port of the page; 0 is any free."),
+    ] = 0,
+    page_host: Annotated[
+        str, typer.Option("--page-host", metavar="HOST", help="Address that the page is served on.")
+    ] = "127.0.0.1",
     as_json: Json = False,
 ) -> None:
     """Live devices – serial, CAN, simulated – to one recording, through a crash-safe journal."""
-    from pipelines.recording.live_view import LiveView
+    from pipelines.live_page.live_page import LivePage, PageSettings
     from pipelines.recording.record import RecordSettings
-    from pipelines.recording.record import record as record_run
 
     settings = RecordSettings(
         sources=tuple(sources),
@@ -198,9 +209,27 @@ def record(
         keep_journal=keep_journal,
         overwrite=overwrite,
     )
-    with LiveView(output.absolute().parent, len(sources)) as view:
-        summary = record_run(settings, view)
+    if not page:
+        finish(_recorded(settings, None), as_json)
+        return
+    page_settings = PageSettings(output.absolute().parent, rig, page_host, page_port)
+    with LivePage(page_settings, lambda line, is_warning: say(line, error=is_warning)) as live_page:
+        say(f"page {live_page.url}")
+        summary = _recorded(settings, live_page)
+        live_page.finished(summary)
     finish(summary, as_json)
+
+
+def _recorded(settings: RecordSettings, live_page: LivePage | None) -> dict[str, Any]:
+    """Record, watched on the terminal and, if there is one, on the live page."""
+    from acquisition.recorder.status import SeveralWatching
+    from pipelines.recording.live_view import LiveView
+    from pipelines.recording.record import record as record_run
+
+    with LiveView(settings.output.absolute().parent, len(settings.sources)) as view:
+        if live_page is None:
+            return record_run(settings, view)
+        return record_run(settings, SeveralWatching(view, live_page), listener=live_page)
 
 
 @app.command()

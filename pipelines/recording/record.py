@@ -15,6 +15,7 @@ from typing import Any, Final
 from acquisition.recorder.assembly import assemble
 from acquisition.recorder.assembly_summary import AssemblySummary
 from acquisition.recorder.journal import JournalWriter, existing_journal, is_live, read_journal
+from acquisition.recorder.listener import Listener
 from acquisition.recorder.longest_recording import longest_duration_s
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
 from acquisition.recorder.recording_plan import require_recordable
@@ -89,6 +90,7 @@ def record(
     settings: RecordSettings,
     observer: Observer | None = None,
     *,
+    listener: Listener | None = None,
     open_source: Callable[[str], Source] = open_source,
 ) -> dict[str, Any]:
     """Record one run.
@@ -98,6 +100,8 @@ def record(
     settings : RecordSettings
     observer : Observer, optional
         Shown what happens while it records.
+    listener : Listener, optional
+        Gets a copy of everything that arrives.
     open_source : callable
         Makes the unopened source of a URL; given by tests.
 
@@ -117,8 +121,9 @@ def record(
     with contextlib.ExitStack() as lock:
         with opened([open_source(url) for url in settings.sources]) as sources:
             recorder_settings = _checked_recorder_settings(settings, metadata, [source.info for source in sources])
-            journal_of = functools.partial(_new_journal, settings, metadata)
-            outcome = _recorded(sources, journal_of, recorder_settings, lock, observer)
+            journal_of = functools.partial(_new_journal, settings, metadata, [source.info for source in sources])
+            recorder_of = functools.partial(_recorder, sources, recorder_settings, listener)
+            outcome = _recorded(journal_of, recorder_of, lock, observer)
         return _made_of_journal(settings, outcome)
 
 
@@ -187,21 +192,26 @@ def _new_journal(settings: RecordSettings, metadata: dict[str, Any], infos: Sequ
     return JournalWriter(settings.journal, metadata, infos, overwrite=settings.overwrite)
 
 
+def _recorder(
+    sources: Sequence[Source], settings: RecorderSettings, listener: Listener | None, journal: JournalWriter
+) -> Recorder:
+    return Recorder(sources, journal, settings, listener=listener)
+
+
 def _recorded(
-    sources: Sequence[Source],
-    journal_of: Callable[[Sequence[SourceInfo]], JournalWriter],
-    settings: RecorderSettings,
+    journal_of: Callable[[], JournalWriter],
+    recorder_of: Callable[[JournalWriter], Recorder],
     lock: contextlib.ExitStack,
     observer: Observer | None,
 ) -> RecordingOutcome:
     """Record; the journal stays locked until `lock` is closed."""
     with contextlib.ExitStack() as until_started:
-        journal = journal_of([source.info for source in sources])
+        journal = journal_of()
         # an interrupt before the first sample leaves nothing behind
         until_started.callback(journal.path.unlink, missing_ok=True)
         until_started.callback(journal.abandon)
         lock.enter_context(journal.kept_locked())
-        recorder = Recorder(sources, journal, settings)
+        recorder = recorder_of(journal)
         with _signals_stop(recorder):
             until_started.pop_all()
             return recorder.run(observer)
