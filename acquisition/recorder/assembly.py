@@ -18,6 +18,7 @@ from acquisition.recorder.journal import Journal
 from acquisition.recorder.mark_placement import packed_marks, place_of
 from acquisition.recorder.placed_samples import PlacedSamples
 from acquisition.recorder.placement import Loss, SourcePlacement, placed_source
+from acquisition.recorder.pre_trigger import Trigger, trigger_from
 from acquisition.recorder.recording_file import require_readable_size, written_recording
 from acquisition.recorder.recording_plan import (
     Part,
@@ -109,7 +110,9 @@ def assemble(
     placements, without_samples = _placements(journal)
     base = placements[0]
     rate_hz = base.info.sampling_rate_hz
-    attributes = _attributes(journal, output, base, chosen)
+    trigger = trigger_from(journal.metadata, f"journal {journal.path}")
+    n_before = _n_before(trigger, base)
+    attributes = _attributes(journal, output, base, n_before, chosen)
     losses = [loss for placement in placements for loss in placement.losses()]
     require_readable_size(
         # before anything of that size is read or written: a wrong counter can span years
@@ -125,11 +128,12 @@ def assemble(
     named_channels = [pair for part in parts for pair in part.named_channels]
     attributes = checked_attributes(attributes, named_channels, str(output), rate_hz)
     doubts = doubtful_sensors(parts, str(attributes["experiment"]))
-    record = acquisition_record(journal, parts, losses)
-    variables = variables_of(parts)
-    everything = {**attributes, **_marks(journal, base), "acquisition": json.dumps(record, allow_nan=False)}
+    record = acquisition_record(journal, parts, losses) | _triggered(trigger, n_before)
+    variables = variables_of(parts, n_before / rate_hz)
+    everything = {**attributes, **_marks(journal, base, n_before)}
+    everything["acquisition"] = json.dumps(record, allow_nan=False)
     with written_recording(output, dimensions_of(parts, n_samples), variables, everything) as file:
-        n_lost = write_samples(file, parts, n_samples, rate_hz, advance)
+        n_lost = write_samples(file, parts, n_samples, (rate_hz, -n_before), advance)
     return summarised(
         journal, parts, losses, output=output, n_samples=n_samples, n_lost=n_lost, record=record,
         doubts=[*without_samples, *doubts],
@@ -185,14 +189,16 @@ def _placements(journal: Journal) -> tuple[list[SourcePlacement], list[str]]:
     return placements, remarks
 
 
-def _attributes(journal: Journal, output: Path, base: SourcePlacement, options: AssemblyOptions) -> dict[str, Any]:
+def _attributes(
+    journal: Journal, output: Path, base: SourcePlacement, n_before: int, options: AssemblyOptions
+) -> dict[str, Any]:
     noted = journal.metadata.get("attributes", {})
     return {
         "run_id": output.stem,
         "experiment": "other",
         "configuration": "sloshing",
         "rig": "",
-        "start_time_utc": _start_time_utc(base),
+        "start_time_utc": _start_time_utc(base, n_before),
         **(noted if isinstance(noted, dict) else {}),
         **options.attributes,
         # last: neither the journal nor an option may say otherwise
@@ -201,15 +207,31 @@ def _attributes(journal: Journal, output: Path, base: SourcePlacement, options: 
     }
 
 
-def _marks(journal: Journal, base: SourcePlacement) -> dict[str, str]:
+def _n_before(trigger: Trigger | None, base: SourcePlacement) -> int:
+    """Samples of the first device before the trigger, 0 without one: time counts from it."""
+    if trigger is None:
+        return 0
+    for stream in base.streams:
+        if stream.stream == trigger.stream:
+            return stream.first_index + trigger.counter - stream.first_counter
+    return 0
+
+
+def _triggered(trigger: Trigger | None, n_before: int) -> dict[str, Any]:
+    """What the attribute `acquisition` says of the trigger."""
+    return {"trigger": {**trigger.described(), "n_samples_before": n_before}} if trigger else {}
+
+
+def _marks(journal: Journal, base: SourcePlacement, n_before: int) -> dict[str, str]:
     """Attribute `marks`, where any were set."""
     places = [(place_of(mark, base), mark.text) for mark in journal.marks]
-    inside = [(place / base.info.sampling_rate_hz, text) for place, text in places if place is not None]
+    rate_hz = base.info.sampling_rate_hz
+    inside = [((place - n_before) / rate_hz, text) for place, text in places if place is not None]
     return {"marks": packed_marks(inside)} if inside else {}
 
 
-def _start_time_utc(base: SourcePlacement) -> str:
-    """When the first sample was taken, as well as arrivals tell."""
+def _start_time_utc(base: SourcePlacement, n_before: int) -> str:
+    """When the sample at time 0 was taken, as well as arrivals tell: the first one, or that of the trigger."""
     arrivals = []
     for group in base.groups:
         if len(group.entries):
@@ -217,7 +239,8 @@ def _start_time_utc(base: SourcePlacement) -> str:
             last = group.index[0] + group.entries.n_samples[0] - 1
             arrivals.append(int(group.entries.host_utc_ns[0]) * 1e-9 - int(last) / base.info.sampling_rate_hz)
     try:
-        moment = datetime.fromtimestamp(0, UTC) + timedelta(milliseconds=round(1e3 * min(arrivals)))
+        start_s = min(arrivals) + n_before / base.info.sampling_rate_hz
+        moment = datetime.fromtimestamp(0, UTC) + timedelta(milliseconds=round(1e3 * start_s))
     # a journal may hold any time
     except (OverflowError, ValueError):
         moment = datetime.fromtimestamp(0, UTC)

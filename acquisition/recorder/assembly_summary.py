@@ -105,10 +105,10 @@ def summarised(
     doubts: Sequence[str],
 ) -> AssemblySummary:
     """Lines and flags of an assembly that was written."""
-    lines = [line for part in parts for line in _part_lines(part)]
+    lines = [*_trigger_lines(record), *(line for part in parts for line in _part_lines(part))]
     lines += described({part.label: part.alignment for part in parts})
     lines += [f"{count} × {TroubleKind[kind].value}" for kind, count in record["troubles"]["counts"].items()]
-    flags = [flag for part in parts for flag in _part_flags(part, losses)]
+    flags = [*_trigger_flags(record), *(flag for part in parts for flag in _part_flags(part, losses))]
     flags += [flag for part in parts for flag in _damage_flags(journal, part)]
     flags += [
         f"{count} × {TroubleKind[kind].value}"
@@ -126,6 +126,20 @@ def summarised(
         flags=tuple(flags),
         record=record,
     )
+
+
+def _trigger_lines(record: dict[str, Any]) -> Iterator[str]:
+    if "trigger" in record:
+        trigger = record["trigger"]
+        yield f"trigger {trigger['condition']}: time 0, with {trigger['n_samples_before']} samples before it"
+
+
+def _trigger_flags(record: dict[str, Any]) -> Iterator[str]:
+    if "trigger" in record and record["trigger"]["n_samples_before"] < record["trigger"]["n_asked"]:
+        yield (
+            f"only {record['trigger']['n_samples_before']} samples before the trigger, of "
+            f"{record['trigger']['n_asked']} asked for: it came too soon after the start"
+        )
 
 
 def _device(part: Part) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from acquisition.recorder.arrival_order import out_of_order
 from acquisition.recorder.journal import Entries, Journal
+from acquisition.recorder.pre_trigger import trigger_from
 from acquisition.sources.interface import SourceInfo
 from sloshlab.conditioning.device_clock import ClockStatus, DeviceClock, fitted_device_clock
 from sloshlab.errors import JournalError
@@ -178,10 +179,13 @@ def placed_source(journal: Journal, source: int) -> SourcePlacement:
     info = journal.sources[source]
     entries = [journal.entries[source, group] for group in range(len(info.groups))]
     _require_possible(journal, info, entries)
+    trigger = trigger_from(journal.metadata, f"journal {journal.path}")
+    starts = {stream: counter for number, stream, counter in trigger.starts if number == source} if trigger else {}
     ends = {end.stream: end.n_samples for number, end in journal.ends if number == source}
     streams: list[Stream] = []
     for number in _streams_in_order(entries):
-        placed = _stream(info, entries, number, ends.get(number), is_complete=journal.closed_cleanly)
+        bounds = starts.get(number), ends.get(number)
+        placed = _stream(info, entries, number, bounds, is_complete=journal.closed_cleanly)
         if placed.n_samples > 0:
             streams.append(_following(streams[-1], placed, info.sampling_rate_hz) if streams else placed)
     if not streams:
@@ -224,15 +228,22 @@ def _streams_in_order(entries: Sequence[Entries]) -> list[int]:
 
 
 def _stream(
-    info: SourceInfo, entries: Sequence[Entries], number: int, taken: int | None, *, is_complete: bool
+    info: SourceInfo,
+    entries: Sequence[Entries],
+    number: int,
+    bounds: tuple[int | None, int | None],
+    *,
+    is_complete: bool,
 ) -> Stream:
+    start, taken = bounds
     own = [(entry.counter[mask], entry.n_samples[mask], entry.host_monotonic_ns[mask])
            for entry in entries if (mask := entry.stream == number).any()]  # fmt: skip
     # by counter, not by arrival: the first block to come may be a late one
     firsts = [int(counter.min()) for counter, _, _ in own]
     lasts = [int((counter + n).max()) for counter, n, _ in own]
     ragged = math.ceil(RAGGED_S * info.sampling_rate_hz)
-    first = _first_counter(firsts, ragged)
+    # the recorder left out what came before its trigger: it was not lost
+    first = _first_counter(firsts, ragged) if start is None else start
     last, not_shown = _last_counter(lasts, first, ragged, taken, info.sampling_rate_hz, is_complete=is_complete)
     clock = fitted_device_clock(
         # a host time belongs to the last sample of its block

@@ -19,6 +19,7 @@ from acquisition.recorder.delivery_queue import BYTES_PER_SOURCE, Delivered, Del
 from acquisition.recorder.journal_writing import JournalWriter
 from acquisition.recorder.listener import Listener, NobodyListening
 from acquisition.recorder.mark import LONGEST_TEXT, MOST_MARKS, Mark
+from acquisition.recorder.pre_trigger import PreTrigger
 from acquisition.recorder.reader_thread import ReaderThread
 from acquisition.recorder.source_record import SourceRecord
 from acquisition.recorder.status import (
@@ -30,7 +31,8 @@ from acquisition.recorder.status import (
     SourceState,
     StopReason,
 )
-from acquisition.samples.delivery import Block
+from acquisition.recorder.trigger_condition import Condition
+from acquisition.samples.delivery import Block, Delivery
 from acquisition.sources.interface import Source
 from sloshlab.errors import JournalError, SloshlabError
 
@@ -56,6 +58,10 @@ class RecorderSettings:
         With a duration: the recording ends when no source has brought anything for so long.
     longest_s : float or None
         The recording ends when a device has sampled for so long, silences included [s], see `longest_duration_s`.
+    trigger : tuple of Condition
+        Any of them starts the recording, see `PreTrigger`; without one it starts with the first sample.
+    n_before_trigger : int
+        Samples of the first device that are kept from before it. Durations count from the first sample kept.
     bytes_per_source : int
         Held in memory at most, per source, between reading and writing.
     """
@@ -65,6 +71,8 @@ class RecorderSettings:
     silence_warning_s: float = 5.0
     silence_limit_s: float = 60.0
     longest_s: float | None = None
+    trigger: tuple[Condition, ...] = ()
+    n_before_trigger: int = 0
     bytes_per_source: int = BYTES_PER_SOURCE
 
 
@@ -128,6 +136,10 @@ class Recorder:
             for number, source in enumerate(sources)
         ]
         self._records = [SourceRecord(source.info, monotonic_ns) for source in sources]
+        self._gate: PreTrigger | None = None
+        if self._settings.trigger:
+            infos = [source.info for source in sources]
+            self._gate = PreTrigger(infos, self._settings.trigger, self._settings.n_before_trigger)
         self._joiner = BlockJoiner(journal, monotonic_ns, self._written)
         self._marks: queue.SimpleQueue[Mark] = queue.SimpleQueue()
         self._n_marks = 0
@@ -186,11 +198,12 @@ class Recorder:
             elapsed_s = (self._monotonic_ns() - self._began_ns) * 1e-9
             sources = tuple(record.status(self._queue.fill(number)) for number, record in enumerate(self._records))
             n_bytes, is_stopping = self._journal.n_bytes, self._stopped_ns is not None
-            return RecorderStatus(elapsed_s, self._remaining_s(), n_bytes, is_stopping, sources)
+            waiting_for = self._gate.waiting_for if self._gate is not None else ""
+            return RecorderStatus(elapsed_s, self._remaining_s(), n_bytes, is_stopping, sources, waiting_for)
 
     def _remaining_s(self) -> float | None:
         running = [record for record in self._records if not record.is_finished]
-        if self._settings.duration_s is None or not running:
+        if self._settings.duration_s is None or not running or self._gate is not None:
             return None
         return max(0.0, self._settings.duration_s - running[0].recorded_s)
 
@@ -259,19 +272,45 @@ class Recorder:
                     self._tell(None, f"mark not kept: a recording has {MOST_MARKS} at most", is_failure=False)
                     continue
                 self._journal.append_mark(mark)
+                with self._lock:
+                    if self._gate is not None and self._gate.mark():
+                        self._begin(self._gate)
                 self._tell_event(Event(None, f"mark: {mark.text}", False, mark.host_monotonic_ns))
 
     def _take(self, item: Delivered | Finished) -> None:
-        record = self._records[item.source]
         if isinstance(item, Finished):
             self._finish(item.source, item.error)
             return
         self._listener.delivered(item.source, item.deliveries)
         for delivery in item.deliveries:
-            self._joiner.add(item.source, delivery)
-            message = record.take(delivery)
+            if self._gate is None:
+                self._joiner.add(item.source, delivery)
+            message = self._records[item.source].take(delivery)
             if message:
                 self._tell(item.source, message, is_failure=False)
+            if self._gate is not None:
+                self._hold(self._gate, item.source, delivery)
+
+    def _hold(self, gate: PreTrigger, source: int, delivery: Delivery) -> None:
+        """Keep a delivery for the case that the trigger comes soon, and begin if it is there."""
+        if isinstance(delivery, Block) and len(delivery.counts):
+            self._records[source].meters.update_levels([delivery])
+        gate.take(source, delivery)
+        if gate.trigger is not None:
+            self._begin(gate)
+
+    def _begin(self, gate: PreTrigger) -> None:
+        """Begin to record, with what is held from before the trigger."""
+        assert gate.trigger is not None
+        # before its samples: a journal that is cut short says where they belong, too
+        self._journal.update_metadata({"trigger": gate.trigger.described()})
+        # what came while it waited is no part of the recording, and neither are its losses
+        self._records = [record.begun_anew() for record in self._records]
+        for source, delivery in gate.released():
+            self._joiner.add(source, delivery)
+            self._records[source].take(delivery)
+        self._gate = None
+        self._tell(None, f"trigger: {gate.trigger.condition}", is_failure=False)
 
     def _finish(self, number: int, error: str | None) -> None:
         self._records[number].finish(error)
@@ -313,15 +352,19 @@ class Recorder:
 
     def _reason_to_stop_running(self, running: list[SourceRecord]) -> StopReason | None:
         settings = self._settings
+        if self._gate is not None:
+            return StopReason.SILENCE if self._is_too_quiet(running) else None
         if settings.duration_s is not None and self._has_recorded(settings.duration_s, running):
             return StopReason.DURATION
         # what no reader takes would not be assembled, and its journal not be recovered by any command
         if settings.longest_s is not None and max(record.length_s for record in running) >= settings.longest_s:
             return StopReason.TOO_LONG
+        return StopReason.SILENCE if self._is_too_quiet(running) else None
+
+    def _is_too_quiet(self, running: list[SourceRecord]) -> bool:
         # without a duration silence is no reason to end: the person who started it decides
         quiet_s = min(record.quiet_s for record in running)
-        is_over = settings.duration_s is not None and quiet_s > settings.silence_limit_s
-        return StopReason.SILENCE if is_over else None
+        return self._settings.duration_s is not None and quiet_s > self._settings.silence_limit_s
 
     def _has_recorded(self, duration_s: float, running: list[SourceRecord]) -> bool:
         """Whether the first source has recorded enough, and the others cover it or bring nothing more."""

@@ -135,8 +135,8 @@ def stored_type(channel: Channel, survey: ChannelSurvey) -> tuple[np.dtype[Any],
     )
 
 
-def variables_of(parts: Sequence[Part]) -> list[Variable]:
-    """All variables of the recording, time and quality included."""
+def variables_of(parts: Sequence[Part], before_s: float = 0.0) -> list[Variable]:
+    """All variables of the recording, time and quality included; it begins `before_s` before time 0."""
     variables = [Variable("time", "time", np.float64, {"units": "s"})]
     for part in parts:
         columns = zip(part.names, part.channels, part.stored, strict=True)
@@ -146,7 +146,7 @@ def variables_of(parts: Sequence[Part]) -> list[Variable]:
                 for name, channel, (dtype, fill) in columns
             ]
         else:
-            variables += _resampled_variables(part)
+            variables += _resampled_variables(part, before_s)
     return [*variables, Variable("quality", "time", np.uint8, quality_attributes())]
 
 
@@ -156,10 +156,10 @@ def dimensions_of(parts: Sequence[Part], n_samples: int) -> dict[str, int]:
     return {"time": n_samples, **own}
 
 
-def _resampled_variables(part: Part) -> list[Variable]:
+def _resampled_variables(part: Part, before_s: float) -> list[Variable]:
     """Values on the time base, and beside them the counts as they were taken."""
     dimension = f"sample_{part.label}"
-    place = {"first_sample_s": part.alignment.start_s, "sample_step_s": part.alignment.step_s}
+    place = {"first_sample_s": part.alignment.start_s - before_s, "sample_step_s": part.alignment.step_s}
     values, counts = [], []
     for name, channel, (dtype, fill) in zip(part.names, part.channels, part.stored, strict=True):
         resampled = {**attributes_of(channel), "resampled_from": f"counts_{name}"}

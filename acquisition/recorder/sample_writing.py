@@ -32,10 +32,19 @@ def write_samples(
     file: RecordingFile,
     parts: Sequence[Part],
     n_samples: int,
-    rate_hz: float,
+    time_base: tuple[float, int],
     advance: Callable[[int], None] = lambda n_samples: None,
 ) -> dict[str, int]:
     """Write all samples; `advance` is called with their number after each stretch.
+
+    Parameters
+    ----------
+    file : RecordingFile
+    parts : sequence of Part
+    n_samples : int
+    time_base : tuple of (float, int)
+        Samples per second, and the number of the first sample counted from time 0.
+    advance : callable
 
     Returns
     -------
@@ -43,10 +52,11 @@ def write_samples(
         Lost values on the time base, by channel.
     """
     lost: dict[str, int] = {}
+    rate_hz, origin = time_base
     ratio = max(part.placement.info.sampling_rate_hz / rate_hz for part in parts)
     n_each = samples_at_once(max(len(part.channels) for part in parts), ratio)
     for start, stop in stretches(n_samples, n_each):
-        file.put("time", start, np.arange(start, stop) / rate_hz)
+        file.put("time", start, np.arange(start + origin, stop + origin) / rate_hz)
         quality = np.zeros(stop - start, np.uint8)
         for part in parts:
             write = _put_counts if part.alignment.is_on_base else _put_values

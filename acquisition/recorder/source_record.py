@@ -57,6 +57,13 @@ class SourceRecord:
             return None
         return self._take_trouble(delivery)
 
+    def begun_anew(self) -> SourceRecord:
+        """The same source, of which nothing was recorded yet."""
+        new = SourceRecord(self.info, self._monotonic_ns)
+        new.error, new.is_finished = self.error, self.is_finished
+        new._has_ended, new._is_disconnected = self._has_ended, self._is_disconnected
+        return new
+
     def finish(self, error: str | None) -> None:
         """Nothing more comes."""
         self.is_finished, self.error = True, error

@@ -68,13 +68,17 @@ class SourceStatus:
 
 @dataclass(frozen=True)
 class RecorderStatus:
-    """The recorder at a moment; times in seconds of this computer's clock since the start."""
+    """The recorder at a moment; times in seconds of this computer's clock since the start.
+
+    `waiting_for` says which trigger has not come yet; nothing is recorded until then.
+    """
 
     elapsed_s: float
     remaining_s: float | None
     n_bytes_written: int
     is_stopping: bool
     sources: tuple[SourceStatus, ...]
+    waiting_for: str = ""
 
 
 @dataclass(frozen=True)

@@ -183,6 +183,21 @@ def record(
     redundant: Redundant = None,
     keep_journal: Annotated[bool, typer.Option("--keep-journal", help="Keep RUN.journal.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
+    trigger: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--trigger",
+            metavar="CONDITION",
+            help="Begin when it is met; CHANNEL>LEVEL and others.",
+            show_default=False,
+        ),
+    ] = None,
+    pre_seconds: Annotated[
+        float | None,
+        typer.Option(
+            "--pre-seconds", metavar="S", help="Seconds kept from before the trigger.", show_default=False
+        ),
+    ] = None,
     page: Annotated[bool, typer.Option("--page", help="Serve a live page to a browser.")] = False,
     page_port: Annotated[
         int,
@@ -197,6 +212,7 @@ def record(
     from pipelines.live_page.live_page import LivePage, PageSettings
     from pipelines.recording.record import RecordSettings
 
+    _require_trigger(trigger or [], pre_seconds, page=page)
     settings = RecordSettings(
         sources=tuple(sources),
         rig=rig,
@@ -206,6 +222,8 @@ def record(
         attributes=tuple(attribute or ()),
         align=align,
         redundant=tuple(redundant or ()),
+        trigger=tuple(trigger or ()),
+        pre_s=pre_seconds or 0.0,
         keep_journal=keep_journal,
         overwrite=overwrite,
     )
@@ -218,6 +236,14 @@ def record(
         summary = _recorded(settings, live_page)
         live_page.finished(summary)
     finish(summary, as_json)
+
+
+def _require_trigger(trigger: list[str], pre_seconds: float | None, *, page: bool) -> None:
+    """Refuse options that need another one."""
+    if pre_seconds is not None and not trigger:
+        raise typer.BadParameter("--pre-seconds needs --trigger")
+    if "mark" in trigger and not page:
+        raise typer.BadParameter("--trigger mark needs --page, where the mark is set")
 
 
 def _recorded(settings: RecordSettings, live_page: LivePage | None) -> dict[str, Any]:

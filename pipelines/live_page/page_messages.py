@@ -15,6 +15,7 @@ def described_status(status: RecorderStatus, n_skipped: int) -> dict[str, Any]:
         "elapsed_s": status.elapsed_s,
         "remaining_s": status.remaining_s,
         "n_bytes_written": status.n_bytes_written,
+        "waiting_for": status.waiting_for,
         "is_stopping": status.is_stopping,
         "n_skipped": n_skipped,
         "sources": [_described_source(source) for source in status.sources],

@@ -167,6 +167,8 @@ def _heading(status: RecorderStatus, n_bytes_free: int | None) -> Text:
     from rich.text import Text
 
     line = Text("stopping " if status.is_stopping else "recording ", style="bold")
+    if status.waiting_for:
+        line = Text(f"waiting for {printable(status.waiting_for)} ", style="bold yellow")
     line.append(clock_text(status.elapsed_s))
     if status.remaining_s is not None:
         line.append(f"   {clock_text(status.remaining_s)} left")

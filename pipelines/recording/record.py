@@ -17,10 +17,12 @@ from acquisition.recorder.assembly_summary import AssemblySummary
 from acquisition.recorder.journal import JournalWriter, existing_journal, is_live, read_journal
 from acquisition.recorder.listener import Listener
 from acquisition.recorder.longest_recording import longest_duration_s
+from acquisition.recorder.pre_trigger import require_triggerable
 from acquisition.recorder.recorder import Recorder, RecorderSettings, opened
 from acquisition.recorder.recording_plan import require_recordable
 from acquisition.recorder.source_alignment import require_alignable
 from acquisition.recorder.status import Observer, RecordingOutcome, SourceStatus, StopReason
+from acquisition.recorder.trigger_condition import parsed_condition
 from acquisition.sources.interface import Source, SourceInfo
 from acquisition.sources.urls import open_source
 from pipelines.recording.alignment_choice import channel_pairs, checked_align
@@ -66,6 +68,10 @@ class RecordSettings:
     align : {"host", "device", "counter"}
     redundant : tuple of str
         ``A:B``, channels of two devices that show the same motion.
+    trigger : tuple of str
+        Conditions, see `trigger_condition`; any of them starts the recording, and `duration_s` counts from it.
+    pre_s : float
+        Of the first device's samples before the trigger.
     keep_journal, overwrite : bool
     """
 
@@ -77,6 +83,8 @@ class RecordSettings:
     attributes: tuple[str, ...] = ()
     align: str = "host"
     redundant: tuple[str, ...] = ()
+    trigger: tuple[str, ...] = ()
+    pre_s: float = 0.0
     keep_journal: bool = False
     overwrite: bool = False
 
@@ -130,6 +138,13 @@ def record(
 def _made_of_journal(settings: RecordSettings, outcome: RecordingOutcome) -> dict[str, Any]:
     if outcome.storage_error is not None:
         raise JournalError(f"{outcome.storage_error}; {_recovery(settings)}")
+    waiting_for = outcome.status.waiting_for
+    if waiting_for:
+        settings.journal.unlink(missing_ok=True)
+        raise SourceError(
+            f"--trigger {waiting_for}", got=f"no event in {outcome.status.elapsed_s:.1f} s", allowed="an event",
+            remedy="another level, or no trigger",
+        )  # fmt: skip
     if not any(source.n_samples for source in outcome.status.sources):
         settings.journal.unlink(missing_ok=True)
         raise SourceError(_why_nothing(outcome))
@@ -146,6 +161,8 @@ def _checked_metadata(settings: RecordSettings) -> dict[str, Any]:
         raise InputError("--source", got="the same source twice", allowed="each source once")
     if settings.duration_s is not None and not 0 < settings.duration_s <= LONGEST_DURATION_S:
         raise InputError("--duration", got=f"{settings.duration_s:g} s", allowed=f"0 … {LONGEST_DURATION_S:g} s")
+    for condition in settings.trigger:
+        parsed_condition(condition)
     chosen = {"align": checked_align(settings.align), "redundant": channel_pairs(settings.redundant)}
     Rig.from_toml(settings.rig)
     attributes = checked_run_attributes(settings.output, settings.rig, settings.run, settings.attributes)
@@ -173,8 +190,16 @@ def _checked_recorder_settings(
     require_recordable(infos, metadata["attributes"], f"recording {settings.output}")
     require_alignable(infos, settings.align, metadata["redundant"])
     longest_s = longest_duration_s(infos, settings.align)
-    _require_readable_duration(settings.duration_s, longest_s)
-    return RecorderSettings(settings.duration_s, longest_s=longest_s)
+    conditions = tuple(parsed_condition(condition) for condition in settings.trigger)
+    duration_s = settings.duration_s
+    n_before = 0
+    if conditions:
+        require_triggerable(conditions, infos, settings.pre_s)
+        n_before = round(settings.pre_s * infos[0].sampling_rate_hz)
+        # that of the recorder counts from the first sample that is kept
+        duration_s = None if duration_s is None else duration_s + n_before / infos[0].sampling_rate_hz
+    _require_readable_duration(duration_s, longest_s)
+    return RecorderSettings(duration_s, longest_s=longest_s, trigger=conditions, n_before_trigger=n_before)
 
 
 def _require_readable_duration(duration_s: float | None, longest_s: float) -> None:

@@ -305,6 +305,8 @@ function drawAnalyses() {
   if (!$("trend").hidden) plots.trend($("trend"), work.trend, "time [s]", work.trend_label);
   $("loop").hidden = !work.loop;
   put($("loop-note"), work.loop ? work.loop.note : work.note || "");
+  const named = work.loop || {};
+  $("loop").setAttribute("aria-label", `${named.y_label} over ${named.x_label}`);
   if (work.loop) plots.loop($("loop"), work.loop.cycles, work.loop.x_label, work.loop.y_label);
 }
 
