@@ -64,7 +64,7 @@ class Access:
         """Whether the header `Origin` is that of this page."""
         if header is None or not header.startswith("http://"):
             return False
-        return self.is_own_host(urlsplit(header).netloc)
+        return self.is_own_host(header.removeprefix("http://"))
 
     def url(self, host: str | None = None) -> str:
         """Where a browser finds the page."""
