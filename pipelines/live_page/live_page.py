@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import subprocess
 import sys
@@ -88,9 +89,8 @@ class LivePage:
             self.url = self._announced()
         except BaseException:
             self._process.kill()
-            self._process.wait()
+            self._let_go()
             raise
-        # no daemons would be safer for the pipe, but a browser must not keep a command from ending
         self._feeder = threading.Thread(target=self._feed, name="live page", daemon=True)
         self._hearer = threading.Thread(target=self._hear, name="marks of the live page", daemon=True)
         self._feeder.start()
@@ -110,11 +110,13 @@ class LivePage:
             self.finished({"lines": [], "flags": [" ".join(str(error).split()) or type(error).__name__]})
         self._is_ending = True
         self._feeder.join(_END_TIMEOUT_S)
-        try:
+        with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_END_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        # nothing happens to one that has ended; both threads end with it
+        self._process.kill()
+        self._feeder.join()
+        self._hearer.join()
+        self._let_go()
 
     def begins(
         self, infos: Sequence[SourceInfo], metadata: Mapping[str, Any], mark: Callable[[str], None]
@@ -150,6 +152,14 @@ class LivePage:
         """Show how the recording went."""
         content = {key: [str(line) for line in summary.get(key, ())] for key in ("lines", "flags")}
         self._messages.append(packed_message("finished", content))
+
+    def _let_go(self) -> None:
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            # what could not be written any more is tried once more by closing
+            with contextlib.suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
 
     def _announced(self) -> str:
         """URL of the page, as soon as its process listens."""
