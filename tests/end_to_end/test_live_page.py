@@ -264,7 +264,7 @@ def pixels_like(page: Any, colour: str) -> int:
 
 
 def test_a_browser_sees_a_device_go_and_come_back(bench: Path, lab: Path, browser: Any) -> None:
-    (lab / "faults.toml").write_text("[[disconnect]]\nat_s = 8.0\nfor_s = 5.0\n", encoding="utf-8")
+    (lab / "faults.toml").write_text("[[disconnect]]\nat_s = 12.0\nfor_s = 6.0\n", encoding="utf-8")
     seen = browser.new_page(viewport={"width": 1400, "height": 900})
     wrong: list[str] = []
     seen.on("pageerror", lambda error: wrong.append(str(error)))
@@ -275,7 +275,7 @@ def test_a_browser_sees_a_device_go_and_come_back(bench: Path, lab: Path, browse
     ):
         seen.goto(url_of(recorder))
         seen.set_default_timeout(60_000)
-        seen.get_by_text("recording", exact=True).wait_for()
+        seen.wait_for_selector("#curves canvas")
         wait_until(lambda: pixels_like(seen, "curve") > 200, "a curve")
         seen.wait_for_selector("#state.bad:has-text('a device is missing')")
         # the right edge goes on without it
@@ -298,7 +298,7 @@ def test_a_browser_sees_a_device_go_and_come_back(bench: Path, lab: Path, browse
     found, original = stored(lab / "new.nc"), stored(bench / "long.nc")
     n_samples = found.sizes["time"]
     is_lost = found["quality"].values != 0
-    assert 4.9 < is_lost.sum() / RATE_HZ < 30
+    assert 5.9 < is_lost.sum() / RATE_HZ < 40
     np.testing.assert_array_equal(
         found["force_cell_1"].values[~is_lost], original["force_cell_1"].values[:n_samples][~is_lost]
     )
