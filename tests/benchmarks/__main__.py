@@ -38,6 +38,8 @@ AIMS = {
     **{label(layers): aim for layers, aim in RESOLUTIONS.items()},
     **{f"{transport}: samples wrong or lost": 0.0 for transport in TRANSPORTS},
     **{f"{transport}: recorder, share of one core": 0.6 for transport in TRANSPORTS},
+    "live page: samples wrong or lost": 0.0,
+    "live page: recorder, share of one core": 0.6,
 }
 AT_LEAST = {
     LANES_LABEL: 4.0,
@@ -78,7 +80,10 @@ def recording_figures() -> dict[str, float]:
         if load.frames_per_s:
             figures[f"{transport}: frames [1/s]"] = load.frames_per_s
         figures |= {f"{transport}: {name}": float(found[name]) for name in shown}
-    return figures
+    print(f"recording by serial with the live page open for {RECORDING_S:g} s …", flush=True)
+    found = sustained(LOADS["serial"], RECORDING_S, has_page=True)
+    of_page = ("page, messages", "page, samples not shown", "page, share of one core")
+    return figures | {f"live page: {name}": float(found[name]) for name in (*shown, *of_page)}
 
 
 def main() -> None:

@@ -3,7 +3,8 @@
 ``python -m tests.benchmarks.sustained serial --duration 600`` plays a test pattern in real time, records
 it, computes the pattern again and compares. It prints throughput, the share of one core that each
 process took while samples came, and the latency from a sample to the disk. It ends with 1 if a sample
-is lost or wrong, or the recorder takes more than its share.
+is lost or wrong, or the recorder takes more than its share. With ``--page`` the live page is open in a browser, or
+in a program that takes all of it where there is no browser.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import netCDF4
 import numpy as np
@@ -68,8 +70,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("transport", choices=[*LOADS])
     parser.add_argument("--duration", type=float, default=600.0, help="seconds")
+    parser.add_argument("--page", action="store_true", help="with the live page open")
     given = parser.parse_args()
-    figures = sustained(LOADS[given.transport], given.duration)
+    figures = sustained(LOADS[given.transport], given.duration, has_page=given.page)
     for name, value in figures.items():
         print(f"{given.transport:<11}{name:<44}{value}")
     is_good = (
@@ -78,13 +81,13 @@ def main() -> None:
     sys.exit(0 if is_good else 1)
 
 
-def sustained(load: Load, duration_s: float) -> dict[str, float | int | str]:
-    """Play, record, compare; figures by name."""
+def sustained(load: Load, duration_s: float, *, has_page: bool = False) -> dict[str, float | int | str]:
+    """Play, record, compare; figures by name, those of the live page among them if it is open."""
     with tempfile.TemporaryDirectory(prefix="sloshlab_") as name:
         folder = Path(name)
         (folder / "rig.toml").write_text(RIG)
         with _device(load, duration_s, folder) as (device, url):
-            observed = _recorded(url, device, folder)
+            observed = _recorded(url, device, folder, has_page)
         wrong, expected_hash, found_hash = compared(folder / "run.nc", load, duration_s)
         latency_s = _latency_s(folder / "run.journal", observed, load.sampling_rate_hz)
     return {
@@ -101,6 +104,7 @@ def sustained(load: Load, duration_s: float) -> dict[str, float | int | str]:
         "sample to disk, 99 % [s]": round(float(np.quantile(latency_s, 0.99)), 3),
         "sample to disk, longest [s]": round(float(latency_s.max()), 3),
         "from the last sample to the recording [s]": round(observed.finish_s, 2),
+        **(observed.page_figures() if has_page else {}),
     }
 
 
@@ -132,6 +136,16 @@ class Observed:
     cpu: dict[str, list[tuple[float, float]]]
     finish_s: float = 0.0
     peak_bytes: int = 0
+    seen: dict[str, Any] = field(default_factory=dict)
+
+    def page_figures(self) -> dict[str, float | int | str]:
+        """What the viewer of the live page saw, and what its process cost."""
+        return {
+            "page, looked at by": self.seen["viewer"],
+            "page, messages": self.seen["n_messages"],
+            "page, samples not shown": self.seen["n_skipped"],
+            "page, share of one core": round(self.share("page"), 3),
+        }
 
     def share(self, process: str) -> float:
         """Processor time over time, while the journal grew."""
@@ -142,11 +156,33 @@ class Observed:
         return (inside[-1][1] - inside[0][1]) / (inside[-1][0] - inside[0][0])
 
 
-def _recorded(url: str, device: subprocess.Popen[str], folder: Path) -> Observed:
+def _recorded(url: str, device: subprocess.Popen[str], folder: Path, has_page: bool) -> Observed:
     output, journal = folder / "run.nc", folder / "run.journal"
     command = _command("record", "--source", url, "--rig", str(folder / "rig.toml"), "-o", str(output))
-    recorder = subprocess.Popen([*command, "--keep-journal", "--json"], stdout=subprocess.PIPE, text=True)
-    observed = Observed([], [], {"recorder": [], "device": []})
+    command += ["--keep-journal", "--json", *(["--page"] if has_page else [])]
+    recorder = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert recorder.stdout is not None
+    page_url = recorder.stdout.readline().removeprefix("page ").strip() if has_page else ""
+    processes = {"recorder": recorder.pid, "device": device.pid}
+    if has_page:
+        processes["page"] = _page_of(recorder.pid)
+    observed = Observed([], [], {name: [] for name in processes})
+    with _viewer(page_url, observed) if has_page else contextlib.nullcontext():
+        _observe(observed, recorder, processes, journal)
+    said = recorder.communicate()[0]
+    if recorder.returncode != 0:
+        sys.exit(f"the recorder ended with {recorder.returncode}: {said}")
+    summary = json.loads(said.splitlines()[-1])
+    assert not summary["flags"]
+    grown = np.flatnonzero(np.diff(np.array(observed.journal_bytes)) > 0)
+    observed.finish_s = observed.times_s[-1] - observed.times_s[grown[-1]]
+    return observed
+
+
+def _observe(
+    observed: Observed, recorder: subprocess.Popen[str], processes: dict[str, int], journal: Path
+) -> None:
+    """Look at the journal's size and at the processes until the recorder ends."""
     next_cpu = 0.0
     while recorder.poll() is None:
         now = time.monotonic()
@@ -154,20 +190,30 @@ def _recorded(url: str, device: subprocess.Popen[str], folder: Path) -> Observed
         observed.journal_bytes.append(journal.stat().st_size if journal.exists() else 0)
         if now >= next_cpu:
             next_cpu = now + 0.5
-            for name, process in (("recorder", recorder), ("device", device)):
+            for name, pid in processes.items():
                 with contextlib.suppress(OSError, IndexError):
-                    observed.cpu[name].append((now, _cpu_s(process.pid)))
+                    observed.cpu[name].append((now, _cpu_s(pid)))
             with contextlib.suppress(OSError):
                 observed.peak_bytes = max(observed.peak_bytes, _resident_bytes(recorder.pid))
         time.sleep(_POLL_S)
-    said = recorder.communicate()[0]
-    if recorder.returncode != 0:
-        sys.exit(f"the recorder ended with {recorder.returncode}: {said}")
-    summary = json.loads(said.splitlines()[-1])
-    assert not summary["flags"]
-    grown = np.flatnonzero(np.diff(np.array(observed.journal_bytes)) > 0)
-    observed.finish_s = time.monotonic() - observed.times_s[grown[-1]]
-    return observed
+
+
+def _page_of(pid: int) -> int:
+    """The process that serves the live page of a recorder."""
+    for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+        if b"page_process" in Path(f"/proc/{child}/cmdline").read_bytes():
+            return int(child)
+    sys.exit("the recorder has no live page")
+
+
+@contextlib.contextmanager
+def _viewer(url: str, observed: Observed) -> Iterator[None]:
+    """Somebody who looks at the page meanwhile."""
+    command = [sys.executable, "-m", "tests.benchmarks.page_viewer", url]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as viewer:
+        yield
+        said = viewer.communicate(timeout=60)[0]
+    observed.seen = json.loads(said.splitlines()[-1])
 
 
 def _cpu_s(pid: int) -> float:
