@@ -125,7 +125,8 @@ class CrossingDetector:
         return None if at is None else counter + at
 
     def _values(self, counts: NDArray[np.int32]) -> FloatArray:
-        values: FloatArray = counts * self._channel.scale_factor + self._channel.add_offset
+        scaled = counts * self._channel.scale_factor + self._channel.add_offset
+        values: FloatArray = np.asarray(scaled, dtype=np.float64)
         if self._channel.missing_count is not None:
             values[counts == self._channel.missing_count] = np.nan
         return values

@@ -7,17 +7,29 @@ import time
 from collections.abc import Mapping
 from typing import Any, Final
 
+import numpy as np
+import numpy.typing as npt
+
 from pipelines.live_page.last_cycles import Roles, last_cycles, recording_of, rig_at, roles_of
 from pipelines.live_page.page_state import PageState
 from pipelines.live_page.source_view import KEPT_S
 from pipelines.live_page.spectra import LATEST_S, spectrum
 from sloshlab.errors import SloshlabError
 
+FloatArray = npt.NDArray[np.float64]
+
 _INTERVAL_S: Final = 1.0
 _MOST_SPECTRA: Final = 32
 _MOST_WORKS: Final = 400
 # windows that share most of their cycles are no new points
 _SHORTEST_STEP_CYCLES: Final = 4
+
+
+def since_the_last_loss(place: int, values: FloatArray) -> tuple[int, FloatArray]:
+    """Place and values of the samples behind the last one that is missing in any channel."""
+    lost = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    n_before = int(lost[-1]) + 1 if lost.size else 0
+    return place + n_before, values[n_before:]
 
 
 class Analyst:
@@ -82,7 +94,7 @@ class Analyst:
             return {"headline": "", "note": "not computed: the tank is empty, so that W̄ has no scale"}
         roles, info = self._roles[source], self._state.sources[source].info
         numbers = [*roles.forces, *roles.accelerations]
-        place, values = self._state.latest(source, KEPT_S, numbers)
+        place, values = since_the_last_loss(*self._state.latest(source, KEPT_S, numbers))
         recording = recording_of(info.channels, numbers, values, info.sampling_rate_hz)
         rig = rig_at(self._state.about["rig"])
         return self._shown(last_cycles(recording, rig, place / info.sampling_rate_hz))
@@ -96,7 +108,7 @@ class Analyst:
 
     def _shown(self, found: Mapping[str, Any]) -> dict[str, Any]:
         if "reason" in found:
-            kept = {"trend": self._trend()} if self._works else {}
+            kept = {"trend": self._trend(), "trend_label": "W̄ [1]"} if self._works else {}
             return {"headline": "", "note": f"not computed: {found['reason']}", **kept}
         before = self._works[-1]["time_s"] if self._works else float("-inf")
         if found["time_s"] - before >= _SHORTEST_STEP_CYCLES / found["frequency_hz"]:

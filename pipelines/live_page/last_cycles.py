@@ -113,7 +113,7 @@ def last_cycles(recording: xr.Dataset, rig: Rig, start_time_s: float) -> dict[st
         phase = measured_phase(motion, None, rate_hz)
         boundaries = phase.cycle_boundaries_s()
     except AnalysisError as error:
-        return {"reason": f"{error.what}: {error.got}"}
+        return {"reason": f"{error.what} since the last lost sample: {error.got}"}
     cycles = evaluate_cycles(force, motion, boundaries, sampling_rate_hz=rate_hz, inertia_kg=inertia_kg)
     windows = evaluate_windows(
         cycles, run_id="live", law=None, start_time_s=start_time_s, rig=rig, settings=WINDOWS

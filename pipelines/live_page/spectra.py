@@ -47,7 +47,7 @@ def spectrum(values: FloatArray, sampling_rate_hz: float, units: str) -> dict[st
     return {
         "frequency_hz": [rounded(value) for value in frequency.tolist()],
         "density": [rounded(value) for value in density.tolist()],
-        "units": f"({units})² / Hz",
+        "units": f"{units if units.isalpha() else f'({units})'}²/Hz",
         "note": f"Hann segments of {n_segment / sampling_rate_hz:.3g} s of the last "
         f"{values.size / sampling_rate_hz:.3g} s, mean removed; "
         "where lines are closer than the screen shows, the largest of them",

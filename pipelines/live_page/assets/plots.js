@@ -8,7 +8,8 @@ export function colour(name) {
 export function number(value) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value !== 0 && (Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3)) {
-    return value.toExponential(2).replace("e", "·10^").replace("^+", "^");
+    const [factor, exponent] = value.toExponential(2).split("e");
+    return `${factor}·10${raised(Number(exponent))}`;
   }
   return String(Number(value.toPrecision(4)));
 }
@@ -55,9 +56,13 @@ function logTicks(low, high) {
   return found.filter((_, k) => k % every === 0);
 }
 
+function raised(exponent) {
+  return String(exponent).replace(/-/, "⁻").replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]);
+}
+
 function power(value) {
   const exponent = Math.round(Math.log10(value));
-  return exponent >= -2 && exponent <= 4 ? String(Number((10 ** exponent).toPrecision(1))) : `10^${exponent}`;
+  return exponent >= -2 && exponent <= 4 ? String(Number((10 ** exponent).toPrecision(1))) : `10${raised(exponent)}`;
 }
 
 // a frame with axes; returns how values become places
@@ -65,7 +70,7 @@ function axes(canvas, box) {
   const { pen, width, height } = context(canvas);
   const texts = box.yTicks.map((value) => (box.logarithmic ? power(value) : number(value)));
   const left = 8 + Math.max(...texts.map((text) => pen.measureText(text).width), 12);
-  const bottom = height - (box.xLabel ? 32 : 17), top = box.yLabel ? 18 : 6, right = width - 8;
+  const bottom = height - (box.xLabel ? 32 : 17), top = box.yLabel ? 21 : 6, right = width - 8;
   const of = (value) => (box.logarithmic ? Math.log10(value) : value);
   const x = (value) => left + ((of(value) - of(box.x[0])) / (of(box.x[1]) - of(box.x[0]))) * (right - left);
   const y = (value) => bottom - ((of(value) - of(box.y[0])) / (of(box.y[1]) - of(box.y[0]))) * (bottom - top);
@@ -93,7 +98,7 @@ function axes(canvas, box) {
   }
   if (box.xLabel) pen.fillText(box.xLabel, (left + right) / 2, bottom + 17);
   pen.textAlign = "left";
-  if (box.yLabel) pen.fillText(box.yLabel, 2, 1);
+  if (box.yLabel) pen.fillText(box.yLabel, 2, 4);
   return { pen, x, y, left, right, top, bottom };
 }
 
@@ -116,29 +121,36 @@ export function curve(canvas, columns, columnS, now, windowS, marks) {
   }
   pen.strokeStyle = colour("curve");
   pen.fillStyle = colour("curve");
+  pen.lineWidth = 1.2;
   pen.beginPath();
+  const wide = Math.max(1, drawn.x(columnS) - drawn.x(0));
   let before = null;
   for (const column of columns) {
     if (column.low === null) { before = null; continue; }
     const at = drawn.x(column.t + columnS / 2);
     const high = drawn.y(column.high), low = drawn.y(column.low);
     if (before !== null) { pen.moveTo(before.at, before.middle); pen.lineTo(at, (high + low) / 2); }
-    pen.moveTo(at, Math.min(high, low - 0.5));
-    pen.lineTo(at, Math.max(low, high + 0.5));
+    // as wide as the column is: lines of one pixel would make a pattern of their own
+    if (low - high > 1) pen.fillRect(at - wide / 2, high, wide, low - high);
     before = { at, middle: (high + low) / 2 };
   }
   pen.stroke();
   pen.strokeStyle = colour("mark");
-  pen.fillStyle = colour("mark");
+  pen.lineWidth = 1;
   pen.textBaseline = "top";
   pen.setLineDash([4, 3]);
-  for (const mark of marks) {
+  for (const mark of marks.filter((one) => one.t >= x[0])) {
     const at = drawn.x(mark.t);
     pen.beginPath();
     pen.moveTo(at, top);
     pen.lineTo(at, bottom);
     pen.stroke();
-    pen.fillText(mark.text, at + 3, top + 1);
+    const text = mark.text || "mark", width = pen.measureText(text).width;
+    const begin = Math.min(at + 3, right - width - 4);
+    pen.fillStyle = colour("panel");
+    pen.fillRect(begin - 1, top, width + 4, 14);
+    pen.fillStyle = colour("mark");
+    pen.fillText(text, begin + 1, top + 2);
   }
   pen.restore();
 }

@@ -14,7 +14,7 @@ from acquisition.recorder.journal_format import described_source
 from acquisition.samples.channel import Channel
 from acquisition.samples.delivery import Block
 from acquisition.sources.interface import SourceInfo
-from pipelines.live_page.analyses import Analyst
+from pipelines.live_page.analyses import Analyst, since_the_last_loss
 from pipelines.live_page.last_cycles import roles_of
 from pipelines.live_page.page_state import PageState
 from pipelines.live_page.spectra import spectrum, thinned
@@ -125,6 +125,20 @@ def test_lost_samples_are_said_and_not_filled(tmp_path: Path) -> None:
     assert "lost" in state.analyses["spectra"]["0:0"]["note"]
 
 
+def test_work_begins_anew_behind_a_gap(tmp_path: Path) -> None:
+    """Ten seconds lost in the middle, which no cycle may span; the closed form again from what came since."""
+    state = state_of((*FORCES, ROOF), dashpot_counts(20_000)[:8000], tmp_path)
+    for counter in range(28_000, 38_000, 1000):
+        part = dashpot_counts(38_000)[counter : counter + 1000]
+        state.take((0, Block(0, 1, counter, part, None, counter * 500_000, 0)))
+    [point] = work_of(state)["trend"]
+    omega = 2 * math.pi * FREQUENCY_HZ
+    assert point["y"] == pytest.approx(math.pi * DASHPOT_KG_PER_S / (LIQUID_KG * omega), rel=1e-4)
+    assert 14.0 < point["x"] < 19.0
+    place, values = since_the_last_loss(100, np.array([[1.0, 2.0], [np.nan, 2.0], [1.0, 3.0]]))
+    assert (place, values.tolist()) == (102, [[1.0, 3.0]])
+
+
 def test_roles_follow_the_names_of_the_format() -> None:
     roles = roles_of([ROOF, *FORCES, Channel("acceleration_control", "acceleration", "m s-2")])
     assert (roles.forces, roles.accelerations) == ((1, 2), (0,))
@@ -136,7 +150,7 @@ def test_a_spectrum_holds_the_power_of_a_sine_and_of_noise() -> None:
     sine = spectrum(3.0 * np.sin(2 * np.pi * 100 * time_s) + 50.0, RATE_HZ, "N")
     frequency, density = np.array(sine["frequency_hz"]), np.array(sine["density"])
     assert frequency[density.argmax()] == 100
-    assert sine["units"] == "(N)² / Hz"
+    assert sine["units"] == "N²/Hz"
     # lines of 0.5 Hz around the largest; Hann has an equivalent noise bandwidth of 1.5 lines
     assert density.max() * 1.5 * 0.5 == pytest.approx(9.0 / 2, rel=1e-3)
     noise = spectrum(np.random.default_rng(1).normal(scale=2.0, size=200_000), RATE_HZ, "N")
