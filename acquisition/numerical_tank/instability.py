@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from sloshlab.errors import SloshlabError
+
+STOPPED: Final = "numerical_tank_stopped"
+"""Global attribute of a recording whose computation became unstable: why, when and where."""
 
 
 class InstabilityError(SloshlabError, ArithmeticError):

@@ -22,6 +22,7 @@ from typing import Any, Final
 import xarray as xr
 
 from acquisition.numerical_tank import checkpoint as checkpoints
+from acquisition.numerical_tank.instability import STOPPED
 from acquisition.numerical_tank.tank import TankSetup
 from acquisition.virtual_laboratory.campaign import (
     CAMPAIGN_LABORATORY,
@@ -30,7 +31,7 @@ from acquisition.virtual_laboratory.campaign import (
     file_record,
     laboratory_option,
 )
-from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid, numerical_setup
+from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid, numerical_setup
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
 from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC, virtual_shaker_run, write_virtual_run
 from acquisition.virtual_laboratory.structure_rig import structure_laboratory

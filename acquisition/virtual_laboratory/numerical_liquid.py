@@ -8,12 +8,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.numerical_tank.computed_force import ComputedForce, computed_force
+from acquisition.numerical_tank.instability import STOPPED
 from acquisition.numerical_tank.tank import Box, Liquid, TankSetup, filled_tank
 from acquisition.virtual_laboratory.tone_motion import TankMotion
 from sloshlab._version import __version__
@@ -21,9 +22,6 @@ from sloshlab.errors import InputError
 from sloshlab.rig import Rig
 
 FloatArray = NDArray[np.float64]
-
-STOPPED: Final = "numerical_tank_stopped"
-"""Global attribute of a recording whose computation became unstable: why, when and where."""
 
 
 def numerical_setup(rig: Rig, *, layers_per_height: int, seed: int, sampling_rate_hz: float) -> TankSetup:

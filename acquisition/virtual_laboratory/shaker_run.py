@@ -6,14 +6,13 @@ import itertools
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from acquisition.virtual_laboratory.liquid_force import LiquidForce
-from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
 from acquisition.virtual_laboratory.sensors import (
     ACCELEROMETERS,
     FORCE_CELLS,
@@ -38,6 +37,9 @@ from sloshlab.errors import InputError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
 from sloshlab.recording import CLIPPED, LOST, STUCK, quality_attributes, write_recording
 from sloshlab.rig import Rig
+
+if TYPE_CHECKING:  # its compiled loops take a second to load; a liquid that follows its law needs none of them
+    from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
 
 FloatArray = NDArray[np.float64]
 TONES: Final = {"shaker_random": random_motion, "shaker_two_tone": two_tone_motion}

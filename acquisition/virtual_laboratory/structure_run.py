@@ -16,15 +16,11 @@ from numpy.typing import NDArray
 
 from acquisition.numerical_tank.carried_tank import FrozenTank
 from acquisition.numerical_tank.computed_force import ComputedForce
+from acquisition.numerical_tank.instability import STOPPED
 from acquisition.numerical_tank.structures import Structure
 from acquisition.numerical_tank.tank import TankSetup
 from acquisition.virtual_laboratory.base_motion import RandomBaseMotion
-from acquisition.virtual_laboratory.numerical_liquid import (
-    STOPPED,
-    NumericalLiquid,
-    method_attributes,
-    numerical_setup,
-)
+from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid, method_attributes, numerical_setup
 from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC
 from acquisition.virtual_laboratory.structure_channels import readings_of, recording_of, true_values
 from acquisition.virtual_laboratory.structure_computation import (

@@ -104,7 +104,6 @@ def virtual(
     as_json: Json = False,
 ) -> None:
     """A run of the virtual laboratory, or repeats and levels of one."""
-    from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
     from pipelines.recording.virtual import (
         CAMPAIGN,
         VirtualRun,
@@ -116,6 +115,8 @@ def virtual(
 
     of_laboratory = laboratory_seed_of(laboratory, laboratory_seed, is_campaign=experiment == CAMPAIGN)
     if experiment == CAMPAIGN:
+        from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
+
         require_free_folder(output, f"--output {output}")
         computed = CampaignSettings(seed, layers, workers, only, checkpoints, of_laboratory, overwrite)
         finish(make_campaign_folder(output, liquid, computed, say), as_json)

@@ -9,17 +9,12 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import xarray as xr
 
+from acquisition.numerical_tank.instability import STOPPED
 from acquisition.virtual_laboratory.campaign import CAMPAIGN_LABORATORY, campaign_laboratory, make_campaign
-from acquisition.virtual_laboratory.numerical_campaign import (
-    CampaignSettings,
-    FinishedRun,
-    make_numerical_campaign,
-)
-from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid
 from acquisition.virtual_laboratory.sensors import Laboratory
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from acquisition.virtual_laboratory.structure_rig import StructureLaboratory, structure_laboratory
@@ -32,6 +27,10 @@ from sloshlab.experiments import EXPERIMENTS, experiment_names
 from sloshlab.recording import read_recording
 from sloshlab.registry import loaded
 from sloshlab.rig import Rig
+
+if TYPE_CHECKING:  # the compiled loops of a computed liquid take a second to load: only where it is computed
+    from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings, FinishedRun
+    from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
 
 DEVIATIONS: Final = "laboratory_deviations"
 """Attribute of a recording: in what the laboratory differs from what the rig tells, as JSON."""
@@ -197,16 +196,19 @@ def _check_run(run: VirtualRun) -> None:
 
 def _computed(run: VirtualRun, rig: RigSource, saved: Path) -> xr.Dataset:
     """The run, with progress; a computed liquid is saved meanwhile."""
+    # no law is known for the liquid in a tank that moves with a structure
+    if run.liquid != "numerical" and not EXPERIMENTS[run.experiment].structure:
+        return _recorded(run, rig, None)
+    from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
+
     with amounts(run.experiment) as advance:
         numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
         return _recorded(run, rig, numerical)
 
 
-def _recorded(run: VirtualRun, rig: RigSource, numerical: NumericalLiquid) -> xr.Dataset:
-    """The liquid follows its law where there is one and nothing else is asked for."""
+def _recorded(run: VirtualRun, rig: RigSource, computed: NumericalLiquid | None) -> xr.Dataset:
+    """The liquid follows its law where none is to be computed."""
     described, experiment = rig_of(rig), EXPERIMENTS[run.experiment]
-    # no law is known for the liquid in a tank that moves with a structure
-    computed = numerical if run.liquid == "numerical" or experiment.structure else None
     make: Callable[..., xr.Dataset] = loaded(experiment.virtual_run)
     drawn: dict[str, Any] = {}
     if run.laboratory_seed is not None:
@@ -306,6 +308,8 @@ def _check_liquid(liquid: str) -> None:
 def _make_numerical_campaign_folder(
     folder: Path, settings: CampaignSettings, say: Callable[[str], None]
 ) -> dict[str, Any]:
+    from acquisition.virtual_laboratory.numerical_campaign import make_numerical_campaign
+
     share, start_s = [0.0], time.monotonic()
 
     def told(run: FinishedRun) -> None:

@@ -7,13 +7,12 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final, Protocol, runtime_checkable
-
-import numpy as np
-import xarray as xr
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from sloshlab import atomic_file, interrupt
-from sloshlab.netcdf_lock import NETCDF_LOCK
+
+if TYPE_CHECKING:  # every command looks at its result folder with this module before anything else
+    import xarray as xr
 
 _HASH_BLOCK = 1 << 20
 _SMALLEST_COMPRESSED_SIZE = 1000
@@ -39,6 +38,8 @@ class InMemory(Protocol):
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     """Write a result atomically; text is stored as fixed-width characters so that bytes repeat."""
+    from sloshlab.netcdf_lock import NETCDF_LOCK
+
     encoding: dict[str, dict[str, Any]] = {}
     stored = dataset.copy(deep=False)
     for name in [*stored.data_vars, *stored.coords]:
@@ -47,7 +48,7 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
             stored[name] = variable.astype(str)
             encoding[str(name)] = {"dtype": "S1", "char_dim_name": f"{name}_length"}
         elif variable.size >= _SMALLEST_COMPRESSED_SIZE and variable.dtype.kind == "f":
-            encoding[str(name)] = {"zlib": True, "complevel": 4, "shuffle": True, "_FillValue": np.nan}
+            encoding[str(name)] = {"zlib": True, "complevel": 4, "shuffle": True, "_FillValue": float("nan")}
     # the netCDF library is not made for threads; an interrupt within xarray would leave its lock taken for ever
     with atomic_file.replaced(path) as temporary, NETCDF_LOCK, interrupt.held():
         stored.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)

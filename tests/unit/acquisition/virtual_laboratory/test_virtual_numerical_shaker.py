@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from acquisition.numerical_tank.instability import STOPPED
 from acquisition.virtual_laboratory.campaign import rig_text
-from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid, numerical_setup
+from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid, numerical_setup
 from acquisition.virtual_laboratory.sensors import Laboratory
 from acquisition.virtual_laboratory.shaker import (
     STROKE_LIMIT_M,

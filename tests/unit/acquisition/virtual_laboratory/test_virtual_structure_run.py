@@ -10,9 +10,10 @@ import pytest
 import xarray as xr
 
 from acquisition.numerical_tank.computed_force import ComputationInterruptedError
+from acquisition.numerical_tank.instability import STOPPED
 from acquisition.virtual_laboratory import structure_run
 from acquisition.virtual_laboratory.base_motion import RandomBaseMotion
-from acquisition.virtual_laboratory.numerical_liquid import STOPPED, NumericalLiquid, numerical_setup
+from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid, numerical_setup
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from acquisition.virtual_laboratory.structure_computation import (
     StructureTask,
