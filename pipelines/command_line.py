@@ -7,6 +7,7 @@ need when they run, so that ``sloshlab --help`` stays quick.
 
 from __future__ import annotations
 
+import io
 import signal
 import sys
 from collections.abc import Sequence
@@ -41,8 +42,12 @@ from pipelines.commands import trial
 from pipelines.commands import laboratory
 
 # isort: split
+from pipelines.commands import info
+
+# isort: split
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, app
-from pipelines.report.terminal import say
+from pipelines.commands.completion import PROGRAM, answer_a_shell
+from pipelines.report.terminal import complain, say
 from sloshlab import interrupt
 from sloshlab.errors import RecordingInterruptedError, SloshlabError
 
@@ -57,6 +62,7 @@ __all__ = [
     "demo",
     "diagnosis",
     "field_benchmarks",
+    "info",
     "laboratory",
     "main",
     "models",
@@ -72,22 +78,24 @@ _UsageError: Any = next(base for base in typer.BadParameter.__mro__ if base.__na
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
+        answer_a_shell()
         with interrupt.never_lost():
-            code = int(app(args=list(arguments) if arguments is not None else None, standalone_mode=False) or 0)
+            words = list(arguments) if arguments is not None else None
+            code = int(app(args=words, prog_name=PROGRAM, standalone_mode=False) or 0)
         if code == INTERRUPTED:  # some versions of typer turn Ctrl-C into this code without a word
             raise KeyboardInterrupt
         return code
     except RecordingInterruptedError as error:
-        say(f"sloshlab: {error}", error=True)
+        complain(f"sloshlab: {error}")
         return INTERRUPTED
     except SloshlabError as error:
-        say(f"sloshlab: {error}", error=True)
+        complain(f"sloshlab: {error}")
         return INPUT_IS_BAD
     except _UsageError as error:
-        error.show()
+        _show(error)
         return USAGE
     except (KeyboardInterrupt, typer.Abort):
-        say("sloshlab: interrupted; nothing half-written", error=True)
+        complain("sloshlab: interrupted; nothing half-written")
         return INTERRUPTED
     except interrupt.Terminated as termination:
         print(f"sloshlab: ended by {termination}; nothing half-written", file=sys.stderr)  # noqa: T201
@@ -95,8 +103,19 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
         remedy = "check that the path can be written, and that a folder or file of this name is not in the way"
-        say(f"sloshlab: {what}got {error.strerror or error}; remedy: {remedy}", error=True)
+        complain(f"sloshlab: {what}got {error.strerror or error}; remedy: {remedy}")
         return INPUT_IS_BAD
+
+
+def _show(error: Any) -> None:
+    """A usage error, or the help of a command that was called without anything."""
+    text = io.StringIO()
+    error.show(text)
+    for line in text.getvalue().expandtabs().splitlines():
+        if line.startswith("Error:"):
+            complain(line)
+        else:
+            say(line, error=True)
 
 
 def main() -> NoReturn:

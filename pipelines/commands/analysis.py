@@ -19,6 +19,7 @@ from pipelines.commands.application import (
     command_as_given,
     finish,
 )
+from pipelines.commands.completion import one_of
 from pipelines.report.result_folder import require_result_folder
 
 
@@ -39,7 +40,11 @@ def shaker(
     p: HalfWidth = 6,
     m: Spacing = 24,
     boundaries: Annotated[
-        str, typer.Option(help="Cycle boundaries from the 'measured' phase or from the sweep 'law'.")
+        str,
+        typer.Option(
+            help="Cycle boundaries from the 'measured' phase or from the sweep 'law'.",
+            autocompletion=one_of(("measured", "law")),
+        ),
     ] = "measured",
     allow_incomplete: Annotated[
         bool, typer.Option("--allow-incomplete", help="Analyse a sweep that stops early up to where it stops.")
@@ -146,7 +151,12 @@ def ball(
     output: OutputFolder,
     *,
     omega_bar: Annotated[float, typer.Option(help="On the shaker: ω̄ at which W̄ is matched.")] = 4.0,
-    damper: Annotated[str, typer.Option(help="The ball's damper acts in 'contact' or 'always'.")] = "contact",
+    damper: Annotated[
+        str,
+        typer.Option(
+            help="The ball's damper acts in 'contact' or 'always'.", autocompletion=one_of(("contact", "always"))
+        ),
+    ] = "contact",
     lowest_acceleration_g: Annotated[
         float, typer.Option(help="Of a decay: smallest amplitude that is matched, in g.")
     ] = 0.3,

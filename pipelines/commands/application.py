@@ -10,13 +10,14 @@ from typing import Annotated, Any
 
 import typer
 
+from pipelines.commands.command_help import Application
+from pipelines.commands.completion import SHELLS, completion_script, install_completion, one_of
 from pipelines.report.free_place import require_free_file, require_free_folder
-from pipelines.report.terminal import say
-from sloshlab import __version__
+from pipelines.report.terminal import complain, say
 
 INPUT_IS_BAD, USAGE, DONE_BUT_FLAGGED, INTERRUPTED = 1, 2, 3, 130
 
-app = typer.Typer(
+app = Application(
     name="sloshlab",
     help="Energy, effective mass and damping of shaken, partly filled tanks.",
     no_args_is_help=True,
@@ -71,11 +72,46 @@ NoReport = Annotated[bool, typer.Option("--no-report", help="Write windows.nc an
 
 @app.callback(invoke_without_command=True)
 def _root(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print version, commit and those of the dependencies, and exit.")
+    ] = False,
+    install: Annotated[
+        str | None,
+        typer.Option(
+            "--install-completion",
+            metavar="[SHELL]",
+            help=f"Install completion for the shell around, or for one of {', '.join(SHELLS)}.",
+            show_default=False,
+            autocompletion=one_of(SHELLS),
+        ),
+    ] = None,
+    show: Annotated[
+        str | None,
+        typer.Option(
+            "--show-completion",
+            metavar="[SHELL]",
+            help="Print the completion script instead.",
+            show_default=False,
+            autocompletion=one_of(SHELLS),
+        ),
+    ] = None,
 ) -> None:
     if version:
-        say(__version__)
+        from pipelines.report.installation import version_lines
+
+        for line in version_lines():
+            say(line)
         raise typer.Exit
+    if install is not None:
+        finish({"lines": install_completion(install)}, as_json=False)
+        raise typer.Exit
+    if show is not None:
+        # a script of many lines for a shell, with control characters that are meant
+        sys.stdout.write(completion_script(show))
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        context.fail("Missing command.")
 
 
 def finish(summary: dict[str, Any], as_json: bool) -> None:
@@ -84,10 +120,10 @@ def finish(summary: dict[str, Any], as_json: bool) -> None:
         say(line)
     defects = summary.get("defects", [])
     for defect in defects:
-        say(f"sloshlab: {defect}", error=True)
+        complain(f"sloshlab: {defect}")
     flags = summary.get("flags", [])
     for flag in flags:
-        say(f"flagged: {flag}", error=True)
+        complain(f"flagged: {flag}", "flag")
     if as_json:
         say(json.dumps(summary, sort_keys=True, default=str))
     if defects:

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from pipelines.commands.application import Json, app, finish
+from pipelines.commands.command_help import Application
 
-case = typer.Typer(
+case = Application(
     help="Case folders for the diagnosis: made, checked, and what their runs can decide.", no_args_is_help=True
 )
 app.add_typer(case, name="case")

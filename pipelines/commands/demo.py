@@ -8,12 +8,20 @@ from typing import Annotated
 import typer
 
 from pipelines.commands.application import Json, app, finish, free_folder
+from pipelines.commands.completion import DEMONSTRATIONS, one_of
 from pipelines.report.terminal import say
 
 
 @app.command()
 def demo(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="What is hidden; see --list.")] = "friction",
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="[NAME]",
+            help="What is hidden; see --list.",
+            autocompletion=one_of(DEMONSTRATIONS),
+        ),
+    ] = "friction",
     *,
     output: Annotated[
         Path | None,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pipelines.commands.application import Json, app, command_as_given, finish, free_folder
+from pipelines.commands.completion import BENCHMARKS, one_of
 from pipelines.report.terminal import say
 
 
@@ -15,7 +16,12 @@ from pipelines.report.terminal import say
 def benchmark(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME...]", help="Benchmarks; all whose files are there.", show_default=False),
+        typer.Argument(
+            metavar="[NAME...]",
+            help="Benchmarks; all whose files are there.",
+            show_default=False,
+            autocompletion=one_of(BENCHMARKS),
+        ),
     ] = None,
     *,
     data: Annotated[

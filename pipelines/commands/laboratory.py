@@ -17,6 +17,16 @@ from pipelines.commands.application import (
     free_file,
     free_folder,
 )
+from pipelines.commands.completion import (
+    ALIGNMENTS,
+    LABORATORIES,
+    LIQUIDS,
+    SWEEP_LAWS,
+    device_url,
+    one_of,
+    replay_source,
+    source_url,
+)
 from pipelines.report.free_place import require_free_folder, require_free_place
 from pipelines.report.terminal import say
 from sloshlab.configurations import CONFIGURATIONS, SLOSHING
@@ -27,14 +37,17 @@ if TYPE_CHECKING:
     from pipelines.live_page.live_page import LivePage
     from pipelines.recording.record import RecordSettings
 
+_VIRTUAL = experiment_names(lambda experiment: bool(experiment.virtual_run))
+"""Experiments that the virtual laboratory can run."""
+
 
 @app.command()
 def virtual(
     experiment: Annotated[
         str,
         typer.Argument(
-            help=", ".join(experiment_names(lambda experiment: bool(experiment.virtual_run)))
-            + ", or campaign for a whole folder of raw_data."
+            help=f"{', '.join(_VIRTUAL)}, or campaign for a whole folder of raw_data.",
+            autocompletion=one_of((*_VIRTUAL, "campaign")),
         ),
     ],
     output: Annotated[
@@ -42,10 +55,15 @@ def virtual(
     ],
     *,
     rig: Annotated[Path | None, typer.Option("--rig", metavar="RIG.toml", help="Rig of the experiment.")] = None,
-    configuration: Annotated[str, typer.Option(help=f"One of {', '.join(CONFIGURATIONS)}.")] = SLOSHING,
+    configuration: Annotated[
+        str, typer.Option(help=f"One of {', '.join(CONFIGURATIONS)}.", autocompletion=one_of(CONFIGURATIONS))
+    ] = SLOSHING,
     acceleration_g: Annotated[float, typer.Option(help="Level of the sweep in g.")] = 3.0,
-    direction: Annotated[str, typer.Option(help="up or down.")] = "up",
-    law: Annotated[str, typer.Option(help="octave, linear or stepped.")] = "octave",
+    direction: Annotated[str, typer.Option(help="up or down.", autocompletion=one_of(("up", "down")))] = "up",
+    law: Annotated[
+        str,
+        typer.Option(help="octave, linear or stepped.", autocompletion=one_of(SWEEP_LAWS)),
+    ] = "octave",
     frequency_hz: Annotated[float, typer.Option(help="Of a sudden start or the first tone, in Hz.")] = 11.4,
     second_frequency_hz: Annotated[float, typer.Option(help="Of the second tone, in Hz.")] = 14.7,
     initial_displacement_m: Annotated[
@@ -73,13 +91,18 @@ def virtual(
     laboratory: Annotated[
         str,
         typer.Option(
-            help="exact: the rig as told, or drawn: masses, gains, frequencies a little off.", show_default=False
+            help="exact: the rig as told, or drawn: masses, gains, frequencies a little off.",
+            show_default=False,
+            autocompletion=one_of(LABORATORIES),
         ),
     ] = "",
     laboratory_seed: Annotated[
         int | None, typer.Option(help="Which laboratory is drawn.", show_default=False)
     ] = None,
-    liquid: Annotated[str, typer.Option(help="law, or numerical: computed, takes long.")] = "law",
+    liquid: Annotated[
+        str,
+        typer.Option(help="law, or numerical: computed, takes long.", autocompletion=one_of(LIQUIDS)),
+    ] = "law",
     layers: Annotated[int, typer.Option(help="Layers of particles over the height of the tank.")] = 16,
     checkpoint: Annotated[
         Path | None,
@@ -163,7 +186,13 @@ def virtual(
 def record(
     sources: Annotated[
         list[str],
-        typer.Option("--source", metavar="URL", help="A device; the first is the time base.", show_default=False),
+        typer.Option(
+            "--source",
+            metavar="URL",
+            help="A device; the first is the time base.",
+            show_default=False,
+            autocompletion=source_url,
+        ),
     ],
     rig: Annotated[
         Path, typer.Option("--rig", metavar="RIG.toml", help="Rig the run belongs to.", show_default=False)
@@ -180,7 +209,12 @@ def record(
     attribute: Annotated[
         list[str] | None, typer.Option(metavar="KEY=VALUE", help="An attribute of the run.", show_default=False)
     ] = None,
-    align: Annotated[str, typer.Option(help="Clocks of several devices: host, device or counter.")] = "host",
+    align: Annotated[
+        str,
+        typer.Option(
+            help="Clocks of several devices: host, device or counter.", autocompletion=one_of(ALIGNMENTS)
+        ),
+    ] = "host",
     redundant: Redundant = None,
     keep_journal: Annotated[bool, typer.Option("--keep-journal", help="Keep RUN.journal.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
@@ -268,7 +302,11 @@ def recover(
     *,
     align: Annotated[
         str | None,
-        typer.Option(help="host, device or counter; as it was recorded if not given.", show_default=False),
+        typer.Option(
+            help="host, device or counter; as it was recorded if not given.",
+            show_default=False,
+            autocompletion=one_of(ALIGNMENTS),
+        ),
     ] = None,
     redundant: Redundant = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a recording that is there.")] = False,
@@ -289,10 +327,14 @@ def replay(
             metavar="RUN.nc",
             help="A recording, virtual:EXPERIMENT?rig=RIG.toml or pattern:channels=8.",
             show_default=False,
+            autocompletion=replay_source,
         ),
     ],
     urls: Annotated[
-        list[str], typer.Option("--as", metavar="URL", help="Where a device appears.", show_default=False)
+        list[str],
+        typer.Option(
+            "--as", metavar="URL", help="Where a device appears.", show_default=False, autocompletion=device_url
+        ),
     ],
     *,
     channels: Annotated[

@@ -17,7 +17,8 @@ from pipelines.commands.application import (
     finish,
     free_file,
 )
-from sloshlab.configurations import SLOSHING
+from pipelines.commands.completion import NETWORKS, one_of
+from sloshlab.configurations import CONFIGURATIONS, SLOSHING
 
 Runs = Annotated[
     list[Path],
@@ -59,11 +60,15 @@ def train(
     *,
     still: Still = None,
     test: Test = None,
-    model: Annotated[str, typer.Option(help="nfir (no feedback) or noe.")] = "nfir",
+    model: Annotated[
+        str, typer.Option(help="nfir (no feedback) or noe.", autocompletion=one_of(("nfir", "noe")))
+    ] = "nfir",
     delays: Annotated[int, typer.Option(min=1, help="Past velocities that the model sees.")] = 70,
     output_delays: Annotated[int, typer.Option(min=1, help="Past forces fed back, with noe.")] = 2,
     neurons: Annotated[int, typer.Option(min=1, help="Neurons of the hidden layer.")] = 35,
-    network: Annotated[str, typer.Option(help="normalised_rbf, rbf or multilayer.")] = "normalised_rbf",
+    network: Annotated[
+        str, typer.Option(help="normalised_rbf, rbf or multilayer.", autocompletion=one_of(NETWORKS))
+    ] = "normalised_rbf",
     rate_hz: Rate = None,
     epochs: Annotated[int, typer.Option(min=1, help="At most so many.")] = 60,
     starts: Starts = 1,
@@ -126,7 +131,12 @@ def study(
     output: OutputFolder,
     *,
     still: Still = None,
-    cases: Annotated[str, typer.Option(help="'source': its 24 NFIR and 3 NOE, or 'all': more.")] = "all",
+    cases: Annotated[
+        str,
+        typer.Option(
+            help="'source': its 24 NFIR and 3 NOE, or 'all': more.", autocompletion=one_of(("source", "all"))
+        ),
+    ] = "all",
     rate_hz: Rate = None,
     epochs: Annotated[int, typer.Option(min=1, help="Of each case, at most so many.")] = 20,
     starts: Starts = 1,
@@ -157,9 +167,18 @@ def simulate(
     output: OutputFile,
     *,
     block: Annotated[
-        str, typer.Option(help="'all' together, or 'tank' or 'structure' alone on its measured input.")
+        str,
+        typer.Option(
+            help="'all' together, or 'tank' or 'structure' alone on its measured input.",
+            autocompletion=one_of(("all", "tank", "structure")),
+        ),
     ] = "all",
-    configuration: Annotated[str, typer.Option(help="Liquid: sloshing (as described), frozen, empty.")] = SLOSHING,
+    configuration: Annotated[
+        str,
+        typer.Option(
+            help="Liquid: sloshing (as described), frozen, empty.", autocompletion=one_of(CONFIGURATIONS)
+        ),
+    ] = SLOSHING,
     twin: Annotated[
         Path | None,
         typer.Option(metavar="TWIN.toml", help="A saved twin instead of that of the rig.", show_default=False),

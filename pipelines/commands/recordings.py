@@ -39,6 +39,15 @@ def import_(
     describe: Annotated[
         bool, typer.Option("--describe", help="List columns, units, rates and traps; no map needed.")
     ] = False,
+    starter: Annotated[
+        Path | None,
+        typer.Option(
+            "--starter",
+            metavar="MAP.toml",
+            help="With --describe: write a map to begin with.",
+            show_default=False,
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
@@ -46,8 +55,10 @@ def import_(
     from pipelines.recording.importing import describe_sources, import_run
 
     if describe:
-        finish(describe_sources(sources), as_json)
+        finish(describe_sources(sources, starter), as_json)
         return
+    if starter is not None:
+        raise typer.BadParameter("--starter belongs to --describe", param_hint="--starter")
     if channel_map is None or output is None:
         raise typer.BadParameter("--map and -o are needed, unless --describe is given")
     finish(import_run(sources, channel_map, output, rig, overwrite=overwrite), as_json)

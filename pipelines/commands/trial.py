@@ -8,9 +8,11 @@ from typing import Annotated
 import typer
 
 from pipelines.commands.application import Json, OutputFolder, app, finish
+from pipelines.commands.command_help import Application
+from pipelines.commands.completion import one_of
 from sloshlab.errors import InputError
 
-trial = typer.Typer(
+trial = Application(
     help="The blind proof: hidden cases sealed, diagnosed without the key, and scored.", no_args_is_help=True
 )
 app.add_typer(trial, name="trial")
@@ -33,7 +35,11 @@ Key = Annotated[
 Half = Annotated[
     str | None,
     typer.Option(
-        "--half", metavar="HALF", help="odd: cases that develop; even: cases that judge.", show_default=False
+        "--half",
+        metavar="HALF",
+        help="odd: cases that develop; even: cases that judge.",
+        show_default=False,
+        autocompletion=one_of(("odd", "even")),
     ),
 ]
 Cases = Annotated[

@@ -8,7 +8,9 @@ from pathlib import Path
 from sloshlab.errors import InputError
 
 
-def require_free_place(output: Path, *, overwrite: bool, described: str = "recording") -> None:
+def require_free_place(
+    output: Path, *, overwrite: bool, described: str = "recording", remedy: str = "another name, or --overwrite"
+) -> None:
     """Refuse a place that is taken or cannot be written.
 
     Parameters
@@ -19,6 +21,8 @@ def require_free_place(output: Path, *, overwrite: bool, described: str = "recor
         Whether a file, or a link, that is there may be replaced.
     described : str
         What it is, for messages.
+    remedy : str
+        What to do about a file that is there.
 
     Raises
     ------
@@ -30,7 +34,7 @@ def require_free_place(output: Path, *, overwrite: bool, described: str = "recor
         raise InputError(what, got="a folder in the way", allowed="a file", remedy="choose another name")
     # a link is taken, too, even one that leads nowhere: it is replaced itself
     if os.path.lexists(output) and not overwrite:
-        raise InputError(what, got="a file that is there already", remedy="another name, or --overwrite")
+        raise InputError(what, got="a file that is there already", remedy=remedy)
     _require_writable(output.absolute().parent, what)
 
 

@@ -17,6 +17,27 @@ _LINE_EVERY_S: Final = 30.0
 """In a pipe: often enough that nobody takes a long command for one that hangs."""
 
 
+class _Silence:
+    """Whether progress is shown; errors and results are none of it."""
+
+    asked_for = False
+
+
+@contextlib.contextmanager
+def silenced(asked_for: bool = True) -> Iterator[None]:
+    """Show no progress within the block."""
+    before, _Silence.asked_for = _Silence.asked_for, _Silence.asked_for or asked_for
+    try:
+        yield
+    finally:
+        _Silence.asked_for = before
+
+
+def is_silenced() -> bool:
+    """Whether no progress is shown."""
+    return _Silence.asked_for
+
+
 class Advance(Protocol):
     """Takes what is done, what there is to do, and a word on where things stand."""
 
@@ -72,6 +93,9 @@ def _duration(seconds: float) -> str:
 @contextlib.contextmanager
 def amounts(description: str) -> Iterator[Advance]:
     """Yield a function that shows what is done of what there is to do."""
+    if _Silence.asked_for:
+        yield lambda done, everything, note="": None
+        return
     if not sys.stderr.isatty():
         yield _Lines(description)
         return
@@ -91,6 +115,9 @@ def amounts(description: str) -> Iterator[Advance]:
 @contextlib.contextmanager
 def progress(description: str, total: int) -> Iterator[Callable[[str], None]]:
     """Yield a function that advances a bar by one step and names the step."""
+    if _Silence.asked_for:
+        yield lambda step: None
+        return
     if not sys.stderr.isatty():
         lines, steps = _Lines(description), itertools.count(1)
         yield lambda step: lines(next(steps), total, step)

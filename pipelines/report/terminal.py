@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import unicodedata
+from typing import Final, Literal
 
 import typer
+
+Tone = Literal["error", "flag"]
+_COLOURS: Final[dict[Tone, str]] = {"error": "red", "flag": "yellow"}
 
 
 def printable(text: str) -> str:
@@ -29,3 +35,17 @@ def printable(text: str) -> str:
 def say(line: str, *, error: bool = False) -> None:
     """Print one line at once, to standard error if `error`."""
     typer.echo(printable(line), err=error)
+
+
+def complain(line: str, tone: Tone = "error") -> None:
+    """Print one line to standard error, its beginning up to the first colon in colour where that is seen."""
+    shown = printable(line)
+    head, colon, rest = shown.partition(":")
+    if colon and errors_are_coloured():
+        shown = f"{typer.style(head + colon, fg=_COLOURS[tone], bold=True)}{rest}"
+    typer.echo(shown, err=True)
+
+
+def errors_are_coloured() -> bool:
+    """Whether standard error is a terminal that shows colours, and nobody asked for none (no-color.org)."""
+    return sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
