@@ -23,7 +23,7 @@ VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak docs docs-publish clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -134,6 +134,9 @@ fuzz: setup  ## damaged files to every reader, for FUZZ_SECONDS (600): no crash,
 
 soak: setup  ## ten minutes of recording at full load, by serial, socketcand and slcan
 	for transport in serial socketcand slcan; do $(BIN)/python -m tests.benchmarks.sustained $$transport --duration 600 || exit 1; done
+
+wheel: setup  ## the wheel, installed into an environment of its own and used in an empty folder
+	PYTHON=$(CURDIR)/$(BIN)/python .ci/wheel
 
 docs: setup  ## the documentation as a web site in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

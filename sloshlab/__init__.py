@@ -11,6 +11,9 @@ import importlib as _importlib
 from typing import Any as _Any
 
 from sloshlab._version import __version__
+from sloshlab.compiled_cache import keep_compiled_loops as _keep_compiled_loops
+
+_keep_compiled_loops()
 
 _PLACES = {
     "BeamAnalysis": "pipelines.interface.beam",

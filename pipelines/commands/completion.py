@@ -100,7 +100,7 @@ def completion_script(shell: str) -> str:
     known = _known(shell)
     if known in SHELL_FILES:
         return SHELL_FILES[known].script
-    return _typer_completion().get_completion_script(prog_name=PROGRAM, complete_var=VARIABLE, shell=known)
+    return str(_typer_completion().get_completion_script(prog_name=PROGRAM, complete_var=VARIABLE, shell=known))
 
 
 def answer_a_shell() -> None:
