@@ -128,7 +128,7 @@ class UntrustedFile:
 
     def of_the_dead(self, status: int) -> InputError:
         """Why a process ended without an answer: minus the signal, or its exit code."""
-        if status == -signal.SIGXCPU:
+        if status == -getattr(signal, "SIGXCPU", 0) != 0:
             return self.refused(
                 f"more than the {self.limits.computing_s:.0f} s of computing that reading may take",
                 "it is damaged or too long to be read at once; split it",

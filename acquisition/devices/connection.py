@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import array
 import contextlib
-import fcntl
 import os
 import select
 import socket
-import termios
 import time
-import tty
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
@@ -22,10 +19,27 @@ from typing import Final
 
 from sloshlab.errors import SourceError
 
+with contextlib.suppress(ImportError):  # Windows, which has no pseudo-terminals; `require_terminals` says so
+    import fcntl
+    import termios
+    import tty
+
 MOST_CONNECTIONS: Final = 8
 _AT_ONCE = 65536
 _PATIENCE_S = 2.0
 _MOST_WAITING = 128
+
+
+def require_terminals(what: str) -> None:
+    """Refuse a simulated device where the system has no pseudo-terminals, nor tells what waits in a line.
+
+    Raises
+    ------
+    SourceError
+        On Windows.
+    """
+    if os.name != "posix":
+        raise SourceError(what, got=f"simulated devices on {os.name}", allowed="Linux, macOS", remedy="use WSL")
 
 
 class Connection(ABC):
@@ -94,8 +108,9 @@ class PseudoTerminal(Listener, Connection):
         Raises
         ------
         SourceError
-            If the path is taken or cannot be made.
+            If the path is taken or cannot be made, or the system has no pseudo-terminals.
         """
+        require_terminals(f"serial port {self._link}")
         master, slave = os.openpty()
         self._master = master
         try:
@@ -280,9 +295,10 @@ class ListeningSocket(Listener):
         Raises
         ------
         SourceError
-            If the port is taken or the host is not of this computer.
+            If the port is taken or the host is not of this computer, or on Windows.
         """
         where = f"{self._host}:{self._port}"
+        require_terminals(f"listening on {where}")
         try:
             family = socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)[0][0]
             listening = socket.socket(family, socket.SOCK_STREAM)

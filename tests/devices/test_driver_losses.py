@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import struct
 import sys
 import threading
@@ -18,6 +17,7 @@ from pipelines.recording.record import RecordSettings, record
 from pipelines.recording.replay import ReplaySettings, replay
 from sloshlab.recording import LOST
 
+fcntl = pytest.importorskip("fcntl", reason="counters of Linux")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="counters of Linux")
 
 PATIENCE_S = 60.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import resource
 import signal
 import struct
 import time
@@ -22,7 +21,7 @@ from acquisition.samples.delivery import Block, Delivery
 from acquisition.sources.interface import Source, SourceInfo
 from sloshlab.errors import JournalError
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs fork and SIGKILL")
+resource = pytest.importorskip("resource", reason="needs fork and SIGKILL")
 
 N_CHANNELS = 3
 N_KILLS = 200

@@ -9,7 +9,6 @@ import socket
 import struct
 import threading
 import time
-import tty
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,6 +21,8 @@ from acquisition.sources.interface import SourceURL
 from acquisition.sources.serial_line import DescriptorLine, Line, LineLostError, open_line
 from acquisition.sources.serial_source import SerialSource
 from sloshlab.errors import SourceError
+
+tty = pytest.importorskip("tty", reason="needs pseudo-terminals")
 
 PATIENCE_S = 60.0
 TEXT = (

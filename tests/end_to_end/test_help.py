@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import os
-import pty
 import re
 import shlex
 import subprocess
@@ -105,6 +104,7 @@ def test_cheap_examples_run(
 
 def seen_on_a_terminal(arguments: list[str], **environment: str) -> str:
     """What a command writes to a terminal."""
+    pty = pytest.importorskip("pty", reason="needs pseudo-terminals")
     ours, theirs = pty.openpty()
     words = [sys.executable, "-m", "pipelines.command_line", *arguments]
     removed = {"NO_COLOR", "FORCE_COLOR", "TERM"}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -34,7 +33,7 @@ from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, asser
 import pipelines.recording.record
 from pipelines.command_line import run
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals and signals")
+resource = pytest.importorskip("resource", reason="needs pseudo-terminals and signals")
 
 N_SAMPLES = 4096
 LOST = 1

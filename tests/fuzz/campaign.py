@@ -6,7 +6,6 @@ dies or a reader says anything but one line, each file of the batch is read once
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import tempfile
@@ -90,6 +89,8 @@ def fuzzed(name: str, first: int, n: int, findings: Findings, kept: Path | None 
             for number in _troubling(name, start, n_here, folder):
                 _read_alone(name, number, findings, kept)
             findings.n_inputs += n_here
+    import resource  # where there is one: Windows can collect what is in this module
+
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     if peak > MOST_MEMORY_KIB:
         findings.wrong.append(f"{name} {first} … {first + n - 1}: {peak} KiB of memory")

@@ -4,7 +4,6 @@ import contextlib
 import os
 import select
 import socket
-import tty
 
 import numpy as np
 import pytest
@@ -13,6 +12,8 @@ from acquisition.devices.can_conversation import SocketcandConversation
 from acquisition.devices.connection import Connection, Listener, ListeningSocket, PseudoTerminal
 from acquisition.devices.conversation import Conversation
 from acquisition.devices.endpoint import LONGEST_STALL_S, StreamEndpoint
+
+tty = pytest.importorskip("tty", reason="needs pseudo-terminals")
 
 FRAMES = np.zeros(1)  # what is sent is the text that the endpoint makes of them
 MIB = 1 << 20
