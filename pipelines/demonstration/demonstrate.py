@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from pipelines.demonstration.comparison import error_lines, judgement, number_lines, truth_sentence
 from pipelines.demonstration.sealed_cases import DIAGNOSIS, TRUTH, conceal, earlier_files
+from pipelines.report.progress import is_silenced
 from sealed_trial.demonstrations import DEMONSTRATIONS, DOMAIN
 from sealed_trial.running import DIAGNOSE
 from sealed_trial.scoring.answer import read_answer
@@ -93,7 +94,7 @@ def _find(output: Path, say: Say) -> None:
     say(f"2. FIND – sloshlab diagnose {output / CASE}")
     say("   A process of its own compares the simulation with the recordings; it has neither key nor seed.")
     began = time.monotonic()
-    words = [*DIAGNOSE, str(output / CASE), "-o", str(output / DIAGNOSIS)]
+    words = [*DIAGNOSE, str(output / CASE), "-o", str(output / DIAGNOSIS), *(["--quiet"] if is_silenced() else [])]
     # its progress goes to this terminal, its answer is read from the file
     ended = subprocess.run(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False)
     if ended.returncode not in _DONE:

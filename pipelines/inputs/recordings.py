@@ -29,6 +29,19 @@ _SCALED_ATTRIBUTES = ("range_min", "range_max", "noise_std", "known_to", "adc_st
 """Of a channel, in its units."""
 
 
+def work_of(runs: Iterable[RunSource]) -> list[float]:
+    """Work that each recording makes, in proportion, for the time left: bytes of files, or of arrays in memory.
+
+    A file that cannot be read is none; whoever reads it says so.
+    """
+    return [
+        float(run.recording.nbytes)
+        if isinstance(run, RecordingInMemory)
+        else float(run.is_file() and os.path.getsize(run))
+        for run in runs
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class RecordingInMemory:
     """A recording that is no file.

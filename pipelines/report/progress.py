@@ -6,13 +6,12 @@ import contextlib
 import itertools
 import sys
 import time
-from collections.abc import Callable, Iterator
-from typing import Final, Protocol
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Final, Protocol
 
 from pipelines.report.terminal import printable, say
+from pipelines.report.time_left import TimeLeft, WeightedSteps
 
-_REMEMBERED_S: Final = 3600.0
-"""Steps that take minutes still tell how long the rest takes."""
 _LINE_EVERY_S: Final = 30.0
 """In a pipe: often enough that nobody takes a long command for one that hangs."""
 
@@ -47,33 +46,40 @@ class Advance(Protocol):
 
 
 class _Lines:
-    """A line on standard error every half minute; commands that take less say nothing.
+    """A line on standard error every half minute, and one at the end; commands that take less say nothing.
 
     Parameters
     ----------
     description : str
+    plan : mapping of str to float, optional
+        As of `TimeLeft`.
     """
 
-    def __init__(self, description: str) -> None:
+    def __init__(self, description: str, plan: Mapping[str, float] | None = None) -> None:
         self._description = description
-        self._began = self._said = self._step_began = time.monotonic()
-        self._everything = 0.0
+        self._began = self._said = time.monotonic()
+        self._left = TimeLeft(self._began, plan)
+        self._has_said = False
 
     def __call__(self, done: float, everything: float, note: str = "") -> None:
         """Take what is done; another amount of work in all, or none of it done, is another step."""
         now = time.monotonic()
-        if done == 0 or everything != self._everything:
-            self._step_began = now
-        self._everything = everything
+        self._left.at(now, done, everything, note)
         if now - self._said < _LINE_EVERY_S:
             return
-        self._said = now
+        self._said, self._has_said = now, True
         share = f", {100 * done / everything:.0f} %" if everything > 0 else ""
-        left = ""
-        if done > 0 and now > self._step_began:
-            left = f", about {_duration((now - self._step_began) * (everything - done) / done)} left of this step"
+        seconds = self._left.seconds(now)
+        left = "" if seconds is None else f", about {_duration(seconds)} left"
+        if left and not self._left.is_of_everything:
+            left += " of this step"
         step = f": {note}" if note else ""
         say(f"{self._description}, {_duration(now - self._began)} so far{step}{share}{left}", error=True)
+
+    def end(self) -> None:
+        """Say that it is done, if anything was said before."""
+        if self._has_said:
+            say(f"{self._description}, {_duration(time.monotonic() - self._began)}: done", error=True)
 
 
 def _duration(seconds: float) -> str:
@@ -91,42 +97,81 @@ def _duration(seconds: float) -> str:
 
 
 @contextlib.contextmanager
-def amounts(description: str) -> Iterator[Advance]:
-    """Yield a function that shows what is done of what there is to do."""
+def amounts(description: str, plan: Mapping[str, float] | None = None) -> Iterator[Advance]:
+    """Yield a function that shows what is done of what there is to do.
+
+    Parameters
+    ----------
+    description : str
+    plan : mapping of str to float, optional
+        Stages by the beginnings of notes, with the share of the time that is usually over when each begins;
+        the time left is then that of all stages.
+    """
     if _Silence.asked_for:
         yield lambda done, everything, note="": None
         return
     if not sys.stderr.isatty():
-        yield _Lines(description)
+        lines = _Lines(description, plan)
+        yield lines
+        lines.end()
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(),
-               TextColumn("{task.fields[note]}", markup=False))  # fmt: skip
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, speed_estimate_period=_REMEMBERED_S) as bar:
+    left = TimeLeft(time.monotonic(), plan)
+    with _bar(left, percent=True) as bar:
         task = bar.add_task(description, total=None, note="")
-        yield lambda done, everything, note="": bar.update(
-            task, completed=done, total=everything, note=printable(note)
-        )
+
+        def advance(done: float, everything: float, note: str = "") -> None:
+            left.at(time.monotonic(), done, everything, note)
+            bar.update(task, completed=done, total=everything, note=printable(note))
+
+        yield advance
 
 
 @contextlib.contextmanager
-def progress(description: str, total: int) -> Iterator[Callable[[str], None]]:
-    """Yield a function that advances a bar by one step and names the step."""
+def progress(description: str, total: int, weights: Sequence[float] = ()) -> Iterator[Callable[[str], None]]:
+    """Yield a function that advances a bar by one step and names the step.
+
+    Parameters
+    ----------
+    description : str
+    total : int
+        Steps.
+    weights : sequence of float
+        Work of each step, such as the size of its file, where steps are not alike.
+    """
     if _Silence.asked_for:
         yield lambda step: None
         return
+    work, steps = WeightedSteps(weights or [1.0] * total), itertools.count(1)
     if not sys.stderr.isatty():
-        lines, steps = _Lines(description), itertools.count(1)
-        yield lambda step: lines(next(steps), total, step)
+        lines = _Lines(description)
+        yield lambda step: lines(work.done(next(steps)), work.everything, step)
+        lines.end()
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    left = TimeLeft(time.monotonic())
+    with _bar(left, percent=False) as bar:
+        task = bar.add_task(description, total=total, note="")
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"),
-               TimeRemainingColumn(), TextColumn("{task.fields[step]}", markup=False))  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(description, total=total, step="")
-        yield lambda step: bar.update(task, advance=1, step=printable(step))
+        def advance(step: str) -> None:
+            left.at(time.monotonic(), work.done(next(steps)), work.everything)
+            bar.update(task, advance=1, note=printable(step))
+
+        yield advance
+
+
+def _bar(left: TimeLeft, *, percent: bool) -> Any:
+    """A bar of rich with the time left."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TextColumn
+    from rich.text import Text
+
+    class LeftColumn(ProgressColumn):
+        """Counts down between the steps, too."""
+
+        def render(self, task: Task) -> Text:
+            seconds = left.seconds(time.monotonic())
+            return Text("" if seconds is None else f"{_duration(seconds)} left")
+
+    done = TaskProgressColumn() if percent else TextColumn("{task.completed}/{task.total}")
+    note = TextColumn("{task.fields[note]}", markup=False)
+    columns = (TextColumn("{task.description}"), BarColumn(), done, LeftColumn(), note)
+    return Progress(*columns, console=Console(stderr=True), transient=True)

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from pipelines.inputs.recordings import RunSource, recording_of
+from pipelines.inputs.recordings import RunSource, recording_of, work_of
 from pipelines.inputs.rigs import RigSource, rig_of
 from pipelines.report.progress import progress
 from pipelines.structure.results import METHODS, BeamExperiment, BeamRun, BeamSettings, FrozenMode, group_of
@@ -75,7 +75,7 @@ def analyse_beam(paths: Sequence[RunSource], rig_path: RigSource, settings: Beam
     runs = _loaded(paths, rig)
     settings = dataclasses.replace(settings, segment_s=settings.segment_s or _segment_s(runs))
     results = []
-    with progress("beam", len(runs)) as advance:
+    with progress("beam", len(runs), work_of(run.path for run in runs)) as advance:
         for run in runs:
             with naming(run.path):
                 results.append(analysed(run, rig, settings))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipelines.inputs.recordings import RunSource, attributes_of, recording_of
+from pipelines.inputs.recordings import RunSource, attributes_of, recording_of, work_of
 from pipelines.inputs.rigs import RigSource, rig_of
 from pipelines.report.progress import progress
 from pipelines.sweep.results import RigResult, RunResult, SweepExperiment, SweepOptions, SweepSignals
@@ -105,7 +105,8 @@ def analyse_shaker(
     runs = _assigned(paths, rigs)
     results: dict[str, list[RunResult]] = {name: [] for name in rigs}
     still: dict[str, StillRuns] = {}
-    with progress("shaker", len(runs)) as advance:
+    in_turn = [run.path for name in rigs for run in runs if run.rig_name == name]
+    with progress("shaker", len(runs), work_of(in_turn)) as advance:
         for name, rig in rigs.items():
             own = [run for run in runs if run.rig_name == name]
             quiet = [run.path for run in own if run.attributes.configuration in STILL_CONFIGURATIONS]

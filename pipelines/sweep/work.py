@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from pipelines.inputs.recordings import RunSource, recording_of
+from pipelines.inputs.recordings import RunSource, recording_of, work_of
 from pipelines.report.progress import progress
 from pipelines.sweep.results import RunResult, SweepExperiment, SweepOptions, SweepSignals
 from pipelines.sweep.stages import (
@@ -83,7 +83,7 @@ def analyse_work(
         If a run or a channel is bad; nothing has been written then.
     """
     results: list[RunResult] = []
-    with progress("work", len(paths)) as advance:
+    with progress("work", len(paths), work_of(paths)) as advance:
         for path in paths:
             with naming(path):
                 results.append(_analysed(path, settings, keep_signals))

@@ -94,12 +94,15 @@ def test_a_pipe_has_a_line_every_half_minute(capsys: Any, monkeypatch: pytest.Mo
         "diagnosing, 30 s so far: one effect: \\x1b[2J, 6 %, about 2 min left of this step",
         "diagnosing, 60 s so far: one effect: \\x1b[2J, 25 %, about 2 min left of this step",
         "diagnosing, 90 s so far: one effect: \\x1b[2J, 44 %, about 90 s left of this step",
+        "diagnosing, 95 s: done",
     ]
     with progress("runs", 4) as step:
         step("run_01")
         now[0] += 31.0
         step("run_02")
-    assert capsys.readouterr().err == "runs, 31 s so far: run_02, 50 %, about 31 s left of this step\n"
+    assert capsys.readouterr().err == (
+        "runs, 31 s so far: run_02, 50 %, about 31 s left of this step\nruns, 31 s: done\n"
+    )
 
 
 def test_the_live_view_writes_out_what_a_device_says() -> None:
