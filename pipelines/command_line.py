@@ -39,12 +39,16 @@ from pipelines.commands import field_benchmarks
 from pipelines.commands import trial
 
 # isort: split
+from pipelines.commands import campaign
+
+# isort: split
 from pipelines.commands import laboratory
 
 # isort: split
 from pipelines.commands import info
 
 # isort: split
+from campaigns.task import StoppedError
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, app
 from pipelines.commands.completion import PROGRAM, answer_a_shell
 from pipelines.report.terminal import complain, say
@@ -58,6 +62,7 @@ __all__ = [
     "USAGE",
     "analysis",
     "app",
+    "campaign",
     "case",
     "demo",
     "diagnosis",
@@ -94,12 +99,13 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except _UsageError as error:
         _show(error)
         return USAGE
-    except (KeyboardInterrupt, typer.Abort):
+    except (KeyboardInterrupt, typer.Abort) as interruption:
+        if isinstance(interruption, StoppedError) and interruption.number != signal.SIGINT:
+            return _terminated(interrupt.Terminated(interruption.number))
         complain("sloshlab: interrupted; nothing half-written")
         return INTERRUPTED
     except interrupt.Terminated as termination:
-        print(f"sloshlab: ended by {termination}; nothing half-written", file=sys.stderr)  # noqa: T201
-        return termination.exit_code
+        return _terminated(termination)
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
         remedy = "check that the path can be written, and that a folder or file of this name is not in the way"
@@ -116,6 +122,11 @@ def _show(error: Any) -> None:
             complain(line)
         else:
             say(line, error=True)
+
+
+def _terminated(termination: interrupt.Terminated) -> int:
+    print(f"sloshlab: ended by {termination}; nothing half-written", file=sys.stderr)  # noqa: T201
+    return termination.exit_code
 
 
 def main() -> NoReturn:

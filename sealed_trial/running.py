@@ -5,18 +5,18 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import signal
-import subprocess
 import sys
 import tempfile
-import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from campaigns.executor import Executor
+from campaigns.local_executor import LocalExecutor
+from campaigns.task import Ending, Task
+from campaigns.watched_command import run_watched
+from campaigns.working import work_through
 from sealed_trial.perturbed_case import write_perturbed_case
 from sealed_trial.sealing.key import PREFIX, is_key
 from sealed_trial.sealing.selection import EVERYTHING, Selection
@@ -28,10 +28,6 @@ DIAGNOSES: Final = "diagnoses"
 OUTCOME: Final = "outcome.json"
 _LOOKED_THROUGH_BYTES: Final = 4096
 _LARGEST_OUTCOME_BYTES: Final = 65536
-_MEMORY_EVERY_S: Final = 0.3
-"""What the system keeps as the peak of a process, ru_maxrss, begins with that of the process which started it."""
-_SESSION: Final = 3
-"""Field of `/proc/PID/stat` after the name of the process (proc(5))."""
 DIAGNOSE: Final = (sys.executable, "-m", "pipelines.command_line", "diagnose")
 
 
@@ -100,6 +96,7 @@ def run_trial(
     diagnoses: str = DIAGNOSES,
     perturbation: int | None = None,
     finished: Callable[[Outcome], None] = lambda outcome: None,
+    executor: Executor | None = None,
 ) -> list[Outcome]:
     """Diagnose all chosen cases that have not been; what was done before stays.
 
@@ -119,6 +116,8 @@ def run_trial(
         Seed by which the recordings are moved a little; as they are, by default.
     finished : callable
         Told every outcome.
+    executor : Executor, optional
+        In place of processes of this machine.
 
     Raises
     ------
@@ -140,6 +139,7 @@ def run_trial(
         command=command,
         perturbation=perturbation,
         finished=finished,
+        executor=executor,
     )
 
 
@@ -153,6 +153,7 @@ def run_folders(
     options_of: Callable[[Path], Sequence[str]] = lambda case: (),
     perturbation: int | None = None,
     finished: Callable[[Outcome], None] = lambda outcome: None,
+    executor: Executor | None = None,
 ) -> list[Outcome]:
     """Diagnose case folders that have not been; what was done before stays.
 
@@ -162,38 +163,46 @@ def run_folders(
         Folders of different names.
     answers : Path
         Takes a folder of the name of each case.
-    n_workers, time_limit_s, command, perturbation, finished
+    n_workers, time_limit_s, command, perturbation, finished, executor
         As of `run_trial`.
     options_of : callable
         (folder of a case) → more words for the command.
+
+    Raises
+    ------
+    InputError
+        If an answer cannot be kept.
     """
     outputs = {case.name: answers / case.name for case in cases}
     outcomes = {name: outcome for name, output in outputs.items() if (outcome := _known(output)) is not None}
     waiting = [case for case in cases if case.name not in outcomes]
-    stopping = threading.Event()
-    watched = _Watched(command, options_of, time_limit_s, stopping)
-    with ThreadPoolExecutor(n_workers) as pool:
-        tasks = [pool.submit(_answered, case, outputs[case.name], perturbation, watched) for case in waiting]
-        try:
-            for task in as_completed(tasks):
-                outcome = task.result()
-                outcomes[outcome.case] = outcome
-                finished(outcome)
-        except BaseException:
-            stopping.set()
-            pool.shutdown(cancel_futures=True)
-            raise
+
+    def arguments_of(case: Path) -> dict[str, Any]:
+        return {
+            # as they were given: words of the command are seen in what it writes
+            "case": str(case),
+            "output": str(outputs[case.name]),
+            "folder": str(Path.cwd()),
+            "command": list(command),
+            "options": list(options_of(case)),
+            "time_limit_s": time_limit_s,
+            "perturbation": perturbation,
+        }
+
+    def ended(number: int, ending: Ending) -> None:
+        case = waiting[number].name
+        if ending.status in ("failed", "full"):
+            remedy = "mend it, then give the same command again"
+            raise InputError(f"answer of {case}", got=ending.line, remedy=remedy)
+        if ending.status == "done":
+            outcomes[case] = Outcome(**ending.result)
+        else:  # not kept: its process was ended by somebody, and the next run tries again
+            outcomes[case] = Outcome(case, "crashed", -1, round(ending.seconds, 2), 0.0, 0.0, ending.line)
+        finished(outcomes[case])
+
+    tasks = (Task(case.name, "sealed_trial.running:answered_case", arguments_of(case)) for case in waiting)
+    work_through(tasks, executor or LocalExecutor(n_workers, one_core=False), finished=ended)
     return [outcomes[case.name] for case in cases]
-
-
-@dataclass(frozen=True)
-class _Watched:
-    """How every case is diagnosed: by which command, how long at most, and until when at all."""
-
-    command: Sequence[str]
-    options_of: Callable[[Path], Sequence[str]]
-    time_limit_s: float
-    stopping: threading.Event
 
 
 def _known(output: Path) -> Outcome | None:
@@ -219,12 +228,26 @@ def read_outcome(path: Path) -> Outcome:
         raise InputError(f"{path}", got="something else", allowed=allowed, remedy="remove it") from error
 
 
-def _answered(case: Path, output: Path, perturbation: int | None, watched: _Watched) -> Outcome:
-    """One case, or the same a little moved, in a process of its own."""
-    if watched.stopping.is_set():
-        raise KeyboardInterrupt
-    with _as_given_or_moved(case, perturbation) as folder:
-        return _diagnosed(folder, output, watched)
+def answered_case(arguments: Mapping[str, Any], say_share: Callable[[float], None]) -> dict[str, Any]:
+    """One case, or the same a little moved, in a process of its own; this is what a worker does.
+
+    Parameters
+    ----------
+    arguments : mapping
+        ``case`` and ``output``, seen from ``folder``; the ``command`` with its ``options``, ``time_limit_s`` and
+        ``perturbation``.
+    say_share : callable
+
+    Returns
+    -------
+    dict
+        The outcome.
+    """
+    os.chdir(arguments["folder"])
+    output = Path(arguments["output"])
+    with _as_given_or_moved(Path(arguments["case"]), arguments["perturbation"]) as case:
+        words = [*arguments["command"], str(case), "-o", str(output), *arguments["options"]]
+        return asdict(answered(case, output, words, arguments["time_limit_s"]))
 
 
 @contextlib.contextmanager
@@ -238,53 +261,30 @@ def _as_given_or_moved(case: Path, perturbation: int | None) -> Iterator[Path]:
         yield moved
 
 
-def _diagnosed(case: Path, output: Path, watched: _Watched) -> Outcome:
-    """One case in a process of its own, watched."""
+def answered(case: Path, output: Path, words: Sequence[str], time_limit_s: float) -> Outcome:
+    """One case diagnosed by a command in a process of its own, watched; its outcome is kept beside the answer.
+
+    Parameters
+    ----------
+    case, output : Path
+        Folder of the case, and of its answer.
+    words : sequence of str
+        The command.
+    time_limit_s : float
+    """
     output.mkdir(parents=True, exist_ok=True)
-    words = [*watched.command, str(case), "-o", str(output), *watched.options_of(case)]
-    with (output / "stderr.txt").open("w+b") as errors:
-        started = time.monotonic()
-        process = subprocess.Popen(
-            words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True
-        )
-        status, code, usage = _waited(process.pid, started + watched.time_limit_s, watched.stopping)
-        wall = time.monotonic() - started
-        errors.seek(max(0, errors.tell() - 2000))
-        last = (errors.read().decode(errors="replace").strip().splitlines() or [""])[-1][-500:]
-    process.returncode = code  # was waited for by its number, for its use of processor and memory
-    if status == "done" and (code not in (0, 3) or not (output / "verdict.json").is_file()):
+    ending = run_watched(words, output / "stderr.txt", time_limit_s)
+    status = "timed_out" if ending.is_timed_out else "done"
+    if status == "done" and (ending.exit_code not in (0, 3) or not (output / "verdict.json").is_file()):
         status = "crashed"
-    outcome = Outcome(case.name, status, code, round(wall, 2), round(usage[0], 2), round(usage[1], 1), last)
+    outcome = Outcome(
+        case.name,
+        status,
+        ending.exit_code,
+        round(ending.wall_s, 2),
+        round(ending.processor_s, 2),
+        round(ending.memory_mib, 1),
+        ending.last_words,
+    )
     write_bytes(output / OUTCOME, json.dumps(asdict(outcome), indent=1, sort_keys=True).encode() + b"\n")
     return outcome
-
-
-def _waited(pid: int, until: float, stopping: threading.Event) -> tuple[str, int, tuple[float, float]]:
-    """Status, exit code, processor seconds and peak memory [MiB] of a child, killed when its time is over."""
-    status, largest_mib, looked_at = "done", 0.0, 0.0
-    while True:
-        found, wait_status, usage = os.wait4(pid, os.WNOHANG)
-        if found:
-            spent = usage.ru_utime + usage.ru_stime, largest_mib or usage.ru_maxrss / 1024
-            if stopping.is_set():
-                raise KeyboardInterrupt
-            return status, os.waitstatus_to_exitcode(wait_status), spent
-        if stopping.is_set() or time.monotonic() > until:
-            status = "timed_out"
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(pid, signal.SIGKILL)
-        if time.monotonic() - looked_at > _MEMORY_EVERY_S:
-            largest_mib, looked_at = max(largest_mib, _memory_mib(pid)), time.monotonic()
-        time.sleep(0.05)
-
-
-def _memory_mib(session: int) -> float:
-    """Memory of all processes of a session, what they share counted once; zero where the system does not tell."""
-    total_kib = 0
-    for process in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError, ValueError, IndexError):  # it has ended meanwhile, or is not ours
-            after_name = (process / "stat").read_text().rpartition(")")[2].split()
-            if int(after_name[_SESSION]) == session:
-                lines = (process / "smaps_rollup").read_text().splitlines()
-                total_kib += sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
-    return total_kib / 1024

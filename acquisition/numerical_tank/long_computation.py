@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 
-from acquisition.numerical_tank.interruption import stop_signals_noted
+from sloshlab.interrupt import stop_signals_noted
 
 
 class LongComputation(ABC):

@@ -36,7 +36,11 @@ from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRu
 from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC, virtual_shaker_run, write_virtual_run
 from acquisition.virtual_laboratory.structure_rig import structure_laboratory
 from acquisition.virtual_laboratory.structure_run import virtual_structure_run
-from acquisition.virtual_laboratory.worker_processes import Outcome, work_through
+from campaigns.executor import Executor
+from campaigns.local_executor import LocalExecutor
+from campaigns.store import only_one
+from campaigns.task import Ending, Task
+from campaigns.working import work_through
 from sloshlab import atomic_file
 from sloshlab._version import __version__
 from sloshlab.errors import InputError, RecordingInterruptedError, SloshlabError
@@ -141,6 +145,7 @@ def make_numerical_campaign(
     runs: Sequence[NumericalRun] | None = None,
     progressed: Callable[[float], None] | None = None,
     finished: Callable[[FinishedRun], None] | None = None,
+    executor: Executor | None = None,
 ) -> CampaignSummary:
     """Make the recordings that are not there yet.
 
@@ -155,6 +160,8 @@ def make_numerical_campaign(
         Called with the share of the work of this session that is done.
     finished : callable, optional
         Called after every run.
+    executor : Executor, optional
+        In place of processes of this machine.
 
     Raises
     ------
@@ -177,9 +184,10 @@ def make_numerical_campaign(
         missing.sort(key=_cost, reverse=True)
         session = _Session(manifest, missing, progressed or (lambda share: None), finished or (lambda run: None))
         try:
-            work_through(
-                record, missing, settings.n_workers, progressed=session.progressed, finished=session.finished
-            )
+            # a process each: what one run leaves behind in it cannot touch another
+            where = executor or LocalExecutor(settings.n_workers, fresh=True)
+            handed = [_as_task(task) for task in missing]
+            work_through(handed, where, progressed=session.progressed, finished=session.finished)
         except KeyboardInterrupt as interrupt:
             raise RecordingInterruptedError(
                 f"campaign interrupted: {session.n_done} of {len(missing)} runs done; checkpoints keep what was "
@@ -191,8 +199,45 @@ def make_numerical_campaign(
     return CampaignSummary(manifest.path, len(tasks) - len(missing), session.n_made, tuple(session.flags))
 
 
+def _as_task(task: _Task) -> Task:
+    arguments = {
+        "run": {**asdict(task.run), "settings": dict(task.run.settings)},
+        "recording": str(task.recording.absolute()),
+        "checkpoint": str(task.checkpoint.absolute()),
+        "seed": task.seed,
+        "layers_per_height": task.layers_per_height,
+        "laboratory_seed": task.laboratory_seed,
+    }
+    return Task(task.run.name, "acquisition.virtual_laboratory.numerical_campaign:record_told_run", arguments)
+
+
+def record_told_run(arguments: Mapping[str, Any], say_share: Callable[[float], None]) -> dict[str, Any]:
+    """Make one recording as another process is told it; this is what a worker does.
+
+    Parameters
+    ----------
+    arguments : mapping
+        The ``run``, places of its ``recording`` and ``checkpoint``, seeds and resolution.
+    say_share : callable
+
+    Returns
+    -------
+    dict
+        ``computing_s`` and ``flag``.
+    """
+    task = _Task(
+        NumericalRun(**arguments["run"]),
+        Path(arguments["recording"]),
+        Path(arguments["checkpoint"]),
+        arguments["seed"],
+        arguments["layers_per_height"],
+        arguments["laboratory_seed"],
+    )
+    return record(task, say_share)
+
+
 def record(task: _Task, progress: Callable[[float], None]) -> dict[str, Any]:
-    """Make one recording; this is what a worker does.
+    """Make one recording.
 
     Returns
     -------
@@ -259,11 +304,11 @@ class _Session:
         done = sum(cost * share for cost, share in zip(self._costs, self._shares, strict=True))
         self._progressed(done / sum(self._costs))
 
-    def finished(self, number: int, outcome: Outcome) -> None:
+    def finished(self, number: int, ending: Ending) -> None:
         task = self._tasks[number]
-        result = outcome.result or {"computing_s": 0.0, "flag": f"not made: {outcome.error}"}
+        result = ending.result or {"computing_s": 0.0, "flag": f"not made: {ending.line}"}
         self.n_done += 1
-        if not outcome.error:
+        if ending.status == "done":
             self.n_made += 1
             self._manifest.add(task, result)
         if result["flag"]:
@@ -423,25 +468,7 @@ def _made_of(task: _Task) -> str:
 def _alone(folder: Path) -> Iterator[None]:
     """Make the folder of the checkpoints, keep a second campaign out of it, remove it when it is empty."""
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "lock").open("w") as lock:
-        if not _locked(lock.fileno()):
-            raise InputError(
-                f"{folder}", got="another campaign at work", remedy="wait for it, or name other --checkpoints"
-            )
+    with only_one(folder / "lock", f"{folder}", remedy="wait for it, or name other --checkpoints"):
         yield
-        if len(list(folder.iterdir())) == 1:
-            (folder / "lock").unlink()
-            folder.rmdir()
-
-
-def _locked(file: int) -> bool:
-    try:
-        import fcntl
-    except ImportError:  # there are no such locks on this system
-        return True
-    try:
-        # let go by the system when the process ends, however it ends
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
+    with contextlib.suppress(OSError):  # checkpoints are in it yet
+        folder.rmdir()

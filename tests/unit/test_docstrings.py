@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-PACKAGES = ("sloshlab", "acquisition", "pipelines", "studies")
+PACKAGES = ("sloshlab", "campaigns", "acquisition", "pipelines", "studies")
 
 
 def module_names() -> list[str]:

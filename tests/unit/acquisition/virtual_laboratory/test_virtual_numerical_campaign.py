@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from acquisition.virtual_laboratory import numerical_campaign
 from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings, make_numerical_campaign
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
-from acquisition.virtual_laboratory.worker_processes import Outcome
+from campaigns.task import Ending
 from sloshlab.errors import InputError
 from sloshlab.recording import read_recording
 from sloshlab.rig import Rig
@@ -45,10 +46,11 @@ def contents(folder: Path) -> dict[str, str]:
     }
 
 
-def one_after_another(work, tasks, n_workers, *, progressed, finished) -> None:
+def one_after_another(tasks, executor, *, progressed, finished) -> None:
     """Stands in for `work_through` without other processes."""
     for number, task in enumerate(tasks):
-        finished(number, Outcome(work(task, lambda share, number=number: progressed(number, share))))
+        told = partial(progressed, number)
+        finished(number, Ending("done", numerical_campaign.record_told_run(task.arguments, told)))
 
 
 @pytest.fixture(scope="module")
@@ -178,8 +180,8 @@ def test_what_is_good_is_kept_and_the_rest_is_made_again(campaign, monkeypatch) 
     folder, _, _ = campaign
     before, asked = contents(folder), []
 
-    def not_made(work, tasks, n_workers, *, progressed, finished) -> None:
-        asked.append([task.run.name for task in tasks])
+    def not_made(tasks, executor, *, progressed, finished) -> None:
+        asked.append([task.name for task in tasks])
 
     monkeypatch.setattr(numerical_campaign, "work_through", not_made)
     frozen = folder / "shaker" / "frozen.nc"
@@ -272,8 +274,8 @@ def test_a_shallow_liquid_is_computed_more_finely(fill_level: str, layers: int, 
     """3/8 of 16 layers are 6; a quarter of the tank has them at h/24."""
     made = []
 
-    def worker(work, tasks, n_workers, *, progressed, finished) -> None:
-        made.extend(task.layers_per_height for task in tasks)
+    def worker(tasks, executor, *, progressed, finished) -> None:
+        made.extend(task.arguments["layers_per_height"] for task in tasks)
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(numerical_campaign, "work_through", worker)

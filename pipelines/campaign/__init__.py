@@ -1,0 +1,1 @@
+"""Campaigns: analyses, trainings and diagnoses over hundreds of recordings, planned, carried out and shown."""
