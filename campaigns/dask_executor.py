@@ -159,8 +159,8 @@ class DaskExecutor:
             return Ending(**json.loads(answer))
         if isinstance(answer, self._distributed.KilledWorker):
             return Ending("died", line="the workers that it was given to died")
-        gone = (str, self._distributed.client.FutureCancelledError, TimeoutError, ConnectionError)
-        if isinstance(answer, (*gone, self._distributed.CommClosedError)):
+        # of the connection: those of a task are in its ending
+        if isinstance(answer, str | self._distributed.client.FutureCancelledError | OSError):
             return None
         return Ending("failed", line=" ".join(f"the worker: {type(answer).__name__}: {answer}".split())[:500])
 
@@ -179,8 +179,8 @@ class DaskExecutor:
         self._in_vain += 1
         if self._in_vain > _MOST_IN_VAIN:
             raise ClusterError(
-                f"scheduler {self._address}: got {_MOST_IN_VAIN} losses of what it was given, and no result; remedy: "
-                "look at its log, then give the same command again"
+                f"scheduler {self._address}: got {_MOST_IN_VAIN} losses of what it was given, and no result; "
+                "remedy: look at its log, then give the same command again"
             )
         self._said(f"scheduler {self._address} is lost; waiting for it")
         self._forget_client()

@@ -50,7 +50,10 @@ def carried_out(asked: str) -> str:
     workers: dict[bool, WorkerProcess] = _OWN.__dict__.setdefault("workers", {})
     worker = workers.setdefault(document["one_core"], WorkerProcess(one_core=document["one_core"]))
     stopping = _STOPPING.setdefault(document["campaign"], threading.Event())
-    ending = worker.carried_out(Task(**document["task"]), attempt=document["attempt"], stopping=stopping)
+    try:
+        ending = worker.carried_out(Task(**document["task"]), attempt=document["attempt"], stopping=stopping)
+    except OSError as error:
+        ending = Ending("failed", line=" ".join(f"its process could not be asked: {error}".split()))
     return json.dumps(asdict(ending))
 
 

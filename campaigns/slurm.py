@@ -39,9 +39,7 @@ class SlurmExecutor(DaskExecutor):
         except ImportError as error:
             raise MissingExtraError("dask-jobqueue", extra="cluster", purpose="jobs of Slurm") from error
         if shutil.which("sbatch") is None:
-            raise ClusterError(
-                "scheduler slurm: got no command sbatch; remedy: log in to a node that submits jobs"
-            )
+            raise ClusterError("scheduler slurm: got no command sbatch; remedy: use a node that submits jobs")
         try:
             self._cluster: Any = SLURMCluster(**_settings(asked))
             self._cluster.scale(jobs=n_jobs)

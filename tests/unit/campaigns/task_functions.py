@@ -91,3 +91,11 @@ def nothing(folder, files, arguments, say_share):
     """A stub."""
     (folder / "result.txt").write_text("nothing")
     return {}
+
+
+def written_full(folder, files, arguments, say_share):
+    """Find no space after half of the result, as long as a file is there."""
+    (folder / "half.txt").write_text("half")
+    if Path(arguments["full"]).exists():
+        full({}, say_share)
+    return doubled(folder, files, {}, say_share)
