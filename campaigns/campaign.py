@@ -9,7 +9,7 @@ from campaigns.outcome import Outcome
 from campaigns.store import Store, require_names
 from campaigns.stored_task import StoredTask
 from campaigns.task import Ending, Task
-from campaigns.working import RETRIES, work_through
+from campaigns.working import RETRIES, terminations_kept, work_through
 from sloshlab.errors import InputError
 
 Finished = Callable[[StoredTask, Outcome, bool], None]
@@ -45,14 +45,14 @@ def run_campaign(
     ------
     InputError
         If a name is impossible or a file cannot be read, or there is no space for results.
-    StoppedError
-        At Ctrl-C or a termination.
+    KeyboardInterrupt, sloshlab.interrupt.Terminated
+        At Ctrl-C or a termination, after every process has been stopped.
     ClusterError
         If a cluster is lost and does not come back.
     """
     require_names(tasks)
     session = _Session(store, failed_again, finished)
-    with store.alone():
+    with store.alone(), terminations_kept():
         work_through(session.missing(tasks), executor, retries=retries, finished=session.ended)
     return {task.name: session.outcomes[task.name] for task in tasks}
 

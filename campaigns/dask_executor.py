@@ -103,10 +103,13 @@ class DaskExecutor:
     def n_at_once(self) -> int:
         """How many tasks the cluster is given at a time; the others wait here, where they take no memory of it."""
         if time.monotonic() - self._counted_s > _COUNT_EVERY_S:
-            self._counted_s = time.monotonic()
-            with self._unless_lost():
-                self._n_threads = sum(self._client.nthreads().values())
+            self._count()
         return max(_PER_THREAD * self._n_threads, _LEAST)
+
+    def _count(self) -> None:
+        self._counted_s = time.monotonic()
+        with self._unless_lost():
+            self._n_threads = sum(self._client.nthreads().values())
 
     def submit(self, number: int, task: Task, attempt: int) -> None:
         """Take a task, which is told of by its number."""
@@ -197,6 +200,7 @@ class DaskExecutor:
     def stop(self) -> list[Event]:
         """Ask all tasks to stop and save, wait for them, and tell how they ended."""
         found: list[Event] = []
+        self._count()
         with self._unless_lost():
             self._client.run(stop, self._campaign, on_error="ignore")
             until = time.monotonic() + PATIENCE_S

@@ -10,7 +10,8 @@ from campaigns.dask_executor import DaskExecutor
 from campaigns.task import ClusterError
 from sloshlab.errors import MissingExtraError
 
-_USUAL: Final = {"cores": 1, "memory": "4 GB", "walltime": "01:00:00"}
+_USUAL: Final = {"cores": 1, "memory": "4 GB"}
+"""Where neither the plan nor the configuration of dask-jobqueue says anything."""
 
 
 class SlurmExecutor(DaskExecutor):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
 from campaigns.executor import Executor
 from campaigns.task import Ending, StoppedError, Task
-from sloshlab.interrupt import stop_signals_noted
+from sloshlab.interrupt import TERMINATIONS, Terminated, stop_signals_noted
 
 _LOOK_UP_S: Final = 0.5
 RETRIES: Final = 2
@@ -56,6 +57,22 @@ def work_through(
             executor.close()
         if stopping:
             raise StoppedError(stopping[0])
+
+
+@contextlib.contextmanager
+def terminations_kept() -> Iterator[None]:
+    """Let a termination that has stopped work end the program as one, and not as Ctrl-C does.
+
+    Raises
+    ------
+    sloshlab.interrupt.Terminated
+    """
+    try:
+        yield
+    except StoppedError as stopped:
+        if stopped.number in TERMINATIONS:
+            raise Terminated(stopped.number) from stopped
+        raise
 
 
 class _Session:

@@ -48,7 +48,6 @@ from pipelines.commands import laboratory
 from pipelines.commands import info
 
 # isort: split
-from campaigns.task import StoppedError
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, app
 from pipelines.commands.completion import PROGRAM, answer_a_shell
 from pipelines.report.terminal import complain, say
@@ -99,13 +98,12 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except _UsageError as error:
         _show(error)
         return USAGE
-    except (KeyboardInterrupt, typer.Abort) as interruption:
-        if isinstance(interruption, StoppedError) and interruption.number != signal.SIGINT:
-            return _terminated(interrupt.Terminated(interruption.number))
+    except (KeyboardInterrupt, typer.Abort):
         complain("sloshlab: interrupted; nothing half-written")
         return INTERRUPTED
     except interrupt.Terminated as termination:
-        return _terminated(termination)
+        print(f"sloshlab: ended by {termination}; nothing half-written", file=sys.stderr)  # noqa: T201
+        return termination.exit_code
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
         remedy = "check that the path can be written, and that a folder or file of this name is not in the way"
@@ -122,11 +120,6 @@ def _show(error: Any) -> None:
             complain(line)
         else:
             say(line, error=True)
-
-
-def _terminated(termination: interrupt.Terminated) -> int:
-    print(f"sloshlab: ended by {termination}; nothing half-written", file=sys.stderr)  # noqa: T201
-    return termination.exit_code
 
 
 def main() -> NoReturn:

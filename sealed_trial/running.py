@@ -16,7 +16,7 @@ from campaigns.executor import Executor
 from campaigns.local_executor import LocalExecutor
 from campaigns.task import Ending, Task
 from campaigns.watched_command import run_watched
-from campaigns.working import work_through
+from campaigns.working import terminations_kept, work_through
 from sealed_trial.perturbed_case import write_perturbed_case
 from sealed_trial.sealing.key import PREFIX, is_key
 from sealed_trial.sealing.selection import EVERYTHING, Selection
@@ -201,7 +201,8 @@ def run_folders(
         finished(outcomes[case])
 
     tasks = (Task(case.name, "sealed_trial.running:answered_case", arguments_of(case)) for case in waiting)
-    work_through(tasks, executor or LocalExecutor(n_workers, one_core=False), finished=ended)
+    with terminations_kept():
+        work_through(tasks, executor or LocalExecutor(n_workers, one_core=False), finished=ended)
     return [outcomes[case.name] for case in cases]
 
 

@@ -21,7 +21,7 @@ _KEPT: Final = ("verdict.json", "extended_twin.toml", "retuned_twin.toml", "resu
 
 
 def case_folders(folder: Path, kept_out: Path) -> list[Path]:
-    """Case folders: the folder itself, those in it, and those in its folder ``cases``.
+    """Case folders: the folder itself, and all below it.
 
     Parameters
     ----------
@@ -36,13 +36,9 @@ def case_folders(folder: Path, kept_out: Path) -> list[Path]:
     """
     if not folder.is_dir():
         raise InputError(f"folder {folder}", got="no such folder", allowed="a folder of cases")
-    inside = sorted((*folder.iterdir(), *((folder / "cases").iterdir() if (folder / "cases").is_dir() else ())))
     own = kept_out.resolve()
-    return [
-        case
-        for case in (folder, *inside)
-        if (case / "rig.toml").is_file() and (case / "recordings").is_dir() and own not in case.resolve().parents
-    ]
+    cases = sorted(rig.parent for rig in folder.rglob("rig.toml") if rig.is_file())
+    return [case for case in cases if (case / "recordings").is_dir() and own not in case.resolve().parents]
 
 
 def diagnosis_tasks(part: DiagnosePart, kept_out: Path) -> list[StoredTask]:
@@ -54,9 +50,10 @@ def diagnosis_tasks(part: DiagnosePart, kept_out: Path) -> list[StoredTask]:
     kept_out : Path
         Folders below it do not count.
     """
+    top = Path(part.folder.absolute().name)
     return [
         StoredTask(
-            name_of(part.name, Path(case.absolute().name)),
+            name_of(part.name, top if case == part.folder else case.relative_to(part.folder)),
             "pipelines.campaign.case_tasks:diagnosed",
             _files_of(case),
             {"report": part.report},

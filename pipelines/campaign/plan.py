@@ -108,12 +108,17 @@ class SlurmSettings(_Table):
 
     queue: str | None = None
     account: str | None = None
-    cores: int = Field(default=1, ge=1, le=1024)
+    cores: int | None = Field(default=None, ge=1, le=1024)
     processes: int | None = Field(default=None, ge=1, le=1024)
-    memory: str = Field(default="4 GB", max_length=40)
-    walltime: str = Field(default="01:00:00", max_length=40)
+    memory: str | None = Field(default=None, max_length=40)
+    walltime: str | None = Field(default=None, max_length=40)
     job_extra_directives: tuple[str, ...] = Field(default=(), max_length=100)
     job_script_prologue: tuple[str, ...] = Field(default=(), max_length=100)
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """What the plan says itself."""
+        return self.model_dump(exclude_none=True, exclude_unset=True)
 
 
 class Plan(_Table):

@@ -14,7 +14,7 @@ from campaigns.campaign import run_campaign
 from campaigns.outcome import Outcome
 from campaigns.store import RESULTS, Store, require_names
 from campaigns.stored_task import StoredTask
-from pipelines.campaign.executors import Where, executor_of
+from campaigns.where import Where, executor_of
 from pipelines.campaign.kinds import planned, tasks_of
 from pipelines.campaign.plan import Plan
 from pipelines.campaign.summary_page import CarriedOut, page_of
@@ -23,6 +23,7 @@ from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines
 from pipelines.report.page import write_page
 from pipelines.report.progress import progress
 from pipelines.report.result_folder import require_result_folder, result_folder
+from pipelines.report.terminal import warn
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
 
@@ -85,7 +86,7 @@ def carry_out(source: Path, folder: Path, options: CampaignOptions, *, command: 
     tasks = tasks_of(plan, folder)
     require_names(tasks)
     _keep_plan(plan, folder)
-    executor = executor_of(options.where, plan.slurm)
+    executor = executor_of(options.where, plan.slurm.asked, said=warn)
     kept: list[str] = []
     with progress("campaign", len(tasks)) as advance:
 

@@ -47,13 +47,13 @@ def timings_csv(tasks: Sequence[StoredTask], outcomes: Mapping[str, Outcome]) ->
 
 
 def number_names(outcomes: Iterable[Outcome]) -> list[str]:
-    """Names of all numbers, in the order in which they first come.
+    """Names of all numbers, sorted: the order of those in a record is not that of those just made.
 
     Parameters
     ----------
     outcomes : iterable of Outcome
     """
-    return list(dict.fromkeys(name for outcome in outcomes for name in outcome.numbers))
+    return sorted({name for outcome in outcomes for name in outcome.numbers})
 
 
 def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:

@@ -66,6 +66,15 @@ Redundant = Annotated[
         "--redundant", metavar="A:B", help="Channels of two devices that show the same motion.", show_default=False
     ),
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="WHERE",
+        help="tcp://HOST:PORT of a Dask scheduler, or slurm; this machine if not given.",
+        show_default=False,
+    ),
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Write windows.nc and maps.nc only.")]
 

@@ -7,17 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import Json, OutputFolder, app, command_as_given, finish
-
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="WHERE",
-        help="tcp://HOST:PORT of a Dask scheduler, or slurm; this machine if not given.",
-        show_default=False,
-    ),
-]
+from pipelines.commands.application import Json, OutputFolder, Scheduler, app, command_as_given, finish
 
 
 @app.command()
@@ -50,7 +40,7 @@ def campaign(
     as_json: Json = False,
 ) -> None:
     """Analyses, trainings, diagnoses over a folder or a plan; goes on where it was stopped."""
-    from pipelines.campaign.executors import Where
+    from campaigns.where import Where
     from pipelines.campaign.run import CampaignOptions, carry_out
 
     if time_limit is not None and not time_limit > 0:

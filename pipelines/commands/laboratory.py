@@ -12,6 +12,7 @@ from pipelines.commands.application import (
     OutputFile,
     Overwrite,
     Redundant,
+    Scheduler,
     app,
     finish,
     free_file,
@@ -112,6 +113,7 @@ def virtual(
         ),
     ] = None,
     workers: Annotated[int, typer.Option(help="Processes of a computed campaign.")] = 2,
+    scheduler: Scheduler = None,
     only: Annotated[
         str, typer.Option(metavar="PATTERN", help="Runs of a computed campaign, as a pattern of file names.")
     ] = "*",
@@ -142,7 +144,7 @@ def virtual(
 
         require_free_folder(output, f"--output {output}")
         computed = CampaignSettings(seed, layers, workers, only, checkpoints, of_laboratory, overwrite)
-        finish(make_campaign_folder(output, liquid, computed, say), as_json)
+        finish(make_campaign_folder(output, liquid, computed, say, scheduler=scheduler), as_json)
         return
     run = VirtualRun(
         experiment=experiment,

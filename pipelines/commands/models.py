@@ -12,6 +12,7 @@ from pipelines.commands.application import (
     OutputFile,
     OutputFolder,
     Overwrite,
+    Scheduler,
     app,
     command_as_given,
     finish,
@@ -142,6 +143,7 @@ def study(
     starts: Starts = 1,
     seed: StartSeed = 0,
     workers: Annotated[int, typer.Option(min=1, max=256, help="Processes, one case each.")] = 2,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Sensitivity study: many models, picked by validation error; goes on where it was stopped."""
@@ -152,7 +154,7 @@ def study(
 
     files = RunFiles.of(runs, still or [], rig)
     settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed)
-    wanted = StudySettings(cases, rate_hz, workers)
+    wanted = StudySettings(cases, rate_hz, workers, scheduler)
     finish(carried_out(files, output, wanted, settings, command=command_as_given()), as_json)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import Json, OutputFolder, app, finish
+from pipelines.commands.application import Json, OutputFolder, Scheduler, app, finish
 from pipelines.commands.command_help import Application
 from pipelines.commands.completion import one_of
 from sloshlab.errors import InputError
@@ -122,6 +122,7 @@ def run(
     trust_code: Annotated[
         bool, typer.Option("--trust-code", help="Run the twins of a challenge, which are programs.")
     ] = False,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Diagnose every case in a process of its own; goes on where it was stopped."""
@@ -141,6 +142,7 @@ def run(
             options=options,
             diagnoses=diagnoses,
             perturbation=perturb,
+            scheduler=scheduler,
         )
     else:
         summary = run_cases(
@@ -151,6 +153,7 @@ def run(
             options=options,
             diagnoses=diagnoses,
             perturbation=perturb,
+            scheduler=scheduler,
         )
     finish(summary, as_json)
 

@@ -11,10 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from campaigns.where import Where, executor_of
 from pipelines.diagnosis.challenge_truths import is_outside, known_vocabulary, marked_truth
 from pipelines.diagnosis.trial import require_effort, require_folder_of_answers, summary_of
 from pipelines.report.free_place import require_free_place
 from pipelines.report.progress import progress
+from pipelines.report.terminal import warn
 from sealed_trial.challenge.challenge_commitments import (
     commitment_defects,
     committed,
@@ -192,6 +194,7 @@ def run_challenge(
     options: Sequence[str] = (),
     diagnoses: str = DIAGNOSES,
     perturbation: int | None = None,
+    scheduler: str | None = None,
 ) -> dict[str, Any]:
     """Diagnose every chosen case of a challenge, freeze the answers when all are there; return the summary.
 
@@ -200,7 +203,7 @@ def run_challenge(
     folder : Path
     chosen : Selection
         Cases by name; halves are of trials of our own.
-    n_workers, time_limit_s, options, diagnoses, perturbation
+    n_workers, time_limit_s, options, diagnoses, perturbation, scheduler
         As of `pipelines.diagnosis.trial.run_cases`.
     trust_code : bool
         Whether twins of the cases are run: they are programs, with all rights of whoever calls this.
@@ -242,6 +245,7 @@ def run_challenge(
             options_of=_twin_of,
             perturbation=perturbation,
             finished=finished,
+            executor=executor_of(Where(scheduler, n_workers, one_core=False), said=warn),
         )
     summary = summary_of(outcomes, folder / place)
     if n_before:

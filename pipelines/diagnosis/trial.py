@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from campaigns.where import Where, executor_of
 from pipelines.report.progress import progress
+from pipelines.report.terminal import warn
 from sealed_trial.running import DIAGNOSE, DIAGNOSES, Outcome, require_no_key, run_trial
 from sealed_trial.sealing.key import made_or_read_key
 from sealed_trial.sealing.selection import Selection
@@ -52,6 +54,7 @@ def run_cases(
     options: Sequence[str] = (),
     diagnoses: str = DIAGNOSES,
     perturbation: int | None = None,
+    scheduler: str | None = None,
 ) -> dict[str, Any]:
     """Diagnose every chosen case that has not been; return the summary of the command.
 
@@ -70,6 +73,8 @@ def run_cases(
         Folder of the trial that takes the answers; `_perturbed_SEED` is added to it where recordings are moved.
     perturbation : int, optional
         Seed of the moves.
+    scheduler : str, optional
+        Of a cluster that diagnoses instead of processes of this machine.
 
     Raises
     ------
@@ -96,6 +101,7 @@ def run_cases(
             diagnoses=place,
             perturbation=perturbation,
             finished=finished,
+            executor=executor_of(Where(scheduler, n_workers, one_core=False), said=warn),
         )
     return summary_of(outcomes, folder / place)
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
+from campaigns.where import Where, executor_of
 from pipelines.liquid_model.sensitivity_study import (
     FURTHER_CASES,
     MODEL_NAME,
@@ -24,6 +25,7 @@ from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines, sta
 from pipelines.report.page import write_page
 from pipelines.report.progress import amounts
 from pipelines.report.result_folder import require_result_folder, result_folder
+from pipelines.report.terminal import warn
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
 from sloshlab.quantities import described
@@ -43,11 +45,14 @@ class StudySettings:
     rate_hz : float, optional
         By default chosen from the training runs.
     n_workers : int
+    scheduler : str, optional
+        Of a cluster that trains instead of processes of this machine.
     """
 
     cases: str = "all"
     rate_hz: float | None = None
     n_workers: int = 2
+    scheduler: str | None = None
 
 
 def study(
@@ -88,7 +93,7 @@ def study(
             folder,
             settings,
             cases=CASES[wanted.cases],
-            n_workers=wanted.n_workers,
+            executor=executor_of(Where(wanted.scheduler, wanted.n_workers, fresh=True), said=warn),
             facts=runs.facts(),
             on_case=on_case,
             on_progress=lambda share: advance(share, 1.0, last),
@@ -96,7 +101,7 @@ def study(
     pick = picked(results)
     best = folder / pick.best.case.name / MODEL_NAME
     inputs = (*files.training, *files.validation, *files.still, files.rig)
-    provenance = provenance_of(command, inputs, settings=(replace(wanted, n_workers=1), settings))
+    provenance = provenance_of(command, inputs, settings=(replace(wanted, n_workers=1, scheduler=None), settings))
     flags = (*runs.flags, *(f"{result.case.name}: {result.ended}" for result in results if not result.is_trained))
     found = StudiedModels(tuple(results), pick, settings, runs.rate.reason, flags, provenance)
     with result_folder(folder, provenance) as complete:

@@ -18,9 +18,12 @@ from acquisition.virtual_laboratory.campaign import CAMPAIGN_LABORATORY, campaig
 from acquisition.virtual_laboratory.sensors import Laboratory
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from acquisition.virtual_laboratory.structure_rig import StructureLaboratory, structure_laboratory
+from campaigns.executor import Executor
+from campaigns.where import Where, executor_of
 from pipelines.inputs.rigs import RigSource, rig_of
 from pipelines.report.free_place import require_free_file, require_free_place
 from pipelines.report.progress import amounts, progress
+from pipelines.report.terminal import warn
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
@@ -266,7 +269,12 @@ def deviation_lines(seed: int | None, deviations: Mapping[str, Any]) -> list[str
 
 
 def make_campaign_folder(
-    folder: Path, liquid: str, settings: CampaignSettings, say: Callable[[str], None]
+    folder: Path,
+    liquid: str,
+    settings: CampaignSettings,
+    say: Callable[[str], None],
+    *,
+    scheduler: str | None = None,
 ) -> dict[str, Any]:
     """Make the campaign whose liquid follows its law, of which only the seeds can be chosen, or is computed.
 
@@ -277,10 +285,13 @@ def make_campaign_folder(
     settings : CampaignSettings
     say : callable
         Takes a line for every computed run.
+    scheduler : str, optional
+        Of a cluster that computes instead of processes of this machine.
     """
     _check_liquid(liquid)
     if liquid == "numerical":
-        return _make_numerical_campaign_folder(folder, settings, say)
+        executor = executor_of(Where(scheduler, settings.n_workers, fresh=True), said=warn)
+        return _make_numerical_campaign_folder(folder, settings, say, executor)
     with progress("campaign", 40) as advance:
         manifest = make_campaign(
             folder,
@@ -306,7 +317,7 @@ def _check_liquid(liquid: str) -> None:
 
 
 def _make_numerical_campaign_folder(
-    folder: Path, settings: CampaignSettings, say: Callable[[str], None]
+    folder: Path, settings: CampaignSettings, say: Callable[[str], None], executor: Executor
 ) -> dict[str, Any]:
     from acquisition.virtual_laboratory.numerical_campaign import make_numerical_campaign
 
@@ -326,7 +337,9 @@ def _make_numerical_campaign_folder(
             share[0] = now
             advance(round(10_000 * now), 10_000)
 
-        summary = make_numerical_campaign(folder, settings, progressed=progressed, finished=told)
+        summary = make_numerical_campaign(
+            folder, settings, progressed=progressed, finished=told, executor=executor
+        )
     lines = [f"made: {summary.n_made}, kept: {summary.n_kept}", f"manifest: {summary.manifest}"]
     return {
         "lines": lines,

@@ -49,3 +49,8 @@ def complain(line: str, tone: Tone = "error") -> None:
 def errors_are_coloured() -> bool:
     """Whether standard error is a terminal that shows colours, and nobody asked for none (no-color.org)."""
     return sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def warn(line: str) -> None:
+    """Print one line to standard error at once."""
+    say(line, error=True)

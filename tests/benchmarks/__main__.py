@@ -14,6 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from tests.benchmarks.campaigns import DASK_OVERHEAD_LABEL, OVERHEAD_LABEL, RATIO_LABEL, campaign_figures
 from tests.benchmarks.diagnosis import LONGEST_LABEL, MEDIAN_LABEL, diagnosis_figures
 from tests.benchmarks.diagnosis import MEMORY_LABEL as DIAGNOSIS_MEMORY_LABEL
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
@@ -33,6 +34,8 @@ AIMS = {
     MEDIAN_LABEL: 60.0,
     LONGEST_LABEL: 180.0,
     DIAGNOSIS_MEMORY_LABEL: 2.0,
+    OVERHEAD_LABEL: 50.0,
+    DASK_OVERHEAD_LABEL: 50.0,
     TIME_LABEL: 300.0,
     MEMORY_LABEL: 1.5,
     **{label(layers): aim for layers, aim in RESOLUTIONS.items()},
@@ -45,6 +48,7 @@ AT_LEAST = {
     LANES_LABEL: 4.0,
     SIDE_BY_SIDE: 1.8,
     PRODUCT_LABEL: 0.5,
+    RATIO_LABEL: 1.8,
     **{RIVAL_LABEL.format(method): 50.0 for method in METHODS},
 }
 RECORDING_S = 20.0
@@ -114,6 +118,7 @@ def main() -> None:
     figures |= model_figures()
     figures |= tank_figures(ONE_CORE)
     figures |= recording_figures()
+    figures |= campaign_figures()
     print("diagnosing six cases …", flush=True)
     with tempfile.TemporaryDirectory() as name:
         figures |= diagnosis_figures(Path(name))

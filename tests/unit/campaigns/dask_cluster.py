@@ -32,6 +32,7 @@ class DaskCluster:
         """Start the scheduler, and wait until it listens."""
         words = ["dask_scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--dashboard-address", ":0"]
         self._start(words)
+        self.scheduler_pid = self._running[-1].pid
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline:
             with socket.socket() as probe:

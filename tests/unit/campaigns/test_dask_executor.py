@@ -141,10 +141,11 @@ def test_stopped_tasks_on_a_cluster_save_what_they_have(tmp_path, cluster):
     note = tmp_path / "note"
     executor.submit(0, Task("waits", "task_functions:waiting", {"note": str(note)}), 1)
     deadline = time.monotonic() + 60
-    while executor.n_at_once < 4 and time.monotonic() < deadline:
-        executor._counted_s = 0.0
+    while not executor._client.processing() and time.monotonic() < deadline:
         time.sleep(0.2)
-    time.sleep(3)
+    while not any(executor._client.processing().values()) and time.monotonic() < deadline:
+        time.sleep(0.2)
+    time.sleep(3)  # for its process to begin
     [(number, ending)] = executor.stop()
     assert (number, ending.status, note.read_text()) == (0, "stopped", "saved")
 

@@ -73,7 +73,7 @@ def test_jobs_make_the_bytes_of_this_machine(slurm, tmp_path):
     assert contents(tmp_path / "jobs") == contents(tmp_path / "here") != {}
     scripts = [path.read_text() for path in slurm.iterdir()]
     assert len(scripts) == 2
-    for line in ("#SBATCH -p night", "#SBATCH --exclusive", "#SBATCH -t 01:00:00", "--nthreads 1"):
+    for line in ("#SBATCH -p night", "#SBATCH --exclusive", "#SBATCH -t 00:30:00", "--nthreads 1"):
         assert line in scripts[0]
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 from campaigns.executor import Executor
 from campaigns.local_executor import LocalExecutor
 from campaigns.task import MOST_WORKERS
-from pipelines.campaign.plan import SlurmSettings
 from sloshlab.errors import InputError
 
 SLURM: Final = "slurm"
@@ -37,14 +37,18 @@ class Where:
     fresh: bool = False
 
 
-def executor_of(where: Where, slurm: SlurmSettings | None = None) -> Executor:
+def executor_of(
+    where: Where, slurm: Mapping[str, Any] | None = None, *, said: Callable[[str], None] = lambda line: None
+) -> Executor:
     """An executor, which is to be closed.
 
     Parameters
     ----------
     where : Where
-    slurm : SlurmSettings, optional
-        What a job asks for.
+    slurm : mapping, optional
+        What a job asks for; see `campaigns.slurm`.
+    said : callable
+        Takes a line when a cluster is lost.
 
     Raises
     ------
@@ -62,12 +66,11 @@ def executor_of(where: Where, slurm: SlurmSettings | None = None) -> Executor:
     if where.scheduler == SLURM:
         from campaigns.slurm import SlurmExecutor
 
-        asked: dict[str, Any] = (slurm or SlurmSettings()).model_dump(exclude_none=True, exclude_unset=True)
-        return SlurmExecutor(where.n_workers, asked, one_core=where.one_core)
+        return SlurmExecutor(where.n_workers, slurm or {}, one_core=where.one_core)
     if not where.scheduler.startswith(ADDRESSES):
         raise InputError(
             "--scheduler", got=repr(where.scheduler)[:120], allowed="tcp://HOST:PORT, tls://HOST:PORT or slurm"
         )
     from campaigns.dask_executor import DaskExecutor
 
-    return DaskExecutor(where.scheduler, one_core=where.one_core)
+    return DaskExecutor(where.scheduler, one_core=where.one_core, said=said)
