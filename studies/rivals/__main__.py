@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from campaigns.where import Where
 from sealed_trial.running import DIAGNOSES
 from sealed_trial.sealing.trial_folder import check_data, read_commitments
 from sloshlab.atomic_file import write_bytes
@@ -32,6 +33,8 @@ def main() -> int:
     parser.add_argument("--key", type=Path, help="key of a sealed trial, in place of its truths")
     parser.add_argument("--training", type=Path, nargs="+", default=[], help="development trials to learn from")
     parser.add_argument("--diagnoses", default=DIAGNOSES, help="folder of the trial with the answers of sloshlab")
+    parser.add_argument("--workers", type=int, default=2, help="cases looked at at once")
+    parser.add_argument("--scheduler", help="tcp://HOST:PORT of a Dask scheduler, or slurm; else this machine")
     parser.add_argument("-o", "--output", type=Path, required=True)
     arguments = parser.parse_args()
     try:
@@ -45,6 +48,7 @@ def main() -> int:
 
 def _compared(arguments: argparse.Namespace) -> list[Row]:
     trial, output = arguments.trial, arguments.output
+    where = Where(arguments.scheduler, arguments.workers)
     require_apart(arguments.training, trial)
     names = [folder.resolve().name for folder in (trial, *arguments.training)]
     if len(set(names)) < len(names):
@@ -54,9 +58,9 @@ def _compared(arguments: argparse.Namespace) -> list[Row]:
     known = []
     for folder in arguments.training:
         truths = opened(folder)
-        seen = seen_cases(folder, output / "seen" / folder.resolve().name)
+        seen = seen_cases(folder, output / "seen" / folder.resolve().name, where=where)
         known += [Known(each, truths[each.case]) for each in seen]
-    judged = seen_cases(trial, output / "seen" / trial.resolve().name)
+    judged = seen_cases(trial, output / "seen" / trial.resolve().name, where=where)
     rivals = rivals_of(known)
     # Opened last: nothing of the rivals depends on them.
     truths = opened(trial, arguments.truths, arguments.key)

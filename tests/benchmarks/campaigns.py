@@ -1,4 +1,4 @@
-"""What a campaign costs beside the work of its tasks: overhead, gain by a second process, memory of a scheduler."""
+"""What a campaign costs beside its work: overhead, gain by a second process, memory of a scheduler."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -22,7 +23,7 @@ from studies.rivals.__main__ import main
 from studies.rivals.learnt_classifiers import LearntClassifier, Neighbours, forest, neighbours, of_signals
 from studies.rivals.plain_rules import RemainingError, always_nothing
 from studies.rivals.regressed_models import ChosenTerm, RegressedModel
-from studies.rivals.seen import Seen
+from studies.rivals.seen import Seen, looked_at, seen_cases
 from studies.rivals.sparse_regression import SparseRegression
 from studies.rivals.training import Known, opened, require_apart
 
@@ -244,3 +245,23 @@ def test_one_command_marks_all_rivals_and_goes_on_with_what_was_seen(
     assert "| right after | 4 cases | 8 cases | 12 cases |" in page
     assert "| sparse regression | 12 | 12 | 12 |" in page
     assert "| sloshlab | 6 of 12" in capsys.readouterr().out
+
+
+def test_what_is_seen_of_a_case_is_kept_by_a_process_of_its_own(tmp_path: Path, repository: Path) -> None:
+    """A case whose rig is damaged is seen as one in a moment; what is kept is not looked at again."""
+    cases, kept = tmp_path / "trial" / "cases", tmp_path / "seen"
+    for name in ("case_001", "case_002"):
+        shutil.copytree(repository / "raw_data" / "cases" / "nothing-hidden" / "case", cases / name)
+        rig = (cases / name / "rig.toml").read_text()
+        (cases / name / "rig.toml").write_text(rig.replace("height_m = 0.0572", "height_m = -1.0", 1))
+    seen = seen_cases(tmp_path / "trial", kept)
+    assert seen == [looked_at(cases / name) for name in ("case_001", "case_002")]
+    assert all("height_m: got -1" in case.trouble for case in seen)
+    written = (kept / "case_001.json").stat().st_mtime_ns
+    (kept / "case_002.json").write_text('{"format": 0}')
+    assert seen_cases(tmp_path / "trial", kept) == seen
+    assert (kept / "case_001.json").stat().st_mtime_ns == written
+    (kept / "case_002.json").unlink()
+    shutil.rmtree(cases / "case_002")
+    with pytest.raises(InputError, match="case case_002"):
+        seen_cases(tmp_path / "trial", kept, ["case_002"])
