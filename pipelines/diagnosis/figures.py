@@ -230,7 +230,7 @@ def _most_missed(diagnosis: Diagnosis, observation: Observation, steps: Sequence
     time = np.asarray(recording["time"].values, np.float64)
     recorded = np.asarray(recording[observation.channel].values, np.float64)
     lacking = _left(observation, recorded - steps[0].readings[observation.channel])
-    return _stretch(time, diagnosis.findings.surroundings.frequency_hz, lacking)
+    return stretch_missed_most(time, diagnosis.findings.surroundings.frequency_hz, lacking)
 
 
 def _draw_stretch(axes: Axes, observation: Observation, steps: Sequence[_Step], stretch: slice) -> None:
@@ -335,10 +335,10 @@ def handy_units(run: CaseRun, channel: str) -> tuple[float, str]:
     return 1.0, {"m s-2": "m/s²", "m s-1": "m/s"}.get(units, units)
 
 
-def _stretch(time: FloatArray, frequency_hz: float, lacking: FloatArray) -> slice:
+def stretch_missed_most(time: FloatArray, frequency_hz: float, lacking: FloatArray) -> slice:
     """The cycles that are missed most."""
     step = time[1] - time[0]
-    n = max(10, min(int(_SHOWN_CYCLES / max(frequency_hz, 1e-6) / step), time.size))
+    n = min(max(10, int(_SHOWN_CYCLES / max(frequency_hz, 1e-6) / step)), time.size)
     power = np.concatenate([[0.0], np.cumsum(np.nan_to_num(lacking) ** 2)])
-    first = int(np.argmax(power[n:] - power[:-n]))
+    first = int(np.argmax(power[n:] - power[: power.size - n]))
     return slice(first, first + n)

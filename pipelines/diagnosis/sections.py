@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from pipelines.diagnosis import figures, figures_force, figures_where, tables
+from pipelines.diagnosis import figures, figures_force, figures_where, tables, touchable_histories
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.citations import Citation
 from pipelines.report.figure import ReportFigure
@@ -46,7 +46,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
     }
     before_and_after: dict[str, tuple[dict[str, Draw], tuple[Table | None, ...]]] = {
         "Before and after": (
-            {"time_histories": figures.time_histories, "held_out_errors": figures.held_out_errors},
+            {"time_histories": touchable_histories.time_histories, "held_out_errors": figures.held_out_errors},
             (tables.effect_parameter_table(diagnosis),),
         )
     }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipelines.report.interactive.contents import Touchable
+
 
 @dataclass(frozen=True)
 class ReportFigure:
@@ -19,12 +21,15 @@ class ReportFigure:
         Figure of the thesis that it corresponds to, empty if none.
     png : bytes
         The image.
+    touch : Touchable, optional
+        What it shows on a screen instead, where it can be zoomed and switched.
     """
 
     name: str
     caption: str
     counterpart: str
     png: bytes
+    touch: Touchable | None = None
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.report.citations import THESIS_REMARK, Citation
 from pipelines.report.figure import NothingToDrawError, ReportFigure, SkippedFigure
+from pipelines.report.interactive.embedding import embedded
+from pipelines.report.interactive.policy import content_security_policy
 from pipelines.report.outputs import RESULT_ID
 from pipelines.report.sections import SectionPlan
 from pipelines.report.style import drawing_style, file_stem
@@ -113,6 +115,8 @@ def page_html(page: Page, sections: Sequence[Section], *, result_id: str = "") -
     from jinja2 import Environment, StrictUndefined
 
     files = resources.files("pipelines.report")
+    css = files.joinpath("page.css").read_text(encoding="utf-8")
+    touch = embedded(list(_figures(sections)))
     # names of runs and rigs come from files: they are text, never markup
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(files.joinpath("page.html.j2").read_text(encoding="utf-8"))
@@ -121,24 +125,28 @@ def page_html(page: Page, sections: Sequence[Section], *, result_id: str = "") -
         result_id=result_id,
         subtitle=page.subtitle,
         lead=page.lead,
-        css=_safe_css(files.joinpath("page.css").read_text(encoding="utf-8")),
+        css=_own(css),
+        policy=content_security_policy(touch.scripts, css),
+        scripts=[_own(script) for script in touch.scripts],
+        touch_remark=touch.remark,
         flags=page.flags,
         summary=page.summary,
         remark=GRAVITY_REMARK,
         has_counterparts=any(figure.counterpart for figure in _figures(sections)),
         thesis=THESIS_REMARK,
-        sections=_numbered(sections),
+        sections=_numbered(sections, touch.contents),
         papers=page.papers,
     )
 
 
-def _safe_css(text: str) -> Any:
+def _own(text: str) -> Any:
+    """Text that goes into the page as it is: a file of ours or of the library, or JSON that was escaped."""
     from markupsafe import Markup
 
-    return Markup(text)  # our own file, no input goes into it
+    return Markup(text)
 
 
-def _numbered(sections: Sequence[Section]) -> list[dict[str, Any]]:
+def _numbered(sections: Sequence[Section], touch: Mapping[str, str]) -> list[dict[str, Any]]:
     """Sections as the template takes them, figures numbered through the report."""
     shown, number = [], 0
     for index, section in enumerate(sections, start=1):
@@ -152,6 +160,8 @@ def _numbered(sections: Sequence[Section]) -> list[dict[str, Any]]:
                     "caption": figure.caption,
                     "counterpart": figure.counterpart,
                     "data": base64.b64encode(figure.png).decode("ascii"),
+                    "touch": _own(touch[figure.name]) if figure.name in touch else "",
+                    "touch_caption": "" if figure.touch is None else figure.touch.caption,
                 }
             )
         anchor = f"section-{index}-{file_stem(section.title).lower()}"

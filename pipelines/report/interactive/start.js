@@ -1,0 +1,29 @@
+// Every figure that the page carries, drawn as it comes into sight; one that fails stays as it is printed.
+
+const KINDS = { histories: HistoriesFigure, map: WindowMapFigure };
+Bokeh.logger.set_level("error");
+
+async function begin(figure) {
+  const place = figure.querySelector(".touch");
+  const content = JSON.parse(figure.querySelector("script[type='application/json']").textContent);
+  figure.classList.add("touched");
+  try {
+    const made = new KINDS[content.kind](content, place);
+    await showTogether(made.panels);
+    place.dataset.state = "ready";
+  } catch (error) {
+    figure.classList.remove("touched");
+    place.replaceChildren();
+    place.dataset.state = "failed";
+    console.error(`${figure.id}: ${error.message}`);
+  }
+}
+
+const seen = new IntersectionObserver((entries) => {
+  for (const entry of entries) {
+    if (!entry.isIntersecting) continue;
+    seen.unobserve(entry.target);
+    begin(entry.target);
+  }
+}, { rootMargin: "600px" });
+document.querySelectorAll("figure.touchable").forEach((figure) => seen.observe(figure));
