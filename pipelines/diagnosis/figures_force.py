@@ -40,7 +40,8 @@ def missing_force(name: str, diagnosis: Diagnosis) -> ReportFigure:
     caption = (
         f"The force that the retuned baseline lacks at the {place}, from {plain(largest.run.name)} (work: all "
         f"fitted runs): {character.size_n:.3g} N RMS beyond the block's own parameters, "
-        f"{character.noise_n:.2g} N of it noise. Positive is upward; positive work is taken from the motion, "
+        f"{character.noise_n:.2g} N of it noise. Loops are of the cycles that are shown in time. Positive is "
+        "upward; positive work is taken from the motion, "
         "after the damping that retuning may have added is given back."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))
@@ -63,14 +64,7 @@ def worst_place(diagnosis: Diagnosis) -> str:
 
 
 def _in_time(axes: Axes, latent_force: LatentForce) -> None:
-    spread = latent_force.motion[:, 2].std() / max(latent_force.motion[:, 1].std(), 1e-300)
-    # of what does not move a cycle is as long as the run
-    shown_s = _CYCLES * 2 * np.pi / spread if spread > 0 else np.inf
-    n = int(min(latent_force.time_s.size, shown_s * latent_force.run.attributes.sampling_rate_hz))
-    power = np.convolve(latent_force.force_n**2, np.ones(n), "valid")
-    # A release has its largest motion at the start.
-    start = int(power.argmax()) if not latent_force.run.is_free else 0
-    part = slice(start, start + n)
+    part = _shown_part(latent_force)
     velocity = latent_force.motion[part, 1]
     scale = np.abs(latent_force.force_n[part]).max() / max(np.abs(velocity).max(), 1e-300)
     axes.plot(latent_force.time_s[part], scale * velocity, color="#b8c4d0", lw=1.0, label="velocity (scaled)")
@@ -86,10 +80,26 @@ def _in_time(axes: Axes, latent_force: LatentForce) -> None:
     axes.legend(loc="upper right", fontsize=7, ncols=2)
 
 
+def _shown_part(latent_force: LatentForce) -> slice:
+    """The cycles with the largest force."""
+    spread = latent_force.motion[:, 2].std() / max(latent_force.motion[:, 1].std(), 1e-300)
+    # of what does not move a cycle is as long as the run
+    shown_s = _CYCLES * 2 * np.pi / spread if spread > 0 else np.inf
+    n = int(min(latent_force.time_s.size, shown_s * latent_force.run.attributes.sampling_rate_hz))
+    power = np.convolve(latent_force.force_n**2, np.ones(n), "valid")
+    # A release has its largest motion at the start.
+    start = int(power.argmax()) if not latent_force.run.is_free else 0
+    return slice(start, start + n)
+
+
 def _over(axes: Axes, latent_force: LatentForce, order: int, label: str) -> None:
     step = max(1, latent_force.force_n.size // _MOST_POINTS)
     values = latent_force.motion[::step, order] * (1e3 if order == 0 else 1.0)
-    axes.plot(values, latent_force.force_n[::step], ".", color=NEUTRAL_COLOUR, ms=1.5, alpha=0.5, rasterized=True)
+    part, factor = _shown_part(latent_force), 1e3 if order == 0 else 1.0
+    axes.plot(
+        factor * latent_force.motion[part, order], latent_force.force_n[part],
+        color=NEUTRAL_COLOUR, lw=0.7, alpha=0.75, label="loops",
+    )  # fmt: skip
     # Classes of equal population without the extremes, in which single samples would make the mean.
     edges = np.quantile(values, np.linspace(0.005, 0.995, 31))
     middle, mean = [], []
@@ -98,7 +108,7 @@ def _over(axes: Axes, latent_force: LatentForce, order: int, label: str) -> None
         if inside.sum() > 3:
             middle.append(float(values[inside].mean()))
             mean.append(float(latent_force.force_n[::step][inside].mean()))
-    axes.plot(middle, mean, color=REFERENCE_COLOUR, lw=1.5, label="mean")
+    axes.plot(middle, mean, color=REFERENCE_COLOUR, lw=1.5, label="mean of the run")
     axes.set(xlabel=label, ylabel="missing force [N]")
     axes.legend(loc="upper right", fontsize=7)
 

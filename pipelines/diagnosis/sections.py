@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import partial
 
 from pipelines.diagnosis import figures, figures_force, figures_where, tables, touchable_histories
+from pipelines.diagnosis.banner import banner_of
+from pipelines.diagnosis.next_experiment import next_experiment
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.citations import Citation
 from pipelines.report.figure import ReportFigure
@@ -90,6 +92,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
         subtitle=f"{diagnosis.findings.case.name} · sloshlab {__version__}",
         flags=diagnosis.flags,
         lead=diagnosis.verdict.headline,
+        banner=banner_of(diagnosis),
         summary=_sentences(diagnosis),
         plans=(*plans, SectionPlan("Provenance", (), (provenance_table(diagnosis.provenance),))),
         papers=(_TRANSFORM, _ROBUST),
@@ -98,7 +101,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
 
 def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     verdict, found = diagnosis.verdict, diagnosis.findings
-    lines = [verdict.statement, f"Which experiment next: {_next_experiment(diagnosis)}."]
+    lines = [verdict.statement, f"Which experiment next: {next_experiment(diagnosis)}."]
     names = [(name, p) for name, p in verdict.probabilities.items() if p >= 0.005][:4]
     lines.append(
         "Probabilities: " + ", ".join(f"{name.replace('_', ' ')} {100 * p:.0f} %" for name, p in names) + "."
@@ -109,21 +112,3 @@ def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
         f"{len(found.explanations)} models fitted to the end, {len(found.failed)} failed."
     )
     return tuple(lines)
-
-
-def _next_experiment(diagnosis: Diagnosis) -> str:
-    """What to record next: what tells equals apart, what a name's look-alikes need, or what this case lacks."""
-    verdict, found = diagnosis.verdict, diagnosis.findings
-    if verdict.separating_experiment:
-        return f"to tell them apart, {verdict.separating_experiment}"
-    nearest = [] if verdict.best is None else [c.effect.separated_by for c in verdict.best.fit.candidates]
-    wanted = [words for words in dict.fromkeys(nearest) if words]
-    if verdict.has_law:
-        return "another level and another frequency, at which the law must hold as well"
-    if verdict.kind == "unknown" and wanted:
-        return f"to see whether it is the nearest known effect, {'; or '.join(wanted)}"
-    if found.split.limits:
-        return f"what this case lacks: {'; '.join(found.split.limits)}"
-    if verdict.kind == "named" and wanted:
-        return f"to confirm it, {'; or '.join(wanted)}"
-    return "none is needed to say this; another level or frequency widens where it holds"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pipelines.report.citations import THESIS_REMARK, Citation
 from pipelines.report.figure import NothingToDrawError, ReportFigure, SkippedFigure
@@ -33,6 +33,25 @@ GRAVITY_REMARK: Final = f"Accelerations in g are multiples of {GRAVITY_M_PER_S2}
 
 
 @dataclass(frozen=True)
+class Banner:
+    """What kind of answer a report gives, at a glance.
+
+    Attributes
+    ----------
+    tone : {"clear", "found", "open", "unknown"}
+        Its colour: nothing is wrong; an answer; several answers; none.
+    label : str
+        The kind in words, as a colour alone says nothing to many.
+    words : str
+        How good it is.
+    """
+
+    tone: Literal["clear", "found", "open", "unknown"]
+    label: str
+    words: str
+
+
+@dataclass(frozen=True)
 class Page:
     """What a report says beside its figures; `plans` are drawn in their order.
 
@@ -48,6 +67,8 @@ class Page:
         What the methods rest on.
     lead : str
         The result in one sentence, before everything else, if one says it.
+    banner : Banner, optional
+        What kind of answer it is.
     """
 
     title: str
@@ -57,6 +78,7 @@ class Page:
     plans: tuple[SectionPlan, ...]
     papers: tuple[Citation, ...]
     lead: str = ""
+    banner: Banner | None = None
 
 
 @dataclass(frozen=True)
@@ -125,9 +147,11 @@ def page_html(page: Page, sections: Sequence[Section], *, result_id: str = "") -
         result_id=result_id,
         subtitle=page.subtitle,
         lead=page.lead,
+        banner=page.banner,
         css=_own(css),
-        policy=content_security_policy(touch.scripts, css),
-        scripts=[_own(script) for script in touch.scripts],
+        policy=content_security_policy(touch.script.elements, css),
+        starter=_own(touch.script.starter),
+        carried=touch.script.carried,
         touch_remark=touch.remark,
         flags=page.flags,
         summary=page.summary,

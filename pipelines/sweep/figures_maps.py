@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 _N_SHADES = 28
+_MOST_SURFACE_POINTS = 150
 
 
 @dataclass(frozen=True)
@@ -271,14 +272,17 @@ def surface(name: str, maps: EnergyMaps, windows: xr.Dataset) -> ReportFigure:
         vmin=0.0, vmax=float(np.nanmax(field.values)), antialiased=False,
     )  # fmt: skip
     points = (length_factor * windows["amplitude_m"], windows["frequency_hz"], factor * windows["work_j"])
-    style = {"s": 7, "facecolors": "none", "edgecolors": REFERENCE_COLOUR, "lw": 0.7, "depthshade": False}
-    axes.scatter(*(np.asarray(part) for part in points), **style)
+    # a campaign has so many windows that all of them would hide the surface
+    n = int(windows.sizes["window"])
+    shown = np.unique(np.linspace(0, n - 1, min(n, _MOST_SURFACE_POINTS)).astype(int))
+    style = {"s": 3, "color": "#111111", "alpha": 0.6, "lw": 0, "depthshade": False}
+    axes.scatter(*(np.asarray(part)[shown] for part in points), **style)
     axes.set(xlabel=field.plane.abscissa_label, ylabel=field.plane.ordinate_label, zlabel=field.label)
     axes.view_init(elev=26, azim=-128)
     axes.set_box_aspect((1.25, 1.25, 0.8), zoom=0.92)
     caption = (
-        "The windows (red circles) and the surface of radial basis functions through them; the smoothing was "
-        "chosen by cross-validation."
+        f"Windows (black dots{'' if shown.size == n else f', {shown.size} of {n}'}) and the surface of radial "
+        "basis functions through all of them; the smoothing was chosen by cross-validation."
     )
     return ReportFigure(name, caption, "Fig. 1.10", png_bytes(figure))
 

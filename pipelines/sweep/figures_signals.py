@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from pipelines.sweep.results import Excerpt, RunResult
+    from pipelines.sweep.results import RunResult
+    from pipelines.sweep.window_signals import Excerpt
 
 FloatArray = npt.NDArray[np.float64]
 

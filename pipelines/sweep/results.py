@@ -11,6 +11,7 @@ import xarray as xr
 
 from pipelines.inputs.recordings import RunSource
 from pipelines.inputs.rigs import RigSource
+from pipelines.sweep.window_signals import Excerpt, WindowSignals
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.quality import RunQuality
 from sloshlab.consistency.finding import NOT_EXAMINED, ConsistencyExamination
@@ -65,26 +66,6 @@ class SweepSignals:
 
 
 @dataclass(frozen=True)
-class Excerpt:
-    """Signals of one window, for the time histories and hysteresis loops.
-
-    Attributes
-    ----------
-    frequency_hz, acceleration_g : float
-        Of the window.
-    time_s, force_n, displacement_m : ndarray, shape (n,)
-        With a tank, `force_n` is the sloshing force F_S = M_dry ü − F_ext on the tank; without one
-        the measured force. Upward positive, mean removed.
-    """
-
-    frequency_hz: float
-    acceleration_g: float
-    time_s: FloatArray
-    force_n: FloatArray
-    displacement_m: FloatArray
-
-
-@dataclass(frozen=True)
 class RunResult:
     """One run, analysed.
 
@@ -117,6 +98,8 @@ class RunResult:
         Of the first sample.
     signals : SweepSignals, optional
         What the windows were evaluated from, if it was to be kept.
+    window_signals : tuple of WindowSignals
+        What is seen of every window, in their order; none where the motion is a velocity.
     """
 
     path: RunSource
@@ -135,6 +118,7 @@ class RunResult:
     examination: ConsistencyExamination = NOT_EXAMINED
     start_time_s: float = 0.0
     signals: SweepSignals | None = None
+    window_signals: tuple[WindowSignals, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from pipelines.sweep import (
     figures_signals,
     figures_work,
     tables,
+    touchable_maps,
 )
 from pipelines.sweep.selection import by_level, rig_text, runs_of
 from sloshlab.experiments import EXPERIMENTS
@@ -63,7 +64,9 @@ def _rig_section(experiment: SweepExperiment, rig: RigResult, prefix: str) -> Se
     source = _THESIS_FIGURES.get(round(rig.rig.liquid.fill_level, 3), _OTHER_FIGURES)
     scaled = partial(figures_maps.scaled_map, rig=rig, runs=runs)
     plans = {
-        "w_bar_map": partial(scaled, quantity="w_bar", counterpart=source["w_bar"]),
+        "w_bar_map": partial(
+            touchable_maps.w_bar_map, rig=rig, runs=runs, counterpart=source["w_bar"], n_maps=len(experiment.rigs)
+        ),
         "beta_map": partial(scaled, quantity="beta", counterpart="Fig. 1.21"),
         "displacement_paths": partial(figures_runs.displacement_paths, runs=runs),
         "acceleration_paths": partial(figures_runs.acceleration_paths, runs=runs),
@@ -128,9 +131,7 @@ does, and passes through zero at resonance."
         "harmonics": partial(figures_regimes.harmonics, runs=runs, with_liquid=False),
     }  # fmt: skip
     if maps is not None:
-        plans["work_map"] = partial(
-            figures_maps.work_map, maps=maps, runs=runs, counterpart="like Fig. 1.11", with_points=False
-        )
+        plans["work_map"] = partial(touchable_maps.work_map, maps=maps, runs=runs, counterpart="like Fig. 1.11")
         plans["uncertainty"] = partial(figures_maps.uncertainty_maps, maps=maps, rig=None)
     return SectionPlan(
         "Work and response",

@@ -11,7 +11,8 @@ import xarray as xr
 
 from pipelines.inputs.recordings import RunSource
 from pipelines.report.outputs import sha256_of
-from pipelines.sweep.results import Excerpt, RunResult, SweepOptions, SweepSignals
+from pipelines.sweep.results import RunResult, SweepOptions, SweepSignals
+from pipelines.sweep.window_signals import Excerpt, WindowSignals, window_signals
 from sloshlab.conditioning.clipping import clipped_samples
 from sloshlab.conditioning.integration import displacement_of_part
 from sloshlab.conditioning.quality import RunQuality, quality_of
@@ -171,6 +172,7 @@ def analyse_sweep(
         flags=tuple(flags),
         start_time_s=start_time_s,
         signals=signals if keep_signals else None,
+        window_signals=_signals_of_windows(windows, signals, rig, rate_hz, start_time_s),
     )
 
 
@@ -244,6 +246,18 @@ def _excerpts(
     # two places may have the same nearest window, which is shown once
     nearest = sorted({int(np.abs(frequency - wanted_hz).argmin()) for wanted_hz in wanted})
     return tuple(excerpt_of(windows.isel(window=at), signals, rig, rate_hz, start_time_s) for at in nearest)
+
+
+def _signals_of_windows(
+    windows: xr.Dataset, signals: SweepSignals, rig: Rig | None, rate_hz: float, start_time_s: float
+) -> tuple[WindowSignals, ...]:
+    """What is seen of every window; none without a displacement."""
+    if signals.motion_is_velocity:
+        return ()
+    return tuple(
+        window_signals(excerpt_of(windows.isel(window=at), signals, rig, rate_hz, start_time_s))
+        for at in range(windows.sizes["window"])
+    )
 
 
 def excerpt_of(

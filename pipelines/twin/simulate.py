@@ -18,6 +18,7 @@ from pipelines.inputs.rigs import RigSource, folder_of, rig_of
 from pipelines.report.free_place import require_free_place
 from pipelines.report.outputs import RESULT_ID, provenance_of, sha256_of, versions
 from pipelines.report.progress import amounts
+from pipelines.twin.comparison_figure import comparison_png
 from pipelines.twin.simulated_tank_model import departure_attributes, with_tank_model
 from sloshlab import atomic_file
 from sloshlab.configurations import CONFIGURATIONS
@@ -27,7 +28,7 @@ from sloshlab.missing_physics.extension import Extension, with_acting
 from sloshlab.missing_physics.saved_effects import saved_effects
 from sloshlab.modal.rig_beam import scale_remarks
 from sloshlab.recording import run_attributes, write_recording
-from sloshlab.rig import Rig
+from sloshlab.rig import TANK_MODELS, Rig
 from sloshlab.toml_file import read_toml
 from sloshlab.twin.recorded_run import Block, Drive, drive_of
 from sloshlab.twin.reduced_order_model_domain import Departure, departures
@@ -139,6 +140,12 @@ class SimulatedTwin:
     n_steps: int
     left: Sequence[Departure]
 
+    @property
+    def is_of_another_configuration(self) -> bool:
+        """Whether the liquid of the twin is not in the state of that of the recording."""
+        now = self.simulated.recording.attrs["configuration"]
+        return bool(run_attributes(self.recording).configuration != now)
+
     def summary(self) -> dict[str, Any]:
         """``lines`` for people, ``flags``, and numbers for machines."""
         summary = _summary(
@@ -199,9 +206,17 @@ def write_simulation(found: SimulatedTwin, settings: SimulationSettings) -> dict
     with atomic_file.together() as stagings:
         place = stagings.file(settings.output, overwrite=settings.overwrite)
         write_recording(recording, place, encoding=_encoding(recording))
+        drawn = comparison_png(found.recording, recording) if found.is_of_another_configuration else None
+        if drawn is not None:
+            figure = settings.output.with_suffix(".png")
+            stagings.file(figure, overwrite=settings.overwrite).write_bytes(drawn)
         if settings.save_twin is not None:
             save_twin(found.twin, stagings.file(settings.save_twin, overwrite=settings.overwrite))
-    return replace(found, settings=settings).summary()
+    summary = replace(found, settings=settings).summary()
+    if drawn is not None:
+        summary["lines"].append(f"drawn: {figure}, recorded and simulated where they differ most")
+        summary["figure"] = str(figure)
+    return summary
 
 
 def _effects(settings: SimulationSettings) -> Extension:
@@ -352,6 +367,7 @@ def _summary(
         lines.append(f"energy balance: closes to {error:.1e} of the energy passed on")
     if recorded != now:
         lines.append(f"the run is recorded {recorded}, the twin is {now}")
+        lines.append(f"to try next: {_to_try(settings, recorded, now)}")
     if simulated.left_out:
         lines.append(f"not simulated: {', '.join(simulated.left_out)}")
     if rig.structure is not None and rig.structure.kind == "beam":
@@ -370,6 +386,19 @@ def _summary(
         "relative_energy_error": error,
         "rms": _rms(recording, simulated.recording),
     }
+
+
+def _to_try(settings: SimulationSettings, recorded: str, now: str) -> str:
+    """What makes twin and run alike, where they are not."""
+    if settings.configuration != "sloshing":
+        return f"leave --configuration {settings.configuration} out, or drive the twin with a run recorded {now}"
+    if recorded != "sloshing":
+        return f"--configuration {recorded}, or a run recorded sloshing"
+    moving = ", ".join(name for name in TANK_MODELS.names if name != "frozen")
+    return (
+        f"a liquid that moves: tank_model = one of {moving} under [twin] of {settings.rig.name}; or `sloshlab "
+        "diagnose` on a case of such runs, which finds what the frozen liquid lacks"
+    )
 
 
 def _rms(recording: xr.Dataset, simulated: xr.Dataset) -> dict[str, dict[str, float]]:

@@ -21,6 +21,8 @@ from sloshlab.twin.structure_forces import MASS_ERROR
 
 _FACTORS: Final = (1 / 3, 3.0)
 """Of the level, and of the frequency, of a run: what a laboratory can set without another rig."""
+_SAME_LEVEL: Final = 1.25
+"""Ratio up to which two levels are one."""
 _ADDED_MASS: Final = 0.1
 """Of the moving mass, as a weight that is known and screwed to the tank."""
 _LEAST_NOISE_FLOORS: Final = 3.0
@@ -98,11 +100,12 @@ def _planned(found: Findings, runs: Sequence[CaseRun]) -> list[_Planned]:
         kind = "decays" if run.is_free else "runs on the moving base"
         for factor in _FACTORS:
             words = f"{kind} at {_times(factor)} the level of {run.name}"
-            planned.append(
-                _Planned(words, run, release=factor)
-                if run.is_free
-                else _Planned(words, _driven(found, run, factor))
-            )
+            if not _is_held(factor * level(run), run, runs):
+                planned.append(
+                    _Planned(words, run, release=factor)
+                    if run.is_free
+                    else _Planned(words, _driven(found, run, factor))
+                )
             if not run.is_free:
                 planned.append(
                     _Planned(
@@ -115,6 +118,13 @@ def _planned(found: Findings, runs: Sequence[CaseRun]) -> list[_Planned]:
         )
         planned.append(_Planned(words, run, extension=weight))
     return planned
+
+
+def _is_held(wanted: float, like: CaseRun, runs: Sequence[CaseRun]) -> bool:
+    """Whether a run of the same kind has about this level already."""
+    kind = (like.attributes.experiment, like.attributes.configuration)
+    levels = [level(run) for run in runs if (run.attributes.experiment, run.attributes.configuration) == kind]
+    return any(wanted / _SAME_LEVEL < held < wanted * _SAME_LEVEL for held in levels)
 
 
 def _times(factor: float) -> str:

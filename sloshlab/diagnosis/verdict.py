@@ -8,6 +8,7 @@ from typing import Any
 
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.found_law import FoundLaw, found_law
+from sloshlab.diagnosis.held_experiments import lacking_of
 from sloshlab.diagnosis.inference.decision import Decision, decided
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.interval import LEVEL, Interval, intervals_of
@@ -17,7 +18,7 @@ from sloshlab.diagnosis.wording import (
     law_statement,
     names_of_alternatives,
     refuted_statement,
-    separating_experiment_of,
+    separating_experiments_of,
     statement_of,
 )
 from sloshlab.identification.mismatch import mismatches, summary
@@ -118,7 +119,7 @@ def _separating(found: Findings, decision: Decision) -> str:
     """The experiment that was found, or what the effects themselves name where none of those simulated tells."""
     experiment = separating_experiment(found, decision.alternatives)
     if experiment is None:
-        return separating_experiment_of(decision)
+        return "; or ".join(lacking_of(separating_experiments_of(decision), found.case))
     channel, size = experiment.channel, experiment.noise_floors
     return f"{experiment.description}: {channel} would differ by {size:.2g} noise floors"
 

@@ -203,12 +203,12 @@ def equivalents_of(model: ScoredModel) -> list[tuple[str, ...]]:
     return found
 
 
-def separating_experiment_of(decision: Decision) -> str:
-    """Experiments that would tell explanations apart."""
+def separating_experiments_of(decision: Decision) -> list[str]:
+    """Experiments that would tell explanations apart, each once."""
     effects = [
         candidate.effect for alternative in decision.alternatives for candidate in alternative.fit.candidates
     ]
-    return "; or ".join(dict.fromkeys(effect.separated_by for effect in effects if effect.separated_by))
+    return list(dict.fromkeys(effect.separated_by for effect in effects if effect.separated_by))
 
 
 def named_and_placed(candidate: Candidate) -> str:

@@ -389,3 +389,29 @@ def test_a_twin_of_a_users_own_is_not_taken_for_one_of_a_rig(
     command = ["simulate", "--rig", str(folder / "sdof.toml"), "--input", str(folder / "sdof_free.nc")]
     command += ["--twin", str(tmp_path / name), "-o", str(tmp_path / "sim.nc")]
     refusal(capsys, command, tmp_path / "sim.nc", said, "UserTwinModel.simulate", "load_extended")
+
+
+def test_a_liquid_in_another_state_than_recorded_is_drawn_and_told_what_to_try(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig, recorded = folder / "sdof.toml", folder / "sdof_free.nc"
+    simulated(rig, recorded, tmp_path / "same.nc")
+    assert "to try next" not in capsys.readouterr().out
+    assert not (tmp_path / "same.png").exists()
+    simulated(rig, recorded, tmp_path / "other.nc", "--configuration", "empty")
+    said = capsys.readouterr().out
+    assert "the run is recorded frozen, the twin is empty" in said
+    assert "to try next: leave --configuration empty out, or drive the twin with a run recorded empty" in said
+    assert f"drawn: {tmp_path / 'other.png'}" in said
+    assert (tmp_path / "other.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_figure_in_the_way_is_not_replaced_unasked(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "sim.png").write_bytes(b"mine")
+    words = ["simulate", "--rig", str(folder / "sdof.toml"), "--input", str(folder / "sdof_free.nc"),
+             "-o", str(tmp_path / "sim.nc"), "--configuration", "empty"]  # fmt: skip
+    assert run(words) == 1
+    assert (tmp_path / "sim.png").read_bytes() == b"mine"
+    assert not (tmp_path / "sim.nc").exists()
+    assert run([*words, "--overwrite"]) == 0
+    assert (tmp_path / "sim.png").read_bytes() != b"mine"

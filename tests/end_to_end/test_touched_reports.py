@@ -39,7 +39,8 @@ LINES = """name => {
 PLACE = """([name, point]) => {
   const panel = document.querySelector(`#${name} .panel`);
   const view = [...Bokeh.index].find((view) => panel.contains(view.el));
-  const scatter = view.model.renderers.find((each) => each.glyph.type === "Scatter").data_source.data;
+  const tap = view.model.toolbar.tools.find((tool) => tool.type === "TapTool");
+  const scatter = tap.renderers[0].data_source.data;
   const box = view.canvas_view.el.getBoundingClientRect(), { x_scale, y_scale } = view.frame;
   return [box.x + x_scale.compute(scatter.x[point]), box.y + y_scale.compute(scatter.y[point])];
 }"""
@@ -161,9 +162,9 @@ def test_a_point_of_the_map_shows_its_loop_its_window_and_its_spectrum(opened: C
     page.mouse.click(*page.evaluate(PLACE, ["map", 12]))
     page.wait_for_function("document.querySelector('#map .touch-words').textContent.includes('12 Hz, 12 g')")
     then = page.evaluate(LINES, "map")
-    # the points stay; ring, loop, window and spectrum are those of the point
-    assert [one == other for one, other in zip(first, then, strict=True)] == [True, False, False, False, False]
-    window = page.evaluate("lines => JSON.parse(lines[3])[1]", then)
+    # all points stay; ring, loop, window and spectrum are those of the point
+    assert [one == other for one, other in zip(first, then, strict=True)] == [True, True, *[False] * 4]
+    window = page.evaluate("lines => JSON.parse(lines[4])[1]", then)
     assert max(window) == pytest.approx(13.0, rel=1e-3)
     assert page.input_value("#map select >> nth=1") == "12"
 
@@ -178,9 +179,9 @@ def test_points_can_be_reached_without_a_mouse(opened: Callable[..., Any]) -> No
 
 def test_colours_are_those_of_the_chosen_quantity(opened: Callable[..., Any]) -> None:
     page = opened()
-    before = page.evaluate(LINES, "map")[0]
+    before = page.evaluate(LINES, "map")[1]
     page.select_option("#map select >> nth=0", label="β")
-    assert page.evaluate(LINES, "map")[0] != before
+    assert page.evaluate(LINES, "map")[1] != before
 
 
 def test_paper_shows_the_images(opened: Callable[..., Any]) -> None:

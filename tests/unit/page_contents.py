@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 from html.parser import HTMLParser
 from typing import Any
@@ -28,6 +29,7 @@ class Scripts(HTMLParser):
         super().__init__()
         self.data: list[Any] = []
         self.scripts: list[str] = []
+        self.carried = ""
         self.styles: list[str] = []
         self.policy = ""
         self._open, self._type = "", ""
@@ -49,5 +51,7 @@ class Scripts(HTMLParser):
             self.styles.append(data)
         elif self._open == "script" and self._type == "application/json":
             self.data.append(json.loads(data))
+        elif self._open == "script" and self._type == "application/gzip":
+            self.carried += gzip.decompress(base64.b64decode(data)).decode()
         elif self._open == "script":
             self.scripts.append(data)

@@ -62,9 +62,9 @@ def window_map() -> WindowMap:
     image = np.arange(20.0).reshape(4, 5)
     image[3, 4] = np.nan
     quantities = (Quantity("W̄", x * y, image, colours, 0.0, 3.0), Quantity("β", -x, None, colours, -1.0, 0.0))
-    extent = (0.0, 1.0, 0.8, 3.2)
+    extent, others = (0.0, 1.0, 0.8, 3.2), (x[:2] + 0.05, y[:2])
     return WindowMap(
-        "Work", "Points.", "ū", "ω̄", x, y, extent, quantities, tuple(windows), "F", "u", "|F|", first=3
+        "Work", "Points.", "ū", "ω̄", x, y, *others, extent, quantities, tuple(windows), "F", "u", "|F|", first=3
     )  # fmt: skip
 
 

@@ -202,6 +202,7 @@ class Window:
     run, words : str
         Which run it is of; frequency and level.
     time_s, force, displacement : ndarray, shape (n,)
+        As many samples as are drawn.
     order, amplitude : ndarray, shape (m,)
         Spectrum of the force over multiples of the frequency of the motion.
     """
@@ -214,17 +215,14 @@ class Window:
     order: FloatArray
     amplitude: FloatArray
 
-    def plain(self, most_samples: int) -> dict[str, Any]:
+    def plain(self) -> dict[str, Any]:
         """As JSON has it."""
-        kept = envelope_samples(np.vstack([self.force, self.displacement]), most_samples)
-        n = self.time_s.size
         return {
             "run": self.run,
             "words": self.words,
-            "interval": float(self.time_s[-1] - self.time_s[0]) / (n - 1) if n > 1 else 0.0,
-            "samples": packed_steps(kept),
-            "force": packed(self.force[kept]),
-            "displacement": packed(self.displacement[kept]),
+            "time": packed(self.time_s),
+            "force": packed(self.force),
+            "displacement": packed(self.displacement),
             "order": packed(self.order),
             "amplitude": packed(_decades(self.amplitude)),
         }
@@ -238,6 +236,8 @@ class WindowMap:
     ----------
     title, caption, x_label, y_label : str
     x, y : ndarray, shape (n_points,)
+    others_x, others_y : ndarray, shape (n_others,)
+        Points of which nothing more is shown.
     extent : tuple of float
         x from, x to, y from, y to of the maps.
     quantities : tuple of Quantity
@@ -246,8 +246,6 @@ class WindowMap:
     force_label, displacement_label, amplitude_label : str
     first : int
         The point that is shown first.
-    most_samples : int
-        All windows together.
     """
 
     title: str
@@ -256,6 +254,8 @@ class WindowMap:
     y_label: str
     x: FloatArray
     y: FloatArray
+    others_x: FloatArray
+    others_y: FloatArray
     extent: tuple[float, float, float, float]
     quantities: tuple[Quantity, ...]
     windows: tuple[Window, ...]
@@ -263,11 +263,9 @@ class WindowMap:
     displacement_label: str
     amplitude_label: str
     first: int = 0
-    most_samples: int = 60_000
 
     def plain(self) -> dict[str, Any]:
         """As JSON has it."""
-        each = max(64, min(self.most_samples // max(len(self.windows), 1), 1200))
         return {
             "kind": "map",
             "title": self.title,
@@ -280,9 +278,10 @@ class WindowMap:
             },
             "x": packed(self.x),
             "y": packed(self.y),
+            "others": {"x": packed(self.others_x), "y": packed(self.others_y)},
             "extent": list(self.extent),
             "quantities": [_plain_quantity(quantity) for quantity in self.quantities],
-            "windows": [window.plain(each) for window in self.windows],
+            "windows": [window.plain() for window in self.windows],
             "first": self.first,
         }
 

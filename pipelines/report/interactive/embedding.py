@@ -9,7 +9,7 @@ from typing import Final, Protocol
 
 from pipelines.report.interactive.contents import Touchable
 from pipelines.report.interactive.packed import safe_json
-from pipelines.report.interactive.script import scripts
+from pipelines.report.interactive.script import Script, script
 from sloshlab.errors import MissingExtraError
 
 LARGEST_PAGE_BYTES: Final = 6_000_000
@@ -45,14 +45,14 @@ class Embedded:
     ----------
     contents : dict
         JSON, safe within a script element, by names of figures.
-    scripts : tuple of str
+    script : Script
         Empty where no figure can be touched.
     remark : str
         What a reader should know of it.
     """
 
     contents: dict[str, str] = field(default_factory=dict)
-    scripts: tuple[str, ...] = ()
+    script: Script = field(default_factory=Script)
     remark: str = ""
 
 
@@ -72,12 +72,12 @@ def embedded(figures: Sequence[Figure], largest_bytes: int = LARGEST_PAGE_BYTES)
     if not wanted:
         return Embedded()
     try:
-        needed = scripts()
+        needed = script()
     except MissingExtraError as error:
         return Embedded(remark=f"The figures of this page stand still: {error}.")
     contents = {name: safe_json(touch.plain()) for name, touch in wanted.items()}
     still = sum(len(base64.b64encode(figure.png)) for figure in figures)
-    room = largest_bytes - _TEXT_BYTES - still - sum(len(script.encode()) for script in needed)
+    room = largest_bytes - _TEXT_BYTES - still - needed.size
     left_out = 0
     while contents and sum(len(content.encode()) for content in contents.values()) > room:
         # the largest first, so that as many as possible stay

@@ -41,6 +41,9 @@ class WindowMapFigure {
     this.cells = new Bokeh.ColumnDataSource({ data: { x: [], y: [], value: [] } });
     this.cellGlyph = this.map.figure.rect(field("x"), field("y"), 1, 1, { source: this.cells, fill_color: shaded,
       line_color: shaded, line_width: 1 }).glyph;
+    const others = new Bokeh.ColumnDataSource({ data: { x: unpacked(this.content.others.x),
+      y: unpacked(this.content.others.y) } });
+    const dots = this.map.figure.scatter(field("x"), field("y"), { source: others, size: 2, line_color: null });
     this.points = new Bokeh.ColumnDataSource({ data: { x: this.xs, y: this.ys, value: this.xs.map(() => 0) } });
     const circles = this.map.figure.scatter(field("x"), field("y"), { source: this.points, size: 9,
       fill_color: shaded, line_color: "#222222", line_width: 0.8 });
@@ -68,6 +71,7 @@ class WindowMapFigure {
     themed(() => {
       const { ink, paper, mark, before } = palette();
       ring.glyph.line_color = mark;
+      dots.glyph.fill_color = "#111111";
       this.force.renderer.glyph.line_color = this.lines.renderer.glyph.line_color = before;
       Object.assign(this.bar, { title_text_color: ink, major_label_text_color: ink, background_fill_color: paper });
     });
@@ -102,8 +106,7 @@ class WindowMapFigure {
 
   choose(at) {
     this.at = at;
-    const window = this.content.windows[at], samples = samplesOf(window.samples);
-    const time = samples.map((sample) => sample * window.interval);
+    const window = this.content.windows[at], time = unpacked(window.time);
     const force = unpacked(window.force), displacement = unpacked(window.displacement);
     this.ring.data = { x: [this.xs[at]], y: [this.ys[at]] };
     this.points.selected.indices = [at];

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipelines.sweep.results import Excerpt, RigResult, RunResult, SweepExperiment, SweepOptions
+from pipelines.sweep.results import RigResult, RunResult, SweepExperiment, SweepOptions
+from pipelines.sweep.window_signals import Excerpt
 from sloshlab.conditioning.calibration import DryMass
 from sloshlab.conditioning.clipping import Clipping
 from sloshlab.conditioning.gaps import Gap

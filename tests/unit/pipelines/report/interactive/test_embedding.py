@@ -33,8 +33,10 @@ def sha256(text: str) -> str:
 def test_the_policy_allows_the_scripts_of_the_page_by_hash_and_nothing_else(html: str) -> None:
     page = Scripts(html)
     rules = {rule.split(" ")[0]: rule.split(" ")[1:] for rule in page.policy.split("; ")}
-    assert rules["script-src"] == [sha256(script) for script in page.scripts]
-    assert len(page.scripts) == 3
+    assert len(page.scripts) == 1
+    # the second is what the first unpacks and adds to the page
+    assert rules["script-src"] == [sha256(page.scripts[0]), sha256(page.carried)]
+    assert "Copyright (c) Anaconda" in page.carried
     assert rules["default-src"] == rules["connect-src"] == rules["base-uri"] == rules["form-action"] == ["'none'"]
     assert rules["img-src"] == ["data:"]
     assert "unsafe-eval" not in page.policy
@@ -44,6 +46,7 @@ def test_a_page_of_images_allows_no_script_and_only_its_own_style(tmp_path: Path
     page = Scripts(written_page(tmp_path, {"image": None}).read_text(encoding="utf-8"))
     rules = {rule.split(" ")[0]: rule.split(" ")[1:] for rule in page.policy.split("; ")}
     assert page.scripts == page.data == []
+    assert page.carried == ""
     assert rules["script-src"] == ["'none'"]
     assert rules["style-src"] == [sha256(style) for style in page.styles]
 
@@ -51,7 +54,7 @@ def test_a_page_of_images_allows_no_script_and_only_its_own_style(tmp_path: Path
 def test_names_are_text_wherever_they_stand(html: str) -> None:
     page = Scripts(html)
     # as many scripts as we wrote: no name opened or closed one
-    assert len(page.scripts) == 3
+    assert len(page.scripts) == 1
     assert page.data[0]["runs"][1]["name"] == HOSTILE
     assert page.data[1]["windows"][0]["run"] == HOSTILE
     assert "<script>document.title" not in html
@@ -98,7 +101,7 @@ def test_what_finds_no_room_stands_still_and_the_largest_goes_first() -> None:
     figures = [figure("histories", histories()), figure("map", window_map())]
     whole = embedded(figures)
     sizes = {name: len(content.encode()) for name, content in whole.contents.items()}
-    scripts = sum(len(script.encode()) for script in whole.scripts)
+    scripts = whole.script.size
     images = sum(4 * -(-len(each.png) // 3) for each in figures)
     # room for the text of a page, the scripts, the images and the smaller content
     room = 150_000 + scripts + images + min(sizes.values())
@@ -107,7 +110,7 @@ def test_what_finds_no_room_stands_still_and_the_largest_goes_first() -> None:
     assert "1 of them stands still" in smaller.remark
     nothing = embedded(figures, room - 1 - min(sizes.values()))
     assert nothing.contents == {}
-    assert nothing.scripts == ()
+    assert nothing.script.elements == ()
     assert "stand still" in nothing.remark
 
 
@@ -121,6 +124,7 @@ def test_without_the_library_images_are_shown_and_the_page_says_so(
     html = written_page(tmp_path, {"histories": histories()}).read_text(encoding="utf-8")
     page = Scripts(html)
     assert page.scripts == page.data == []
+    assert page.carried == ""
     assert "stand still: zooming into figures needs bokeh" in html
     assert "sloshlab[interactive]" in html
     assert "data:image/png;base64," in html
