@@ -52,5 +52,5 @@ def errors_are_coloured() -> bool:
 
 
 def warn(line: str) -> None:
-    """Print one line to standard error at once."""
-    say(line, error=True)
+    """Print one line to standard error at once, as a warning."""
+    complain(line, "flag")
