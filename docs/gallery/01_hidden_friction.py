@@ -32,7 +32,7 @@ print(verdict.headline)
 # a run that nothing was fitted to, where it is missed most.
 # Right: the error on that run in multiples of the noise.
 # At 1 only noise is left.
-figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained", width_ratios=(1.7, 1))
+figure, (left, right) = plt.subplots(1, 2, figsize=(9.4, 4.2), layout="constrained", width_ratios=(1.7, 1))
 verdict.plot.before_after(ax=left)
 verdict.plot.errors(ax=right)
 plt.show()

@@ -21,7 +21,7 @@ print(*sweep.summary, sep="\n")
 # Every window is the mean of twelve cycles: the area of the loop of force over displacement.
 # W̄ = W/(m_l u₀²Ω²) compares it with the kinetic energy that the liquid has with the tank.
 strongest = sweep.windows.isel(window=sweep.windows["w_bar"].values.argmax())
-figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(9.4, 4.4), layout="constrained")
 sweep.plot.map("w_bar", ax=left)
 sweep.plot.loop(strongest, ax=right)
 plt.show()

@@ -28,7 +28,7 @@ for reading in found.experiment.free_runs[0].first_decay.readings:
     frozen[reading.method] = 100 * float(np.median(reading.damping_ratio[reading.used]))
     print(f"frozen, {reading.method}: ζ = {frozen[reading.method]:.4f} %")
 names = [run.name for run in found.experiment.free_runs]
-figure, panels = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
+figure, panels = plt.subplots(1, 2, figsize=(9.4, 4.2), layout="constrained")
 for axes, name in zip(panels, names[:2], strict=True):
     found.plot.decay(name, ax=axes)
 plt.show()

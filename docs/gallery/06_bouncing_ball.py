@@ -54,7 +54,7 @@ print(f"area of the loop {1e3 * area:.3f} mJ, work counted {1e3 * work:.3f} mJ")
 # Elsewhere it does not: the ball has one way to bounce, and a liquid has many.
 # That is why there is a network.
 u_bar = np.linspace(0.1, 0.36, 6)
-figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(9.4, 4.6), layout="constrained")
 left.plot(1e3 * displacement, force, lw=0.9)
 left.set(xlabel="displacement [mm]", ylabel="force of the liquid on the tank [N]", title="ω̄ = 4, ū = 0.25")
 errors = {}

@@ -19,7 +19,7 @@ guide = raw_data / "numerical_tank" / "sdof"
 simulations = {
     name: sl.simulate(guide / "rig_sdof.toml", guide / f"decay_{name}.nc") for name in ("frozen", "sloshing")
 }
-figure, panels = plt.subplots(1, 2, figsize=(11, 4), layout="constrained", sharey=True)
+figure, panels = plt.subplots(1, 2, figsize=(9.4, 4), layout="constrained", sharey=True)
 for axes, (name, simulation) in zip(panels, simulations.items(), strict=True):
     simulation.plot.channel("displacement_tank", ax=axes)
     axes.set_title(f"liquid {name}")
