@@ -142,7 +142,7 @@ docs: setup  ## the documentation as a web site in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 docs-publish: docs  ## the site as VERSION and as the latest into the local branch DOCS_BRANCH (gh-pages)
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mike deploy --branch $(DOCS_BRANCH) --update-aliases $(VERSION) latest
+	PATH="$(abspath $(BIN)):$$PATH" NO_MKDOCS_2_WARNING=1 $(BIN)/mike deploy --branch $(DOCS_BRANCH) --update-aliases $(VERSION) latest
 	$(BIN)/mike set-default --branch $(DOCS_BRANCH) latest
 
 clean:  ## remove everything that make made, the environment included

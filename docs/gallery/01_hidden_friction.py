@@ -30,11 +30,11 @@ print(verdict.headline)
 # %%
 # Left:
 # a run that nothing was fitted to, where it is missed most.
-# Right: the error on that run in multiples of the noise.
+# Below: the error on that run in multiples of the noise.
 # At 1 only noise is left.
-figure, (left, right) = plt.subplots(1, 2, figsize=(9.4, 4.2), layout="constrained", width_ratios=(1.7, 1))
-verdict.plot.before_after(ax=left)
-verdict.plot.errors(ax=right)
+figure, (above, below) = plt.subplots(2, 1, figsize=(8, 6), layout="constrained", height_ratios=(2, 1))
+verdict.plot.before_after(ax=above)
+verdict.plot.errors(ax=below)
 plt.show()
 
 # %%

@@ -93,7 +93,7 @@ for effect in verdict.effects:
         print(f"{effect['name']}: {name} = {number['estimate']:.3g} ({number['low']:.3g} … {number['high']:.3g})")
 
 # %%
-figure, (left, right) = plt.subplots(1, 2, figsize=(9.4, 4.2), layout="constrained", width_ratios=(1.7, 1))
-verdict.plot.before_after(ax=left)
-verdict.plot.errors(ax=right)
+figure, (above, below) = plt.subplots(2, 1, figsize=(8, 6), layout="constrained", height_ratios=(2, 1))
+verdict.plot.before_after(ax=above)
+verdict.plot.errors(ax=below)
 plt.show()
