@@ -139,7 +139,7 @@ wheel: setup  ## the wheel, installed into an environment of its own and used in
 	PYTHON=$(CURDIR)/$(BIN)/python .ci/wheel
 
 docs: setup  ## the documentation as a web site in site/
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 docs-publish: docs  ## the site as VERSION and as the latest into the local branch DOCS_BRANCH (gh-pages)
 	PATH="$(abspath $(BIN)):$$PATH" NO_MKDOCS_2_WARNING=1 $(BIN)/mike deploy --branch $(DOCS_BRANCH) --update-aliases $(VERSION) latest

@@ -145,7 +145,7 @@ def test_the_navigation_lists_every_page_but_single_trials() -> None:
 
 def test_the_reference_has_everything_that_python_programs_are_offered() -> None:
     text = (DOCS / "api" / "interface.md").read_text(encoding="utf-8")
-    shown = {name.rpartition(".")[2] for name in re.findall(r"^::: (\S+)$", text, flags=re.MULTILINE)}
+    shown = {name.rpartition(".")[2] for name in re.findall(r"(?:^::: |\]\[)([\w.]+)", text, flags=re.MULTILINE)}
     assert set(sloshlab.__all__) - {"__version__"} <= shown
 
 
