@@ -176,13 +176,15 @@ def test_a_second_device_begins_before_the_trigger_too(place: Path) -> None:
 
 
 class Marking(NobodyListening):
-    """Sets marks when a sample has arrived."""
+    """Sets marks when a sample has arrived; those of a negative number before any has."""
 
     def __init__(self, marks: Mapping[int, str]) -> None:
         self._marks = dict(marks)
 
     def begins(self, infos: Any, metadata: Any, mark: Callable[[str], None]) -> None:
         self._mark = mark
+        for number in [at for at in self._marks if at < 0]:
+            mark(self._marks.pop(number))
 
     def delivered(self, source: int, deliveries: Sequence[Delivery]) -> None:
         for delivery in deliveries:
@@ -193,10 +195,12 @@ class Marking(NobodyListening):
 
 def in_real_time(n_samples: int) -> list[Any]:
     """Steps that come when their samples are due, by the clock that marks are stamped by."""
-    began_ns = time.monotonic_ns()
+    began_ns: list[int] = []
 
     def due(counter: int) -> Sequence[Delivery]:
-        at_ns = began_ns + (counter + 10) * 1_000_000
+        # from the first read on: the computer may be busy before
+        began_ns[:] = began_ns or [time.monotonic_ns()]
+        at_ns = began_ns[0] + (counter + 10) * 1_000_000
         while time.monotonic_ns() < at_ns:
             time.sleep(0.001)
         return [Block(0, 1, counter, true_counts(counter, 10), None, at_ns, time.time_ns())]
@@ -222,15 +226,21 @@ def test_a_mark_stands_in_the_recording_at_its_time(place: Path) -> None:
 
 
 def test_marks_count_from_the_trigger_and_survive_a_crash(place: Path) -> None:
-    listener = Marking({500: "before", 1200: "after"})
+    listener = Marking({-1: "before", 1200: "after"})
     recorded(
         place, [RisingSource(in_real_time(1500))], listener,
         trigger=("force_a_0>10",), pre_s=0.2, keep_journal=True,
     )  # fmt: skip
-    # 0.5 s is before the recording, which begins at 0.801 s
+    # the recording begins at 0.801 s
     [mark] = marks_of(place)
     assert mark["text"] == "after"
-    assert 0.199 <= mark["time_s"] <= 0.5
+    # by the stamps themselves: the last sample of a block was due when the block says that it had been read
+    with read_journal(place / "run.journal") as read:
+        entry = read.entries[0, 0][0]
+        since_s = (read.marks[1].host_monotonic_ns - entry.host_monotonic_ns) * 1e-9
+    due_s = (entry.counter + entry.n_samples - 1 - 1001) / RATE_HZ + since_s
+    assert due_s >= 0.199
+    assert mark["time_s"] == pytest.approx(due_s, abs=0.002)
     # as after a kill: the last blocks are missing
     journal = place / "run.journal"
     whole = journal.read_bytes()
