@@ -212,8 +212,10 @@ def _n_before(trigger: Trigger | None, base: SourcePlacement) -> int:
     if trigger is None:
         return 0
     for stream in base.streams:
-        if stream.stream == trigger.stream:
-            return stream.first_index + trigger.counter - stream.first_counter
+        n_before = stream.first_index + trigger.counter - stream.first_counter
+        if stream.stream == trigger.stream and 0 <= n_before < base.n_samples:
+            return n_before
+    # its samples were lost with a part of the journal
     return 0
 
 

@@ -18,6 +18,7 @@ from sloshlab.errors import InputError, JournalError
 
 MOST_HELD_BYTES: Final = 512 << 20
 LONGEST_PRE_S: Final = 3600.0
+_LARGEST_COUNTER: Final = 2**62
 _MARGIN_S: Final = 1.0
 """Messages of a CAN device, and devices among each other, may be so far apart."""
 
@@ -66,6 +67,11 @@ def trigger_from(metadata: Mapping[str, Any], what: str) -> Trigger | None:
     try:
         starts = tuple((int(source), int(stream), int(counter)) for source, stream, counter in content["starts"])
         numbers = int(content["stream"]), int(content["counter"]), int(content["n_asked"])
+        # a journal may name any number: one that no device can have would make a recording of that length
+        if not all(
+            0 <= counter <= _LARGEST_COUNTER for counter in (*numbers[1:], *(start[2] for start in starts))
+        ):
+            raise ValueError("a counter that no device has")
         return Trigger(str(content["condition"])[:200], *numbers, starts)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise JournalError(f"{what}: metadata", got="a trigger that is described wrongly") from error

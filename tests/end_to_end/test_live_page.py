@@ -24,6 +24,7 @@ from live_commands import (
     RATE_HZ,
     Command,
     cut_recording,
+    n_bytes,
     playing,
     running,
     samples_that_agree,
@@ -228,6 +229,45 @@ def test_a_trigger_by_the_command(bench: Path, lab: Path) -> None:
     assert found["time"].values[512] == 0
     for name in ("force_cell_1", "force_cell_2", "acceleration_roof_1"):
         np.testing.assert_array_equal(found[name].values, original[name].values[at - 512 :])
+
+
+def test_a_mark_of_the_page_starts_a_recording(bench: Path, lab: Path) -> None:
+    """By the messages of the page itself; what came before the mark is there, and time 0 is where it was set."""
+    from websockets.sync.client import connect
+
+    given = ["--trigger", "mark", "--pre-seconds", "0.5", "--json"]
+    with (
+        playing(bench / "long.nc", lab, "pty") as devices,
+        running(arguments(devices.sources, bench, lab, *given), lab) as recorder,
+    ):
+        parts = urlsplit(url_of(recorder))
+        with connect(f"ws://{parts.netloc}{parts.path}live", origin=f"http://{parts.netloc}") as page:  # type: ignore[arg-type]
+
+            def status() -> dict[str, Any]:
+                return dict(json.loads(page.recv(60))["status"])
+
+            wait_until(
+                lambda: status().get("waiting_for") == "mark" and status()["sources"][0]["n_samples"] > 512, "it"
+            )
+            assert n_bytes(lab / "new.nc") == 0
+            page.send(json.dumps({"mark": "go"}))
+            wait_until(
+                lambda: status()["waiting_for"] == "" and status()["sources"][0]["n_samples"] > 512, "samples"
+            )
+        recorder.send(signal.SIGINT)
+        assert recorder.exit_code() == 0, recorder.stderr
+        trigger = recorder.summary["report"]["trigger"]
+    found, original = stored(lab / "new.nc"), stored(bench / "long.nc")
+    start = trigger["counter"] - 256
+    assert found["time"].values[256] == 0
+    for name in ("force_cell_1", "acceleration_control"):
+        expected = original[name].values[start : start + found.sizes["time"]]
+        np.testing.assert_array_equal(found[name].values, expected)
+    with netCDF4.Dataset(lab / "new.nc") as file:
+        [mark] = json.loads(file.marks)
+    # the newest sample that had come when it was set; a loaded computer may be late with either
+    assert mark["text"] == "go"
+    assert abs(mark["time_s"]) < 2
 
 
 @pytest.fixture

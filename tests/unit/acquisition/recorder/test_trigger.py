@@ -219,6 +219,7 @@ def test_a_described_trigger_comes_back_and_nonsense_is_refused() -> None:
     trigger = Trigger("force>1", 3, 1234, 100, ((0, 3, 1134), (1, 9, 17)))
     assert trigger_from({"trigger": trigger.described()}, "journal") == trigger
     assert trigger_from({}, "journal") is None
-    for wrong in ({}, [], 7, {**trigger.described(), "starts": [[0, 1]]}, {**trigger.described(), "counter": "x"}):
+    changes = ({"starts": [[0, 1]]}, {"counter": "x"}, {"counter": 10**30}, {"starts": [[0, 3, -1]]})
+    for wrong in ({}, [], 7, *({**trigger.described(), **change} for change in changes)):
         with pytest.raises(JournalError, match="trigger"):
             trigger_from({"trigger": wrong}, "journal")
