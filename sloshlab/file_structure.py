@@ -1,4 +1,4 @@
-"""What is checked in a netCDF-4 file before its library opens it.
+"""What is checked of a netCDF-4 file before its library opens it, or is loaded at all.
 
 The HDF5 library (seen in 1.14 and 2.2) walks its global heaps, which hold text attributes and the
 references between dimensions and variables, object by object. A free object of size zero, as a damaged
@@ -10,6 +10,7 @@ from __future__ import annotations
 import mmap
 import os
 import struct
+from pathlib import Path
 
 from sloshlab.errors import RecordingError
 
@@ -19,6 +20,18 @@ _HEAP_HEADER_BYTES = 16
 _OBJECT_HEADER = struct.Struct("<HHIQ")
 # Objects of a heap are padded to it.
 _ALIGNMENT = 8
+
+
+def require_recording_file(file: Path) -> None:
+    """Refuse what is no file; needs no library, so that a misspelt name is told at once.
+
+    Raises
+    ------
+    RecordingError
+    """
+    if not file.is_file():
+        got = "a folder" if file.is_dir() else "no such file"
+        raise RecordingError(f"recording {file}", got=got, allowed="a netCDF-4 file", remedy="check the path")
 
 
 def require_sound_structure(path: str | os.PathLike[str]) -> None:

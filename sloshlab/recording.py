@@ -21,7 +21,7 @@ from sloshlab import atomic_file, interrupt, limited_process
 from sloshlab.configurations import CONFIGURATIONS
 from sloshlab.errors import RecordingError, UnitsError
 from sloshlab.experiments import EXPERIMENTS, recorded_experiments
-from sloshlab.file_structure import require_sound_structure
+from sloshlab.file_structure import require_recording_file, require_sound_structure
 from sloshlab.hdf5_contents import require_self_contained
 from sloshlab.limited_process import ReadingLimits, UntrustedFile
 from sloshlab.netcdf_lock import NETCDF_LOCK
@@ -199,13 +199,11 @@ def read_recording(
 
 def _untrusted(file: Path) -> UntrustedFile:
     """The file, after what can be told without a child process."""
+    require_recording_file(file)
     # heavy, and so imported only where a file is opened; here, so that every child has them already
     import h5py  # noqa: F401
     import netCDF4  # noqa: F401
 
-    if not file.is_file():
-        got = "a folder" if file.is_dir() else "no such file"
-        raise RecordingError(f"recording {file}", got=got, allowed="a netCDF-4 file", remedy="check the path")
     return UntrustedFile(f"recording {file}", _LIMITS, RecordingError)
 
 

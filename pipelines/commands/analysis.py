@@ -18,6 +18,7 @@ from pipelines.commands.application import (
     app,
     command_as_given,
     finish,
+    require_recordings,
 )
 from pipelines.commands.completion import one_of
 from pipelines.report.result_folder import require_result_folder
@@ -26,6 +27,7 @@ from pipelines.report.result_folder import require_result_folder
 @app.command()
 def analyse(runs: Recordings, rig: RigOption, output: OutputFolder, as_json: Json = False) -> None:
     """Recordings by the pipeline of their experiment, with its usual settings."""
+    require_recordings(runs)
     from pipelines.recording.analysing import analyse_runs
 
     finish(analyse_runs(runs, rig, output, command_as_given()), as_json)
@@ -53,6 +55,7 @@ def shaker(
     as_json: Json = False,
 ) -> None:
     """Sweeps or VFA runs of a tank on the shaker: windows, maps and a report."""
+    require_recordings(runs)
     from pipelines.sweep.outputs import files_of, write_experiment
     from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 
@@ -82,6 +85,7 @@ def work(
     as_json: Json = False,
 ) -> None:
     """Any sweep with one force and one motion channel, no tank needed."""
+    require_recordings(runs)
     from pipelines.sweep.outputs import files_of, write_experiment
     from pipelines.sweep.work import WorkSettings, analyse_work
 
@@ -125,6 +129,7 @@ def beam(
     as_json: Json = False,
 ) -> None:
     """Beam or guided tank, frozen and sloshing: modal accelerations, damping, spectra and a report."""
+    require_recordings(runs)
     from pipelines.structure.analysis import analyse_beam, checked_settings
     from pipelines.structure.outputs import files_of, write_beam
     from pipelines.structure.with_twins import analyse_beam_with_twins
@@ -166,6 +171,7 @@ def ball(
     as_json: Json = False,
 ) -> None:
     """A bouncing ball in place of the liquid, from free decays or from runs on the shaker."""
+    require_recordings(runs)
     from pipelines.ball.outputs import files_of, write_ball
     from pipelines.ball.settings import BallSettings
     from pipelines.ball.stages import analyse_ball

@@ -14,6 +14,7 @@ from pipelines.commands.command_help import Application
 from pipelines.commands.completion import SHELLS, completion_script, install_completion, one_of
 from pipelines.report.free_place import require_free_file, require_free_folder
 from pipelines.report.terminal import complain, say
+from sloshlab.file_structure import require_recording_file
 
 INPUT_IS_BAD, USAGE, DONE_BUT_FLAGGED, INTERRUPTED = 1, 2, 3, 130
 
@@ -31,6 +32,12 @@ RigOption = Annotated[
     list[Path],
     typer.Option("--rig", metavar="RIG.toml", help="Rig description; once per fill level.", show_default=False),
 ]
+
+
+def require_recordings(files: list[Path]) -> None:
+    """Refuse what is no file, before the libraries that read it are loaded."""
+    for file in files:
+        require_recording_file(file)
 
 
 def free_folder(option: typer.CallbackParam, folder: Path | None) -> Path | None:

@@ -14,6 +14,7 @@ from pipelines.commands.application import (
     app,
     finish,
     free_file,
+    require_recordings,
 )
 
 
@@ -67,6 +68,7 @@ def import_(
 @app.command()
 def check(runs: Recordings, as_json: Json = False) -> None:
     """Channels, rates, gaps, clipping and the agreement of redundant sensors."""
+    require_recordings(runs)
     from pipelines.recording.checking import check_runs
 
     finish(check_runs(runs), as_json)

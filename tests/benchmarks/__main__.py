@@ -1,8 +1,8 @@
-"""Speed and memory: analysis, twin, reduced-order model, numerical tank, recording, diagnosis, in one run.
+"""Speed and memory: analysis, twin, reduced-order model, numerical tank, recording, start, diagnosis, in one run.
 
 Each measurement runs in a process of its own, on one core. Times are processor times, the best of several
-repeats after a warm-up that compiles the kernels; training and diagnoses run once, on two cores, and are timed by
-the clock. The parent prints the table and says where a figure misses its aim.
+repeats after a warm-up that compiles the kernels; starts of commands are timed by the clock, and so are training
+and diagnoses, which run once, on two cores. The parent prints the table and says where a figure misses its aim.
 """
 
 from __future__ import annotations
@@ -15,6 +15,13 @@ import tempfile
 from pathlib import Path
 
 from tests.benchmarks.campaigns import DASK_OVERHEAD_LABEL, OVERHEAD_LABEL, RATIO_LABEL, campaign_figures
+from tests.benchmarks.command_start import (
+    COMPLETION_LABEL,
+    HELP_LABEL,
+    REFUSAL_LABEL,
+    VIRTUAL_LABEL,
+    start_figures,
+)
 from tests.benchmarks.diagnosis import LONGEST_LABEL, MEDIAN_LABEL, diagnosis_figures
 from tests.benchmarks.diagnosis import MEMORY_LABEL as DIAGNOSIS_MEMORY_LABEL
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
@@ -36,6 +43,10 @@ AIMS = {
     DIAGNOSIS_MEMORY_LABEL: 2.0,
     OVERHEAD_LABEL: 50.0,
     DASK_OVERHEAD_LABEL: 50.0,
+    HELP_LABEL: 0.6,
+    COMPLETION_LABEL: 0.6,
+    REFUSAL_LABEL: 0.6,
+    VIRTUAL_LABEL: 2.0,
     TIME_LABEL: 300.0,
     MEMORY_LABEL: 1.5,
     **{label(layers): aim for layers, aim in RESOLUTIONS.items()},
@@ -119,6 +130,9 @@ def main() -> None:
     figures |= tank_figures(ONE_CORE)
     figures |= recording_figures()
     figures |= campaign_figures()
+    print("starting every command …", flush=True)
+    with tempfile.TemporaryDirectory() as name:
+        figures |= start_figures(Path(name))
     print("diagnosing six cases …", flush=True)
     with tempfile.TemporaryDirectory() as name:
         figures |= diagnosis_figures(Path(name))
