@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from campaigns.executor import Executor
@@ -85,7 +86,8 @@ class _Session:
         if ending.status == "done":
             self._tell(task, Outcome.from_document(ending.result), False)
         else:
-            self._tell(task, self._store.note(task, key, ending), False)
+            told = dataclasses.replace(ending, line=task.without_places(ending.line))
+            self._tell(task, self._store.note(task, key, told), False)
 
     def _tell(self, task: StoredTask, outcome: Outcome, before: bool) -> None:
         self.outcomes[task.name] = outcome

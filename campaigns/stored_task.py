@@ -72,6 +72,13 @@ class StoredTask:
         content = [self.function, dict(self.arguments), files, __version__]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
+    def without_places(self, line: str) -> str:
+        """A line with the names of the task's files in place of their paths: it says the same wherever they lie."""
+        paths = {str(path.absolute()): path.name for paths in self.files.values() for path in paths}
+        for place in sorted(paths, key=len, reverse=True):
+            line = line.replace(place, paths[place])
+        return line
+
     def as_task(self, place: Path, digests: Mapping[str, Sequence[str]]) -> Task:
         """The task as a process is told it.
 

@@ -69,7 +69,7 @@ def doubled(folder, files, arguments, say_share):
     content = files["recording"][0].read_bytes()
     time.sleep(arguments.get("wait_s", 0.0))
     if content.startswith(b"bad"):
-        raise InputError("recording", got="bad\nand <b>hostile</b>\x1b[2J")
+        raise InputError(f"recording {files['recording'][0]}", got="bad\nand <b>hostile</b>\x1b[2J")
     if content.startswith(b"defect"):
         raise KeyError("defect")
     (folder / "parts").mkdir()

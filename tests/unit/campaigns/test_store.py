@@ -71,7 +71,7 @@ def test_every_end_has_a_record_and_nothing_is_done_twice(recordings, tmp_path):
     assert [outcomes[name].status for name in "abcd"] == ["done", "done", "failed", "failed"]
     assert outcomes["b"].flags == ("seven is odd",)
     assert dict(outcomes["a"].numbers) == {"bytes": 6}
-    assert outcomes["c"].line == "recording: got bad and <b>hostile</b>\x1b[2J"
+    assert outcomes["c"].line == "recording c.bin: got bad and <b>hostile</b>\x1b[2J"
     assert outcomes["d"].line == "KeyError: 'defect'"
     assert contents(tmp_path / "store") == {
         "results/a/parts/twice.bin": b"sixsix",
