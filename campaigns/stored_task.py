@@ -73,7 +73,7 @@ class StoredTask:
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def without_places(self, line: str) -> str:
-        """A line with the names of the task's files in place of their paths: it says the same wherever they lie."""
+        """A line with names of the task's files in place of their paths: it says the same wherever they lie."""
         paths = {str(path.absolute()): path.name for paths in self.files.values() for path in paths}
         for place in sorted(paths, key=len, reverse=True):
             line = line.replace(place, paths[place])

@@ -243,9 +243,16 @@ def answered_case(arguments: Mapping[str, Any], say_share: Callable[[float], Non
     -------
     dict
         The outcome.
+
+    Raises
+    ------
+    InputError
+        If a key is in reach.
     """
     os.chdir(arguments["folder"])
     output = Path(arguments["output"])
+    # on another computer there may be another environment
+    require_no_key(Path(arguments["case"]).parent.parent, [], os.environ)
     with _as_given_or_moved(Path(arguments["case"]), arguments["perturbation"]) as case:
         words = [*arguments["command"], str(case), "-o", str(output), *arguments["options"]]
         return asdict(answered(case, output, words, arguments["time_limit_s"]))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from sloshlab import atomic_file, interrupt, limited_process
 from sloshlab.configurations import CONFIGURATIONS
-from sloshlab.errors import RecordingError, UnitsError
+from sloshlab.errors import RecordingError, SloshlabError, UnitsError
 from sloshlab.experiments import EXPERIMENTS, recorded_experiments
 from sloshlab.file_structure import require_recording_file, require_sound_structure
 from sloshlab.hdf5_contents import require_self_contained
@@ -257,6 +257,35 @@ def _opened(file: Path) -> Iterator[Any]:
             allowed="a complete netCDF-4 file",
             remedy="the file is cut short, damaged or of another format; copy it again or use `sloshlab import`",
         ) from error
+
+
+def _attributes_of_many_here(paths: list[str]) -> list[dict[str, Any] | None]:
+    found: list[dict[str, Any] | None] = []
+    for path in paths:
+        try:
+            found.append(_attributes_here(path))
+        except RecordingError:
+            found.append(None)
+    return found
+
+
+def read_attributes_of_many(paths: Sequence[str | os.PathLike[str]]) -> list[RunAttributes]:
+    """Read and validate the global attributes of recordings; many in one go, which costs a fraction.
+
+    Raises
+    ------
+    RecordingError
+        As `read_attributes`, for the first recording of which it would be raised.
+    """
+    try:
+        read = _untrusted(Path(paths[0])).read(_attributes_of_many_here, [os.fspath(path) for path in paths])
+    except SloshlabError:
+        # one of them has ended the process that read them: which, and why, tells a process each
+        read = [None] * len(paths)
+    return [
+        read_attributes(path) if attributes is None else _validated(RunAttributes, attributes, what=str(path))
+        for path, attributes in zip(paths, read, strict=True)
+    ]
 
 
 def read_attributes(path: str | os.PathLike[str]) -> RunAttributes:

@@ -140,6 +140,7 @@ def answered_blindly(
     say_share : callable
     """
     case = files["rig"][0].parent
+    require_no_key(case.parent.parent, [], os.environ)
     answer = case.parent.parent / arguments["diagnoses"] / case.name
     outcome = _outcome(case, answer, arguments["time_limit_s"])
     for name in _KEPT:

@@ -12,9 +12,10 @@ from pipelines.campaign.plan import BeamPart, SweepPart
 from pipelines.report.progress import progress
 from sloshlab.configurations import SLOSHING, STILL_CONFIGURATIONS
 from sloshlab.errors import InputError
-from sloshlab.recording import RunAttributes, read_attributes
+from sloshlab.recording import RunAttributes, read_attributes_of_many
 
 MOST_RECORDINGS: Final = 1_000_000
+_AT_A_TIME: Final = 100
 Files = Mapping[str, Sequence[Path]]
 
 
@@ -168,10 +169,11 @@ def _found(part: SweepPart | BeamPart, kept_out: Path) -> list[_Found]:
     rigs = {path.name: path for path in matching(part.folder, part.rigs, kept_out)}
     found = []
     with progress("planning", len(paths)) as advance:
-        for path in paths:
-            attributes = read_attributes(path)
-            found.append(_Found(path, attributes, _rig_of(path, attributes, rigs)))
-            advance(path.name)
+        for first in range(0, len(paths), _AT_A_TIME):
+            block = paths[first : first + _AT_A_TIME]
+            for path, attributes in zip(block, read_attributes_of_many(block), strict=True):
+                found.append(_Found(path, attributes, _rig_of(path, attributes, rigs)))
+                advance(path.name)
     return found
 
 

@@ -12,7 +12,14 @@ import xarray as xr
 from hostile_hdf5 import HOSTILE
 
 from sloshlab.errors import RecordingError
-from sloshlab.recording import channels, read_attributes, read_recording, validate_recording, write_recording
+from sloshlab.recording import (
+    channels,
+    read_attributes,
+    read_attributes_of_many,
+    read_recording,
+    validate_recording,
+    write_recording,
+)
 
 RATE_HZ = 512.0
 
@@ -139,3 +146,14 @@ def test_what_lies_outside_of_a_recording_is_refused(damage, tmp_path):
     for read in (read_recording, read_attributes):
         with pytest.raises(RecordingError, match=rf"run\.nc: force_cell_9.*: got {said}"):
             read(tmp_path / "run.nc")
+
+
+def test_attributes_of_many_are_those_of_each_and_a_bad_one_is_named(tmp_path, repository) -> None:
+    runs = sorted((repository / "raw_data" / "shaker").glob("fill_0.50_sweep_*g.nc"))[:3]
+    assert read_attributes_of_many(runs) == [read_attributes(run) for run in runs]
+    cut = tmp_path / "cut.nc"
+    cut.write_bytes(runs[0].read_bytes()[:5000])
+    with pytest.raises(RecordingError, match=r"cut\.nc"):
+        read_attributes_of_many([runs[0], cut, runs[1]])
+    with pytest.raises(RecordingError, match=r"nowhere\.nc.*no such file"):
+        read_attributes_of_many([runs[0], tmp_path / "nowhere.nc"])
