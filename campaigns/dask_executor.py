@@ -29,6 +29,9 @@ _PER_THREAD: Final = 2
 """Tasks that lie at the cluster for every thread of a worker: one at work, one that follows without a pause."""
 _LEAST: Final = 8
 _MOST_IN_VAIN: Final = 5
+_TRY_S: Final = 2.0
+"""Between two tries a campaign can be stopped."""
+_PAUSE_S: Final = 0.5
 
 
 class DaskExecutor:
@@ -74,30 +77,35 @@ class DaskExecutor:
         self._futures: dict[int, Any] = {}
         self._connection, self._in_vain = 0, 0
         self._lost = False
+        self._lost_since_s: float | None = None
         self._n_threads, self._counted_s = 0, 0.0
         # its tracebacks and remarks on connections; what matters is said in one line
         self._quiet = contextlib.ExitStack()
         self._quiet.enter_context(_silenced())
-        self._client: Any = self._connected(connect_s, self._target())
+        self._client: Any = self._connected(connect_s)
 
     def _target(self) -> Any:
         """What a client connects to."""
         return self._address
 
-    def _connected(self, timeout_s: float, target: Any) -> Any:
+    def _connected(self, timeout_s: float) -> Any:
+        """A client; the scheduler is tried until the time is over."""
         until = time.monotonic() + timeout_s
         while True:
-            left_s = max(until - time.monotonic(), 0.1)
             try:
-                return self._distributed.Client(target, timeout=left_s, set_as_default=False)
+                left_s = max(until - time.monotonic(), 0.1)
+                return self._distributed.Client(self._target(), timeout=left_s, set_as_default=False)
             except (OSError, ValueError, TypeError, RuntimeError) as error:
-                if time.monotonic() + 0.5 > until or not isinstance(error, OSError):
-                    self._quiet.close()
-                    raise ClusterError(
-                        f"scheduler {self._address}: got no answer within {timeout_s:g} s; remedy: start it and "
-                        "its workers (dask scheduler, dask worker), then give the same command again"
-                    ) from error
-                time.sleep(0.5)
+                if time.monotonic() + _PAUSE_S > until or not isinstance(error, OSError):
+                    raise self._no_answer(timeout_s) from error
+                time.sleep(_PAUSE_S)
+
+    def _no_answer(self, waited_s: float) -> ClusterError:
+        self._quiet.close()
+        return ClusterError(
+            f"scheduler {self._address}: got no answer within {waited_s:g} s; remedy: start it and "
+            "its workers (dask scheduler, dask worker), then give the same command again"
+        )
 
     @property
     def n_at_once(self) -> int:
@@ -108,12 +116,16 @@ class DaskExecutor:
 
     def _count(self) -> None:
         self._counted_s = time.monotonic()
+        if self._lost:
+            return
         with self._unless_lost():
             self._n_threads = sum(self._client.nthreads().values())
 
     def submit(self, number: int, task: Task, attempt: int) -> None:
         """Take a task, which is told of by its number."""
         self._under_way[number] = task, attempt
+        if self._lost:  # is given it when it is back
+            return
         asked = asked_for(self._campaign, task, attempt, one_core=self._one_core)
         with self._unless_lost():
             future = self._client.submit(carried_out, asked, key=f"{self._campaign}-{number}-{uuid.uuid4().hex}")
@@ -133,14 +145,15 @@ class DaskExecutor:
     def events(self, timeout_s: float) -> list[Event]:
         """What has happened; waits for something so long at most."""
         found: list[Event] = []
+        if self._lost:
+            self._look_for_it()
+            return found
         with contextlib.suppress(queue.Empty):
             found += self._event(*self._happened.get(block=timeout_s > 0, timeout=timeout_s or None))
             while True:
                 found += self._event(*self._happened.get_nowait())
         if self._client.status != "running":
             self._lost = True
-        if self._lost:
-            self._reconnect()
         return found
 
     def _event(self, number: int, answered: tuple[int, Any]) -> list[Event]:
@@ -176,19 +189,29 @@ class DaskExecutor:
             # Dask says all of these of a client whose connection has just broken
             self._lost = True
 
-    def _reconnect(self) -> None:
-        """Wait for the scheduler to come back, and give it again what it has forgotten."""
-        self._connection += 1
-        self._in_vain += 1
+    def _look_for_it(self) -> None:
+        """Try once whether a scheduler that was lost is back, and give it again what it has forgotten."""
+        if self._lost_since_s is None:
+            self._lost_since_s = time.monotonic()
+            # what comes from the old connection is of no interest any more
+            self._connection += 1
+            self._in_vain += 1
+            self._forget_client()
+            self._said(f"scheduler {self._address} is lost; waiting for it")
         if self._in_vain > _MOST_IN_VAIN:
+            self._quiet.close()
             raise ClusterError(
                 f"scheduler {self._address}: got {_MOST_IN_VAIN} losses of what it was given, and no result; "
                 "remedy: look at its log, then give the same command again"
             )
-        self._said(f"scheduler {self._address} is lost; waiting for it")
-        self._forget_client()
-        self._client = self._connected(self._return_s, self._target())
-        self._lost, self._counted_s = False, 0.0
+        try:
+            self._client = self._distributed.Client(self._target(), timeout=_TRY_S, set_as_default=False)
+        except (OSError, RuntimeError) as error:
+            if time.monotonic() - self._lost_since_s > self._return_s:
+                raise self._no_answer(self._return_s) from error
+            time.sleep(_PAUSE_S)
+            return
+        self._lost, self._lost_since_s, self._counted_s = False, None, 0.0
         for number, (task, attempt) in list(self._under_way.items()):
             self.submit(number, task, attempt)
 
@@ -201,6 +224,9 @@ class DaskExecutor:
         """Ask all tasks to stop and save, wait for them, and tell how they ended."""
         found: list[Event] = []
         self._count()
+        if self._lost:
+            self.close()
+            return found
         with self._unless_lost():
             self._client.run(stop, self._campaign, on_error="ignore")
             until = time.monotonic() + PATIENCE_S
@@ -213,7 +239,7 @@ class DaskExecutor:
     def close(self) -> None:
         """Leave nothing at the cluster; what is under way is given up."""
         with self._unless_lost():
-            if self._under_way:
+            if self._under_way and not self._lost:
                 self._client.run(stop, self._campaign, on_error="ignore")
         self._under_way.clear()
         self._forget_client()
