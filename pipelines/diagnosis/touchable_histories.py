@@ -12,6 +12,7 @@ from pipelines.diagnosis import figures
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.report.figure import ReportFigure
 from pipelines.report.interactive.contents import Channel, Histories, Line, Role, Run
+from pipelines.report.interactive.spectra import power_densities
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.identification.observations import Observation
 
@@ -25,9 +26,6 @@ _CAPTION: Final = (
     "misses most; panels over time zoom together. The mean is taken off where it means nothing. Releases and "
     "offsets are those of the fit, or believed where the run was not fitted."
 )
-_FEWEST_BANDS, _MOST_BANDS = 64, 512
-_SHOWN_POWER: Final = 0.999
-"""Share of the power of a recording, above whose frequency four times as much is still shown."""
 
 
 def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
@@ -105,7 +103,7 @@ def channel_of(
         lines.append(Line(label, role, shown, begins_hidden=role == "believed"))
     retuned = next(line for line in lines if line.label == _RETUNED)
     stretch = figures.stretch_missed_most(time, frequency_hz, lines[0].values - retuned.values)
-    frequency, spectra = _spectra(lines, run.attributes.sampling_rate_hz)
+    frequency, spectra = power_densities(lines, run.attributes.sampling_rate_hz)
     return Channel(
         channel,
         unit,
@@ -123,25 +121,3 @@ def comparable(observation: Observation, recorded: FloatArray, simulated: FloatA
     """A simulation as it is judged: NaN where it is not, and on the recording's mean where that says nothing."""
     shown = np.where(observation.known, simulated, np.nan)
     return shown if observation.keeps_mean else shown + float(np.nanmean(recorded - shown))
-
-
-def _spectra(lines: list[Line], rate_hz: float) -> tuple[FloatArray, tuple[Line, ...]]:
-    """Power densities after Welch, up to where the recording has nearly all of its power, and four times that."""
-    from scipy.signal import welch
-
-    n = lines[0].values.size
-    length = int(min(n, max(2 * _MOST_BANDS, n // 4)))
-    densities = []
-    for line in lines:
-        known = np.isfinite(line.values)
-        if not known.any():
-            return np.empty(0), ()
-        filled = np.interp(np.arange(n), np.flatnonzero(known), line.values[known])
-        frequency, density = welch(filled, rate_hz, nperseg=length)
-        densities.append(density)
-    power = np.cumsum(densities[0])
-    top = int(np.searchsorted(power, _SHOWN_POWER * power[-1])) if power[-1] > 0 else frequency.size
-    # the mean is no motion
-    shown = slice(1, int(min(frequency.size, max(4 * top, _FEWEST_BANDS), _MOST_BANDS)))
-    spectra = [Line(line.label, line.role, density[shown]) for line, density in zip(lines, densities, strict=True)]
-    return frequency[shown], tuple(spectra)

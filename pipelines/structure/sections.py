@@ -18,6 +18,7 @@ from pipelines.structure import (
     figures_spectra,
     figures_twin,
     tables,
+    touchable_histories,
     twin_damping,
 )
 from pipelines.structure.results import BeamExperiment
@@ -96,7 +97,7 @@ def planned_sections(experiment: BeamExperiment) -> tuple[SectionPlan, ...]:
 def _decay_section(experiment: BeamExperiment) -> SectionPlan:
     plans = {
         "sensor_signals": partial(figures_signals.sensor_signals, experiment=experiment),
-        "modal_accelerations": partial(figures_signals.modal_accelerations, experiment=experiment),
+        "modal_accelerations": partial(touchable_histories.modal_accelerations, experiment=experiment),
         "release_transient": partial(figures_signals.release_transient, experiment=experiment),
         "damping_over_amplitude": partial(figures_decay.over_amplitude, experiment=experiment, quantity="damping"),
         "frequency_over_amplitude": partial(
@@ -126,7 +127,7 @@ def _twin_section(experiment: BeamExperiment) -> SectionPlan:
 
 def _random_section(experiment: BeamExperiment) -> SectionPlan:
     plans = {
-        "random_signals": figures_signals.random_signals,
+        "random_signals": touchable_histories.random_signals,
         "excitation": figures_spectra.excitation,
         "densities": figures_spectra.densities,
         "frequency_responses": figures_spectra.frequency_responses,

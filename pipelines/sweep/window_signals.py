@@ -12,7 +12,7 @@ from pipelines.report.interactive.envelope import envelope_samples
 
 FloatArray = npt.NDArray[np.float64]
 
-_MOST_SAMPLES: Final = 480
+_MOST_SAMPLES: Final = 640
 _HIGHEST_ORDER: Final = 8.0
 
 

@@ -137,7 +137,7 @@ class Histories:
     title: str
     runs: tuple[Run, ...]
     caption: str
-    most_samples: int = 150_000
+    most_samples: int = 260_000
 
     def plain(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -220,12 +220,22 @@ class Window:
         return {
             "run": self.run,
             "words": self.words,
-            "time": packed(self.time_s),
+            "time": _even_or_packed(self.time_s),
             "force": packed(self.force),
             "displacement": packed(self.displacement),
             "order": packed(self.order),
             "amplitude": packed(_decades(self.amplitude)),
         }
+
+
+def _even_or_packed(time_s: FloatArray) -> dict[str, Any]:
+    """Times of samples; of evenly spaced ones their interval and count."""
+    if time_s.size > 1:
+        steps = np.diff(time_s)
+        interval_s = float(steps.mean())
+        if np.allclose(steps, interval_s, rtol=1e-3, atol=0.0):
+            return {"interval": interval_s, "count": int(time_s.size)}
+    return packed(time_s)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ class HistoriesFigure {
     this.words = element("p", { class: "touch-words", "aria-live": "polite" });
     this.channelPlace = element("span", { class: "control" });
     this.views = element("span", { class: "control" },
-      button("most telling stretch", () => this.look(true)), button("whole run", () => this.look(false)));
+      button("close up", () => this.look(true)), button("whole run", () => this.look(false)));
     this.controls = element("div", { class: "controls" }, this.runChoice.shown, this.channelPlace, this.switches,
       this.views);
     this.x = new Bokeh.Range1d({ start: 0, end: 1 });
@@ -97,6 +97,7 @@ class HistoriesFigure {
     this.whole = time.length ? [time[0], time[time.length - 1]] : [0, 1];
     this.history.limits(this.whole, null);
     this.history.figure.left[0].axis_label = `${channel.name} [${channel.unit}]`;
+    if (this.difference) this.difference.place.hidden = reference < 0 || values.length < 2;
     if (this.difference)
       this.difference.figure.left[0].axis_label = `recorded − simulated [${channel.unit}]`;
     if (this.spectrum) {

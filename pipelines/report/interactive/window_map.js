@@ -106,7 +106,8 @@ class WindowMapFigure {
 
   choose(at) {
     this.at = at;
-    const window = this.content.windows[at], time = unpacked(window.time);
+    const window = this.content.windows[at], { interval, count } = window.time;
+    const time = count ? samplesOf({ count }).map((sample) => sample * interval) : unpacked(window.time);
     const force = unpacked(window.force), displacement = unpacked(window.displacement);
     this.ring.data = { x: [this.xs[at]], y: [this.ys[at]] };
     this.points.selected.indices = [at];

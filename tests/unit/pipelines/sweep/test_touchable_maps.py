@@ -58,7 +58,7 @@ def test_a_blow_is_kept_where_samples_are_many() -> None:
     force = np.sin(2 * np.pi * 12 * time)
     force[12_345] = 9.0
     kept = window_signals(Excerpt(12.0, 1.0, time, force, np.cos(2 * np.pi * 12 * time)))
-    assert kept.time_s.size < 500
+    assert kept.time_s.size < 660
     assert kept.force_n.max() == 9.0
 
 
@@ -85,7 +85,7 @@ def test_of_many_windows_few_are_chosen_evenly_and_the_largest_among_them(experi
     rig = experiment.rigs[0]
     runs = runs_of(experiment, rig)
     whole = scaled_window_map(rig, runs)
-    few = scaled_window_map(rig, runs, n_maps=24)
+    few = scaled_window_map(rig, runs, n_maps=20)
     assert whole is not None
     assert few is not None
     assert len(few.windows) in (10, 11)
