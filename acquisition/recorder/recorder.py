@@ -18,7 +18,7 @@ from acquisition.recorder.block_joining import BlockJoiner
 from acquisition.recorder.delivery_queue import BYTES_PER_SOURCE, Delivered, DeliveryQueue, Finished
 from acquisition.recorder.journal_writing import JournalWriter
 from acquisition.recorder.listener import Listener, NobodyListening
-from acquisition.recorder.mark import LONGEST_TEXT, MOST_MARKS, Mark
+from acquisition.recorder.mark import MOST_MARKS, MarksToWrite
 from acquisition.recorder.pre_trigger import PreTrigger
 from acquisition.recorder.reader_thread import ReaderThread
 from acquisition.recorder.source_record import SourceRecord
@@ -141,8 +141,7 @@ class Recorder:
             infos = [source.info for source in sources]
             self._gate = PreTrigger(infos, self._settings.trigger, self._settings.n_before_trigger)
         self._joiner = BlockJoiner(journal, monotonic_ns, self._written)
-        self._marks: queue.SimpleQueue[Mark] = queue.SimpleQueue()
-        self._n_marks = 0
+        self._marks = MarksToWrite()
         self._lock = threading.Lock()
         self._began_ns = 0
         self._first_done_ns: int | None = None
@@ -158,8 +157,7 @@ class Recorder:
 
     def mark(self, text: str) -> None:
         """Put a mark of this moment into the recording; may be called from any thread."""
-        # stamped here: it may wait for the writer
-        self._marks.put(Mark(" ".join(text.split())[:LONGEST_TEXT], time.monotonic_ns(), time.time_ns()))
+        self._marks.put(text)
 
     def run(self, observer: Observer | None = None) -> RecordingOutcome:
         """Record until something ends it, then close the journal.
@@ -264,20 +262,15 @@ class Recorder:
                 self._leave_hanging_readers()
 
     def _write_marks(self) -> None:
-        with contextlib.suppress(queue.Empty):
-            while True:
-                mark = self._marks.get_nowait()
-                self._n_marks += 1
-                if self._n_marks > MOST_MARKS:
-                    # once: a key that is held down must not fill the terminal
-                    if self._n_marks == MOST_MARKS + 1:
-                        self._tell(None, f"marks not kept: a recording has {MOST_MARKS}", is_failure=False)
-                    continue
-                self._journal.append_mark(mark)
-                with self._lock:
-                    if self._gate is not None and self._gate.mark():
-                        self._begin(self._gate)
-                self._tell_event(Event(None, f"mark: {mark.text}", False, mark.host_monotonic_ns))
+        for mark in self._marks.take():
+            if mark is None:
+                self._tell(None, f"marks not kept: a recording has {MOST_MARKS}", is_failure=False)
+                continue
+            self._journal.append_mark(mark)
+            with self._lock:
+                if self._gate is not None and self._gate.mark():
+                    self._begin(self._gate)
+            self._events.put(Event(None, f"mark: {mark.text}", False, mark.host_monotonic_ns))
 
     def _take(self, item: Delivered | Finished) -> None:
         if isinstance(item, Finished):
@@ -326,10 +319,7 @@ class Recorder:
         self._records[source].meters.update_levels(blocks)
 
     def _tell(self, source: int | None, message: str, *, is_failure: bool) -> None:
-        self._tell_event(Event(source, message, is_failure))
-
-    def _tell_event(self, event: Event) -> None:
-        self._events.put(event)
+        self._events.put(Event(source, message, is_failure))
 
     def _decide(self) -> None:
         """Stop everything, or single sources that have recorded enough."""

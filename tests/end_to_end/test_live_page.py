@@ -187,6 +187,21 @@ def test_a_page_that_dies_is_one_line_and_the_recording_goes_on(bench: Path, lab
     assert samples_that_agree(bench / "run.nc", lab / "new.nc") == N_SAMPLES
 
 
+def test_a_page_that_takes_nothing_holds_nobody_up(bench: Path, lab: Path) -> None:
+    """Its process is stopped: the pipe fills, the recorder's thread that feeds it waits, and no other."""
+    with (
+        playing(bench / "run.nc", lab, "pty") as devices,
+        running(arguments(devices.sources, bench, lab, "--json"), lab) as recorder,
+    ):
+        url_of(recorder)
+        [page] = wait_until(lambda: pages_of(recorder), "the process of the page")
+        os.kill(page, signal.SIGSTOP)
+        assert recorder.exit_code() == 0, recorder.stderr
+        assert recorder.stderr == ""
+        assert not Path(f"/proc/{page}").exists()
+    assert samples_that_agree(bench / "run.nc", lab / "new.nc") == N_SAMPLES
+
+
 def test_a_recorder_that_is_killed_takes_its_page_along(bench: Path, lab: Path) -> None:
     with (
         playing(bench / "run.nc", lab, "pty") as devices,

@@ -72,6 +72,11 @@ def test_what_is_unknown_is_left_out() -> None:
     assert "drift" not in lines[2]
 
 
+def test_a_recording_that_waits_says_for_what() -> None:
+    heading = shown(replace(STATUS, waiting_for="force_cell_1>2 or mark"))[0]
+    assert heading.startswith("waiting for force_cell_1>2 or mark 2:08")
+
+
 def test_many_channels_fit_the_height() -> None:
     many = replace(DAQ, levels=tuple(replace(FORCE, name=f"force_cell_{k}") for k in range(100)))
     lines = shown(replace(STATUS, sources=(many, many)), height=40)
