@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Final, Self
 from acquisition.recorder.statistics import ChannelLevel
 from acquisition.recorder.status import Event, RecorderStatus, SourceState, SourceStatus
 from acquisition.samples.delivery import TroubleKind
+from pipelines.report.progress import is_silenced
 from pipelines.report.terminal import printable
 
 if TYPE_CHECKING:
@@ -92,8 +93,8 @@ class LiveView:
         self._shown_ns: int | None = None
         self._n_failed = 0
         self._live: Live | None = None
-        # a terminal that cannot show the bars is served as a pipe is
-        if self._console.is_terminal and self._console.encoding.lower().startswith("utf"):
+        # a terminal that cannot show the bars, or shall not, is served as a pipe is
+        if self._console.is_terminal and self._console.encoding.lower().startswith("utf") and not is_silenced():
             self._live = Live(console=self._console, auto_refresh=False, transient=True)
 
     def __enter__(self) -> Self:
