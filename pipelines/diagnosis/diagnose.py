@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.diagnosis.worker_threads import WorkerThreads
@@ -67,6 +67,18 @@ def diagnose_case(
     require_result_folder(target, files_of(report=report))
     diagnosis = diagnosed(opened, command=command, twin=twin, effects=effects, told=say)
     return write_diagnosis(diagnosis, target, report=report)
+
+
+_STAGES: Final = (
+    ("retuning", 0.1),
+    ("one effect", 0.38),
+    ("in the place of", 0.65),
+    ("refining", 0.60),
+    ("one more effect", 0.43),
+    ("in the place of", 0.73),
+)
+"""Share of a search that is over in each of its stages: medians over 86 searches of blind trials that took longer
+than a minute, looked at every half minute. Whether an effect more is sought is known late: the shares may fall."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +172,7 @@ def diagnosed(
         model = UserTwinModel(described, case.runs, name=f"twin {twin}", executor=WorkerThreads())
     # Before the search: who reads that a run is lacking may record it instead of waiting for an answer.
     untold = iter(informative_runs(case).lines)
-    with amounts("diagnosing") as advance:
+    with amounts("diagnosing", _STAGES) as advance:
 
         def progressed(what: str, done: int, of: int) -> None:
             # At the first step, when nothing refuses the case any more.

@@ -6,11 +6,11 @@ import contextlib
 import itertools
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, Protocol
 
 from pipelines.report.terminal import printable, say
-from pipelines.report.time_left import TimeLeft, WeightedSteps
+from pipelines.report.time_left import Plan, TimeLeft, WeightedSteps
 
 _LINE_EVERY_S: Final = 30.0
 """In a pipe: often enough that nobody takes a long command for one that hangs."""
@@ -51,11 +51,11 @@ class _Lines:
     Parameters
     ----------
     description : str
-    plan : mapping of str to float, optional
+    plan : Plan
         As of `TimeLeft`.
     """
 
-    def __init__(self, description: str, plan: Mapping[str, float] | None = None) -> None:
+    def __init__(self, description: str, plan: Plan = ()) -> None:
         self._description = description
         self._began = self._said = time.monotonic()
         self._left = TimeLeft(self._began, plan)
@@ -97,15 +97,15 @@ def _duration(seconds: float) -> str:
 
 
 @contextlib.contextmanager
-def amounts(description: str, plan: Mapping[str, float] | None = None) -> Iterator[Advance]:
+def amounts(description: str, plan: Plan = ()) -> Iterator[Advance]:
     """Yield a function that shows what is done of what there is to do.
 
     Parameters
     ----------
     description : str
-    plan : mapping of str to float, optional
-        Stages by the beginnings of notes, with the share of the time that is usually over when each begins;
-        the time left is then that of all stages.
+    plan : Plan
+        Stages by the beginnings of notes, with the share of the time that is usually over in each; the time left
+        is then that of all stages.
     """
     if _Silence.asked_for:
         yield lambda done, everything, note="": None

@@ -57,15 +57,18 @@ def of_epochs(seed: int) -> Iterator[tuple[float, float, float | None]]:
     return moments_of(TimeLeft(0.0), ends, [(k + 1, 60, f"epoch {k}") for k in range(60)])
 
 
-PLAN = {"reading": 0.0, "one effect": 0.1, "swapped": 0.4, "refining": 0.6, "two effects": 0.7}
+STAGES = {"reading": 10.0, "one effect": 30.0, "swapped": 20.0, "refining": 10.0, "two effects": 30.0}
+"""Usual lengths [s]."""
+PLAN = [("reading", 0.05), ("one effect", 0.25), ("swapped", 0.5), ("refining", 0.65), ("two effects", 0.85)]
+"""The middles of these stages, in shares of the whole."""
 
 
-def of_stages(seed: int, plan: dict[str, float]) -> Iterator[tuple[float, float, float | None]]:
+def of_stages(seed: int, plan: list[tuple[str, float]]) -> Iterator[tuple[float, float, float | None]]:
     """A search through stages of ten steps, each stage usual in length within ± 40 %."""
     draw = np.random.default_rng(seed)
-    lengths = 100 * np.diff([*PLAN.values(), 1.0]) * np.exp(draw.normal(0, 0.4, len(PLAN)))
+    lengths = np.array([*STAGES.values()]) * np.exp(draw.normal(0, 0.4, len(STAGES)))
     steps = np.concatenate([np.full(10, length / 10) for length in lengths])
-    told = [(k + 1, 10, f"{stage}: {k}") for stage in PLAN for k in range(10)]
+    told = [(k + 1, 10, f"{stage}: {k}") for stage in STAGES for k in range(10)]
     return moments_of(TimeLeft(0.0, plan), np.cumsum(steps), told)
 
 
@@ -86,25 +89,31 @@ def test_epochs_whose_cost_drifts() -> None:
 
 
 def test_stages_that_are_usual_in_length() -> None:
-    assert share_of(of_stages, PLAN) > 0.9
+    # a plan knows the middle of a stage only: at the ends of a long one it is off
+    assert share_of(of_stages, PLAN) > 0.75
     # without a plan only the end of the present stage is known
-    assert share_of(of_stages, {}) < 0.5
+    assert share_of(of_stages, []) < 0.5
 
 
 def test_a_stage_that_is_left_out_shortens_what_is_left() -> None:
     time_left = TimeLeft(0.0, PLAN)
     time_left.at(10.0, 0, 1, "one effect: matching")
-    assert time_left.seconds(10.0) == pytest.approx(90.0)
-    time_left.at(20.0, 0, 1, "two effects: matching")
-    assert time_left.seconds(20.0) == pytest.approx(20.0 * 0.3 / 0.7)
+    assert time_left.seconds(10.0) == pytest.approx(30.0)
+    time_left.at(17.0, 0, 1, "two effects: matching")
+    assert time_left.seconds(17.0) == pytest.approx(3.0)
 
 
-def test_a_stage_that_does_not_end_moves_the_end_away() -> None:
-    time_left = TimeLeft(0.0, PLAN)
-    time_left.at(10.0, 0, 1, "one effect: matching")
-    told = [time_left.seconds(now) for now in (10.0, 50.0, 99.0, 200.0, 400.0)]
-    assert all(seconds is not None and seconds > 0 for seconds in told)
-    assert told[3] < told[4]
+def test_a_stage_does_not_come_back() -> None:
+    """What is told of a part of a later stage may begin like an earlier one."""
+    again = TimeLeft(0.0, [*PLAN, ("swapped", 0.9)])
+    again.at(13.0, 0, 1, "refining")
+    again.at(13.0, 0, 1, "swapped before the second one")
+    assert again.seconds(13.0) == pytest.approx(7.0)
+    again.at(17.0, 0, 1, "two effects")
+    again.at(18.0, 0, 1, "swapped once more")
+    assert again.seconds(18.0) == pytest.approx(2.0)
+    again.at(27.0, 0, 1, "one effect: of the last")
+    assert again.seconds(27.0) == pytest.approx(3.0)
 
 
 def test_nothing_is_told_before_anything_is_known() -> None:
