@@ -86,7 +86,8 @@ def signals_of(experiment: BeamExperiment, run: BeamRun) -> dict[str, tuple[str,
 def _channels(experiment: BeamExperiment, run: BeamRun, twins: Sequence[BeamRun]) -> Iterator[Channel]:
     of_twins = {twin.group: signals_of(experiment, twin) for twin in twins}
     for name, (unit, values) in signals_of(experiment, run).items():
-        lines = [Line(_RECORDED if not run.is_simulated else run.group, "before", values)]
+        label = run.group if run.is_simulated else _RECORDED
+        lines = [Line(label, "recorded" if of_twins else "before", values)]
         lines += [Line(group, "other", found[name][1]) for group, found in of_twins.items() if name in found]
         frequency_hz, densities = power_densities(lines, run.attributes.sampling_rate_hz)
         yield Channel(

@@ -16,6 +16,9 @@ Role = Literal["recorded", "believed", "before", "after", "other"]
 _SMALLEST_POWER_RATIO: Final = 1e-12
 """Of the largest in a spectrum: what is below is rounding, and would squash the axis."""
 
+_MOST_SEEN_FIRST: Final = 2500
+"""Samples of a close-up, which is as many as any screen has columns."""
+
 
 class Touchable(Protocol):
     """Content of a figure that can be touched."""
@@ -81,6 +84,13 @@ class Channel:
     spectrum_label: str = ""
     view_s: tuple[float, float] | None = None
 
+    def _seen_first(self) -> npt.NDArray[np.intp]:
+        """All samples of the stretch to begin with, unless they are many."""
+        if self.view_s is None:
+            return np.empty(0, np.intp)
+        inside = np.flatnonzero((self.time_s >= self.view_s[0]) & (self.time_s <= self.view_s[1]))
+        return inside if inside.size <= _MOST_SEEN_FIRST else np.empty(0, np.intp)
+
     def plain(self, most_samples: int) -> dict[str, Any]:
         """As JSON has it, with about so many samples."""
         values = np.array([line.values for line in self.lines], np.float64).reshape(len(self.lines), -1)
@@ -92,6 +102,7 @@ class Channel:
             if line is not reference
         ]
         kept = envelope_samples(np.vstack([values, *differences]), most_samples)
+        kept = np.union1d(kept, self._seen_first())
         n, rate_s = self.time_s.size, 0.0
         if n > 1:
             rate_s = float(self.time_s[-1] - self.time_s[0]) / (n - 1)

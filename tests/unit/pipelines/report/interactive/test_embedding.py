@@ -12,6 +12,7 @@ import pytest
 from page_contents import Scripts, numbers, samples
 from touchable_page import HOSTILE, RATE_HZ, figure, histories, window_map, written_page
 
+from pipelines.report.interactive.contents import Channel, Line
 from pipelines.report.interactive.embedding import LARGEST_PAGE_BYTES, embedded
 
 try:
@@ -74,6 +75,18 @@ def test_histories_hold_what_was_recorded_and_simulated(html: str) -> None:
     density = 10 ** numbers(carried["spectra"][0]["values"])
     at = numbers(carried["frequency"])
     np.testing.assert_allclose(density, 1 / (1 + (at - 4.0) ** 2), rtol=1e-3)
+
+
+def test_a_close_up_of_a_long_run_has_all_its_samples() -> None:
+    n = 50_000
+    values = np.random.default_rng(5).normal(size=n)
+    line = Line("recorded", "recorded", values)
+    long = Channel("displacement", "mm", np.arange(n) / RATE_HZ, (line,), view_s=(10.0, 12.0))
+    carried = long.plain(most_samples=400)
+    at = samples(carried["samples"])
+    assert set(range(5000, 6001)) <= set(at.tolist())
+    assert at.size < 1001 + 410
+    np.testing.assert_allclose(numbers(carried["lines"][0]["values"]), values[at], atol=2e-4)
 
 
 def test_a_map_holds_its_points_and_what_is_seen_of_each(html: str) -> None:
