@@ -117,6 +117,14 @@ def test_another_run_has_other_lines(opened: Callable[..., Any]) -> None:
     assert "all 1000 samples" in page.inner_text("#histories .touch-words")
 
 
+def test_a_run_of_which_nothing_was_recorded_is_empty_and_no_error(opened: Callable[..., Any]) -> None:
+    page = opened()
+    page.select_option("#histories select >> nth=0", index=3)
+    assert "all 1 samples" in page.inner_text("#histories .touch-words")
+    page.select_option("#histories select >> nth=0", index=0)
+    assert "all 1000 samples" in page.inner_text("#histories .touch-words")
+
+
 def test_another_channel_has_other_lines(opened: Callable[..., Any]) -> None:
     page = opened()
     before = page.evaluate(LINES, "histories")

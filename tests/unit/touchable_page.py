@@ -40,10 +40,14 @@ def channel(name: str, amplitude: float) -> Channel:
 
 
 def histories() -> Histories:
+    lost = tuple(
+        Line(label, "before", np.array([value])) for label, value in (("recorded", np.nan), ("x", np.inf))
+    )
     runs = (
         Run("run_2", "held out", (channel("displacement", 3.0), channel("acceleration", 40.0))),
         Run(HOSTILE, "held out", (channel("displacement", 5.0),)),
         Run("run_1", "fitted", (channel("displacement", 7.0),)),
+        Run("lost", "fitted", (Channel("displacement", "mm", np.zeros(1), lost, "recorded"),)),
     )
     return Histories("Recorded and simulated", runs, "Everything that was recorded.")
 

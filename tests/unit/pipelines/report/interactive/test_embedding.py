@@ -63,7 +63,7 @@ def test_names_are_text_wherever_they_stand(html: str) -> None:
 
 def test_histories_hold_what_was_recorded_and_simulated(html: str) -> None:
     content = Scripts(html).data[0]
-    assert [run["group"] for run in content["runs"]] == ["held out", "held out", "fitted"]
+    assert [run["group"] for run in content["runs"]] == ["held out", "held out", "fitted", "fitted"]
     carried = content["runs"][2]["channels"][0]
     time = carried["start"] + carried["interval"] * samples(carried["samples"])
     np.testing.assert_allclose(time, np.arange(1000) / RATE_HZ, atol=1e-12)
