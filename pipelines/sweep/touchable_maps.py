@@ -31,7 +31,8 @@ _MOST_WINDOWS: Final = 200
 """Of a report: a campaign has thousands, and each takes three to five kilobytes of the page."""
 _HOW: Final = (
     " A click on a circle, or its choice in the list, shows its loop, one period after the other from dark to "
-    "light, its window of signals and the amplitudes of its force over multiples of the frequency of the motion."
+    "light, its window of signals and the amplitudes of its force over multiples of the frequency of the motion. "
+    "Dots are windows whose signals the page does not carry."
 )
 
 
