@@ -172,6 +172,8 @@ def _recorded(url: str, device: subprocess.Popen[str], folder: Path, has_page: b
     said = recorder.communicate()[0]
     if recorder.returncode != 0:
         sys.exit(f"the recorder ended with {recorder.returncode}: {said}")
+    if has_page and not observed.seen:
+        sys.exit("nobody saw the live page")
     summary = json.loads(said.splitlines()[-1])
     assert not summary["flags"]
     grown = np.flatnonzero(np.diff(np.array(observed.journal_bytes)) > 0)
@@ -213,7 +215,8 @@ def _viewer(url: str, observed: Observed) -> Iterator[None]:
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as viewer:
         yield
         said = viewer.communicate(timeout=60)[0]
-    observed.seen = json.loads(said.splitlines()[-1])
+    # a recorder that could not begin says why itself
+    observed.seen = json.loads(said.splitlines()[-1]) if said else {}
 
 
 def _cpu_s(pid: int) -> float:
