@@ -260,12 +260,15 @@ PARENT = """
 import sys
 from pathlib import Path
 import test_store as here
+from sloshlab.interrupt import Terminated
 
 if __name__ == "__main__":
     try:
         here.run(here.tasks_of(Path(sys.argv[1]), wait_s=0.4), Path(sys.argv[2]), 1)
     except KeyboardInterrupt:
         sys.exit(130)
+    except Terminated as termination:
+        sys.exit(termination.exit_code)
 """
 
 
@@ -281,7 +284,8 @@ def test_a_campaign_that_is_stopped_goes_on_to_the_same_bytes(recordings, tmp_pa
     while len(list(store.glob("results/*/outcome.json"))) < 2 and time.monotonic() < deadline:
         time.sleep(0.02)
     parent.send_signal(number)
-    assert parent.wait(60) == (-9 if number == signal.SIGKILL else 130)
+    expected = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}
+    assert parent.wait(60) == expected[number]
     time.sleep(0.2)
     n_before = len(list(store.glob("results/*/outcome.json")))
     assert 2 <= n_before < 10
