@@ -195,7 +195,7 @@ def equivalent_model(
     --------
     >>> model = equivalent_model(BoxTank(0.18, 0.18, 0.13, fill_level=0.5, density_kg_per_m3=650.0))
     >>> [round(float(omega), 2) for omega in model.frequencies_rad_per_s]
-    [11.8, 22.64, 29.26]
+    [11.79, 22.64, 29.26]
     """
     if axis not in ("x", "y"):
         raise InputError("lateral sloshing: axis", got=repr(axis)[:80], allowed="x or y")
