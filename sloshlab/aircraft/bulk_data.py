@@ -58,6 +58,9 @@ class Card:
             if default is None:
                 raise self.error(field, "", "a value")
             return default
+        if " " in value:
+            # blanks within a field, unlike those around it, are a value that has slipped out of its columns
+            raise self.error(field, repr(value), "one value in its columns")
         return value
 
     def integer(self, field: int, default: int | None = None) -> int:
@@ -269,13 +272,4 @@ def _fields_of(line: _Line) -> tuple[str, list[str], str]:
     first = text[:8].strip()
     width, n_fields = (16, 4) if "*" in first else (8, 8)
     cut = [text[8 + width * n : 8 + width * (n + 1)].strip() for n in range(n_fields)]
-    for number, field in enumerate(cut, start=2):
-        # blanks within a field, unlike those around it, are a field that has slipped out of its columns
-        if " " in field:
-            raise FileFormatError(
-                f"{line.file}:{line.number}: {first or 'continuation'}: field {number}",
-                got=repr(field),
-                allowed=f"one value in {width} columns",
-                remedy="shift the value into its columns",
-            )
     return first, cut, text[72:80].strip()

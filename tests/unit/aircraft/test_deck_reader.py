@@ -81,6 +81,7 @@ def test_boxes_and_splines(tmp_path: Path) -> None:
 
 
 REFUSED = [
+    ("GRID    1 2", "GRID: field 2: got '1 2'; allowed: one value in its columns"),
     ("CQUAD4  1       1       1       2       3       4", "CQUAD4: got a card that is not known here"),
     ("GRID    1               0.0     1.0.0   0.0", r"GRID: field 5: got 1\.0\.0; allowed: a real number"),
     ("GRID    x", "GRID: field 2: got x; allowed: an integer"),
