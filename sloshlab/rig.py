@@ -45,6 +45,7 @@ for _name, _function in {
     "frozen": "sloshlab.twin.tank_models:frozen",
     "viscous": "sloshlab.twin.tank_models:viscous",
     "bouncing_ball": "sloshlab.twin.tank_models:bouncing_ball",
+    "lateral": "sloshlab.twin.tank_models:lateral",
     "rom": "sloshlab.twin.reduced_order_model_force:reduced_order_model",
 }.items():
     TANK_MODELS.declare(_name, _function)

@@ -26,6 +26,7 @@ from sloshlab.twin import (  # noqa: F401  they register forces
     product_forces,
     rate_independent_forces,
     reduced_order_model_force,
+    rocking_liquid,
     structure_forces,
     tank_forces,
 )

@@ -19,6 +19,7 @@ from typing import Any
 from sloshlab.errors import InputError, RigError
 from sloshlab.rig import TANK_MODELS, Rig
 from sloshlab.twin.measured_maps import terms_from_maps
+from sloshlab.twin.rocking_liquid import rocking_liquid
 from sloshlab.twin.structure_forces import VISCOUS_DAMPING
 from sloshlab.twin.tank_forces import BOUNCING_BALL
 from sloshlab.twin.terms import Term
@@ -73,3 +74,8 @@ def bouncing_ball(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tupl
     fixed = {"liquid_mass_kg": rig.liquid_mass_kg, "height_m": rig.tank.height_m}
     # what the file states wins over what follows from the rig
     return (BOUNCING_BALL(**{**fixed, **parameters}),)
+
+
+def lateral(rig: Rig, parameters: Mapping[str, Any], folder: Path) -> tuple[Term, ...]:
+    """Liquid that sloshes along a beam whose tip rocks the tank; masses and moments are those of the box."""
+    return rocking_liquid(rig, **parameters)

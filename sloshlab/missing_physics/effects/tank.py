@@ -35,6 +35,7 @@ from sloshlab.missing_physics.evidence import (
 from sloshlab.missing_physics.extension import Extension
 from sloshlab.missing_physics.prior import Range
 from sloshlab.twin.liquid_effects import AIR_CUSHION, FARADAY_WAVE, LATERAL_MODE, LIQUID_DAMPING, LIQUID_LOSS
+from sloshlab.twin.rocking_liquid import equivalent_lateral_mass_kg, rocking_liquid
 from sloshlab.twin.structure_forces import COULOMB_FRICTION, MASS_ERROR, QUADRATIC_DRAG, VISCOUS_DAMPING
 from sloshlab.twin.tank_forces import BOUNCING_BALL, EFFECTIVE_MASS, FADING_MASS, VARYING_MASS, VISCOUS_MAP
 from sloshlab.twin.terms import Term
@@ -389,13 +390,38 @@ IMPACT = register(
         sought_at=lambda at: [_impact_numbers(at, *place) for place in _PLACES_OF_AN_IMPACT],
     )
 )
+
+
+def _waves_of_the_box(at: Surroundings) -> list[dict[str, float]]:
+    """The first sideways mode along each side of the tank, where the beam's dimensions tell how it rocks.
+
+    Its mass is the one that moves up and down as strongly as the rocking liquid does at its frequency.
+    """
+    structure = at.rig.structure
+    if structure is None or None in (structure.length_m, structure.width_m, structure.thickness_m):
+        return []
+    terms = [rocking_liquid(at.rig, along=side, n_modes=1)[0] for side in ("length", "width")]
+    starts = [
+        {"frequency_hz": term.values["frequency_hz"], "mass_kg": equivalent_lateral_mass_kg(term)}
+        for term in terms
+    ]
+    return [
+        {**start, "damping_ratio": 0.01}
+        for start in starts
+        if 0.1 < start["frequency_hz"] / at.frequency_hz < 10.0 and start["mass_kg"] > 3e-3 * at.rig.liquid_mass_kg
+    ]
+
+
 # The tank has to rotate to drive it: on a beam's tip it does, in a guide it does not.
 LATERAL = force_effect(
     LATERAL_MODE,
     "tank",
     lambda at: [
-        {"frequency_hz": frequency, "mass_kg": 0.2 * at.rig.liquid_mass_kg, "damping_ratio": 0.01}
-        for frequency in (*(ratio * at.frequency_hz for ratio in (0.3, 0.7, 1.4)), *at.missed_hz)
+        *(
+            {"frequency_hz": frequency, "mass_kg": 0.2 * at.rig.liquid_mass_kg, "damping_ratio": 0.01}
+            for frequency in (*(ratio * at.frequency_hz for ratio in (0.3, 0.7, 1.4)), *at.missed_hz)
+        ),
+        *_waves_of_the_box(at),
     ],
     ranges={
         "frequency_hz": Range(0.1, 10.0, scales.frequency),

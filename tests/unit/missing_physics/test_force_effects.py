@@ -491,3 +491,30 @@ def test_a_lateral_mode_is_sought_where_the_tank_rocks_alone(
     there = candidates(replace(at, rig=at.rig.model_copy(update={"structure": held})))
     assert ("tank.lateral_mode" in {candidate.key for candidate in there}) == sought
     assert "tank.effective_mass" in {candidate.key for candidate in there}
+
+
+def test_a_lateral_mode_is_sought_with_the_waves_of_the_box_too(frozen: RigModel) -> None:
+    """Frequency by g k tanh(k h); mass c² m (h + g/ω²)² with m of SP-106 and 1.5/l for the turn of the tip."""
+    beam = Structure(
+        kind="beam", length_m=0.74, width_m=0.1, thickness_m=0.01, frequencies_hz=(6.0,), damping_ratios=(0.01,),
+        modal_masses_kg=(1.9,), tip_mode_shape=(1.0,),
+    )  # fmt: skip
+    at = surroundings_of(frozen)
+    at = replace(at, rig=at.rig.model_copy(update={"structure": beam}), frequency_hz=6.0)
+    tank, fill = at.rig.tank, at.rig.liquid.fill_level * at.rig.tank.height_m
+    [found] = [c for c in candidates(at) if c.key == "tank.lateral_mode"]
+    for side in (tank.length_m, tank.width_m):
+        k = np.pi / side
+        omega = np.sqrt(9.81 * k * np.tanh(k * fill))
+        mass = at.rig.liquid_mass_kg * 8 * np.tanh(k * fill) / (np.pi**2 * k * fill)
+        height = fill * 0.5 - 2 * np.tanh(k * fill / 2) / k - (tank.height_m - fill) / 2
+        expected = (1.5 / 0.74) ** 2 * mass * (height + 9.81 / omega**2) ** 2
+        starts = [
+            s
+            for s in found.starts()
+            if s["tank.lateral_mode.frequency_hz"] == pytest.approx(omega / (2 * np.pi), rel=1e-6)
+        ]
+        if expected < 3e-3 * at.rig.liquid_mass_kg:
+            assert starts == []
+        else:
+            assert [s["tank.lateral_mode.mass_kg"] for s in starts] == [pytest.approx(expected, rel=0.06)]
