@@ -15,6 +15,7 @@ from sloshlab.errors import AnalysisError, FileFormatError
 from sloshlab.lateral_sloshing.coupling import rigid_motion
 
 FloatArray = npt.NDArray[np.float64]
+_LONGEST_CHAIN: Final = 200
 _MOST_COMPONENTS: Final = 6000
 """Independent ones, whose matrices are full."""
 
@@ -74,7 +75,8 @@ def assembled(deck: Deck, *, constraint_set: int | None = None) -> Assembly:
         raise AnalysisError("deck", got="no GRID", allowed="at least one node")
     nodes = tuple(sorted(deck.grids))
     row = {node: 6 * position for position, node in enumerate(nodes)}
-    stiffness, mass = _stiffness(deck, row), _mass(deck, row)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is no number is refused below
+        stiffness, mass = _stiffness(deck, row), _mass(deck, row)
     independent = _Elimination(deck, row, constraint_set).matrix()
     basic = sparse.block_diag(
         [_both(node_axes(deck, node, "GRID")) for node in nodes], format="csr"
@@ -83,6 +85,12 @@ def assembled(deck: Deck, *, constraint_set: int | None = None) -> Assembly:
     # components that nothing touches, like AUTOSPC
     reduced_k, reduced_m = motion.T @ stiffness @ motion, motion.T @ mass @ motion
     used = np.flatnonzero((reduced_k.diagonal() != 0) | (reduced_m.diagonal() != 0))
+    if not (np.isfinite(reduced_k.data).all() and np.isfinite(reduced_m.data).all()):
+        raise AnalysisError(
+            "deck", got="a mass or stiffness that is no number", remedy="look for numbers too large"
+        )
+    if used.size == 0:
+        raise AnalysisError("deck", got="no mass and no stiffness", allowed="something that moves")
     if used.size > _MOST_COMPONENTS:
         raise AnalysisError("deck", got=f"{used.size} independent components", allowed=f"≤ {_MOST_COMPONENTS}")
     return Assembly(
@@ -143,7 +151,12 @@ def _at(row: dict[int, int], ends: tuple[int, ...]) -> npt.NDArray[np.int64]:
 def _stiffness(deck: Deck, row: dict[int, int]) -> sparse.csr_matrix:
     entries = _Entries(6 * len(row))
     for beam in deck.beams.values():
-        block, _ = beam_matrices(deck, beam)
+        try:
+            block, _ = beam_matrices(deck, beam)
+        except np.linalg.LinAlgError as error:
+            raise FileFormatError(
+                beam.place, got="a length or section of no stiffness", allowed="numbers of a beam"
+            ) from error
         entries.add(_at(row, beam.ends), block)
     for bush in deck.bushes.values():
         entries.add(_at(row, bush.ends), bush_stiffness(deck, bush))
@@ -230,8 +243,12 @@ class _Elimination:
             # what a rigid element does not move and nothing holds is independent
             row = {} if key in self.held else {self.column.setdefault(key, len(self.column)): 1.0}
         else:
-            if key in within:
-                raise FileFormatError(element.place, got=f"node {key[0]}", allowed="no circle of rigid elements")
+            if key in within or len(within) >= _LONGEST_CHAIN:
+                raise FileFormatError(
+                    element.place,
+                    got=f"node {key[0]}",
+                    allowed=f"no circle of rigid elements, ≤ {_LONGEST_CHAIN} in a row",
+                )
             row = {}
             for component, share in enumerate(self._follows(element, key)):
                 if share == 0:

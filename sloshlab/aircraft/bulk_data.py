@@ -16,6 +16,7 @@ from sloshlab.errors import FileFormatError
 _LARGEST_FILE_BYTES: Final = 50 * 2**20
 _LARGEST_DEPTH: Final = 8
 _MOST_CARDS: Final = 1_000_000
+_LARGEST_NUMBER: Final = 1e30
 _WITHOUT_E: Final = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+))([+-]\d+)$")
 _REAL: Final = re.compile(r"^[+-]?(?:\d+\.\d*|\.\d+)(?:[eEdD][+-]?\d+)?$|^[+-]?\d+[eEdD][+-]?\d+$")
 _INTEGER: Final = re.compile(r"^[+-]?\d{1,18}$")
@@ -136,7 +137,8 @@ def real_number(text: str) -> float | None:
         value = float(text.lower().replace("d", "e"))
     else:
         return None
-    return value if abs(value) < 1e300 else None
+    # no deck has larger ones, and none of their powers may overflow
+    return value if abs(value) <= _LARGEST_NUMBER else None
 
 
 def put_once(table: dict[Any, Any], number: Any, value: object, card: Card) -> None:
@@ -192,6 +194,16 @@ def _text_of(path: Path, what: str) -> str:
         raise FileFormatError(what, got=error.strerror or "no file", remedy="give the file") from error
 
 
+def _beside(deck: Path, name: str) -> Path:
+    """The included file; decks written where capitals count for nothing may name it in others."""
+    target = deck.parent / name
+    if not target.exists() and target.parent.is_dir():
+        alike = [path for path in target.parent.iterdir() if path.name.lower() == target.name.lower()]
+        if len(alike) == 1:
+            return alike[0]
+    return target
+
+
 def _lines_of(path: Path, instead: Mapping[str, Path], within: tuple[Path, ...]) -> Iterator[_Line]:
     if path.resolve() in within or len(within) >= _LARGEST_DEPTH:
         raise FileFormatError(
@@ -209,10 +221,12 @@ def _lines_of(path: Path, instead: Mapping[str, Path], within: tuple[Path, ...])
         included = re.match(r"\s*INCLUDE\s+['\"]?([^'\"]+?)['\"]?\s*$", text, re.IGNORECASE)
         if included:
             name = included[1]
-            target = instead.get(name, path.parent / name)
+            target = instead.get(name, _beside(path, name))
             if not target.is_file():
                 raise FileFormatError(
-                    f"{path.name}:{number}: INCLUDE", got=f"no file {name[:80]}", remedy="put it beside the deck"
+                    f"{path.name}:{number}: INCLUDE",
+                    got=f"no file {name[:80]}",
+                    remedy="put it beside the deck, or name what stands for it by `instead`",
                 )
             yield from _lines_of(target, instead, (*within, path.resolve()))
             continue

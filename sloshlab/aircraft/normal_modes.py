@@ -127,8 +127,9 @@ def _lowest(
     n = mass.shape[0]
     if not 1 <= n_modes <= n:
         raise AnalysisError("n_modes", got=str(n_modes), allowed=f"1 … {n}")
-    values, vectors = eigh(0.5 * (inverse + inverse.T), subset_by_index=(n - n_modes, n - 1))
-    values, vectors = values[::-1], vectors[:, ::-1]
+    # all of them: the driver for some of them gives up where many are zero
+    values, vectors = eigh(0.5 * (inverse + inverse.T), driver="evd")
+    values, vectors = values[::-1][:n_modes], vectors[:, ::-1][:, :n_modes]
     massless = values <= 1e-14 * values[0]
     if massless.any():
         raise AnalysisError(

@@ -22,8 +22,8 @@ from sloshlab.lateral_sloshing.coupling import require_positive_definite, rigid_
 FloatArray = npt.NDArray[np.float64]
 FORMAT: Final = 1
 _LARGEST_BYTES: Final = 200_000_000
-_RIGID_BELOW: Final = 1e-3
-"""Of the seventh frequency; six modes below it are those of a free aircraft."""
+_RIGID_BELOW: Final = 0.1
+"""Of the seventh frequency; six modes below it are those of a free aircraft, perhaps on weak springs."""
 
 
 @dataclass(frozen=True, eq=False)
