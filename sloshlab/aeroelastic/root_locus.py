@@ -1,0 +1,278 @@
+"""Root loci: eigenvalues over the speed, joined to branches that are named by the mode they start at.
+
+Between two speeds every root goes to the one that resembles it most: product of left and right eigenvectors
+across the step (a modal assurance criterion that no scaling of the states changes), and distance from where the
+root was heading. Where a branch changes its shape within a step, the step is halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eig
+from scipy.optimize import linear_sum_assignment
+
+from sloshlab.aeroelastic.arrays import ComplexArray, FloatArray, require_positive
+from sloshlab.errors import AnalysisError
+
+System = Callable[[float], FloatArray]
+
+_LEAST_LIKENESS = 0.6
+_MOST_HALVINGS = 10
+_REAL_SHARE = 1e-9
+_LAG = "lag"
+
+
+@dataclass(frozen=True)
+class Roots:
+    """Eigenvalues of one speed, with their right vectors and the left ones that are 1 on them."""
+
+    pole: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+
+    def taken(self, order: np.ndarray) -> Roots:
+        """The same roots in another order."""
+        return Roots(self.pole[order], self.right[:, order], self.left[:, order])
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A root that begins to grow.
+
+    Attributes
+    ----------
+    speed_m_per_s, frequency_rad_per_s : float
+        Where; frequency 0 is divergence.
+    origin : str
+        Mode at which the branch starts, or the number of a lag.
+    """
+
+    speed_m_per_s: float
+    frequency_rad_per_s: float
+    origin: str
+
+    @property
+    def kind(self) -> str:
+        """``flutter`` or ``divergence``."""
+        return "flutter" if self.frequency_rad_per_s > 0 else "divergence"
+
+
+@dataclass(frozen=True)
+class RootLocus:
+    """Branches over the speed.
+
+    Attributes
+    ----------
+    speed_m_per_s : ndarray, shape (n_speeds,)
+        Speeds.
+    pole_rad_per_s : ndarray of complex, shape (n_speeds, n_branches)
+        Roots; of conjugate pairs the one above the real axis at the start.
+    origin : tuple of str
+        What each branch starts at.
+    crossings : tuple of Crossing
+        Where roots begin to grow, by speed.
+    lost : dict
+        Origin of each branch that could not be followed with certainty, and the first speed of that.
+    """
+
+    speed_m_per_s: FloatArray
+    pole_rad_per_s: ComplexArray
+    origin: tuple[str, ...]
+    crossings: tuple[Crossing, ...]
+    lost: dict[str, float]
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What must be read with the branches."""
+        return tuple(f"branch {name} was lost at {speed:.5g} m/s" for name, speed in self.lost.items())
+
+    @property
+    def flutter(self) -> Crossing | None:
+        """The lowest speed of flutter, None if there is none in the range."""
+        return next((crossing for crossing in self.crossings if crossing.kind == "flutter"), None)
+
+    @property
+    def divergence(self) -> Crossing | None:
+        """The lowest speed of divergence, None if there is none in the range."""
+        return next((crossing for crossing in self.crossings if crossing.kind == "divergence"), None)
+
+
+def root_locus(
+    system: System,
+    speeds: FloatArray,
+    names: tuple[str, ...],
+    *,
+    start_m_per_s: float | None = None,
+    tolerance_m_per_s: float = 1e-3,
+) -> RootLocus:
+    """Follow all roots over the speed.
+
+    Parameters
+    ----------
+    system : callable
+        State matrix at a speed; its first states are the coordinates, then their rates, then the rest.
+    speeds : ndarray
+        Ascending, > 0, two at least.
+    names : tuple of str
+        Of the coordinates.
+    start_m_per_s : float, optional
+        Where branches are named, low enough for modes without flow; a twentieth of the first speed if not given.
+    tolerance_m_per_s : float
+        Of the bisection of crossings.
+
+    Returns
+    -------
+    RootLocus
+
+    Raises
+    ------
+    AnalysisError
+        If speeds are not as asked.
+    """
+    speeds = np.asarray(speeds, dtype=float)
+    if speeds.size < 2 or np.any(np.diff(speeds) <= 0):
+        raise AnalysisError("speeds", got=f"{speeds.size} of them", allowed="two or more, ascending")
+    start = speeds[0] / 20 if start_m_per_s is None else start_m_per_s
+    require_positive(first_speed_m_per_s=float(speeds[0]), start_m_per_s=float(start))
+    first = roots_of(system(start))
+    origin = _origins(first, names)
+    walk = _Walk(system, float(start), first, np.array([not name.startswith(_LAG) for name in origin]))
+    # from the start to the first speed in steps that grow, because lags grow with the speed
+    for between in np.geomspace(start, speeds[0], 12)[1:-1]:
+        walk.go(float(between))
+    kept, crossings = [], []
+    for index, speed in enumerate(speeds):
+        before = (walk.speed, walk.roots)
+        walk.go(float(speed))
+        kept.append(walk.roots.pole)
+        if index:
+            crossings += _crossings(walk, before, origin, tolerance_m_per_s)
+    poles = np.array(kept)
+    shown = np.array([pole.imag >= 0 for pole in first.pole])
+    lost = {origin[branch]: speed for branch, speed in sorted(walk.lost.items()) if shown[branch]}
+    return RootLocus(
+        speeds,
+        poles[:, shown],
+        tuple(name for name, is_shown in zip(origin, shown, strict=True) if is_shown),
+        tuple(sorted(crossings, key=lambda crossing: crossing.speed_m_per_s)),
+        lost,
+    )
+
+
+def roots_of(matrix: FloatArray) -> Roots:
+    """Eigenvalues and vectors, left vectors scaled so that left·right = 1.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (n, n)
+        State matrix.
+
+    Returns
+    -------
+    Roots
+        By imaginary part.
+    """
+    pole, left, right = eig(matrix, left=True, right=True)
+    scale = np.einsum("ij,ij->j", left.conj(), right)
+    # defective roots have no scale; they resemble nothing, which is what tracking has to know
+    scale = np.where(np.abs(scale) > np.finfo(float).eps, scale, np.inf)
+    return Roots(pole, right, left / scale.conj()).taken(np.argsort(pole.imag, kind="stable"))
+
+
+class _Walk:
+    """Goes from speed to speed and keeps the order of the roots."""
+
+    def __init__(self, system: System, speed: float, roots: Roots, followed: np.ndarray) -> None:
+        self.system, self.speed, self.roots, self.followed = system, speed, roots, followed
+        self.slope = np.zeros_like(roots.pole)
+        self.lost: dict[int, float] = {}
+
+    def go(self, target: float, halvings: int = 0) -> None:
+        """Follow all roots to another speed."""
+        new = roots_of(self.system(target))
+        heading = self.roots.pole + self.slope * (target - self.speed)
+        new, likeness = _joined(self.roots, new, heading)
+        unlike = self.followed & (likeness < _LEAST_LIKENESS)
+        if unlike.any():
+            if halvings < _MOST_HALVINGS:
+                self.go(0.5 * (self.speed + target), halvings + 1)
+                self.go(target, halvings + 1)
+                return
+            # where two roots meet their vectors become one; one that goes where it was heading is not lost
+            size = np.maximum(np.abs(heading), np.abs(heading).max() * 1e-6)
+            jumped = np.abs(new.pole - heading) > 1e-2 * size
+            for branch in np.flatnonzero(unlike & jumped):
+                self.lost.setdefault(int(branch), target)
+        self.slope = (new.pole - self.roots.pole) / (target - self.speed)
+        self.speed, self.roots = target, new
+
+
+def _joined(old: Roots, new: Roots, heading: ComplexArray) -> tuple[Roots, FloatArray]:
+    """New roots in the order of the old ones, and how much each resembles its predecessor, 0 … 1."""
+    with np.errstate(over="ignore"):
+        likeness = np.abs(old.left.conj().T @ new.right) * np.abs(new.left.conj().T @ old.right).T
+    likeness = np.minimum(np.nan_to_num(likeness, nan=0.0), 1.0)
+    size = np.abs(heading)[:, None] + np.abs(new.pole)[None, :] + 1e-12
+    distance = np.abs(heading[:, None] - new.pole[None, :]) / size
+    _, order = linear_sum_assignment((1 - likeness) + 4 * distance)
+    return new.taken(order), likeness[np.arange(order.size), order]
+
+
+def _origins(roots: Roots, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the modes that take part most; of two that share one, the second gets a number."""
+    n = len(names)
+    share = np.abs(roots.left.conj() * roots.right)
+    share = share[:n] + share[n : 2 * n]
+    size = np.abs(roots.pole)
+    result, used, lags = [], dict.fromkeys(names, 0), 0
+    for branch, pole in enumerate(roots.pole):
+        if pole.imag > _REAL_SHARE * max(size.max(), 1e-30) and pole.imag > 0:
+            name = names[int(share[:, branch].argmax())]
+            used[name] += 1
+            result.append(name if used[name] == 1 else f"{name} ({used[name]})")
+        else:
+            lags += 1
+            result.append(f"{_LAG} {lags}")
+    return tuple(result)
+
+
+def _crossings(
+    walk: _Walk, before: tuple[float, Roots], origin: tuple[str, ...], tolerance: float
+) -> list[Crossing]:
+    """Crossings of the imaginary axis upwards between the last two speeds, by bisection."""
+    low, roots = before
+    noise = 1e-9 * float(np.abs(walk.roots.pole).max())
+    grows = (roots.pole.real <= noise) & (walk.roots.pole.real > noise) & (walk.roots.pole.imag >= 0)
+    # a pair that meets on the real axis leaves by either branch
+    return [
+        _bisected(walk.system, (low, roots), (walk.speed, walk.roots), int(branch), (origin[branch], tolerance))
+        for branch in np.flatnonzero(grows)
+    ]
+
+
+def _bisected(
+    system: System,
+    low: tuple[float, Roots],
+    high: tuple[float, Roots],
+    branch: int,
+    name_and_tolerance: tuple[str, float],
+) -> Crossing:
+    name, tolerance = name_and_tolerance
+    while high[0] - low[0] > tolerance:
+        middle = 0.5 * (low[0] + high[0])
+        heading = 0.5 * (low[1].pole + high[1].pole)
+        joined, _ = _joined(low[1], roots_of(system(middle)), heading)
+        if joined.pole[branch].real > 0:
+            high = (middle, joined)
+        else:
+            low = (middle, joined)
+    share = high[1].pole[branch].real - low[1].pole[branch].real
+    weight = -low[1].pole[branch].real / share if share > 0 else 0.5
+    speed = low[0] + weight * (high[0] - low[0])
+    frequency = low[1].pole[branch].imag + weight * (high[1].pole[branch].imag - low[1].pole[branch].imag)
+    size = max(abs(high[1].pole[branch]), 1e-30)
+    is_real = abs(high[1].pole[branch].imag) <= _REAL_SHARE * size
+    return Crossing(float(speed), 0.0 if is_real else float(frequency), name)

@@ -1,0 +1,1 @@
+"""Makes this folder the package `tests`: PanelAero installs one of that name, to which a bare folder yields."""
