@@ -22,6 +22,8 @@ System = Callable[[float], FloatArray]
 _LEAST_LIKENESS = 0.6
 _MOST_HALVINGS = 10
 _REAL_SHARE = 1e-9
+_LEAST_SHARE = 0.2
+"""Of a coordinate in a root that is named by it; of a mode without flow it is 1."""
 _LAG = "lag"
 
 
@@ -222,20 +224,20 @@ def _joined(old: Roots, new: Roots, heading: ComplexArray) -> tuple[Roots, Float
 
 
 def _origins(roots: Roots, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the modes that take part most; of two that share one, the second gets a number."""
+    """Names of the coordinates that take part most in oscillations, each once; all other roots are lags."""
     n = len(names)
     share = np.abs(roots.left.conj() * roots.right)
     share = share[:n] + share[n : 2 * n]
-    size = np.abs(roots.pole)
-    result, used, lags = [], dict.fromkeys(names, 0), 0
-    for branch, pole in enumerate(roots.pole):
-        if pole.imag > _REAL_SHARE * max(size.max(), 1e-30) and pole.imag > 0:
-            name = names[int(share[:, branch].argmax())]
-            used[name] += 1
-            result.append(name if used[name] == 1 else f"{name} ({used[name]})")
-        else:
+    oscillating = np.flatnonzero(roots.pole.imag > _REAL_SHARE * np.abs(roots.pole).max())
+    coordinate, chosen = linear_sum_assignment(-share[:, oscillating])
+    result, lags = [""] * roots.pole.size, 0
+    for row, column in zip(coordinate, chosen, strict=True):
+        if share[row, oscillating[column]] >= _LEAST_SHARE:
+            result[oscillating[column]] = names[row]
+    for branch, name in enumerate(result):
+        if not name:
             lags += 1
-            result.append(f"{_LAG} {lags}")
+            result[branch] = f"{_LAG} {lags}"
     return tuple(result)
 
 
