@@ -23,7 +23,7 @@ VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -71,6 +71,9 @@ rom: setup  ## the reduced-order model (70 delays, 35 neurons) of raw_data/numer
 closed-loop: setup  ## the beam with the model of `make rom` (or ROM=file) and balls (BALLS=files) in its tank: report
 	$(BIN)/sloshlab beam raw_data/numerical_tank/beam/*.nc --rig raw_data/numerical_tank/beam/rig_beam.toml \
 	  --rom $(ROM) $(addprefix --ball ,$(BALLS)) -o $(RESULTS)/closed_loop || [ $$? -eq 3 ]
+
+flutter-checks: setup  ## published and exact numbers of aeroelasticity: asked and reached (a minute)
+	$(BIN)/python -m studies.flutter_checks $(RESULTS)/flutter_checks.json
 
 rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
 	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study

@@ -27,6 +27,9 @@ from pipelines.commands import analysis
 from pipelines.commands import models
 
 # isort: split
+from pipelines.commands import flutter
+
+# isort: split
 from pipelines.commands import case
 
 # isort: split
@@ -66,6 +69,7 @@ __all__ = [
     "demo",
     "diagnosis",
     "field_benchmarks",
+    "flutter",
     "info",
     "laboratory",
     "main",

@@ -160,6 +160,13 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "lag_s": Quantity("s", "time by which the other signal comes earlier"),
     "residual_correlation": Quantity("1", "correlation of the residual with another signal, −1 … 1"),
     "residual_band": Quantity("1", "half-width of the 95 % band of a correlation around zero"),
+    "speed_m_per_s": Quantity("m s-1", "speed of the air", "U"),
+    "pole_real_per_s": Quantity("s-1", "growth of a root, positive = growing", "Re s"),
+    "pole_imag_rad_per_s": Quantity("rad s-1", "angular frequency of a root", "Im s"),
+    "origin": Quantity("1", "mode that a branch starts at, or the number of a lag"),
+    "crossing_speed_m_per_s": Quantity("m s-1", "speed at which a root begins to grow"),
+    "crossing_frequency_rad_per_s": Quantity("rad s-1", "its angular frequency, 0 for divergence"),
+    "crossing_origin": Quantity("1", "branch of a root that begins to grow"),
     "residual_explained": Quantity("1", "share of the residual's variance that a linear filter would give"),
 }
 

@@ -1,0 +1,42 @@
+"""The command that finds where a wing flutters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipelines.commands.application import Json, OutputFolder, app, command_as_given, finish, free_folder
+from pipelines.report.result_folder import require_result_folder
+
+
+@app.command()
+def flutter(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.toml", help="Wing and air.", show_default=False)],
+    output: OutputFolder,
+    *,
+    first: Annotated[float, typer.Option("--from", metavar="U", help="Lowest speed in m/s.", show_default=False)],
+    last: Annotated[float, typer.Option("--to", metavar="U", help="Highest speed in m/s.", show_default=False)],
+    speeds: Annotated[int, typer.Option("--speeds", help="How many, evenly.")] = 60,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            "--cache",
+            metavar="FOLDER",
+            help="Keeps generalised forces of the doublet lattice.",
+            show_default=False,
+            callback=free_folder,
+        ),
+    ] = None,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write stability.nc only.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Flutter and divergence of a wing: root locus over the speed, p-k beside it, and a report."""
+    from pipelines.flutter.analysis import FlutterSettings, analyse_flutter
+    from pipelines.flutter.outputs import files_of, write_flutter
+
+    settings = FlutterSettings(first, last, speeds)
+    require_result_folder(output, files_of(report=not no_report))
+    experiment = analyse_flutter(model, settings, cache=cache)
+    finish(write_flutter(experiment, output, command=command_as_given(), report=not no_report), as_json)

@@ -1,0 +1,1 @@
+"""Flutter of a wing from a model file: root locus, flutter table, report."""

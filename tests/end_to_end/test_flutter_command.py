@@ -1,0 +1,112 @@
+"""`sloshlab flutter` on good and bad model files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipelines.command_line import run
+
+
+@pytest.fixture
+def goland(repository: Path) -> Path:
+    return repository / "docs" / "examples" / "goland_wing.toml"
+
+
+def test_the_wing_of_goland_flutters_where_it_should(
+    goland: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = run(
+        ["flutter", str(goland), "-o", str(tmp_path), "--from", "60", "--to", "280", "--speeds", "40", "--json"]
+    )
+    assert code == 0
+    summary = json.loads(capsys.readouterr().out.splitlines()[-1])
+    flutter, divergence = summary["crossings"]
+    # an independent script with assumed modes: 136.96 m/s, 70.01 rad/s; divergence in closed form: 251.8 m/s
+    assert flutter["speed_m_per_s"] == pytest.approx(136.96, rel=2e-3)
+    assert flutter["frequency_rad_per_s"] == pytest.approx(70.01, rel=2e-3)
+    assert flutter["origin"] == "mode 2"
+    pressure = (np.pi / 2 / 6.096) ** 2 * 0.987e6 / (2 * np.pi * 1.8288 * 0.9144 * 0.16)
+    assert divergence["speed_m_per_s"] == pytest.approx(np.sqrt(2 * pressure / 1.225), rel=4e-3)
+    assert summary["p_k_flutter_m_per_s"] == pytest.approx(136.96, rel=2e-3)
+    with xr.open_dataset(tmp_path / "stability.nc") as stability:
+        assert stability.attrs["wing"] == "Goland wing"
+        assert float(stability["crossing_speed_m_per_s"][0]) == flutter["speed_m_per_s"]
+        branch = [str(name) for name in stability["origin"].values.astype(str)].index("mode 2")
+        grows = stability["pole_real_per_s"].values[:, branch] > 0
+        speed = stability["speed_m_per_s"].values
+        assert speed[~grows].max() < 137.1 < speed[grows].min() + 6
+    assert "Flutter" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {
+        "root_locus.png",
+        "damping_and_frequency.png",
+        "mode_shapes.png",
+        "fit_of_forces.png",
+    }
+
+
+def test_a_range_without_flutter_says_so(goland: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["flutter", str(goland), "-o", str(tmp_path), "--from", "60", "--to", "90", "--speeds", "5"]
+    assert run([*arguments, "--no-report"]) == 0
+    assert "no root grows from 60 to 90 m/s" in capsys.readouterr().out
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_flutter_beyond_the_aerodynamics_is_flagged(
+    goland: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "model.toml"
+    text = goland.read_text(encoding="utf-8")
+    model.write_text(text.replace("largest_reduced_frequency = 2.0", "largest_reduced_frequency = 0.4"))
+    arguments = [
+        "flutter",
+        str(model),
+        "-o",
+        str(tmp_path / "out"),
+        "--from",
+        "90",
+        "--to",
+        "160",
+        "--speeds",
+        "8",
+    ]
+    assert run([*arguments, "--no-report"]) == 3
+    assert "beyond 0.4 of the aerodynamics" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "chord_m = 1.8288",
+            "chord_m = -1.0",
+            "station.0.chord_m: got -1.0; allowed: Input should be greater than 0",
+        ),
+        ("y_m = 6.096", "y_m = 0.0", "stations: got y = [0.0, 0.0]; allowed: two or more, ascending from 0"),
+        ("n_span = 30", "n_strips = 30", "aerodynamics.n_strips: got 30; allowed: a key of the documentation"),
+        ("pitch_inertia_kg_m = 8.64", "pitch_inertia_kg_m = 0.5", "pitch_inertia_kg_m: got less than mass times"),
+        ("[flow]", "[flow", "model model.toml"),
+    ],
+)
+def test_bad_models_are_one_line(
+    goland: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, message: str
+) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text(goland.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    assert run(["flutter", str(model), "-o", str(tmp_path / "out"), "--from", "60", "--to", "90"]) == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("speeds", [["--from", "90", "--to", "60"], ["--from", "-1", "--to", "60"]])
+def test_speeds_that_do_not_ascend_are_refused(
+    goland: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], speeds: list[str]
+) -> None:
+    assert run(["flutter", str(goland), "-o", str(tmp_path / "out"), *speeds]) == 1
+    assert "--from and --to" in capsys.readouterr().err
