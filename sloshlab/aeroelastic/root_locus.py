@@ -2,7 +2,7 @@
 
 Between two speeds every root goes to the one that resembles it most: product of left and right eigenvectors
 across the step (a modal assurance criterion that no scaling of the states changes), and distance from where the
-root was heading. Where a branch changes its shape within a step, the step is halved.
+root was heading. Where a branch changes its shape within a step, or two come near each other, the step is halved.
 """
 
 from __future__ import annotations
@@ -20,7 +20,12 @@ from sloshlab.errors import AnalysisError
 System = Callable[[float], FloatArray]
 
 _LEAST_LIKENESS = 0.6
+_LARGEST_MISS = 0.2
+"""Of where a root was heading, as a share of its size."""
 _MOST_HALVINGS = 10
+_HALVINGS_OF_A_MEETING = 6
+_NEAR = 0.25
+"""Of the way that two roots go towards each other in a step."""
 _REAL_SHARE = 1e-9
 _LEAST_SHARE = 0.2
 """Of a coordinate in a root that is named by it; of a mode without flow it is 1."""
@@ -197,26 +202,43 @@ class _Walk:
         new = roots_of(self.system(target))
         heading = self.roots.pole + self.slope * (target - self.speed)
         new, likeness = _joined(self.roots, new, heading)
-        unlike = self.followed & (likeness < _LEAST_LIKENESS)
-        if unlike.any():
-            if halvings < _MOST_HALVINGS:
-                self.go(0.5 * (self.speed + target), halvings + 1)
-                self.go(target, halvings + 1)
-                return
-            # where two roots meet their vectors become one; one that goes where it was heading is not lost
-            size = np.maximum(np.abs(heading), np.abs(heading).max() * 1e-6)
-            jumped = np.abs(new.pole - heading) > 1e-2 * size
-            for branch in np.flatnonzero(unlike & jumped):
-                self.lost.setdefault(int(branch), target)
+        missed = np.abs(new.pole - heading) / self._size(heading)
+        unsure = self.followed & ((likeness < _LEAST_LIKENESS) | (missed > _LARGEST_MISS))
+        is_coarse = bool(unsure.any()) or (halvings < _HALVINGS_OF_A_MEETING and self._meet(new))
+        if is_coarse and halvings < _MOST_HALVINGS:
+            self.go(0.5 * (self.speed + target), halvings + 1)
+            self.go(target, halvings + 1)
+            return
+        # where two roots meet their vectors become one; one that goes where it was heading is not lost
+        for branch in np.flatnonzero(unsure & (missed > _LARGEST_MISS)):
+            self.lost.setdefault(int(branch), target)
         self.slope = (new.pole - self.roots.pole) / (target - self.speed)
         self.speed, self.roots = target, new
+
+    def _size(self, pole: ComplexArray) -> FloatArray:
+        # roots near zero, as of rigid bodies, wander by the rounding error of the large ones
+        return np.asarray(np.abs(pole) + 1e-3 * np.abs(pole[self.followed]).max(initial=1e-12), dtype=float)
+
+    def _meet(self, new: Roots) -> bool:
+        """Whether two branches pass so close to each other that shapes may have changed places within the step."""
+        chosen = self.followed & (self.roots.pole.imag > 0)
+        start, way = self.roots.pole[chosen], (new.pole - self.roots.pole)[chosen]
+        apart, closing = start[:, None] - start[None, :], way[:, None] - way[None, :]
+        pace = np.abs(closing) ** 2
+        # nearest point of two that move evenly, within the step
+        share = -(apart * closing.conj()).real / np.maximum(pace, np.finfo(float).tiny)
+        nearest = np.abs(apart + np.clip(share, 0.0, 1.0) * closing)
+        is_within = (share > 0) & (share < 1) & ~np.eye(start.size, dtype=bool)
+        return bool(np.any(is_within & (nearest < _NEAR * np.sqrt(pace))))
 
 
 def _joined(old: Roots, new: Roots, heading: ComplexArray) -> tuple[Roots, FloatArray]:
     """New roots in the order of the old ones, and how much each resembles its predecessor, 0 … 1."""
     with np.errstate(over="ignore"):
         likeness = np.abs(old.left.conj().T @ new.right) * np.abs(new.left.conj().T @ old.right).T
-    likeness = np.minimum(np.nan_to_num(likeness, nan=0.0), 1.0)
+    # a product above 1 is no better than one below it: roots of another size, or nearly defective ones
+    likeness = np.nan_to_num(likeness, nan=0.0, posinf=0.0)
+    likeness = np.minimum(likeness, 1 / np.maximum(likeness, 1.0))
     size = np.abs(heading)[:, None] + np.abs(new.pole)[None, :] + 1e-12
     distance = np.abs(heading[:, None] - new.pole[None, :]) / size
     _, order = linear_sum_assignment((1 - likeness) + 4 * distance)
