@@ -153,6 +153,19 @@ def test_gust_response_agrees_with_a_runge_kutta_solver() -> None:
     assert response.acceleration[-1, 0] == pytest.approx(derivative(1.0, exact.y[:, -1])[1], rel=1e-3, abs=1e-5)
 
 
+def test_harmonic_gust_response_is_that_of_the_forces() -> None:
+    """(K − ω²M − q_D Q) q = (q_D/U) Q_g w_g at ω, with Q and Q_g evaluated and no states."""
+    motion, gust = plunging()
+    structure = of_modes(np.array([12.0]), np.array([3.0]))
+    system, inputs = gust_system(structure, motion, gust, density_kg_per_m3=DENSITY, speed_m_per_s=SPEED)
+    pressure = 0.5 * DENSITY * SPEED**2
+    for omega in (5.0, 40.0):
+        state = np.linalg.solve(1j * omega * np.eye(len(system)) - system, inputs @ [1.0, 1j * omega])
+        p = 1j * omega * SEMI_CHORD / SPEED
+        dynamic = 3.0 * (12.0**2 - omega**2) - pressure * motion.at(p)[0, 0]
+        assert complex(state[0]) == pytest.approx(complex(pressure / SPEED * gust.at(p)[0, 0] / dynamic), rel=1e-9)
+
+
 def test_free_wing_takes_the_speed_of_a_lasting_gust() -> None:
     """Without stiffness the section ends up moving with the air."""
     motion, gust = plunging()

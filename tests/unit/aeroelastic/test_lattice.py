@@ -112,6 +112,15 @@ def test_middle_of_a_slender_wing_has_theodorsens_lift() -> None:
         assert np.all(np.abs(lift - exact) < within * np.abs(exact))
 
 
+def test_forces_depend_on_the_size_only_through_the_reduced_frequency() -> None:
+    """Twice the size, the same k: forces by pitch grow with the area, moments with area and length."""
+    boxes = boxes_of([Trapezoid("wing", ((0.5, -2, 0), (0, 0, 0)), (0.6, 1.0), 5, 3)])
+    small = generalised_forces(boxes, rigid_plunge_and_pitch(boxes, 0.4), K, semi_chord_m=0.4, mach=0.3)
+    twice = boxes.scaled(2.0)
+    large = generalised_forces(twice, rigid_plunge_and_pitch(twice, 0.8), K, semi_chord_m=0.8, mach=0.3)
+    np.testing.assert_allclose(large.motion, small.motion * [[2.0, 4.0], [4.0, 8.0]], rtol=1e-8, atol=1e-10)
+
+
 def test_uniform_gust_is_rigid_plunge_over_the_frequency() -> None:
     """V16, zones summed; a travelling gust of no frequency is a uniform one."""
     boxes = boxes_of([Trapezoid("wing", ((0.5, -2, 0), (0, 0, 0)), (0.6, 1.0), 5, 3)])
