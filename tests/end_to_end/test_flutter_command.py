@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -110,3 +112,48 @@ def test_speeds_that_do_not_ascend_are_refused(
 ) -> None:
     assert run(["flutter", str(goland), "-o", str(tmp_path / "out"), *speeds]) == 1
     assert "--from and --to" in capsys.readouterr().err
+
+
+@pytest.fixture
+def lattice_model(goland: Path, tmp_path: Path) -> Path:
+    model = tmp_path / "lattice.toml"
+    text = goland.read_text(encoding="utf-8").replace('"strips"', '"lattice"')
+    text = text.replace("n_span = 30", "n_span = 8\nn_chord = 3").replace("frequencies = 25", "frequencies = 10")
+    model.write_text(text, encoding="utf-8")
+    return model
+
+
+@pytest.mark.skipif(find_spec("panelaero") is None, reason="PanelAero is not installed: extra aircraft")
+def test_forces_of_the_lattice_are_kept_and_made_anew_when_damaged(
+    lattice_model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["flutter", str(lattice_model), "--from", "100", "--to", "220", "--speeds", "9", "--no-report"]
+    arguments += ["--json", "--cache", str(tmp_path / "cache")]
+
+    def flutter_speed(output: str, code: int) -> float:
+        assert run([*arguments, "-o", str(tmp_path / output)]) == code
+        summary = json.loads(capsys.readouterr().out.splitlines()[-1])
+        assert bool(summary["flags"]) == (code == 3)
+        return float(summary["crossings"][0]["speed_m_per_s"])
+
+    made = flutter_speed("made", 0)
+    # a finite wing has less lift than strips: it flutters later
+    assert 137 < made < 200
+    assert flutter_speed("read", 0) == made
+    [kept] = (tmp_path / "cache").glob("*.nc")
+    kept.write_bytes(kept.read_bytes()[:-100])
+    assert flutter_speed("damaged", 3) == made
+    assert flutter_speed("read again", 0) == made
+
+
+def test_a_missing_panelaero_is_one_line(
+    lattice_model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "panelaero", None)
+    monkeypatch.delitem(sys.modules, "panelaero.VLM", raising=False)
+    monkeypatch.delitem(sys.modules, "panelaero.DLM", raising=False)
+    code = run(["flutter", str(lattice_model), "-o", str(tmp_path / "out"), "--from", "100", "--to", "150"])
+    error = capsys.readouterr().err
+    assert code == 1
+    assert error.count("\n") == 1
+    assert "pip install 'sloshlab[aircraft]'" in error
