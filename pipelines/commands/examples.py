@@ -54,6 +54,10 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
         "sloshlab simulate --rig rig.toml --input sweep_3g.nc -o simulated.nc",
         "sloshlab simulate --rig rig.toml --input sweep_3g.nc --block tank --save-twin twin.toml -o simulated.nc",
     ),
+    "flutter": (
+        "sloshlab flutter wing.toml --from 60 --to 180 -o results",
+        "sloshlab flutter wing.toml --from 60 --to 180 --speeds 30 --cache forces -o results",
+    ),
     "case new": ("sloshlab case new CASE --rig rig.toml --recordings run_1.nc run_2.nc",),
     "case check": ("sloshlab case check CASE",),
     "diagnose": (
@@ -64,6 +68,11 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
     "benchmark": (
         "sloshlab benchmark --list",
         "sloshlab benchmark silverbox emps --data published -o results",
+    ),
+    "campaign": (
+        "sloshlab campaign recordings -o store",
+        "sloshlab campaign plan.toml -o store --scheduler tcp://127.0.0.1:8786",
+        "sloshlab campaign cases --kind diagnose -o store --workers 2 --time-limit 600",
     ),
     "trial seal": ("sloshlab trial seal -o trial --seed 1 --key trial.key",),
     "trial commit": ("sloshlab trial commit CHALLENGE truths.toml -o kept --key trial.key",),
