@@ -171,14 +171,14 @@ def ball(
     as_json: Json = False,
 ) -> None:
     """A bouncing ball in place of the liquid, from free decays or from runs on the shaker."""
+    if damper not in ("contact", "always"):
+        raise typer.BadParameter(f"{damper!r} is neither 'contact' nor 'always'", param_hint="--damper")
     require_recordings(runs)
     from pipelines.ball.outputs import files_of, write_ball
     from pipelines.ball.settings import BallSettings
     from pipelines.ball.stages import analyse_ball
     from sloshlab.bouncing_ball.identification import SearchSettings
 
-    if damper not in ("contact", "always"):
-        raise typer.BadParameter(f"{damper!r} is neither 'contact' nor 'always'", param_hint="--damper")
     search = SearchSettings(n_generations=generations, seed=seed)
     settings = BallSettings(omega_bar, 1.0 if damper == "always" else 0.0, lowest_acceleration_g, search)
     require_result_folder(output, files_of(report=not no_report))

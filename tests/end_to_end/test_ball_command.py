@@ -157,7 +157,8 @@ def test_frozen_decays_only(tmp_path: Path, rig: Path, capsys: pytest.CaptureFix
 def test_bad_options(
     tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str], option: str, value: str, code: int
 ) -> None:
-    arguments = ["ball", "none.nc", "--rig", str(rig), "-o", str(tmp_path / "out"), option, value]
+    (tmp_path / "run.nc").touch()
+    arguments = ["ball", str(tmp_path / "run.nc"), "--rig", str(rig), "-o", str(tmp_path / "out"), option, value]
     assert run(arguments) == code
     assert option in capsys.readouterr().err
 

@@ -23,6 +23,8 @@ FOLDERS: dict[str, list[str]] = {
     "study -o": ["study", *RUN, *RUN, *RIG],
     "diagnose -o": ["diagnose", "absent"],
     "benchmark -o": ["benchmark", "silverbox", "--data", "absent"],
+    "flutter -o": ["flutter", "absent.toml", "--from", "60", "--to", "180"],
+    "campaign -o": ["campaign", "absent"],
     "trial seal -o": ["trial", "seal", "--key", "absent.key"],
     "trial score -o": ["trial", "score", "absent"],
     "virtual campaign -o": ["virtual", "campaign"],
