@@ -34,6 +34,7 @@ def analysis() -> SweepAnalysis:
 
 @pytest.fixture(autouse=True)
 def no_window() -> Iterator[None]:
+    pyplot.close("all")  # those of other tests
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(matplotlib.rcParams, "backend", "agg")
         yield
