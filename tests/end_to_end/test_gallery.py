@@ -66,6 +66,7 @@ def test_where_nothing_is_hidden_nothing_is_claimed(run_script: Callable[[str], 
     assert sum(verdict.probabilities.values()) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_the_map_is_that_of_the_law(run_script: Callable[[str], Names]) -> None:
     names = run_script("03_sweep_to_map")
     assert names["map_error"] < 0.03
@@ -106,6 +107,7 @@ def test_the_ball_holds_where_it_was_tuned(run_script: Callable[[str], Names]) -
     assert min(names["errors"][2.5], names["errors"][5.5]) > 0.3
 
 
+@pytest.mark.slow
 def test_the_network_stays_below_its_ceiling_and_beats_a_repeat(run_script: Callable[[str], Names]) -> None:
     fits = run_script("07_network_and_its_ceiling")["fits"]
     assert fits["a repeat in its place"] < fits["this model"] < fits["the ceiling"] < 100.0
