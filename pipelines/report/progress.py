@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, Protocol
@@ -48,6 +49,8 @@ class Advance(Protocol):
 class _Lines:
     """A line on standard error every half minute, and one at the end; commands that take less say nothing.
 
+    A thread says them, so that a step of many minutes is no silence.
+
     Parameters
     ----------
     description : str
@@ -60,14 +63,28 @@ class _Lines:
         self._began = self._said = time.monotonic()
         self._left = TimeLeft(self._began, plan)
         self._has_said = False
+        self._latest: tuple[float, float, str] = (0.0, 0.0, "")
+        self._lock, self._ended = threading.Lock(), threading.Event()
+        threading.Thread(target=self._repeat, name="progress in lines", daemon=True).start()
 
     def __call__(self, done: float, everything: float, note: str = "") -> None:
         """Take what is done; another amount of work in all, or none of it done, is another step."""
-        now = time.monotonic()
-        self._left.at(now, done, everything, note)
-        if now - self._said < _LINE_EVERY_S:
+        with self._lock:
+            now = time.monotonic()
+            self._latest = (done, everything, note)
+            self._left.at(now, done, everything, note)
+            self._say_where_due(now)
+
+    def _repeat(self) -> None:
+        while not self._ended.wait(_LINE_EVERY_S):
+            with self._lock:
+                self._say_where_due(time.monotonic())
+
+    def _say_where_due(self, now: float) -> None:
+        if now - self._said < _LINE_EVERY_S or self._ended.is_set():
             return
         self._said, self._has_said = now, True
+        done, everything, note = self._latest
         share = f", {100 * done / everything:.0f} %" if everything > 0 else ""
         seconds = self._left.seconds(now)
         left = "" if seconds is None else f", about {_duration(seconds)} left"
@@ -75,6 +92,11 @@ class _Lines:
             left += " of this step"
         step = f": {note}" if note else ""
         say(f"{self._description}, {_duration(now - self._began)} so far{step}{share}{left}", error=True)
+
+    def stop(self) -> None:
+        """Say nothing more."""
+        with self._lock:
+            self._ended.set()
 
     def end(self) -> None:
         """Say that it is done, if anything was said before."""
@@ -112,7 +134,10 @@ def amounts(description: str, plan: Plan = ()) -> Iterator[Advance]:
         return
     if not sys.stderr.isatty():
         lines = _Lines(description, plan)
-        yield lines
+        try:
+            yield lines
+        finally:
+            lines.stop()
         lines.end()
         return
     left = TimeLeft(time.monotonic(), plan)
@@ -144,7 +169,10 @@ def progress(description: str, total: int, weights: Sequence[float] = ()) -> Ite
     work, steps = WeightedSteps(weights or [1.0] * total), itertools.count(1)
     if not sys.stderr.isatty():
         lines = _Lines(description)
-        yield lambda step: lines(work.done(next(steps)), work.everything, step)
+        try:
+            yield lambda step: lines(work.done(next(steps)), work.everything, step)
+        finally:
+            lines.stop()
         lines.end()
         return
     left = TimeLeft(time.monotonic())
