@@ -76,7 +76,8 @@ class _Lines:
             self._say_where_due(now)
 
     def _repeat(self) -> None:
-        while not self._ended.wait(_LINE_EVERY_S):
+        # until the next line is due, which one that the command said has put off
+        while not self._ended.wait(max(self._said + _LINE_EVERY_S - time.monotonic(), 0.01)):
             with self._lock:
                 self._say_where_due(time.monotonic())
 
