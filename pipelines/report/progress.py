@@ -65,7 +65,8 @@ class _Lines:
         self._has_said = False
         self._latest: tuple[float, float, str] = (0.0, 0.0, "")
         self._lock, self._ended = threading.Lock(), threading.Event()
-        threading.Thread(target=self._repeat, name="progress in lines", daemon=True).start()
+        self._thread = threading.Thread(target=self._repeat, name="progress in lines", daemon=True)
+        self._thread.start()
 
     def __call__(self, done: float, everything: float, note: str = "") -> None:
         """Take what is done; another amount of work in all, or none of it done, is another step."""
@@ -95,9 +96,10 @@ class _Lines:
         say(f"{self._description}, {_duration(now - self._began)} so far{step}{share}{left}", error=True)
 
     def stop(self) -> None:
-        """Say nothing more."""
+        """Say nothing more, and leave no thread behind."""
         with self._lock:
             self._ended.set()
+        self._thread.join()
 
     def end(self) -> None:
         """Say that it is done, if anything was said before."""

@@ -28,7 +28,6 @@ def run_script(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], Name
     monkeypatch.setattr(plt, "show", lambda: None)
     with plt.rc_context({"backend": "agg"}):
         yield lambda name: runpy.run_path(f"{name}.py")
-        plt.close("all")
 
 
 def test_there_are_at_least_ten_with_a_title_and_a_text_each() -> None:

@@ -20,7 +20,6 @@ def no_window() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(matplotlib.rcParams, "backend", "agg")
         yield
-    pyplot.close("all")
 
 
 def test_given_axes_are_used_and_no_figure_is_made() -> None:

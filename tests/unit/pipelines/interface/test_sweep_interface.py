@@ -34,11 +34,9 @@ def analysis() -> SweepAnalysis:
 
 @pytest.fixture(autouse=True)
 def no_window() -> Iterator[None]:
-    pyplot.close("all")  # those of other tests
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(matplotlib.rcParams, "backend", "agg")
         yield
-    pyplot.close("all")
 
 
 @pytest.mark.parametrize("quantity", ["", "w_bar", "beta", "w_bar_over_v_bar", "work_j"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 import pytest
@@ -32,6 +33,7 @@ def test_nothing_is_said_after_the_end(fails: bool, capsys: pytest.CaptureFixtur
         advance(1, 4, "the first step")
         if fails:
             raise ZeroDivisionError
+    assert "progress in lines" not in [thread.name for thread in threading.enumerate()]
     capsys.readouterr()
     time.sleep(0.3)
     assert "searching" not in capsys.readouterr().err
