@@ -5,7 +5,7 @@ VENV := .venv
 LOCK := requirements.lock
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-EXTRAS := formats,interactive,dev,docs,trial,live
+EXTRAS := formats,interactive,dev,docs,trial,live,aircraft
 comma := ,
 PIP = $(BIN)/python -m pip --quiet --disable-pip-version-check
 UPGRADE := --upgrade
@@ -72,8 +72,10 @@ closed-loop: setup  ## the beam with the model of `make rom` (or ROM=file) and b
 	$(BIN)/sloshlab beam raw_data/numerical_tank/beam/*.nc --rig raw_data/numerical_tank/beam/rig_beam.toml \
 	  --rom $(ROM) $(addprefix --ball ,$(BALLS)) -o $(RESULTS)/closed_loop || [ $$? -eq 3 ]
 
-flutter-checks: setup  ## published and exact numbers of aeroelasticity: asked and reached (a minute)
+flutter-checks: setup  ## numbers of aeroelasticity, asked and reached, and a flying wing with a tank (2 min)
+	mkdir -p $(RESULTS)
 	$(BIN)/python -m studies.flutter_checks $(RESULTS)/flutter_checks.json
+	$(BIN)/sloshlab flutter raw_data/aircraft/maewing1/case_1.toml -o $(RESULTS)/flutter
 
 rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
 	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study

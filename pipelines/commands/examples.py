@@ -56,7 +56,7 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
     ),
     "flutter": (
         "sloshlab flutter wing.toml --from 60 --to 180 -o results",
-        "sloshlab flutter wing.toml --from 60 --to 180 --speeds 30 --cache forces -o results",
+        "sloshlab flutter aircraft.toml --models frozen,lateral --cache forces -o results",
     ),
     "case new": ("sloshlab case new CASE --rig rig.toml --recordings run_1.nc run_2.nc",),
     "case check": ("sloshlab case check CASE",),

@@ -1,26 +1,20 @@
-"""Root locus, p-k and flutter points of a wing."""
+"""Root locus, p-k and flutter points of a wing or an aircraft."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.flutter.model_file import WingModel, read_model
+from pipelines.flutter.model_file import read_model
+from pipelines.flutter.problem import FlutterProblem, Variant, problem_of
 from pipelines.report.progress import progress
-from sloshlab.aeroelastic.bending_torsion_beam import WingModes
-from sloshlab.aeroelastic.generalised_force_cache import CacheStatus, cached_generalised_forces
-from sloshlab.aeroelastic.generalised_forces import generalised_forces, usual_reduced_frequencies
-from sloshlab.aeroelastic.modal_structure import ModalStructure, of_modes
-from sloshlab.aeroelastic.p_k import Forces, PkRoots, p_k_roots
-from sloshlab.aeroelastic.rational_functions import RationalForces
-from sloshlab.aeroelastic.rational_minimum_state import minimum_state_fit
-from sloshlab.aeroelastic.rational_roger import roger_fit
-from sloshlab.aeroelastic.root_locus import RootLocus, root_locus
-from sloshlab.aeroelastic.state_space import system_over_speed
-from sloshlab.aeroelastic.strip import strip_table
+from sloshlab.aeroelastic.generalised_force_cache import CacheStatus
+from sloshlab.aeroelastic.p_k import PkRoots, p_k_roots
+from sloshlab.aeroelastic.root_locus import Crossing, RootLocus, root_locus
 from sloshlab.errors import InputError
 
 FloatArray = npt.NDArray[np.float64]
@@ -38,11 +32,14 @@ class FlutterSettings:
         Range of speeds.
     n_speeds : int
         How many, evenly.
+    models : tuple of str
+        Liquids of an aircraft, ``frozen`` or ``lateral``; empty for all that it can have.
     """
 
     first_m_per_s: float
     last_m_per_s: float
     n_speeds: int
+    models: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 < self.first_m_per_s < self.last_m_per_s < np.inf:
@@ -53,74 +50,97 @@ class FlutterSettings:
             raise InputError("--speeds", got=f"{self.n_speeds}", allowed="2 … 10000")
 
 
-@dataclass(frozen=True)
-class FlutterExperiment:
-    """A wing, what was computed of it, and from what.
+@dataclass(frozen=True, eq=False)
+class Stability:
+    """Roots of one variant.
 
     Attributes
     ----------
-    model, settings, inputs
-        As given.
-    modes : WingModes
-        Dry.
-    reduced_frequency, table : ndarray, shapes (n_k,), (n_k, n, n)
-        Generalised forces over q_D.
-    rational : RationalForces
-        Their fit.
+    variant : Variant
     locus : RootLocus
-        By the fit.
+        By rational functions.
     p_k : PkRoots
         By the table.
-    cache : CacheStatus or None
-        Where the table is from; None for strips.
+    semi_chord_m, largest_reduced_frequency : float
+        b, and how far the forces are known.
     """
 
-    model: WingModel
-    settings: FlutterSettings
-    inputs: tuple[Path, ...]
-    modes: WingModes
-    reduced_frequency: FloatArray
-    table: npt.NDArray[np.complex128]
-    rational: RationalForces
+    variant: Variant
     locus: RootLocus
     p_k: PkRoots
-    cache: CacheStatus | None = None
-    provenance: dict[str, object] = field(default_factory=dict)
+    semi_chord_m: float
+    largest_reduced_frequency: float
 
     @property
-    def semi_chord_m(self) -> float:
-        """b of reduced frequencies."""
-        return self.rational.semi_chord_m
+    def name(self) -> str:
+        """Of the variant."""
+        return self.variant.name
 
     @property
     def p_k_flutter_m_per_s(self) -> float:
-        """Lowest crossing of the p-k roots, NaN if there is none; linear between speeds."""
-        real = self.p_k.pole_rad_per_s.real
-        rows, columns = np.nonzero((real[:-1] <= 0) & (real[1:] > 0) & (self.p_k.pole_rad_per_s.imag[1:] > 0))
-        if rows.size == 0:
+        """The p-k crossing that is nearest to the first flutter of the root locus, NaN if there is none."""
+        found, flutter = self._p_k_crossings(), self.locus.flutter
+        if flutter is None or not found:
             return float("nan")
-        low, high = real[rows[0], columns[0]], real[rows[0] + 1, columns[0]]
-        speed = self.p_k.speed_m_per_s
-        return float(speed[rows[0]] - low / (high - low) * (speed[rows[0] + 1] - speed[rows[0]]))
+
+        def distance(crossing: tuple[float, float]) -> float:
+            speed, frequency = crossing
+            return abs(speed / flutter.speed_m_per_s - 1) + abs(frequency / flutter.frequency_rad_per_s - 1)
+
+        return min(found, key=distance)[0]
+
+    def _p_k_crossings(self) -> list[tuple[float, float]]:
+        """Speed and frequency where p-k roots begin to grow, linear between computed speeds."""
+        pole, speed = self.p_k.pole_rad_per_s, self.p_k.speed_m_per_s
+        grows = (pole.real[:-1] <= 0) & (pole.real[1:] > 0) & (pole.imag[1:] > 0)
+        found = []
+        for row, column in zip(*np.nonzero(grows), strict=True):
+            low, high = pole[row, column], pole[row + 1, column]
+            weight = float(-low.real / (high.real - low.real))
+            found.append((float(speed[row] + weight * (speed[row + 1] - speed[row])), float(high.imag)))
+        return found
 
     @property
     def flags(self) -> tuple[str, ...]:
         """What must be read before the result."""
         found = list(self.locus.flags)
-        for crossing in self.locus.crossings:
-            k = crossing.frequency_rad_per_s * self.semi_chord_m / crossing.speed_m_per_s
-            if k > self.rational.largest_reduced_frequency:
-                found.append(
-                    f"flutter at {crossing.speed_m_per_s:.5g} m/s has k = {k:.3g}, beyond"
-                    f" {self.rational.largest_reduced_frequency:.3g} of the aerodynamics"
-                )
+        found += [text for crossing in self.locus.crossings for text in self._beyond(crossing)]
         flutter = self.locus.flutter
-        if flutter is not None and np.isfinite(self.p_k_flutter_m_per_s):
+        if flutter is not None:
             difference = self.p_k_flutter_m_per_s / flutter.speed_m_per_s - 1
-            if abs(difference) > _LARGEST_DISAGREEMENT:
+            if np.isnan(difference):
+                found.append(f"p-k does not find the flutter at {flutter.speed_m_per_s:.5g} m/s of the root locus")
+            elif abs(difference) > _LARGEST_DISAGREEMENT:
                 found.append(f"flutter by p-k is {100 * difference:.1f} % off that of the root locus")
-        if self.cache is CacheStatus.DAMAGED:
-            found.append(f"generalised forces were {self.cache.value}")
+        return tuple(found)
+
+    def _beyond(self, crossing: Crossing) -> list[str]:
+        k = crossing.frequency_rad_per_s * self.semi_chord_m / crossing.speed_m_per_s
+        if k <= self.largest_reduced_frequency:
+            return []
+        return [
+            f"flutter at {crossing.speed_m_per_s:.5g} m/s has k = {k:.3g}, beyond"
+            f" {self.largest_reduced_frequency:.3g} of the aerodynamics"
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class FlutterExperiment:
+    """A wing or an aircraft, what was computed of it, and from what."""
+
+    problem: FlutterProblem
+    settings: FlutterSettings
+    inputs: tuple[Path, ...]
+    results: tuple[Stability, ...]
+    provenance: dict[str, object] = field(default_factory=dict)
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What must be read before the results, with the variant's name where there are several."""
+        several = len(self.results) > 1
+        found = [f"{result.name}: {flag}" if several else flag for result in self.results for flag in result.flags]
+        if self.problem.cache is CacheStatus.DAMAGED:
+            found.append(f"generalised forces were {self.problem.cache.value}")
         return tuple(found)
 
 
@@ -132,7 +152,7 @@ def analyse_flutter(path: Path, settings: FlutterSettings, *, cache: Path | None
     path : Path
         The model.
     settings : FlutterSettings
-        Speeds.
+        Speeds, and models of an aircraft's liquids.
     cache : Path, optional
         Folder that keeps generalised forces of the doublet lattice.
 
@@ -140,60 +160,32 @@ def analyse_flutter(path: Path, settings: FlutterSettings, *, cache: Path | None
     -------
     FlutterExperiment
     """
-    model = read_model(path)
-    wing = model.wing
-    modes = wing.modes(model.structure.n_modes, n_elements=model.structure.n_elements)
-    structure = of_modes(modes.structure.natural_frequency_rad_per_s, damping_ratio=model.structure.damping_ratio)
-    k = usual_reduced_frequencies(
-        model.aerodynamics.largest_reduced_frequency, model.aerodynamics.n_reduced_frequencies
-    )
-    forces, table, status = _forces(model, modes, k, cache)
-    rational = _fit(model, k, table)
+    problem = problem_of(read_model(path), settings.models, cache)
+    with progress("root loci", 2 * len(problem.variants)) as advance:
+        results = tuple(_stability(problem, variant, settings, advance) for variant in problem.variants)
+    return FlutterExperiment(problem, settings, (path,), results)
+
+
+def _stability(
+    problem: FlutterProblem, variant: Variant, settings: FlutterSettings, advance: Callable[[str], None]
+) -> Stability:
     speeds = np.linspace(settings.first_m_per_s, settings.last_m_per_s, settings.n_speeds)
-    density = model.flow.density_kg_per_m3
-    locus = root_locus(system_over_speed(structure, rational, density_kg_per_m3=density), speeds, structure.names)
-    p_k = _p_k(structure, forces, rational.semi_chord_m, (density, speeds))
-    return FlutterExperiment(model, settings, (path,), modes, k, table, rational, locus, p_k, status)
+    locus = root_locus(variant.matrix_at, speeds, variant.structure.names, rigid=variant.rigid)
+    advance(f"{variant.name}, rational functions")
+    rational = problem.rational
+    roots = _p_k(variant, rational.semi_chord_m, problem.density_kg_per_m3, speeds)
+    advance(f"{variant.name}, p-k")
+    return Stability(variant, locus, roots, rational.semi_chord_m, rational.largest_reduced_frequency)
 
 
-def _forces(
-    model: WingModel, modes: WingModes, k: FloatArray, cache: Path | None
-) -> tuple[Forces, npt.NDArray[np.complex128], CacheStatus | None]:
-    wing, chosen = model.wing, model.aerodynamics
-    if chosen.method == "strips":
-        forces = strip_table(wing.strips(modes, chosen.n_span), semi_chord_m=wing.semi_chord_m)
-        return forces, np.array([forces(float(value)) for value in k]), None
-    boxes = wing.boxes(chosen.n_span, chosen.n_chord)
-    motion = wing.motion(boxes, modes)
-    with progress("doublet lattice", k.size) as advance:
-        told = {
-            "semi_chord_m": wing.semi_chord_m,
-            "mach": model.flow.mach,
-            "progress": lambda _done, _all, note: advance(note),
-        }
-        if cache is None:
-            lattice = generalised_forces(boxes, motion, k, **told)  # type: ignore[arg-type]
-            return lattice.at, lattice.motion, CacheStatus.MADE
-        lattice, status = cached_generalised_forces(cache, boxes, motion, k, **told)  # type: ignore[arg-type]
-    return lattice.at, lattice.motion, status
-
-
-def _fit(model: WingModel, k: FloatArray, table: npt.NDArray[np.complex128]) -> RationalForces:
-    fit = roger_fit if model.aerodynamics.rational == "roger" else minimum_state_fit
-    return fit(k, table, semi_chord_m=model.wing.semi_chord_m, lags=np.array(model.aerodynamics.lags))
-
-
-def _p_k(
-    structure: ModalStructure, forces: Forces, semi_chord_m: float, flow: tuple[float, FloatArray]
-) -> PkRoots:
-    density, speeds = flow
+def _p_k(variant: Variant, semi_chord_m: float, density_kg_per_m3: float, speeds: FloatArray) -> PkRoots:
     # modes are followed from low speeds on, where each has the frequency that it has without flow
     lead = np.geomspace(speeds[0] / 20, speeds[0], 8)[:-1]
     roots = p_k_roots(
-        structure,
-        forces,
+        variant.structure,
+        variant.forces,
         semi_chord_m=semi_chord_m,
-        density_kg_per_m3=density,
+        density_kg_per_m3=density_kg_per_m3,
         speeds=np.concatenate([lead, speeds]),
     )
     keep = slice(lead.size, None)

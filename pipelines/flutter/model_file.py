@@ -1,4 +1,4 @@
-"""A wing and the flow around it, from a TOML file."""
+"""A wing or an aircraft and the flow around it, from a TOML file."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from sloshlab.aeroelastic.cantilever_wing import CantileverWing, Station
+from sloshlab.aircraft.model import AircraftModel, RationalFit, load_model
 from sloshlab.errors import InputError
 from sloshlab.toml_file import read_toml
 
@@ -35,16 +36,12 @@ class StructureTable(_Table):
     damping_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.0
 
 
-class AerodynamicsTable(_Table):
+class AerodynamicsTable(RationalFit):
     """How the air's forces are computed, and fitted."""
 
     method: Literal["strips", "lattice"]
     n_span: Annotated[int, Field(ge=1, le=200)] = 20
     n_chord: Annotated[int, Field(ge=1, le=50)] = 6
-    largest_reduced_frequency: _Positive = 1.3
-    n_reduced_frequencies: Annotated[int, Field(ge=6, le=100)] = 15
-    rational: Literal["roger", "minimum_state"] = "roger"
-    lags: tuple[_Positive, ...] = (0.08, 0.197, 0.487, 1.2)
 
 
 class StationTable(_Table):
@@ -76,8 +73,8 @@ class WingModel(_Table):
         return CantileverWing(tuple(Station(**station.model_dump()) for station in self.station))
 
 
-def read_model(path: Path) -> WingModel:
-    """Read a model file.
+def read_model(path: Path) -> WingModel | AircraftModel:
+    """Read a model file: of an aircraft if it has [aircraft], else of a wing.
 
     Parameters
     ----------
@@ -86,14 +83,16 @@ def read_model(path: Path) -> WingModel:
 
     Returns
     -------
-    WingModel
+    WingModel or AircraftModel
 
     Raises
     ------
     InputError
-        If the file is not TOML or describes no wing; one line names the place.
+        If the file is not TOML or describes neither; one line names the place.
     """
     document = read_toml(path, f"model {path.name}", remedy="give a model file")
+    if "aircraft" in document:
+        return load_model(path)
     try:
         model = WingModel.model_validate(document)
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""Writing `stability.nc` and the report of a wing."""
+"""Writing `stability.nc` and the report of a wing or an aircraft."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipelines.flutter import figures
-from pipelines.flutter.analysis import FlutterExperiment
+from pipelines.flutter import figures, mode_figures
+from pipelines.flutter.analysis import FlutterExperiment, Stability
+from pipelines.flutter.problem import FlutterProblem
 from pipelines.report.citations import Citation
 from pipelines.report.numbers import text
 from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines, stamp_of, write_dataset
@@ -59,9 +60,10 @@ def write_flutter(
 ) -> dict[str, Any]:
     """Write `stability.nc` and the report; return the summary of the command."""
     provenance = provenance_of(command, experiment.inputs, settings=experiment.settings)
+    name = experiment.problem.name
     with result_folder(folder, provenance) as complete:
         dataset = _dataset(experiment).assign_attrs(
-            title="Stability over the speed", wing=experiment.model.name, **stamp_of(provenance)
+            title="Stability over the speed", name=name, **stamp_of(provenance)
         )
         write_dataset(dataset, complete / "stability.nc")
         if report:
@@ -70,11 +72,28 @@ def write_flutter(
             page = _page(dataclasses.replace(experiment, provenance=provenance))
             write_page(page, complete, result_id=provenance[RESULT_ID])
     return {
-        "wing": experiment.model.name,
-        "crossings": [dataclasses.asdict(crossing) for crossing in experiment.locus.crossings],
-        "p_k_flutter_m_per_s": _known(experiment.p_k_flutter_m_per_s),
+        "name": name,
+        "models": {result.name: _summary(result) for result in experiment.results},
         "flags": list(experiment.flags),
         "lines": [*_sentences(experiment), *report_lines(folder, written=report)],
+    }
+
+
+def _summary(result: Stability) -> dict[str, Any]:
+    flutter = result.locus.flutter
+    return {
+        "flutter_speed_m_per_s": None if flutter is None else flutter.speed_m_per_s,
+        "flutter_frequency_rad_per_s": None if flutter is None else flutter.frequency_rad_per_s,
+        "p_k_flutter_m_per_s": _known(result.p_k_flutter_m_per_s),
+        "crossings": [
+            {
+                "kind": crossing.kind,
+                "speed_m_per_s": crossing.speed_m_per_s,
+                "frequency_rad_per_s": crossing.frequency_rad_per_s,
+                "origin": crossing.origin,
+            }
+            for crossing in result.locus.crossings
+        ],
     }
 
 
@@ -83,97 +102,168 @@ def _known(value: float) -> float | None:
 
 
 def _dataset(experiment: FlutterExperiment) -> xr.Dataset:
-    locus = experiment.locus
-    pole = locus.pole_rad_per_s
+    """Models side by side; one with fewer branches has NaN for the rest."""
+    results = experiment.results
+    loci = [result.locus for result in results]
+    n_branches = max(len(locus.origin) for locus in loci)
+    pole = np.full((len(loci), loci[0].speed_m_per_s.size, n_branches), np.nan, dtype=complex)
+    origin = np.full((len(loci), n_branches), "", dtype=object)
+    for number, locus in enumerate(loci):
+        pole[number, :, : len(locus.origin)] = locus.pole_rad_per_s
+        origin[number, : len(locus.origin)] = locus.origin
     size = np.abs(pole)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(size > 0, -pole.real / size, np.nan)
-    along = ("speed_m_per_s", "branch")
+    along = ("model", "speed", "branch")
+    found = [(result.name, crossing) for result in results for crossing in result.locus.crossings]
+    flutter = [locus.flutter for locus in loci]
     variables: dict[str, Any] = {
-        "pole_real_per_s": (along, pole.real),
-        "pole_imag_rad_per_s": (along, pole.imag),
+        "pole_real": (along, pole.real),
+        "pole_imag": (along, pole.imag),
         "damping_ratio": (along, ratio),
-        "origin": ("branch", np.array(locus.origin, dtype=object)),
-        "crossing_speed_m_per_s": ("crossing", [found.speed_m_per_s for found in locus.crossings]),
-        "crossing_frequency_rad_per_s": ("crossing", [found.frequency_rad_per_s for found in locus.crossings]),
-        "crossing_origin": ("crossing", np.array([found.origin for found in locus.crossings], dtype=object)),
+        "origin": (("model", "branch"), origin),
+        "flutter_speed": ("model", [np.nan if one is None else one.speed_m_per_s for one in flutter]),
+        "flutter_frequency": ("model", [np.nan if one is None else one.frequency_rad_per_s for one in flutter]),
+        "p_k_flutter_speed": ("model", [result.p_k_flutter_m_per_s for result in results]),
+        "crossing_model": ("crossing", np.array([name for name, _ in found], dtype=object)),
+        "crossing_kind": ("crossing", np.array([crossing.kind for _, crossing in found], dtype=object)),
+        "crossing_origin": ("crossing", np.array([crossing.origin for _, crossing in found], dtype=object)),
+        "crossing_speed": ("crossing", np.array([crossing.speed_m_per_s for _, crossing in found])),
+        "crossing_frequency": ("crossing", np.array([crossing.frequency_rad_per_s for _, crossing in found])),
     }
-    return described(xr.Dataset(variables, coords={"speed_m_per_s": locus.speed_m_per_s}))
+    coordinates = {
+        "model": np.array([result.name for result in results], dtype=object),
+        "speed": loci[0].speed_m_per_s,
+    }
+    return described(xr.Dataset(variables, coords=coordinates))
 
 
 def _page(experiment: FlutterExperiment) -> Page:
-    def plan(name: str, draw: Any) -> FigurePlan:
-        return FigurePlan(name, partial(draw, experiment=experiment))
+    def plan(name: str, draw: Any, **more: Any) -> FigurePlan:
+        return FigurePlan(name, partial(draw, **more))
 
-    stability = SectionPlan(
-        "Stability",
-        (
-            plan("root_locus", figures.root_locus),
-            plan("damping_and_frequency", figures.damping_and_frequency),
-        ),
-        (_crossing_table(experiment),),
-    )
-    wing = SectionPlan("The wing without flow", (plan("mode_shapes", figures.mode_shapes),))
-    forces = SectionPlan(
-        "Forces of the air", (plan("fit_of_forces", figures.fit_of_forces),), (_fit_table(experiment),)
-    )
-    provenance = SectionPlan("Provenance", (), (provenance_table(experiment.provenance),))
+    several = len(experiment.results) > 1
+    sections = []
+    for result in experiment.results:
+        ending = f"_{result.name}" if several else ""
+        sections.append(
+            SectionPlan(
+                f"Stability, {result.name}" if several else "Stability",
+                (
+                    plan(f"root_locus{ending}", figures.root_locus, result=result),
+                    plan(f"damping_and_frequency{ending}", figures.damping_and_frequency, result=result),
+                ),
+                (_crossing_table(result),),
+            )
+        )
+    if several:
+        compared = plan("models", figures.models_compared, results=experiment.results)
+        sections.insert(0, SectionPlan("Frozen and sloshing", (compared,), (_model_table(experiment),)))
+    shapes = plan("mode_shapes", mode_figures.mode_shapes, shapes=experiment.problem.shapes)
+    forces = plan("fit_of_forces", figures.fit_of_forces, problem=experiment.problem)
+    sections += [
+        SectionPlan("Modes without flow", (shapes,)),
+        SectionPlan("Forces of the air", (forces,), (_fit_table(experiment.problem),)),
+        SectionPlan("Provenance", (), (provenance_table(experiment.provenance),)),
+    ]
     return Page(
         title="Flutter",
-        subtitle=f"{experiment.model.name} · sloshlab {__version__}",
+        subtitle=f"{experiment.problem.name} · sloshlab {__version__}",
         flags=experiment.flags,
         summary=_sentences(experiment),
-        plans=(stability, wing, forces, provenance),
+        plans=tuple(sections),
         papers=_PAPERS,
     )
 
 
 def _sentences(experiment: FlutterExperiment) -> tuple[str, ...]:
-    found = [
-        f"{crossing.kind} at {crossing.speed_m_per_s:.2f} m/s"
-        + (f", {crossing.frequency_rad_per_s:.2f} rad/s" if crossing.kind == "flutter" else "")
-        + f", from {crossing.origin}"
-        for crossing in experiment.locus.crossings
-    ]
     first, last = experiment.settings.first_m_per_s, experiment.settings.last_m_per_s
-    return tuple(found) or (f"no root grows from {first:g} to {last:g} m/s",)
+    several = len(experiment.results) > 1
+    found = []
+    for result in experiment.results:
+        before = f"{result.name}: " if several else ""
+        lines = [
+            f"{before}{crossing.kind} at {crossing.speed_m_per_s:.2f} m/s"
+            + (f", {crossing.frequency_rad_per_s:.2f} rad/s" if crossing.frequency_rad_per_s else "")
+            + f", from {crossing.origin}"
+            for crossing in result.locus.crossings
+            if crossing.kind != "flight"
+        ]
+        found += lines or [f"{before}no root grows from {first:g} to {last:g} m/s"]
+    return (*found, *_difference(experiment))
 
 
-def _crossing_table(experiment: FlutterExperiment) -> Table:
-    b = experiment.semi_chord_m
+def _difference(experiment: FlutterExperiment) -> tuple[str, ...]:
+    """What sloshing does to the first flutter."""
+    flutter = {result.name: result.locus.flutter for result in experiment.results}
+    frozen, lateral = flutter.get("frozen"), flutter.get("lateral")
+    if frozen is None or lateral is None:
+        return ()
+    speed = _percent(lateral.speed_m_per_s, frozen.speed_m_per_s)
+    frequency = _percent(lateral.frequency_rad_per_s, frozen.frequency_rad_per_s)
+    return (f"sideways sloshing changes the first flutter by {speed} in speed and {frequency} in frequency",)
+
+
+def _percent(value: float, reference: float) -> str:
+    return f"{100 * (value / reference - 1):+.2f} %".replace("-", "−")
+
+
+def _model_table(experiment: FlutterExperiment) -> Table:
+    rows = []
+    for result in experiment.results:
+        flutter = result.locus.flutter
+        speed, frequency = (
+            (float("nan"),) * 2 if flutter is None else (flutter.speed_m_per_s, flutter.frequency_rad_per_s)
+        )
+        rows.append((result.name, text(speed, 5), text(frequency, 5), text(result.p_k_flutter_m_per_s, 5)))
+    return Table(
+        "First flutter",
+        ("liquids", "speed [m/s]", "frequency [rad/s]", "speed by p-k [m/s]"),
+        tuple(rows),
+        "Frozen liquids have the inertia of solids; lateral ones slosh sideways as equivalent masses. p-k is in "
+        "inertial axes, without weight.",
+    )
+
+
+def _crossing_table(result: Stability) -> Table:
     rows = tuple(
         (
             crossing.kind,
             crossing.origin,
             f"{crossing.speed_m_per_s:.3f}",
             text(crossing.frequency_rad_per_s, 5),
-            text(crossing.frequency_rad_per_s * b / crossing.speed_m_per_s, 3),
+            text(crossing.frequency_rad_per_s * result.semi_chord_m / crossing.speed_m_per_s, 3),
         )
-        for crossing in experiment.locus.crossings
+        for crossing in result.locus.crossings
     )
-    other = text(experiment.p_k_flutter_m_per_s, 6)
+    note = (
+        "By bisection of the root locus to 1 mm/s. First flutter by p-k, between computed speeds: "
+        f"{text(result.p_k_flutter_m_per_s, 6)} m/s."
+    )
+    if any(crossing.kind == "flight" for crossing in result.locus.crossings):
+        note += " Flight: the body moves as a whole, as in a phugoid or spiral; without drag that is not decided."
     return Table(
         "Where a root begins to grow",
         ("kind", "branch", "speed [m/s]", "frequency [rad/s]", "reduced frequency"),
         rows,
-        f"By bisection of the root locus to 1 mm/s. First flutter by p-k, between computed speeds: {other} m/s.",
+        note,
     )
 
 
-def _fit_table(experiment: FlutterExperiment) -> Table:
-    quality = experiment.rational.quality
+def _fit_table(problem: FlutterProblem) -> Table:
+    quality = problem.rational.quality
     rms, largest = (quality.rms, float(quality.largest.max())) if quality else (float("nan"), float("nan"))
-    chosen = experiment.model.aerodynamics
+    chosen = problem.fit
     rows = (
-        ("method", chosen.method),
-        ("table", experiment.cache.value if experiment.cache else "computed"),
+        ("method", problem.method),
+        ("table", problem.cache.value if problem.cache else "computed"),
         ("rational functions", chosen.rational.replace("_", " ")),
-        ("lag states", str(experiment.rational.lags.size)),
+        ("lag states", str(problem.rational.lags.size)),
         ("error of all entries, RMS", f"{100 * rms:.3f} %"),
         ("largest error of an entry over its largest value", f"{100 * largest:.2f} %"),
         (
             "reduced frequencies",
-            f"{experiment.reduced_frequency.size}, up to {experiment.reduced_frequency[-1]:g}",
+            f"{problem.reduced_frequency.size}, up to {problem.reduced_frequency[-1]:g}",
         ),
     )
     return Table("Generalised forces", ("", ""), rows)

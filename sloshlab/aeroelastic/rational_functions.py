@@ -7,7 +7,7 @@ In time, with ȧ = −(U/b) P a + B q̇:  e = q_D [A₀ q + (b/U) A₁ q̇ + (b/
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -85,6 +85,24 @@ class RationalForces:
         p = complex(reduced_laplace)
         lagged = p * (self.lag_output / (p + self.lags)) @ self.lag_input
         return np.asarray(self.a0 + p * self.a1 + p**2 * self.a2 + lagged, dtype=complex)
+
+    def transferred(self, motion: FloatArray) -> RationalForces:
+        """The same forces on and by other coordinates.
+
+        Parameters
+        ----------
+        motion : ndarray, shape (n, n_new)
+            Old coordinates per new one.
+        """
+        require_shape("motion", motion, (self.a0.shape[0], -1))
+        of_motion = {name: motion.T @ getattr(self, name) @ motion for name in ("a0", "a1", "a2")}
+        return replace(
+            self,
+            **of_motion,
+            lag_output=motion.T @ self.lag_output,
+            lag_input=self.lag_input @ motion,
+            quality=None,
+        )
 
 
 def quality_of(forces: RationalForces, reduced_frequency: FloatArray, table: ComplexArray) -> FitQuality:

@@ -7,7 +7,7 @@ root was heading. Where a branch changes its shape within a step, or two come ne
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,8 @@ _NEAR = 0.25
 _REAL_SHARE = 1e-9
 _LEAST_SHARE = 0.2
 """Of a coordinate in a root that is named by it; of a mode without flow it is 1."""
+_LEAST_ELASTIC_SHARE = 0.05
+"""Of modes and liquids in a root that is flutter or divergence of them; below it the body flies as a whole."""
 _LAG = "lag"
 
 
@@ -55,15 +57,20 @@ class Crossing:
         Where; frequency 0 is divergence.
     origin : str
         Mode at which the branch starts, or the number of a lag.
+    elastic_share : float
+        Of coordinates that are not those of a rigid body, in the root.
     """
 
     speed_m_per_s: float
     frequency_rad_per_s: float
     origin: str
+    elastic_share: float = 1.0
 
     @property
     def kind(self) -> str:
-        """``flutter`` or ``divergence``."""
+        """``flutter``, ``divergence``, or ``flight`` of a body that hardly deforms."""
+        if self.elastic_share < _LEAST_ELASTIC_SHARE:
+            return "flight"
         return "flutter" if self.frequency_rad_per_s > 0 else "divergence"
 
 
@@ -112,6 +119,7 @@ def root_locus(
     speeds: FloatArray,
     names: tuple[str, ...],
     *,
+    rigid: Collection[str] = (),
     start_m_per_s: float | None = None,
     tolerance_m_per_s: float = 1e-3,
 ) -> RootLocus:
@@ -125,6 +133,8 @@ def root_locus(
         Ascending, > 0, two at least.
     names : tuple of str
         Of the coordinates.
+    rigid : collection of str
+        Those of them that move the body as a whole.
     start_m_per_s : float, optional
         Where branches are named, low enough for modes without flow; a twentieth of the first speed if not given.
     tolerance_m_per_s : float
@@ -146,6 +156,7 @@ def root_locus(
     require_positive(first_speed_m_per_s=float(speeds[0]), start_m_per_s=float(start))
     first = roots_of(system(start))
     origin = _origins(first, names)
+    is_elastic = np.array([name not in rigid for name in names])
     walk = _Walk(system, float(start), first, np.array([not name.startswith(_LAG) for name in origin]))
     # from the start to the first speed in steps that grow, because lags grow with the speed
     for between in np.geomspace(start, speeds[0], 12)[1:-1]:
@@ -156,7 +167,7 @@ def root_locus(
         walk.go(float(speed))
         kept.append(walk.roots.pole)
         if index:
-            crossings += _crossings(walk, before, origin, tolerance_m_per_s)
+            crossings += _crossings(walk, before, (origin, is_elastic), tolerance_m_per_s)
     poles = np.array(kept)
     shown = np.array([pole.imag >= 0 for pole in first.pole])
     lost = {origin[branch]: speed for branch, speed in sorted(walk.lost.items()) if shown[branch]}
@@ -247,9 +258,7 @@ def _joined(old: Roots, new: Roots, heading: ComplexArray) -> tuple[Roots, Float
 
 def _origins(roots: Roots, names: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the coordinates that take part most in oscillations, each once; all other roots are lags."""
-    n = len(names)
-    share = np.abs(roots.left.conj() * roots.right)
-    share = share[:n] + share[n : 2 * n]
+    share = _shares(roots, len(names))
     oscillating = np.flatnonzero(roots.pole.imag > _REAL_SHARE * np.abs(roots.pole).max())
     coordinate, chosen = linear_sum_assignment(-share[:, oscillating])
     result, lags = [""] * roots.pole.size, 0
@@ -263,28 +272,39 @@ def _origins(roots: Roots, names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(result)
 
 
+def _shares(roots: Roots, n: int) -> FloatArray:
+    """How much each coordinate and its rate take part in each root, shape (n, n_roots)."""
+    share = np.abs(roots.left.conj() * roots.right)
+    return np.asarray(share[:n] + share[n : 2 * n], dtype=float)
+
+
 def _crossings(
-    walk: _Walk, before: tuple[float, Roots], origin: tuple[str, ...], tolerance: float
+    walk: _Walk,
+    before: tuple[float, Roots],
+    origin_and_elastic: tuple[tuple[str, ...], np.ndarray],
+    tolerance: float,
 ) -> list[Crossing]:
     """Crossings of the imaginary axis upwards between the last two speeds, by bisection."""
-    low, roots = before
+    (low, roots), (origin, is_elastic) = before, origin_and_elastic
     noise = 1e-9 * float(np.abs(walk.roots.pole).max())
     grows = (roots.pole.real <= noise) & (walk.roots.pole.real > noise) & (walk.roots.pole.imag >= 0)
+    found = []
     # a pair that meets on the real axis leaves by either branch
-    return [
-        _bisected(walk.system, (low, roots), (walk.speed, walk.roots), int(branch), (origin[branch], tolerance))
-        for branch in np.flatnonzero(grows)
-    ]
+    for branch in np.flatnonzero(grows).tolist():
+        speed, root, at_crossing = _bisected(
+            walk.system, (low, roots), (walk.speed, walk.roots), branch, tolerance
+        )
+        share = _shares(at_crossing, is_elastic.size)[:, branch]
+        elastic = float(share[is_elastic].sum() / max(share.sum(), np.finfo(float).tiny))
+        is_real = abs(at_crossing.pole[branch].imag) <= _REAL_SHARE * max(abs(at_crossing.pole[branch]), 1e-30)
+        found.append(Crossing(speed, 0.0 if is_real else root.imag, origin[branch], elastic))
+    return found
 
 
 def _bisected(
-    system: System,
-    low: tuple[float, Roots],
-    high: tuple[float, Roots],
-    branch: int,
-    name_and_tolerance: tuple[str, float],
-) -> Crossing:
-    name, tolerance = name_and_tolerance
+    system: System, low: tuple[float, Roots], high: tuple[float, Roots], branch: int, tolerance: float
+) -> tuple[float, complex, Roots]:
+    """Speed and root of a crossing, and all roots just above it."""
     while high[0] - low[0] > tolerance:
         middle = 0.5 * (low[0] + high[0])
         heading = 0.5 * (low[1].pole + high[1].pole)
@@ -293,10 +313,7 @@ def _bisected(
             high = (middle, joined)
         else:
             low = (middle, joined)
-    share = high[1].pole[branch].real - low[1].pole[branch].real
-    weight = -low[1].pole[branch].real / share if share > 0 else 0.5
-    speed = low[0] + weight * (high[0] - low[0])
-    frequency = low[1].pole[branch].imag + weight * (high[1].pole[branch].imag - low[1].pole[branch].imag)
-    size = max(abs(high[1].pole[branch]), 1e-30)
-    is_real = abs(high[1].pole[branch].imag) <= _REAL_SHARE * size
-    return Crossing(float(speed), 0.0 if is_real else float(frequency), name)
+    start, end = complex(low[1].pole[branch]), complex(high[1].pole[branch])
+    growth = end.real - start.real
+    weight = -start.real / growth if growth > 0 else 0.5
+    return low[0] + weight * (high[0] - low[0]), start + weight * (end - start), high[1]

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import radians
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from sloshlab import physical_ranges
-from sloshlab.aircraft.structure import AircraftStructure, load_structure
+from sloshlab.aircraft.deck_reader import read_deck
+from sloshlab.aircraft.structure import AircraftStructure, load_structure, structure_of_deck
 from sloshlab.errors import InputError
 from sloshlab.lateral_sloshing.box_tank import BoxTank
 from sloshlab.lateral_sloshing.coupling import TankCoupling, frozen_mass_matrix, sloshing_liquid
@@ -21,9 +22,12 @@ from sloshlab.toml_file import read_toml
 
 FloatArray = npt.NDArray[np.float64]
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+_Positive = Annotated[_Number, Field(gt=0)]
 _Dimension = Annotated[_Number, AfterValidator(physical_ranges.TANK_DIMENSION_M.checked)]
 _Density = Annotated[_Number, AfterValidator(physical_ranges.LIQUID_DENSITY_KG_PER_M3.checked)]
 _MOST_TANKS: Final = 1000
+_MODES_OF_A_DECK: Final = 20
+"""With the six of a free body, unless the model says how many it keeps."""
 
 
 class _Described(BaseModel):
@@ -72,15 +76,67 @@ class TankSection(_Described):
         return self
 
 
+class RationalFit(_Described):
+    """Which reduced frequencies forces of the air are computed for, and what is fitted to them.
+
+    Attributes
+    ----------
+    largest_reduced_frequency : float
+    n_reduced_frequencies : int
+    rational : str
+        ``roger`` or ``minimum_state``.
+    lags : tuple of float
+    """
+
+    largest_reduced_frequency: _Positive = 1.3
+    n_reduced_frequencies: Annotated[int, Field(ge=6, le=100)] = 15
+    rational: Literal["roger", "minimum_state"] = "roger"
+    lags: tuple[_Positive, ...] = (0.08, 0.197, 0.487, 1.2)
+
+
+class AerodynamicsSection(RationalFit):
+    """[aerodynamics] of the file: as `RationalFit`, and how many boxes the doublet lattice has at most."""
+
+    n_boxes: Annotated[int, Field(ge=4, le=3000, strict=True)] = 450
+
+
+class FlowSection(_Described):
+    """[flow] of the file: air; the deck's density unless stated."""
+
+    density_kg_per_m3: _Positive | None = None
+    mach: Annotated[_Number, Field(ge=0, le=0.95)] = 0.0
+
+
 class _Aircraft(_Described):
     name: Annotated[str, Field(min_length=1, max_length=100)] = "aircraft"
     structure: Annotated[str, Field(min_length=1)]
+    deck_length_m: _Positive | None = None
+    deck_mass_kg: _Positive | None = None
     n_modes: Annotated[int, Field(ge=0, strict=True)] | None = None
     damping_ratio: Annotated[_Number, Field(ge=0, lt=1)] = 0.0
+
+    @model_validator(mode="after")
+    def _in_units(self) -> _Aircraft:
+        units = (self.deck_length_m, self.deck_mass_kg)
+        if self.is_deck and None in units:
+            raise ValueError(
+                "structure: a deck needs deck_length_m and deck_mass_kg, its units in metre and kilogram"
+            )
+        if not self.is_deck and units != (None, None):
+            raise ValueError(
+                "structure: deck_length_m and deck_mass_kg belong to a deck, which does not end in .nc"
+            )
+        return self
+
+    @property
+    def is_deck(self) -> bool:
+        return not self.structure.lower().endswith(".nc")
 
 
 class _ModelFile(_Described):
     aircraft: _Aircraft
+    flow: FlowSection = FlowSection()
+    aerodynamics: AerodynamicsSection = AerodynamicsSection()
     tanks: Annotated[tuple[TankSection, ...], Field(max_length=_MOST_TANKS)] = ()
 
     @model_validator(mode="after")
@@ -148,6 +204,22 @@ class AircraftModel:
     structure: AircraftStructure
     tanks: tuple[AircraftTank, ...]
     damping_ratio: float = 0.0
+    flow: FlowSection = field(default_factory=FlowSection)
+    aerodynamics: AerodynamicsSection = field(default_factory=AerodynamicsSection)
+
+    @property
+    def density_kg_per_m3(self) -> float:
+        """Of the air, as stated or as the deck has it.
+
+        Raises
+        ------
+        InputError
+            If neither says it.
+        """
+        density = self.flow.density_kg_per_m3 or self.structure.density_kg_per_m3
+        if density is None:
+            raise InputError("aircraft: flow.density_kg_per_m3", got="nothing", allowed="> 0; the deck has none")
+        return density
 
     @property
     def damping_matrix(self) -> FloatArray:
@@ -173,7 +245,8 @@ def load_model(path: str | os.PathLike[str]) -> AircraftModel:
     Parameters
     ----------
     path : path-like
-        TOML with [aircraft], which names the file of the structure beside it, and any number of [[tanks]].
+        TOML with [aircraft], which names the file of the structure beside it (netCDF, or a Nastran deck and its
+        units), and any number of [[tanks]]; [flow] and [aerodynamics] for what needs air.
 
     Raises
     ------
@@ -187,10 +260,28 @@ def load_model(path: str | os.PathLike[str]) -> AircraftModel:
         described = _ModelFile.model_validate(document)
     except ValidationError as error:
         raise _refused(what, error) from error
-    structure = load_structure(file.parent / described.aircraft.structure)
-    structure = _with_modes(structure, described.aircraft.n_modes, what)
+    structure = _with_modes(_structure(file.parent, described.aircraft), described.aircraft.n_modes, what)
     tanks = tuple(_tank(structure, section) for section in described.tanks)
-    return AircraftModel(described.aircraft.name, structure, tanks, described.aircraft.damping_ratio)
+    return AircraftModel(
+        described.aircraft.name,
+        structure,
+        tanks,
+        described.aircraft.damping_ratio,
+        described.flow,
+        described.aerodynamics,
+    )
+
+
+def _structure(folder: Path, described: _Aircraft) -> AircraftStructure:
+    place = folder / described.structure
+    if described.deck_length_m is None or described.deck_mass_kg is None:
+        return load_structure(place)
+    return structure_of_deck(
+        read_deck(place),
+        length_m=described.deck_length_m,
+        mass_kg=described.deck_mass_kg,
+        n_modes=_MODES_OF_A_DECK if described.n_modes is None else 6 + described.n_modes,
+    )
 
 
 def _refused(what: str, error: ValidationError) -> InputError:

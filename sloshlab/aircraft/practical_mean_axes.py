@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
+from sloshlab.aeroelastic.rational_functions import RationalForces
 from sloshlab.aircraft.model import AircraftModel
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError
@@ -41,40 +42,51 @@ class BodyAxesSystem:
 
     def state_matrix(
         self,
+        air: RationalForces | None = None,
         *,
-        force_per_position: npt.ArrayLike | None = None,
-        force_per_rate: npt.ArrayLike | None = None,
-        force_per_acceleration: npt.ArrayLike | None = None,
+        density_kg_per_m3: float = 0.0,
+        speed_m_per_s: float = 0.0,
     ) -> FloatArray:
-        """Matrix of ẋ = A x with x = (η, r, ν, ṙ), r the sloshing coordinates of all tanks.
+        """Matrix of ẋ = A x with x = (η, r, ν, ṙ, a): r sloshing coordinates of all tanks, a lags of the air.
 
         Parameters
         ----------
-        force_per_position, force_per_rate, force_per_acceleration : array_like, shape (n, n), optional
-            Generalised forces per η, η̇ and η̈, for example q_D A₀, q_D (b/U) A₁ and q_D (b/U)² A₂.
+        air : RationalForces, optional
+            Per η in body axes; they act by η̇ = ν + T η and η̈ = ν̇ + T ν.
+        density_kg_per_m3, speed_m_per_s : float
+            Of the air.
         """
         n = self.mass.shape[0]
-        e0, e1, e2 = (
-            np.zeros((n, n)) if given is None else np.asarray(given, dtype=np.float64)
-            for given in (force_per_position, force_per_rate, force_per_acceleration)
-        )
-        t = self.kinematics
-        empty = np.empty((n, 0))
-        rigid = np.asarray(sum((tank.rigid for tank in self.tanks), np.zeros((n, n)))) + e2
-        b = np.hstack([empty, *(tank.inertial for tank in self.tanks)])
-        c = np.hstack([empty, *(tank.gravitational for tank in self.tanks)])
+        none = np.zeros((n, n))
+        still = RationalForces(none, none, none, np.zeros((n, 0)), np.zeros(0), np.zeros((0, n)), 1.0)
+        forces, u = air or still, max(speed_m_per_s, np.finfo(float).tiny)
+        b, pressure = forces.semi_chord_m, 0.5 * density_kg_per_m3 * speed_m_per_s**2
+        e0, e1 = pressure * forces.a0, pressure * b / u * forces.a1
+        t, empty = self.kinematics, np.empty((n, 0))
+        rigid = np.asarray(sum((tank.rigid for tank in self.tanks), np.zeros((n, n))))
+        rigid = rigid + 0.5 * density_kg_per_m3 * b**2 * forces.a2
+        inertial = np.hstack([empty, *(tank.inertial for tank in self.tanks)])
+        gravitational = np.hstack([empty, *(tank.gravitational for tank in self.tanks)])
         of_modes = np.concatenate([np.empty(0), *(tank.damping_per_s for tank in self.tanks)])
         squares = np.concatenate([np.empty(0), *(tank.stiffness_per_s2 for tank in self.tanks)])
-        n_r = b.shape[1]
-        # forces of liquid and air are per η̈ = ν̇ + T ν and η̇ = ν + T η
-        mass = np.block([[self.mass - rigid, -b], [-b.T, np.eye(n_r)]])
-        damping = np.block([[self.damping - rigid @ t - e1, np.zeros((n, n_r))], [-b.T @ t, np.diag(of_modes)]])
-        stiffness = np.block([[self.stiffness - e0 - e1 @ t, -c], [-c.T, np.diag(squares)]])
+        n_r, n_lags = inertial.shape[1], forces.lags.size
+        mass = np.block([[self.mass - rigid, -inertial], [-inertial.T, np.eye(n_r)]])
+        damping = np.block(
+            [[self.damping - rigid @ t - e1, np.zeros((n, n_r))], [-inertial.T @ t, np.diag(of_modes)]]
+        )
+        stiffness = np.block(
+            [[self.stiffness - e0 - e1 @ t, -gravitational], [-gravitational.T, np.diag(squares)]]
+        )
         size = n + n_r
-        kinematics = np.zeros((size, size))
-        kinematics[:n, :n] = t
-        lower = -np.linalg.solve(mass, np.hstack([stiffness, damping]))
-        return np.vstack([np.hstack([kinematics, np.eye(size)]), lower])
+        lagged = np.vstack([pressure * forces.lag_output, np.zeros((n_r, n_lags))])
+        matrix = np.zeros((2 * size + n_lags,) * 2)
+        matrix[:n, :n] = t
+        matrix[:size, size : 2 * size] = np.eye(size)
+        matrix[size : 2 * size] = np.linalg.solve(mass, np.hstack([-stiffness, -damping, lagged]))
+        matrix[2 * size :, :n] = forces.lag_input @ t
+        matrix[2 * size :, size : size + n] = forces.lag_input
+        matrix[2 * size :, 2 * size :] = -u / b * np.diag(forces.lags)
+        return matrix
 
 
 def to_body_axes(n_modes: int) -> FloatArray:

@@ -27,20 +27,24 @@ def test_the_wing_of_goland_flutters_where_it_should(
     )
     assert code == 0
     summary = json.loads(capsys.readouterr().out.splitlines()[-1])
-    flutter, divergence = summary["crossings"]
+    wing = summary["models"]["wing"]
+    flutter, divergence = wing["crossings"]
+    assert [flutter["kind"], divergence["kind"]] == ["flutter", "divergence"]
     # an independent script with assumed modes: 136.96 m/s, 70.01 rad/s; divergence in closed form: 251.8 m/s
     assert flutter["speed_m_per_s"] == pytest.approx(136.96, rel=2e-3)
     assert flutter["frequency_rad_per_s"] == pytest.approx(70.01, rel=2e-3)
     assert flutter["origin"] == "mode 2"
     pressure = (np.pi / 2 / 6.096) ** 2 * 0.987e6 / (2 * np.pi * 1.8288 * 0.9144 * 0.16)
     assert divergence["speed_m_per_s"] == pytest.approx(np.sqrt(2 * pressure / 1.225), rel=4e-3)
-    assert summary["p_k_flutter_m_per_s"] == pytest.approx(136.96, rel=2e-3)
+    assert wing["p_k_flutter_m_per_s"] == pytest.approx(136.96, rel=2e-3)
     with xr.open_dataset(tmp_path / "stability.nc") as stability:
-        assert stability.attrs["wing"] == "Goland wing"
-        assert float(stability["crossing_speed_m_per_s"][0]) == flutter["speed_m_per_s"]
-        branch = [str(name) for name in stability["origin"].values.astype(str)].index("mode 2")
-        grows = stability["pole_real_per_s"].values[:, branch] > 0
-        speed = stability["speed_m_per_s"].values
+        assert stability.attrs["name"] == "Goland wing"
+        of_wing = stability.sel(model="wing")
+        assert float(of_wing["flutter_speed"]) == flutter["speed_m_per_s"]
+        assert float(stability["crossing_speed"][1]) == divergence["speed_m_per_s"]
+        branch = [str(name) for name in of_wing["origin"].values.astype(str)].index("mode 2")
+        grows = of_wing["pole_real"].values[:, branch] > 0
+        speed = stability["speed"].values
         assert speed[~grows].max() < 137.1 < speed[grows].min() + 6
     assert "Flutter" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {
@@ -114,6 +118,84 @@ def test_speeds_that_do_not_ascend_are_refused(
     assert "--from and --to" in capsys.readouterr().err
 
 
+def test_a_wing_has_no_models_of_liquids(goland: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["flutter", str(goland), "-o", str(tmp_path / "out"), "--models", "frozen"]) == 1
+    assert "--models: got frozen; allowed: an aircraft" in capsys.readouterr().err
+
+
+@pytest.fixture
+def flying_wing(repository: Path, tmp_path: Path) -> Path:
+    """mAEWing1 with the tank of case 1, fewer modes and reduced frequencies."""
+    folder = repository / "raw_data" / "aircraft" / "maewing1"
+    text = (folder / "case_1.toml").read_text(encoding="utf-8")
+    text = text.replace('"maewing1.nc"', f'"{folder / "maewing1.nc"}"').replace("n_modes = 10", "n_modes = 8")
+    model = tmp_path / "model.toml"
+    model.write_text(text + "\n[aerodynamics]\nn_reduced_frequencies = 8\n", encoding="utf-8")
+    return model
+
+
+@pytest.mark.skipif(find_spec("panelaero") is None, reason="PanelAero is not installed: extra aircraft")
+def test_a_flying_wing_with_a_tank_flutters_as_it_should(
+    flying_wing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    code = run(
+        ["flutter", str(flying_wing), "-o", str(out), "--from", "25", "--to", "35", "--speeds", "21", "--json"]
+    )
+    assert code == 0
+    summary = json.loads(capsys.readouterr().out.splitlines()[-1])
+    frozen, lateral = summary["models"]["frozen"], summary["models"]["lateral"]
+    # an independent script with 424 boxes and 14 modes: 32.02 m/s and 29.17 rad/s
+    assert frozen["flutter_speed_m_per_s"] == pytest.approx(32.02, rel=0.025)
+    assert frozen["flutter_frequency_rad_per_s"] == pytest.approx(29.17, rel=0.01)
+    # … of the same script with sideways sloshing: −1.3 % and +0.9 %
+    speed = lateral["flutter_speed_m_per_s"] / frozen["flutter_speed_m_per_s"] - 1
+    frequency = lateral["flutter_frequency_rad_per_s"] / frozen["flutter_frequency_rad_per_s"] - 1
+    assert speed == pytest.approx(-0.013, abs=0.002)
+    assert frequency == pytest.approx(0.009, abs=0.002)
+    for model in (frozen, lateral):
+        assert model["p_k_flutter_m_per_s"] == pytest.approx(model["flutter_speed_m_per_s"], rel=0.01)
+        assert model["crossings"][0]["origin"] == "mode 1"
+    with xr.open_dataset(out / "stability.nc") as stability:
+        assert stability["model"].values.astype(str).tolist() == ["frozen", "lateral"]
+        names = stability["origin"].sel(model="lateral").values.astype(str).tolist()
+        poles = stability["pole_imag"].sel(model="lateral", speed=25).values
+        found = sorted(poles[[n for n, name in enumerate(names) if name.startswith("centre")]])
+        # of the same script at 25 m/s, in inertial axes, without the weight of what tilts
+        assert found == pytest.approx([12.42, 12.43, 22.70, 22.70, 29.27, 29.27], abs=0.06)
+    figures = {path.name for path in (out / "figures").iterdir()}
+    assert {"root_locus_frozen.png", "root_locus_lateral.png", "models.png", "mode_shapes.png"} <= figures
+
+
+@pytest.mark.parametrize(
+    ("models", "extra", "message"),
+    [
+        ("frozen,full", "", "--models: got frozen,full; allowed: frozen, lateral, each once"),
+        ("frozen,frozen", "", "--models: got frozen,frozen"),
+        ("frozen", "[flow]\nmach = 1.2", "flow.mach: got 1.2"),
+        ("frozen", "[wind]\nspeed = 1.0", "wind: got an unknown key"),
+    ],
+)
+def test_bad_aircraft_are_one_line(
+    flying_wing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], models: str, extra: str, message: str
+) -> None:
+    flying_wing.write_text(flying_wing.read_text(encoding="utf-8") + extra + "\n", encoding="utf-8")
+    assert run(["flutter", str(flying_wing), "-o", str(tmp_path / "out"), "--models", models]) == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_dry_aircraft_has_nothing_that_sloshes(
+    flying_wing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = flying_wing.read_text(encoding="utf-8")
+    flying_wing.write_text(text[: text.index("[[tanks]]")], encoding="utf-8")
+    assert run(["flutter", str(flying_wing), "-o", str(tmp_path / "out"), "--models", "lateral"]) == 1
+    assert "--models: got lateral; allowed: frozen; the model has no [[tanks]]" in capsys.readouterr().err
+
+
 @pytest.fixture
 def lattice_model(goland: Path, tmp_path: Path) -> Path:
     model = tmp_path / "lattice.toml"
@@ -134,7 +216,7 @@ def test_forces_of_the_lattice_are_kept_and_made_anew_when_damaged(
         assert run([*arguments, "-o", str(tmp_path / output)]) == code
         summary = json.loads(capsys.readouterr().out.splitlines()[-1])
         assert bool(summary["flags"]) == (code == 3)
-        return float(summary["crossings"][0]["speed_m_per_s"])
+        return float(summary["models"]["wing"]["flutter_speed_m_per_s"])
 
     made = flutter_speed("made", 0)
     # a finite wing has less lift than strips: it flutters later

@@ -15,7 +15,7 @@ from packaging.utils import canonicalize_name
 
 REPOSITORY = Path(__file__).parents[2]
 PROJECT: dict[str, Any] = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
-INSTALLED_EXTRAS = ("formats", "interactive", "dev", "docs", "trial", "live")
+INSTALLED_EXTRAS = ("formats", "interactive", "dev", "docs", "trial", "live", "aircraft")
 WANTED = [
     *PROJECT["project"]["dependencies"],
     *(line for extra in INSTALLED_EXTRAS for line in PROJECT["project"]["optional-dependencies"][extra]),

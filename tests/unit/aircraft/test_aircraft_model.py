@@ -7,8 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg
 from hand_made_decks import beam_cards, deck_of_text, fields
 
+from sloshlab.aeroelastic.rational_functions import RationalForces
+from sloshlab.aircraft.flight_stability import flight_system
 from sloshlab.aircraft.model import AircraftModel, load_model
 from sloshlab.aircraft.practical_mean_axes import body_axes_system
 from sloshlab.aircraft.structure import AircraftStructure, load_structure, save_structure, structure_of_deck
@@ -106,31 +109,72 @@ def test_frozen_liquid_in_six_directions_on_the_aircraft(flying_beam: AircraftSt
 
 
 def test_body_axes_have_the_poles_of_inertial_axes(flying_beam: AircraftStructure, tmp_path: Path) -> None:
-    """With sloshing tanks and any forces of the air, without weight; 8 digits of each pole."""
+    """With sloshing tanks and any forces of the air with lags, without weight; 8 digits of each pole."""
     model = model_of(tmp_path, flying_beam, TANK.format(name="a", node=5), more="damping_ratio = 0.01\n")
-    n, speed = model.structure.mass_matrix.shape[0], 20.0
+    n, speed, density, b = model.structure.mass_matrix.shape[0], 20.0, 1.2, 0.3
     generator = np.random.default_rng(3)
+    a0, a1 = (scale * generator.normal(size=(n, n)) for scale in (0.0125, 0.08))
     # air that feels no position of the whole but its tilt, as it does none in flight
-    e0, e1 = (scale * generator.normal(size=(n, n)) for scale in (3.0, 0.3))
-    e0[:, :3] = 0.0
-    e2 = 1e-3 * np.diag(generator.random(n))
-    turn = np.diag([-1.0, 1, -1, -1, 1, -1] + [1.0] * model.structure.n_modes)
-    in_body = [turn @ e @ turn for e in (e0, e1, e2)]
-    body = body_axes_system(model, speed, sloshing=True, gravity=False).state_matrix(
-        force_per_position=in_body[0], force_per_rate=in_body[1], force_per_acceleration=in_body[2]
+    a0[:, :3] = 0.0
+    air = RationalForces(
+        a0,
+        a1,
+        0.02 * np.diag(generator.random(n)),
+        0.02 * generator.normal(size=(n, 4)),
+        np.array([0.1, 0.2, 0.5, 1.1]),
+        generator.normal(size=(4, n)),
+        b,
     )
-    structure = model.structure
-    inertial = coupled_system(
-        structure.mass_matrix - e2,
-        model.damping_matrix - e1,
-        structure.stiffness_matrix - e0,
+    system = flight_system(model, air, "lateral", density_kg_per_m3=density, gravity=False)
+    # in inertial axes: (M − A) η̈ … by blocks of the coupled system, lags ȧ = −(U/b) P a + B η̇ beside them
+    whole = coupled_system(
+        model.structure.mass_matrix,
+        model.damping_matrix,
+        model.structure.stiffness_matrix,
         tuple(tank.sloshing for tank in model.tanks),
     )
-    expected = inertial.poles()
-    found = np.linalg.eigvals(body)
+    size, pressure = whole.mass.shape[0], 0.5 * density * speed**2
+    padded = [np.pad(matrix, (0, size - n)) for matrix in (air.a0, air.a1, air.a2)]
+    output, into = np.pad(air.lag_output, ((0, size - n), (0, 0))), np.pad(air.lag_input, ((0, 0), (0, size - n)))
+    expected = np.linalg.eigvals(
+        np.block(
+            [
+                [np.zeros((size, size)), np.eye(size), np.zeros((size, 4))],
+                [
+                    np.linalg.solve(
+                        whole.mass - pressure * (b / speed) ** 2 * padded[2],
+                        np.hstack(
+                            [
+                                pressure * padded[0] - whole.stiffness,
+                                pressure * b / speed * padded[1] - whole.damping,
+                                pressure * output,
+                            ]
+                        ),
+                    )
+                ],
+                [np.zeros((4, size)), into, -speed / b * np.diag(air.lags)],
+            ]
+        )
+    )
+    found = np.linalg.eigvals(system.matrix_at(speed))
+    assert len(system.names) == size
     # three positions play no part, so zero is a multiple pole and no solver finds it exactly
     for pole in expected[np.abs(expected) > 0.1]:
         assert np.abs(found - pole).min() < 1e-8 * np.abs(pole)
+
+
+def test_a_frozen_aircraft_in_still_air_has_the_modes_of_its_masses(
+    flying_beam: AircraftStructure, tmp_path: Path
+) -> None:
+    """Generalised eigenvalues of the frozen mass matrix; weight left out."""
+    model = model_of(tmp_path, flying_beam, TANK.format(name="a", node=5))
+    n = model.structure.mass_matrix.shape[0]
+    still = RationalForces(*np.zeros((3, n, n)), np.zeros((n, 0)), np.zeros(0), np.zeros((0, n)), 1.0)
+    system = flight_system(model, still, "frozen", density_kg_per_m3=1.2, gravity=False)
+    found = np.sort(np.linalg.eigvals(system.matrix_at(20.0)).imag)[-model.structure.n_modes :]
+    squares = scipy.linalg.eigh(model.structure.stiffness_matrix, model.frozen_mass_matrix, eigvals_only=True)
+    assert found == pytest.approx(np.sqrt(squares[-model.structure.n_modes :]), rel=1e-6)
+    assert system.names[:7] == ("surge", "sway", "heave", "roll", "pitch", "yaw", "mode 1")
 
 
 def test_a_tilted_free_aircraft_feels_the_weight_and_the_free_surface(
