@@ -181,6 +181,7 @@ def assert_prefix_is_exact(path: Path, n_bytes_written: int) -> int:
     return n_samples
 
 
+@pytest.mark.slow
 def test_the_prefix_is_exact_wherever_the_recorder_is_killed(tmp_path: Path) -> None:
     """Half of the kills at random moments, half at random bytes in the middle of a write."""
     random = np.random.default_rng(SEED)

@@ -97,6 +97,7 @@ def test_files_of_a_decay(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixtu
         assert result["loss_factor"].attrs["long_name"]
 
 
+@pytest.mark.slow
 def test_the_frozen_decay_gives_the_guide(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The true guide has 0.30 N and 1.20 kg/s; the rig file says 0.37 and 1.58."""
     true_rig = Rig.from_toml_text(RIG.replace("0.37", "0.30").replace("1.58", "1.20"))

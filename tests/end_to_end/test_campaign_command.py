@@ -188,6 +188,7 @@ def test_a_missing_extra_is_named(laboratory, tmp_path, capsys, monkeypatch) -> 
     assert_one_line(capsys.readouterr().err, "pip install 'sloshlab[cluster]'")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for the processes of workers")
 def test_a_killed_worker_a_killed_command_and_ctrl_c_change_no_byte(carried_out, laboratory, tmp_path) -> None:
     store = tmp_path / "store"

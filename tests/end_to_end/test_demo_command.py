@@ -7,12 +7,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
 from short_runs import refusal
 
 from pipelines.command_line import run
 from sealed_trial.demonstrations import DEMONSTRATIONS
 
 
+@pytest.mark.slow
 def test_nothing_is_hidden_and_nothing_is_claimed(tmp_path: Path, capfd: Any) -> None:
     out = tmp_path / "out"
     code = run(["demo", "nothing-hidden", "--no-open", "--json", "-o", str(out)])

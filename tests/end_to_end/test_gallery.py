@@ -143,6 +143,7 @@ def test_the_hardening_of_an_own_twin_is_found(run_script: Callable[[str], Names
     assert effect["parameters"]["stiffness_n_per_m3"]["estimate"] == pytest.approx(4.0e6, rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_was_played_is_what_was_recorded(run_script: Callable[[str], Names]) -> None:
     names = run_script("11_live_recording")
     assert names["exit_codes"] == {"good": 0, "bad": 3}

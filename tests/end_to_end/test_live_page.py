@@ -117,6 +117,7 @@ def test_options_that_need_another_are_usage_errors(
     assert visible(lab) == []
 
 
+@pytest.mark.slow
 def test_an_exposed_page_is_warned_of(bench: Path, lab: Path) -> None:
     source = ["--source", f"file:{bench / 'run.nc'}"]
     with running(arguments(source, bench, lab, "--page-host", "0.0.0.0"), lab) as recorder:
@@ -143,6 +144,7 @@ def opened_socket(url: str) -> socket.socket:
     return raw
 
 
+@pytest.mark.slow
 def test_browsers_that_go_away_or_read_nothing_cost_no_sample(bench: Path, lab: Path) -> None:
     """Some are closed, some cut off, some stay and take nothing; the page is asked by others meanwhile."""
     with (
@@ -174,6 +176,7 @@ def pages_of(recorder: Command) -> list[int]:
     ]
 
 
+@pytest.mark.slow
 def test_a_page_that_dies_is_one_line_and_the_recording_goes_on(bench: Path, lab: Path) -> None:
     with (
         playing(bench / "run.nc", lab, "pty") as devices,
@@ -187,6 +190,7 @@ def test_a_page_that_dies_is_one_line_and_the_recording_goes_on(bench: Path, lab
     assert samples_that_agree(bench / "run.nc", lab / "new.nc") == N_SAMPLES
 
 
+@pytest.mark.slow
 def test_a_page_that_takes_nothing_holds_nobody_up(bench: Path, lab: Path) -> None:
     """Its process is stopped: the pipe fills, the recorder's thread that feeds it waits, and no other."""
     with (

@@ -133,6 +133,7 @@ def test_recording_and_twin_of_a_simulation_appear_together(folder, tmp_path, ca
     assert contents(tmp_path) == {}
 
 
+@pytest.mark.slow
 def test_a_new_training_takes_the_report_and_ensemble_of_the_old_one_away(folder, tmp_path) -> None:
     output = tmp_path / "ROM.nc"
     first = [word for word in trained(folder, output) if word != "--no-report"]

@@ -98,6 +98,7 @@ def test_data_sets_and_trees_give_what_files_give(laboratory: Path) -> None:
         assert found.windows.attrs["result_id"] != of_files.windows.attrs["result_id"]
 
 
+@pytest.mark.slow
 def test_no_result_depends_on_the_working_directory(
     laboratory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -169,6 +170,7 @@ def test_a_campaign_is_a_tree_and_a_folder_without_recordings_is_refused(laborat
         sl.open_campaign(tmp_path)
 
 
+@pytest.mark.slow
 def test_the_beam_in_python_is_that_of_the_command(tmp_path: Path) -> None:
     make_beam_folder(tmp_path / "lab")
     runs = sorted((tmp_path / "lab").glob("*.nc"))

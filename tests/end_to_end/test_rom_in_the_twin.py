@@ -140,6 +140,7 @@ def test_a_corrupted_model_writes_nothing(folder: Path, tmp_path: Path, capsys: 
     )
 
 
+@pytest.mark.slow
 def test_the_beam_takes_models_beside_the_dampers(folder: Path, tmp_path: Path, capsys: Any) -> None:
     """The recording is the twin with the same damper, so that the model meets it and the dampers do not."""
     assert simulate(folder, tmp_path / "as_measured.nc") == 0

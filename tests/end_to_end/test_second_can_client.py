@@ -59,6 +59,7 @@ def logger(url: str, log: Path, folder: Path) -> Command:
     return Command([*command, "-f", str(log)], folder)
 
 
+@pytest.mark.slow
 def test_the_log_of_another_program_is_the_same_recording(repository: Path, tmp_path: Path) -> None:
     """Frames are lost by the device on the way to both: both recordings must miss the same samples."""
     lab = tmp_path / "lab"

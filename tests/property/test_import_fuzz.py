@@ -21,6 +21,8 @@ from acquisition.files.delay_compensation import delay_compensated
 from acquisition.files.time_base import uniform_grid
 from sloshlab.errors import ChannelMapError, InputError
 
+_N_DAMAGED = 16
+"""Of each format; `make fuzz` goes on for as long as asked."""
 FUZZ = settings(
     max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
@@ -213,7 +215,7 @@ def test_damaged_files(scenario: Scenario, tmp_path: Path) -> None:
     whole = scenario.write(tmp_path)[0].read_bytes()
     rng = np.random.default_rng(20260131)
     n_head = min(len(whole), 600)
-    for number in range(40):
+    for number in range(_N_DAMAGED):
         content = bytearray(whole)
         reach = n_head if number % 2 else len(whole)
         for _ in range(1 + number % 4):

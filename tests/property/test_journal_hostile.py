@@ -104,6 +104,7 @@ HOSTILE: dict[str, Callable[[], bytes]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_time_and_memory_are_in_proportion_to_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str

@@ -50,6 +50,7 @@ print(failures or "done")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", ["write_recording", "write_dataset", "played", "read_recording"])
 def test_several_threads_may_do_it_at_once(tmp_path, action):
     command = [sys.executable, "-c", AT_ONCE, action, str(tmp_path)]

@@ -30,6 +30,7 @@ def rubbing(folder: Path) -> RigModel:
     return RigModel(Rig.from_toml(folder / "rig.toml"), folder, [decay])
 
 
+@pytest.mark.slow
 def test_numbers_of_a_friction_are_drawn_to_a_hundredth(tmp_path: Path) -> None:
     model = rubbing(tmp_path)
     [decay] = model.runs

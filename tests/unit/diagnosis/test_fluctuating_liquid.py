@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from recorded_oscillators import DAMPING, MASS_KG, OMEGA, RATE_HZ, STIFFNESS, rig, run_of
 from scipy.integrate import solve_ivp
 
@@ -44,6 +45,7 @@ def recorded(name: str, size: float, seed: int) -> CaseRun:
     return run_of(name, channels, NOISE, seed, experiment="other")
 
 
+@pytest.mark.slow
 def test_a_run_alone_has_the_side_bands_that_repeats_scatter_by(tmp_path: Path) -> None:
     runs = [recorded("one_1", 1.0, 1), recorded("one_2", 1.0, 2), recorded("two", 2.0, 3)]
     model = RigModel(rig(tmp_path, LIQUID_N_S_PER_M), tmp_path, runs)

@@ -85,6 +85,7 @@ def test_the_law_is_saved_as_a_twin_that_simulates(found, tmp_path: Path) -> Non
     assert np.abs(fast[-300:]).max() < 0.018 / np.sqrt(1 + 2 * rate * 1.7) * 1.05
 
 
+@pytest.mark.slow
 def test_the_verdict_says_the_law_also_where_its_place_is_not_located(found) -> None:  # type: ignore[no-untyped-def]
     everything = found(lambda t, x, v: -3e4 * x**2 * v)
     verdict = verdict_of(everything)

@@ -69,6 +69,7 @@ def pulses(start_s: float) -> Callable[[float, float, float], float]:
     return force
 
 
+@pytest.mark.slow
 def test_what_the_scatter_of_repeats_has_taken(tmp_path: Path) -> None:
     """Pulses at other instants in each repeat make all of the noise, and are less than it."""
     starts = (0.21, 0.37, 0.44, 0.08)

@@ -96,6 +96,7 @@ def pools_of_proposals(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
     return pools
 
 
+@pytest.mark.slow
 def test_beside_what_leaves_nothing_come_only_forces_that_do_nearly_the_same(
     search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -109,6 +110,7 @@ def test_beside_what_leaves_nothing_come_only_forces_that_do_nearly_the_same(
     assert pools == [{CUSHION, "tank.mass_error"}]
 
 
+@pytest.mark.slow
 def test_in_the_place_of_a_force_come_only_forces_that_do_nearly_the_same(
     search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
 ) -> None:

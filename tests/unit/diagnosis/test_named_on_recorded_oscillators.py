@@ -43,6 +43,7 @@ def test_a_damper_that_closes_with_the_displacement_has_no_name_and_is_placed(tm
     assert np.isclose(sum(found.probabilities.values()), 1.0)
 
 
+@pytest.mark.slow
 def test_a_mass_and_a_spring_are_equals_and_a_known_mass_tells_them_apart(tmp_path: Path) -> None:
     # √(k/(1.2 m)) is √((1 − 0.2/1.2) k/m): one decay after the other is the same, until both have a known mass.
     # The frequency is off by 8.7 %; what is within four tolerances is a number of the baseline.

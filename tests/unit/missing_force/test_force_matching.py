@@ -112,6 +112,7 @@ def bounced(known: Candidate, motion: np.ndarray, gap: float, stiffness: float, 
     return np.asarray(pushed + mass * motion[:, 2] + mass * 9.81)
 
 
+@pytest.mark.slow
 def test_impacts_are_met_by_a_population(tmp_path: Path) -> None:
     """A mass that flies between floor and ceiling; its numbers come from far away."""
     known = candidate(tmp_path, "tank.ceiling_impact")

@@ -44,6 +44,7 @@ def test_frequency_and_damping_of_one_mode(frequency_hz: float, ratio: float) ->
     np.testing.assert_allclose(found.influence.sum(axis=0), 0.0, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_errors_are_as_large_as_the_scatter() -> None:
     """Over forty draws of noise a quarter as large as the response, by clusters of twelve blocks."""
     drive = _drive(2)

@@ -110,6 +110,7 @@ def test_a_known_model_with_memory_is_recovered():
     assert np.nanmax(np.abs(model.simulate(unseen.x) - unseen.y)) < 1e-4
 
 
+@pytest.mark.slow
 def test_without_memory_that_model_cannot_be_followed():
     unseen = remembering_run(800, 4)
     with_memory, _ = fitted(Agitation("speed", (0.25,), spread=2.0), neurons=8)

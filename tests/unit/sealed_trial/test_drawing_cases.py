@@ -189,6 +189,7 @@ def test_an_effect_whose_essential_part_is_hidden_is_not_drawn() -> None:
         _scaled(effect(0.3), 10.0, laboratory, floor, [])  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_loss_is_the_equal_of_a_dashpot_only_where_it_predicts_the_same() -> None:
     """Free damping is a dashpot, which hides all of another one, but not relaxing springs, which creep."""
     drawing = CaseDrawing([77, 1])

@@ -169,6 +169,7 @@ def test_a_recorder_makes_all_channels_late_alike() -> None:
         assert late == pytest.approx(0.96, abs=0.03), name
 
 
+@pytest.mark.slow
 def test_what_happens_outside_is_at_another_instant_in_every_run() -> None:
     plain = laboratory("sdof_base", Recorder())
     scales = scales_of(plain, plain.signals())

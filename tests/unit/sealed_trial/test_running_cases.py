@@ -20,6 +20,7 @@ from sloshlab.errors import InputError
 FOUR = [truth(f"case_00{k}", "nothing", accepted=[[]]) for k in (1, 2, 3, 4)]
 
 
+@pytest.mark.slow
 def test_every_end_of_a_case_is_an_outcome_and_nothing_is_done_twice(tmp_path) -> None:
     trial = tmp_path / "trial"
     written_trial(trial, FOUR, None)

@@ -145,6 +145,7 @@ def test_a_mass_on_one_mode_is_a_softer_spring_and_less_damping(plan_name: str) 
             assert changed[name] == pytest.approx(values, abs=1e-9 * (1.0 + np.abs(values).max()))
 
 
+@pytest.mark.slow
 def test_a_base_that_rocks_within_the_tolerances_of_all_modes_does_not_show() -> None:
     """It softens every mode, ten times this by less than frequencies may be off by, twenty times by more."""
     laboratory = laboratory_of("beam_decays")

@@ -106,6 +106,7 @@ def test_pulses_alternate() -> None:
     assert force[np.isclose(time, 0.206)] > 170 > -170 > force[np.isclose(time, 0.656)]
 
 
+@pytest.mark.slow
 def test_the_wave_has_half_the_frequency_and_either_sign() -> None:
     """Above its threshold; runs that differ in their ripples have the same power, and some the opposite sign."""
     time = WAVE_SAMPLING.half_steps_s

@@ -247,6 +247,7 @@ def test_one_command_marks_all_rivals_and_goes_on_with_what_was_seen(
     assert "| sloshlab | 6 of 12" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_what_is_seen_of_a_case_is_kept_by_a_process_of_its_own(tmp_path: Path, repository: Path) -> None:
     """A case whose rig is damaged is seen as one in a moment; what is kept is not looked at again."""
     cases, kept = tmp_path / "trial" / "cases", tmp_path / "seen"

@@ -16,6 +16,7 @@ from studies.tank_diagnosis import CASES, TankCase, at_lower_rate, constant_beyo
 RECORDINGS = "raw_data/numerical_tank"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_case_has_its_recordings_and_what_is_believed(case: TankCase, repository: Path, tmp_path: Path) -> None:
     folder = tmp_path / case.name

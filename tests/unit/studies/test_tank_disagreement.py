@@ -16,6 +16,7 @@ def test_way_up_begins_quietly_and_the_top_is_the_same_on_both_ways() -> None:
     assert quiet.down != quiet.up  # the liquid is still in motion from before
 
 
+@pytest.mark.slow
 def test_thick_liquid_resists_the_subharmonic_wave() -> None:
     """Waves of a liquid ten thousand times as thick as water die faster than 0.5 g can feed them."""
     water, thick = (

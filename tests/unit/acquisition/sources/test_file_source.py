@@ -394,6 +394,7 @@ print("read")
 """
 
 
+@pytest.mark.slow
 def test_several_recordings_are_read_at_once_in_threads(tmp_path):
     values = np.arange(20_000, dtype=np.int16)
     paths = [write(tmp_path / f"{k}.nc", {"force_1": (values, force())}, chunk=1000) for k in range(4)]

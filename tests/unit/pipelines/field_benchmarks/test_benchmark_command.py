@@ -103,6 +103,7 @@ def test_files_are_found_in_folders_of_the_data_folder(tmp_path: Path) -> None:
     assert BENCHMARKS["cascaded_tanks"].read(tmp_path).tests[0].n_samples == 1024
 
 
+@pytest.mark.slow
 def test_tanks_that_spill_over_from_file_to_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Levels by SciPy's integrator: only the model with brims leaves no more than noise on the unseen record."""
     write_tanks(tmp_path, overflows=True, noise_v=0.01)

@@ -44,6 +44,7 @@ def numbers(fitted: FittedModel) -> dict[str, float]:
     return {number.name: number.value for number in fitted.numbers}
 
 
+@pytest.mark.slow
 def test_the_circuit_with_its_diode_agrees_with_scipys_filters() -> None:
     voltage, output = circuit_voltages(4096, 200)
     record = Record("test", {"voltage_input": voltage, "voltage_output": output}, CIRCUIT_RATE_HZ)
@@ -58,6 +59,7 @@ def test_the_circuit_with_its_diode_agrees_with_scipys_filters() -> None:
     assert (without - output).std() > 0.1 * output.std()
 
 
+@pytest.mark.slow
 def test_numbers_of_tanks_are_recovered(tmp_path: Path) -> None:
     """Published equations by SciPy's integrator, without overflow; noise of 1 mV."""
     write_tanks(tmp_path, overflows=False, noise_v=1e-3)
