@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
 from pipelines.flutter.model_file import read_model
 from pipelines.flutter.problem import FlutterProblem, Variant, problem_of
@@ -161,7 +162,8 @@ def analyse_flutter(path: Path, settings: FlutterSettings, *, cache: Path | None
     FlutterExperiment
     """
     problem = problem_of(read_model(path), settings.models, cache)
-    with progress("root loci", 2 * len(problem.variants)) as advance:
+    # matrices of a hundred rows: threads of BLAS only wait for one another
+    with threadpool_limits(1), progress("root loci", 2 * len(problem.variants)) as advance:
         results = tuple(_stability(problem, variant, settings, advance) for variant in problem.variants)
     return FlutterExperiment(problem, settings, (path,), results)
 

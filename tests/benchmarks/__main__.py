@@ -1,4 +1,4 @@
-"""Speed and memory: analysis, twin, reduced-order model, numerical tank, recording, start, diagnosis, in one run.
+"""Speed and memory: analysis, twin, flutter, reduced-order model, numerical tank, recording, start, diagnosis.
 
 Each measurement runs in a process of its own, on one core. Times are processor times, the best of several
 repeats after a warm-up that compiles the kernels; starts of commands are timed by the clock, and so are training
@@ -14,6 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from sloshlab.aircraft.flight_stability import LIQUIDS
 from tests.benchmarks.campaigns import DASK_OVERHEAD_LABEL, OVERHEAD_LABEL, RATIO_LABEL, campaign_figures
 from tests.benchmarks.command_start import (
     COMPLETION_LABEL,
@@ -24,7 +25,9 @@ from tests.benchmarks.command_start import (
 )
 from tests.benchmarks.diagnosis import LONGEST_LABEL, MEDIAN_LABEL, diagnosis_figures
 from tests.benchmarks.diagnosis import MEMORY_LABEL as DIAGNOSIS_MEMORY_LABEL
+from tests.benchmarks.flutter import FORCES_LABEL, KEPT_LABEL, LOCUS_LABEL
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
+from tests.benchmarks.own_twin import STEPS_LABEL
 from tests.benchmarks.reduced_order_model import MEMORY_LABEL, PRODUCT_LABEL, TIME_LABEL, model_figures
 from tests.benchmarks.reduced_order_model_in_the_twin import LOOP_LABEL
 from tests.benchmarks.twin import FREE_LABEL, LANES_LABEL, METHODS, RANDOM_LABEL, RIVAL_LABEL
@@ -38,6 +41,9 @@ AIMS = {
     FREE_LABEL: 0.1,
     RANDOM_LABEL: 1.0,
     LOOP_LABEL: 0.05,
+    FORCES_LABEL: 60.0,
+    KEPT_LABEL: 1.0,
+    **{LOCUS_LABEL.format(liquids): 10.0 for liquids in LIQUIDS},
     MEDIAN_LABEL: 60.0,
     LONGEST_LABEL: 180.0,
     DIAGNOSIS_MEMORY_LABEL: 2.0,
@@ -57,6 +63,7 @@ AIMS = {
 }
 AT_LEAST = {
     LANES_LABEL: 4.0,
+    STEPS_LABEL: 2e6,
     SIDE_BY_SIDE: 1.8,
     PRODUCT_LABEL: 0.5,
     RATIO_LABEL: 1.8,
@@ -126,6 +133,8 @@ def main() -> None:
     }  # fmt: skip
     print("the twin, and the same by solve_ivp …", flush=True)
     figures |= measured("twin")
+    print("flutter …", flush=True)
+    figures |= measured("flutter")
     figures |= model_figures()
     figures |= tank_figures(ONE_CORE)
     figures |= recording_figures()

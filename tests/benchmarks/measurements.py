@@ -159,13 +159,29 @@ def blas() -> dict[str, float]:
 
 def twin() -> dict[str, float]:
     """Speed of the twin, alone and against `solve_ivp`, and with a trained model in its tank."""
+    from tests.benchmarks.own_twin import own_twin_figures
     from tests.benchmarks.reduced_order_model_in_the_twin import loop_figures
     from tests.benchmarks.twin import twin_figures
 
-    return twin_figures() | loop_figures()
+    return twin_figures() | loop_figures() | own_twin_figures()
+
+
+def flutter() -> dict[str, float]:
+    """Speed of the doublet lattice and of root loci."""
+    from tests.benchmarks.flutter import flutter_figures
+
+    return flutter_figures()
 
 
 if __name__ == "__main__":
-    measurements = {"make": make, "analyse": analyse, "memory": memory, "peer": peer, "blas": blas, "twin": twin}
+    measurements = {
+        "make": make,
+        "analyse": analyse,
+        "memory": memory,
+        "peer": peer,
+        "blas": blas,
+        "twin": twin,
+        "flutter": flutter,
+    }
     chosen = measurements[sys.argv[1]]
     print(json.dumps(chosen(*sys.argv[2:])))
