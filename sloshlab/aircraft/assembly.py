@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from sloshlab.aircraft.deck import Deck, PointMass, RigidElement
-from sloshlab.aircraft.element_matrices import beam_matrices, bush_stiffness, node_axes
+from sloshlab.aircraft.deck import Deck, PointMass
+from sloshlab.aircraft.deck_constraints import Component
+from sloshlab.aircraft.element_matrices import beam_matrices, bush_stiffness, rod_matrices
+from sloshlab.aircraft.elimination import independent_motion
 from sloshlab.errors import AnalysisError, FileFormatError
 from sloshlab.lateral_sloshing.coupling import rigid_motion
 
 FloatArray = npt.NDArray[np.float64]
-_LONGEST_CHAIN: Final = 200
 _MOST_COMPONENTS: Final = 6000
 """Independent ones, whose matrices are full."""
 
@@ -55,14 +57,17 @@ class Assembly:
         return np.asarray(rigid.T @ (self.total_mass @ rigid))
 
 
-def assembled(deck: Deck, *, constraint_set: int | None = None) -> Assembly:
+def assembled(deck: Deck, *, constraint_set: int | None = None, equation_set: int | None = None) -> Assembly:
     """Mass and stiffness matrices of a deck.
 
     Parameters
     ----------
     deck : Deck
     constraint_set : int, optional
-        Number of the SPC and SPC1 cards that hold; without it only components that GRID holds.
+        Number of the SPC, SPC1 and SPCADD cards that hold, besides what GRID holds; without it what the case
+        control section selects.
+    equation_set : int, optional
+        Number of the MPC and MPCADD cards that count; without it what the case control section selects.
 
     Raises
     ------
@@ -77,9 +82,11 @@ def assembled(deck: Deck, *, constraint_set: int | None = None) -> Assembly:
     row = {node: 6 * position for position, node in enumerate(nodes)}
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is no number is refused below
         stiffness, mass = _stiffness(deck, row), _mass(deck, row)
-    independent = _Elimination(deck, row, constraint_set).matrix()
+    independent, components = independent_motion(
+        deck, row, deck.selected("SPC", constraint_set), deck.selected("MPC", equation_set)
+    )
     basic = sparse.block_diag(
-        [_both(node_axes(deck, node, "GRID")) for node in nodes], format="csr"
+        [_both(deck.axes_of(node, "GRID")) for node in nodes], format="csr"
     )  # from the axes of the nodes to basic ones
     motion = (basic @ independent).tocsr()
     # components that nothing touches, like AUTOSPC
@@ -93,7 +100,7 @@ def assembled(deck: Deck, *, constraint_set: int | None = None) -> Assembly:
         raise AnalysisError("deck", got="no mass and no stiffness", allowed="something that moves")
     if used.size > _MOST_COMPONENTS:
         raise AnalysisError("deck", got=f"{used.size} independent components", allowed=f"≤ {_MOST_COMPONENTS}")
-    return Assembly(
+    structure = Assembly(
         nodes=nodes,
         mass=_symmetric(reduced_m[used][:, used].toarray()),
         stiffness=_symmetric(reduced_k[used][:, used].toarray()),
@@ -101,14 +108,15 @@ def assembled(deck: Deck, *, constraint_set: int | None = None) -> Assembly:
         places=np.array([deck.grids[node].place for node in nodes]),
         total_mass=mass,
     )
+    return _condensed(deck, structure, tuple(components[column] for column in used))
 
 
 def _is_consistent(deck: Deck) -> bool:
     """Whether PARAM COUPMASS asks for masses along the beams."""
     stated = deck.parameters.get("COUPMASS", "-1")
-    if stated not in ("-1", "0", "1"):
-        raise AnalysisError("PARAM COUPMASS", got=stated[:40], allowed="-1, 0 or 1")
-    return stated == "1"
+    if not stated.lstrip("+-").isdigit() or len(stated) > 9:
+        raise AnalysisError("PARAM COUPMASS", got=stated[:40], allowed="an integer; > 0 for masses along beams")
+    return int(stated) > 0
 
 
 def _symmetric(matrix: FloatArray) -> FloatArray:
@@ -158,6 +166,8 @@ def _stiffness(deck: Deck, row: dict[int, int]) -> sparse.csr_matrix:
                 beam.place, got="a length or section of no stiffness", allowed="numbers of a beam"
             ) from error
         entries.add(_at(row, beam.ends), block)
+    for rod in deck.rods.values():
+        entries.add(_at(row, rod.ends), rod_matrices(deck, rod)[0])
     for bush in deck.bushes.values():
         entries.add(_at(row, bush.ends), bush_stiffness(deck, bush))
     for spring in deck.springs.values():
@@ -171,6 +181,10 @@ def _mass(deck: Deck, row: dict[int, int]) -> sparse.csr_matrix:
     for beam in deck.beams.values():
         _, block = beam_matrices(deck, beam, consistent_mass=consistent)
         entries.add(_at(row, beam.ends), block)
+    for rod in deck.rods.values():
+        entries.add(_at(row, rod.ends), rod_matrices(deck, rod, consistent_mass=consistent)[1])
+    for node_mass in deck.node_masses.values():
+        entries.add(_at(row, (node_mass.grid,)), node_mass.matrix)
     for mass in deck.masses.values():
         deck.grid(mass.grid, mass.place)
         entries.add(_at(row, (mass.grid,)), point_mass_matrix(mass))
@@ -198,82 +212,48 @@ def _add_scalar(
     """A spring or a mass between components, which are those of the nodes' own axes."""
     shares = np.zeros(6 * len(ends))
     for number, (grid, component) in enumerate(ends):
-        axes = _both(node_axes(deck, grid, place))
+        axes = _both(deck.axes_of(grid, place))
         shares[6 * number : 6 * number + 6] = (-1.0) ** number * axes[:, component]
     entries.add(_at(row, tuple(grid for grid, _ in ends)), value * np.outer(shares, shares))
 
 
-class _Elimination:
-    """Every component as a sum of independent ones, in the axes of the nodes."""
+def _condensed(deck: Deck, structure: Assembly, components: tuple[Component, ...]) -> Assembly:
+    """Mass and stiffness in the components that ASET keeps and OMIT leaves (Guyan).
 
-    def __init__(self, deck: Deck, row: dict[int, int], constraint_set: int | None) -> None:
-        self.deck, self.row = deck, row
-        self.held = _held(deck, constraint_set)
-        self.owner: dict[tuple[int, int], RigidElement] = {}
-        for element in deck.rigid.values():
-            deck.grid(element.independent, element.place)
-            for node in element.dependent:
-                deck.grid(node, element.place)
-                for component in element.components:
-                    if (node, component) in self.owner:
-                        raise FileFormatError(
-                            element.place, got=f"node {node}, component {component + 1}, dependent twice",
-                            allowed="each component on one rigid element",
-                        )  # fmt: skip
-                    self.owner[node, component] = element
-        self.known: dict[tuple[int, int], dict[int, float]] = {}
-        self.column: dict[tuple[int, int], int] = {}
-
-    def matrix(self) -> sparse.csr_matrix:
-        n = 6 * len(self.row)
-        rows, columns, values = [], [], []
-        for node, first in self.row.items():
-            for component in range(6):
-                for column, value in self._expressed((node, component), ()).items():
-                    rows.append(first + component)
-                    columns.append(column)
-                    values.append(value)
-        return sparse.csr_matrix((values, (rows, columns)), shape=(n, len(self.column)))
-
-    def _expressed(self, key: tuple[int, int], within: tuple[tuple[int, int], ...]) -> dict[int, float]:
-        if key in self.known:
-            return self.known[key]
-        element = self.owner.get(key)
-        if element is None:
-            # what a rigid element does not move and nothing holds is independent
-            row = {} if key in self.held else {self.column.setdefault(key, len(self.column)): 1.0}
-        else:
-            if key in within or len(within) >= _LONGEST_CHAIN:
-                raise FileFormatError(
-                    element.place,
-                    got=f"node {key[0]}",
-                    allowed=f"no circle of rigid elements, ≤ {_LONGEST_CHAIN} in a row",
-                )
-            row = {}
-            for component, share in enumerate(self._follows(element, key)):
-                if share == 0:
-                    continue
-                for column, value in self._expressed((element.independent, component), (*within, key)).items():
-                    row[column] = row.get(column, 0.0) + share * value
-        self.known[key] = row
-        return row
-
-    def _follows(self, element: RigidElement, key: tuple[int, int]) -> FloatArray:
-        """Shares of the independent node's components in one of a dependent node."""
-        leader, follower = self.deck.grids[element.independent], self.deck.grids[key[0]]
-        own = _both(self.deck.frames[follower.displacement_frame].axes)
-        its = _both(self.deck.frames[leader.displacement_frame].axes)
-        return np.asarray((own.T @ rigid_motion(follower.place - leader.place) @ its)[key[1]])
+    The omitted follow statically, as in Nastran; that changes frequencies.
+    """
+    kept = deck.kept | set(supported_components(deck)) if deck.kept else set(components)
+    keep = [n for n, component in enumerate(components) if component in kept - deck.omitted]
+    omit = [n for n in range(len(components)) if n not in set(keep)]
+    if not omit:
+        return structure
+    if not keep:
+        raise AnalysisError("ASET, OMIT", got="no component that is left", allowed="at least one")
+    within = structure.stiffness[np.ix_(omit, omit)]
+    scale = np.sqrt(np.maximum(np.diag(within), 0.0))
+    try:
+        if (scale == 0).any():
+            raise LinAlgError("a component without stiffness")
+        factor = cho_factor(within / np.outer(scale, scale))
+    except LinAlgError as error:
+        raise AnalysisError(
+            "ASET, OMIT", got="components left out that nothing holds", remedy="keep masses without springs"
+        ) from error
+    follow = np.zeros((len(components), len(keep)))
+    follow[keep] = np.eye(len(keep))
+    across = structure.stiffness[np.ix_(omit, keep)]
+    follow[omit] = -cho_solve(factor, across / scale[:, None]) / scale[:, None]
+    return replace(
+        structure,
+        mass=_symmetric(follow.T @ structure.mass @ follow),
+        stiffness=_symmetric(follow.T @ structure.stiffness @ follow),
+        motion=sparse.csr_matrix(structure.motion @ follow),
+    )
 
 
-def _held(deck: Deck, constraint_set: int | None) -> set[tuple[int, int]]:
-    held = {(number, component) for number, grid in deck.grids.items() for component in grid.held}
-    if constraint_set is not None:
-        if constraint_set not in deck.constraints:
-            raise AnalysisError(
-                "constraint set", got=str(constraint_set), allowed=", ".join(map(str, deck.constraints)) or "none"
-            )
-        for node, held_components in deck.constraints[constraint_set]:
-            deck.grid(node, f"SPC {constraint_set}")
-            held.update((node, component) for component in held_components)
-    return held
+def supported_components(deck: Deck) -> list[Component]:
+    """Components of SUPORT, and of SUPORT1 where the case control section selects it."""
+    number = deck.selected("SUPORT1", None)
+    if number is not None and number not in deck.supports:
+        raise AnalysisError("case control: SUPORT1", got=str(number), allowed="a SUPORT1 that the deck has")
+    return deck.supported + (deck.supports[number] if number is not None else [])

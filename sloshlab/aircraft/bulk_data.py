@@ -6,16 +6,18 @@ Kept by hand because pyNastran, the library for it, pins NumPy below 2.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from sloshlab.aircraft.bulk_lines import Line, read_lines
 from sloshlab.errors import FileFormatError
 
-_LARGEST_FILE_BYTES: Final = 50 * 2**20
-_LARGEST_DEPTH: Final = 8
 _MOST_CARDS: Final = 1_000_000
+_MOST_FIELDS: Final = 1_000_000
+_LONGEST_LIST: Final = 200_000
+_LARGEST_IDENTIFIER: Final = 2**31 - 1
 _LARGEST_NUMBER: Final = 1e30
 _WITHOUT_E: Final = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+))([+-]\d+)$")
 _REAL: Final = re.compile(r"^[+-]?(?:\d+\.\d*|\.\d+)(?:[eEdD][+-]?\d+)?$|^[+-]?\d+[eEdD][+-]?\d+$")
@@ -76,8 +78,8 @@ class Card:
     def identifier(self, field: int, default: int | None = None) -> int:
         """Field as a positive integer."""
         value = self.integer(field, default)
-        if value <= 0 and value != default:
-            raise self.error(field, str(value), "an integer > 0")
+        if value != default and not 0 < value <= _LARGEST_IDENTIFIER:
+            raise self.error(field, str(value), f"an integer > 0, ≤ {_LARGEST_IDENTIFIER}")
         return value
 
     def real(self, field: int, default: float | None = None) -> float:
@@ -87,30 +89,43 @@ class Card:
             return default if default is not None else 0.0
         value = real_number(text)
         if value is None:
-            raise self.error(field, text, "a real number")
+            raise self.error(field, text, f"a real number up to {_LARGEST_NUMBER:g}")
         return value
 
     def reals(self, first: int, number: int, default: float = 0.0) -> tuple[float, ...]:
         """Some fields as real numbers."""
         return tuple(self.real(field, default) for field in range(first, first + number))
 
-    def listed(self, first: int) -> tuple[int, ...]:
-        """The rest of the fields as integers, with THRU and BY; blank fields between are left out."""
-        numbers: list[int] = []
+    def ranges(self, first: int) -> tuple[range, ...]:
+        """The rest of the fields as integers, with THRU and BY; blank fields between are left out.
+
+        A number alone is a range of itself; what stands after THRU begins at the number before it.
+        """
+        found: list[range] = []
         words = [(field, text) for field, text in enumerate(self.fields[first - 2 :], start=first) if text]
         at = 0
         while at < len(words):
             field, text = words[at]
             if text.upper() == "THRU":
                 stop, step, used = self._range(words, at)
-                if not numbers or stop < numbers[-1] or (stop - numbers[-1]) // step > _MOST_CARDS:
+                if not found or len(found[-1]) != 1 or stop < found[-1][0]:
                     raise self.error(field, f"THRU {stop}", "a range upwards")
-                numbers.extend(range(numbers[-1] + step, stop + 1, step))
+                found[-1] = range(found[-1][0], stop + 1, step)
                 at += used
                 continue
-            numbers.append(self.identifier(field))
+            number = self.identifier(field)
+            found.append(range(number, number + 1))
             at += 1
-        return tuple(numbers)
+        return tuple(found)
+
+    def listed(self, first: int) -> tuple[int, ...]:
+        """The numbers of `ranges`, one by one."""
+        ranges = self.ranges(first)
+        if sum(map(len, ranges)) > _LONGEST_LIST:
+            raise FileFormatError(
+                self.place, got=f"{sum(map(len, ranges))} numbers", allowed=f"≤ {_LONGEST_LIST} in a list"
+            )
+        return tuple(number for numbers in ranges for number in numbers)
 
     def _range(self, words: list[tuple[int, str]], at: int) -> tuple[int, int, int]:
         if at + 1 >= len(words):
@@ -141,6 +156,24 @@ def real_number(text: str) -> float | None:
     return value if abs(value) <= _LARGEST_NUMBER else None
 
 
+def components(card: Card, field: int, default: str = "") -> tuple[int, ...]:
+    """Digits 1 to 6 of a field as indices 0 to 5."""
+    text = card.text(field, default)
+    if not text or text == "0":
+        return ()
+    if not set(text) <= set("123456") or len(set(text)) != len(text):
+        raise card.error(field, text, "digits of 123456, each once")
+    return tuple(int(digit) - 1 for digit in text)
+
+
+def one_component(card: Card, field: int) -> int:
+    """One digit 1 to 6 of a field as an index 0 to 5."""
+    found = components(card, field)
+    if len(found) != 1:
+        raise card.error(field, card.text(field, ""), "one digit of 123456")
+    return found[0]
+
+
 def put_once(table: dict[Any, Any], number: Any, value: object, card: Card) -> None:
     """Enter what a card says, which no other card of its family may have said.
 
@@ -169,83 +202,22 @@ def read_cards(*paths: Path, instead: Mapping[str, Path] | None = None) -> tuple
     FileFormatError
         If a file is missing, too large or no text, or a continuation has nothing before it.
     """
-    cards: list[Card] = []
-    for path in paths:
-        for card in _cards_of(_lines_of(path, instead or {}, ())):
-            if len(cards) >= _MOST_CARDS:
-                raise FileFormatError(f"{path}", got=f"more than {_MOST_CARDS} cards", allowed="fewer")
-            cards.append(card)
-    return tuple(cards)
+    return tuple(cards_of(read_lines(*paths, instead=instead).bulk))
 
 
-@dataclass(frozen=True)
-class _Line:
-    text: str
-    file: str
-    number: int
-
-
-def _text_of(path: Path, what: str) -> str:
-    try:
-        if path.stat().st_size > _LARGEST_FILE_BYTES:
-            raise FileFormatError(what, got="a large file", allowed=f"≤ {_LARGEST_FILE_BYTES // 2**20} MiB")
-        return path.read_bytes().decode("latin-1")  # comments have any bytes; cards are ASCII
-    except OSError as error:
-        raise FileFormatError(what, got=error.strerror or "no file", remedy="give the file") from error
-
-
-def _beside(deck: Path, name: str) -> Path:
-    """The included file; decks written where capitals count for nothing may name it in others."""
-    target = deck.parent / name
-    if not target.exists() and target.parent.is_dir():
-        alike = [path for path in target.parent.iterdir() if path.name.lower() == target.name.lower()]
-        if len(alike) == 1:
-            return alike[0]
-    return target
-
-
-def _lines_of(path: Path, instead: Mapping[str, Path], within: tuple[Path, ...]) -> Iterator[_Line]:
-    if path.resolve() in within or len(within) >= _LARGEST_DEPTH:
-        raise FileFormatError(
-            str(path), got="an INCLUDE that goes round or deeper than 8", remedy="correct INCLUDE"
-        )
-    # an INCLUDE may stand over several lines, as long names do; none of the supported decks needs that
-    lines = [text.split("$")[0].rstrip() for text in _text_of(path, str(path)).splitlines()]
-    begins = [n for n, text in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", text, re.IGNORECASE)]
-    first = begins[-1] + 1 if begins else 0
-    for number, text in enumerate(lines[first:], start=first + 1):
-        if not text.strip():
-            continue
-        if re.match(r"\s*ENDDATA", text, re.IGNORECASE):
-            return
-        included = re.match(r"\s*INCLUDE\s+['\"]?([^'\"]+?)['\"]?\s*$", text, re.IGNORECASE)
-        if included:
-            name = included[1]
-            target = instead.get(name, _beside(path, name))
-            if not target.is_file():
-                raise FileFormatError(
-                    f"{path.name}:{number}: INCLUDE",
-                    got=f"no file {name[:80]}",
-                    remedy="put it beside the deck, or name what stands for it by `instead`",
-                )
-            yield from _lines_of(target, instead, (*within, path.resolve()))
-            continue
-        if any(ord(character) > 126 or ord(character) < 32 for character in text.replace("\t", "")):
-            raise FileFormatError(f"{path.name}:{number}", got=repr(text)[:60], allowed="ASCII text")
-        yield _Line(text, path.name, number)
-
-
-def _cards_of(lines: Iterator[_Line]) -> Iterator[Card]:
-    name, label_before, start = "", "", _Line("", "", 0)
+def cards_of(lines: Iterable[Line]) -> Iterator[Card]:
+    """Cards in their order; a continuation stands right after what it continues."""
+    name, label_before, start, n_cards = "", "", Line("", "", 0), 0
     fields: list[str] = []
     for line in lines:
-        first, cut, label = _fields_of(line)
+        first, cut, label_after = _fields_of(line)
         if _is_continuation(first):
             if not name:
-                raise FileFormatError(f"{line.file}:{line.number}", got="a continuation without a card")
-            if first.lstrip("+*") and label_before and first.lstrip("+*") != label_before:
+                raise FileFormatError(line.place, got="a continuation without a card")
+            label = first.lstrip("+*").upper()
+            if label and label_before and label != label_before:
                 raise FileFormatError(
-                    f"{line.file}:{line.number}: continuation {first[:8]}",
+                    f"{line.place}: continuation {first[:8]}",
                     got=f"after a line that names {label_before[:8]}",
                     allowed="continuations right after their card",
                 )
@@ -253,8 +225,13 @@ def _cards_of(lines: Iterator[_Line]) -> Iterator[Card]:
         else:
             if name:
                 yield Card(name, _without_tail(fields), start.file, start.number)
+            n_cards += 1
+            if n_cards > _MOST_CARDS:
+                raise FileFormatError(line.place, got=f"more than {_MOST_CARDS} cards", allowed="fewer")
             name, fields, start = first.rstrip("*").strip().upper(), list(cut), line
-        label_before = label.lstrip("+*").strip()
+        if len(fields) > _MOST_FIELDS:
+            raise FileFormatError(start.place, got=f"more than {_MOST_FIELDS} fields", allowed="fewer")
+        label_before = label_after.lstrip("+*").strip().upper()
     if name:
         yield Card(name, _without_tail(fields), start.file, start.number)
 
@@ -270,15 +247,13 @@ def _without_tail(fields: list[str]) -> tuple[str, ...]:
     return tuple(fields[:end])
 
 
-def _fields_of(line: _Line) -> tuple[str, list[str], str]:
+def _fields_of(line: Line) -> tuple[str, list[str], str]:
     """Name or name of a continuation, fields, and the name of the next line's continuation."""
     if "," in line.text:
         # free format: eight fields to a line, wide or not
         parts = [part.strip() for part in line.text.replace("\t", " ").split(",")]
         if len(parts) > 10:
-            raise FileFormatError(
-                f"{line.file}:{line.number}", got=f"{len(parts)} fields", allowed="≤ 10 to a line"
-            )
+            raise FileFormatError(line.place, got=f"{len(parts)} fields", allowed="≤ 10 to a line")
         n_fields = 4 if "*" in parts[0] else 8
         cut, label = parts[1 : 1 + n_fields], "".join(parts[1 + n_fields :])
         return parts[0], cut + [""] * (n_fields - len(cut)), label

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from math import isinf
-
 import numpy as np
 import numpy.typing as npt
 
-from sloshlab.aircraft.deck import Beam, Bush, Deck, Material, Section
+from sloshlab.aircraft.deck import Beam, Bush, Deck, Material, Rod, Section, TaperedSection
+from sloshlab.aircraft.section_matrices import mass_of_section, stiffness_of_section
 from sloshlab.errors import FileFormatError
 from sloshlab.lateral_sloshing.coupling import rigid_motion
 
 FloatArray = npt.NDArray[np.float64]
 
 
-def node_axes(deck: Deck, grid: int, place: str) -> FloatArray:
-    """Axes of a node's displacements as columns, in basic coordinates."""
-    return deck.frame(deck.grid(grid, place).displacement_frame, place).axes
-
-
 def at_basic(deck: Deck, grid: int, vector: FloatArray, place: str) -> FloatArray:
     """A vector that is given in the axes of a node's displacements."""
-    return np.asarray(node_axes(deck, grid, place) @ vector)
+    return np.asarray(deck.axes_of(grid, place) @ vector)
 
 
 def direction(deck: Deck, grid: int, orientation: FloatArray | int, place: str) -> FloatArray:
@@ -60,104 +54,83 @@ def beam_matrices(deck: Deck, beam: Beam, *, consistent_mass: bool = False) -> t
     have it; that of a CBAR has none.
     """
     section, material = _properties(deck, beam)
-    arms = [at_basic(deck, grid, offset, beam.place) for grid, offset in zip(beam.ends, beam.offsets, strict=True)]
+    arms = _arms(deck, beam)
     a, b = (deck.grid(grid, beam.place).place + arm for grid, arm in zip(beam.ends, arms, strict=True))
-    if isinstance(beam.orientation, int):
-        orientation = deck.grid(beam.orientation, beam.place).place - a
-    else:
-        orientation = at_basic(deck, beam.ends[0], beam.orientation, beam.place)
+    orientation = _orientation(deck, beam, a)
     axes = element_axes(b - a, orientation, beam.place)
     length = float(np.linalg.norm(b - a))
-    stiffness = _released(uniform_stiffness(section, material, length), beam)
+    stiffness = _released(stiffness_of_section(section, material, length), beam)
     turned = np.zeros((12, 12))
     for first in range(0, 12, 3):
         turned[first : first + 3, first : first + 3] = axes
     to_ends = np.zeros((12, 12))
     to_ends[:6, :6], to_ends[6:, 6:] = rigid_motion(arms[0]), rigid_motion(arms[1])
-    per_length = material.density * section.area + section.mass_per_length
-    polar = material.density * (section.inertia_1 + section.inertia_2) if beam.section[0] == "BEAM" else 0.0
-    mass = (_consistent_mass if consistent_mass else _lumped_mass)(per_length, polar, length)
+    mass = mass_of_section(section, material, length, beam.section[0] == "BEAM", consistent_mass)
     local = turned @ to_ends
     return local.T @ stiffness @ local, local.T @ mass @ local
 
 
-def _properties(deck: Deck, beam: Beam) -> tuple[Section, Material]:
-    section = deck.sections.get(beam.section)
-    if section is None:
-        raise FileFormatError(beam.place, got=f"property {beam.section[1]}", allowed=f"a P{beam.section[0]}")
-    material = deck.materials.get(section.material)
-    if material is None:
-        raise FileFormatError(beam.place, got=f"material {section.material}", allowed="a MAT1 that the deck has")
-    return section, material
+def _orientation(deck: Deck, beam: Beam, start: FloatArray) -> FloatArray:
+    if isinstance(beam.orientation, int):
+        return deck.grid(beam.orientation, beam.place).place - start
+    if beam.frames[0] == "B":
+        return beam.orientation
+    return at_basic(deck, beam.ends[0], beam.orientation, beam.place)
 
 
-def uniform_stiffness(section: Section, material: Material, length: float) -> FloatArray:
-    """Stiffness of a uniform beam along x in its own axes, shape (12, 12).
+def _arms(deck: Deck, beam: Beam) -> list[FloatArray]:
+    """Offsets of both ends in basic axes."""
+    if "O" not in beam.frames:
+        return [at_basic(deck, g, offset, beam.place) for g, offset in zip(beam.ends, beam.offsets, strict=True)]
+    a, b = (deck.grid(end, beam.place).place for end in beam.ends)
+    along = element_axes(b - a, _orientation(deck, beam, a), beam.place)
+    return [
+        along.T @ offset if kind == "O" else at_basic(deck, grid, offset, beam.place)
+        for kind, grid, offset in zip(beam.frames[1:], beam.ends, beam.offsets, strict=True)
+    ]
+
+
+def rod_matrices(deck: Deck, rod: Rod, *, consistent_mass: bool = False) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass of a rod, shape (12, 12), as of a beam: stretch and torsion, no inertia of rotation.
 
     Notes
     -----
-    From the flexibility of the beam clamped at A, loaded at B, and the equilibrium of both ends. Rows are stretch,
-    deflections along y and z, torsion, rotations about y and z.
+    With COUPMASS 1, mass along the rod is 5/12 at each end and 1/12 between them, the mean of masses at the ends
+    and of linear stretch, as Nastran has it; masses across the rod stay at its ends.
     """
-    at_b = np.zeros((6, 6))
-    at_b[0, 0] = material.youngs_modulus * section.area / length
-    at_b[3, 3] = material.shear_modulus * section.torsion / length
-    at_b += _bending(section, material, length)
-    between = np.hstack([-rigid_motion([length, 0.0, 0.0]), np.eye(6)])  # motion of B, less that with A
-    return np.asarray(between.T @ at_b @ between)
+    material = _material(deck, rod.material, rod.place)
+    a, b = (deck.grid(grid, rod.place).place for grid in rod.ends)
+    length = float(np.linalg.norm(b - a))
+    if length == 0:
+        raise FileFormatError(rod.place, got="no length", allowed="two places")
+    along = np.outer(b - a, b - a) / length**2
+    stiffness, mass = np.zeros((12, 12)), np.zeros((12, 12))
+    for first, value in (
+        (0, material.youngs_modulus * rod.area / length),
+        (3, material.shear_modulus * rod.torsion / length),
+    ):
+        rows = np.r_[first : first + 3, first + 6 : first + 9]
+        stiffness[np.ix_(rows, rows)] = value * np.kron([[1.0, -1.0], [-1.0, 1.0]], along)
+    rows = np.r_[0:3, 6:9]
+    total = length * (material.density * rod.area + rod.mass_per_length)
+    whole = np.kron(0.5 * np.eye(2), np.eye(3))
+    if consistent_mass:
+        whole += np.kron(np.array([[-1.0, 1.0], [1.0, -1.0]]) / 12, along)
+    mass[np.ix_(rows, rows)] = total * whole
+    return stiffness, mass
 
 
-def _lumped_mass(per_length: float, polar_per_length: float, length: float) -> FloatArray:
-    mass = 0.5 * length * per_length
-    return np.diag([mass, mass, mass, 0.5 * length * polar_per_length, 0.0, 0.0] * 2)
+def _material(deck: Deck, number: int, place: str) -> Material:
+    if number not in deck.materials:
+        raise FileFormatError(place, got=f"material {number}", allowed="a MAT1 that the deck has")
+    return deck.materials[number]
 
 
-def _consistent_mass(per_length: float, polar_per_length: float, length: float) -> FloatArray:
-    """Mass of linear stretch and twist and of cubic deflections (Archer)."""
-    mass = np.zeros((12, 12))
-    linear = length / 6 * np.array([[2.0, 1.0], [1.0, 2.0]])
-    mass[np.ix_([0, 6], [0, 6])] = per_length * linear
-    mass[np.ix_([3, 9], [3, 9])] = polar_per_length * linear
-    a = length
-    cubic = np.array(
-        [
-            [156, 22 * a, 54, -13 * a],
-            [22 * a, 4 * a * a, 13 * a, -3 * a * a],
-            [54, 13 * a, 156, -22 * a],
-            [-13 * a, -3 * a * a, -22 * a, 4 * a * a],
-        ]
-    )
-    # a rotation about y is a slope −w′
-    for places, signs in (([1, 5, 7, 11], [1, 1, 1, 1]), ([2, 4, 8, 10], [1, -1, 1, -1])):
-        mass[np.ix_(places, places)] = per_length * a / 420 * cubic * np.outer(signs, signs)
-    return mass
-
-
-def _bending(section: Section, material: Material, length: float) -> FloatArray:
-    """Stiffness at B of both planes together, shape (6, 6)."""
-    inertia = np.array([[section.inertia_1, section.inertia_12], [section.inertia_12, section.inertia_2]])
-    stiffness = np.zeros((6, 6))
-    # deflections v, w and slopes v′, w′, of which the rotation about y is −w′
-    planes = np.zeros((4, 6))
-    planes[0, 1] = planes[1, 2] = planes[2, 5] = 1.0
-    planes[3, 4] = -1.0
-    bent = np.diag(inertia) > 0
-    if not bent.any():
-        return stiffness
-    kept = np.flatnonzero(np.concatenate([bent, bent]))
-    compliance = np.linalg.inv(inertia[np.ix_(bent, bent)]) / material.youngs_modulus
-    shares = np.array([section.shear_1, section.shear_2])[bent]
-    flexible = [
-        0.0 if isinf(share) else length / (share * section.area * material.shear_modulus) for share in shares
-    ]
-    flexibility = np.block(
-        [
-            [length**3 / 3 * compliance + np.diag(flexible), length**2 / 2 * compliance],
-            [length**2 / 2 * compliance, length * compliance],
-        ]
-    )
-    of_kept = planes[kept]
-    return np.asarray(stiffness + of_kept.T @ np.linalg.inv(flexibility) @ of_kept)
+def _properties(deck: Deck, beam: Beam) -> tuple[Section | TaperedSection, Material]:
+    section = deck.sections.get(beam.section)
+    if section is None:
+        raise FileFormatError(beam.place, got=f"property {beam.section[1]}", allowed=f"a P{beam.section[0]}")
+    return section, _material(deck, section.material, beam.place)
 
 
 def _released(stiffness: FloatArray, beam: Beam) -> FloatArray:
@@ -193,7 +166,7 @@ def bush_stiffness(deck: Deck, bush: Bush) -> FloatArray:
 
 def _bush_axes(deck: Deck, bush: Bush, places: list[FloatArray]) -> FloatArray:
     if bush.frame is not None:
-        return deck.frame(bush.frame, bush.place).axes.T
+        return deck.frame(bush.frame, bush.place).axes_at(places[0]).T
     if len(places) == 1 or np.linalg.norm(places[1] - places[0]) == 0:
         raise FileFormatError(
             bush.place, got="nodes at one place and no coordinate system", remedy="give the system of its springs"

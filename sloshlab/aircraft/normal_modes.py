@@ -10,12 +10,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 
-from sloshlab.aircraft.assembly import Assembly, assembled
+from sloshlab.aircraft.assembly import Assembly, assembled, supported_components
 from sloshlab.aircraft.deck import Deck
 from sloshlab.errors import AnalysisError
 from sloshlab.lateral_sloshing.coupling import require_positive_definite
 
 FloatArray = npt.NDArray[np.float64]
+_N_MODES: Final = 20
 _SHIFT_RAD2_PER_S2: Final = (2 * pi * 10.0) ** 2
 """Rigid modes make a stiffness singular; with this share of the mass it is not, at no loss below 100 Hz."""
 
@@ -54,15 +55,17 @@ class NormalModes:
         return np.array([moments[1, 2], moments[2, 0], moments[0, 1]]) / self.mass
 
 
-def normal_modes(deck: Deck, *, n_modes: int = 20, constraint_set: int | None = None) -> NormalModes:
+def normal_modes(
+    deck: Deck, *, n_modes: int | None = None, constraint_set: int | None = None, equation_set: int | None = None
+) -> NormalModes:
     """The lowest modes of a structure.
 
     Parameters
     ----------
     deck : Deck
-    n_modes : int
-        With the rigid ones.
-    constraint_set : int, optional
+    n_modes : int, optional
+        With the rigid ones; without it as many of those that METHOD asks for, or of 20, as there are.
+    constraint_set, equation_set : int, optional
         As for `assembled`.
 
     Raises
@@ -76,11 +79,12 @@ def normal_modes(deck: Deck, *, n_modes: int = 20, constraint_set: int | None = 
     names r components, the r lowest modes are replaced by motion of the whole as a rigid body at no frequency, as
     Nastran does: weak springs to the ground that a deck may have for other analyses then play no part.
     """
-    structure = assembled(deck, constraint_set=constraint_set)
+    structure = assembled(deck, constraint_set=constraint_set, equation_set=equation_set)
     factor = _mass_factor(deck)
     mass = factor * structure.mass
-    squares, vectors = _lowest(mass, structure.stiffness, n_modes, structure)
-    n_rigid = len(deck.supported)
+    asked = _asked(deck) if n_modes is None else n_modes
+    squares, vectors = _lowest(mass, structure.stiffness, asked, structure, fewer_will_do=n_modes is None)
+    n_rigid = len(supported_components(deck))
     if n_rigid:
         vectors, squares = _supported(structure, mass, vectors, squares, n_rigid)
     squares = np.where(squares < 0, 0.0, squares)
@@ -103,8 +107,14 @@ def _mass_factor(deck: Deck) -> float:
     return factor
 
 
+def _asked(deck: Deck) -> int:
+    """How many modes the METHOD of the case control section asks for."""
+    method = deck.selected("METHOD", None)
+    return (deck.method_modes.get(method, 0) if method else 0) or _N_MODES
+
+
 def _lowest(
-    mass: FloatArray, stiffness: FloatArray, n_modes: int, structure: Assembly
+    mass: FloatArray, stiffness: FloatArray, n_modes: int, structure: Assembly, *, fewer_will_do: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Squares of angular frequencies, ascending, and shapes with modal mass 1."""
     _require_positive(mass)
@@ -125,13 +135,17 @@ def _lowest(
     half = solve_triangular(factor, mass * np.outer(scale, scale), lower=True)
     inverse = solve_triangular(factor, half.T, lower=True)
     n = mass.shape[0]
+    if fewer_will_do:
+        n_modes = min(n_modes, n)
     if not 1 <= n_modes <= n:
         raise AnalysisError("n_modes", got=str(n_modes), allowed=f"1 … {n}")
     # all of them: the driver for some of them gives up where many are zero
     values, vectors = eigh(0.5 * (inverse + inverse.T), driver="evd")
     values, vectors = values[::-1][:n_modes], vectors[:, ::-1][:, :n_modes]
     massless = values <= 1e-14 * values[0]
-    if massless.any():
+    if fewer_will_do and not massless.all():
+        values, vectors = values[~massless], vectors[:, ~massless]
+    elif massless.any():
         raise AnalysisError(
             "n_modes", got=str(n_modes), allowed=f"≤ {int((~massless).sum())}, as many as masses move"
         )

@@ -90,12 +90,12 @@ REFUSED = [
     (fields("CORD2R", 1, None, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0), "one line"),
     (NODE + "\nCONM2   1       1               heavy", "CONM2: field 5: got heavy"),
     ("MAT1    1       7.+10", "MAT1: field 3: got fewer than two"),
-    (fields("PBEAM", 1, 1, 1.0, 1.0, 1.0, None, 1.0, None, "YES", 1.0, 2.0), "constant section"),
-    ("PBARL   1       1               HAT", "PBARL: field 5: got HAT; allowed: BAR, ROD, TUBE"),
+    (fields("PBEAM", 1, 1, 1.0, 1.0, 1.0, None, 1.0, None, "NO", 0.5, 2.0), "one at end B"),
+    ("PBARL   1       1               HAT", "PBARL: field 5: got HAT; allowed: BAR, ROD, TUBE, TUBE2, BOX, I"),
     ("RBE2    1       1       1237    2", "RBE2: field 4: got 1237"),
     ("SPLINE4 1       7       1               1", "SPLINE4: field 3: got 7; allowed: the number of a CAERO1"),
     ("CELAS1  1       5       1       1", "CELAS1: field 3: got 5; allowed: the number of a PELAS"),
-    ("PBUSH   1       B       1.", "PBUSH: field 3: got B"),
+    ("PBUSH   1       M       1.", "PBUSH: field 3: got M"),
 ]
 
 
