@@ -121,6 +121,9 @@ def _spline(deck: Deck, card: Card, lists: Mapping[str, Mapping[int, Card]]) -> 
     else:
         boxes = _listed_boxes(deck, card, lists["AELIST"])
     nodes = _nodes(deck, card, 6, lists)
+    for field, text in enumerate(card.fields[6:], start=8):
+        if text.upper() in ("FORCE", "DISP"):
+            raise card.error(field, text, "BOTH: one spline for forces and displacements")
     method = "IPS"
     if card.name in ("SPLINE1", "SPLINE4"):
         method = card.text(8, "IPS").upper()
