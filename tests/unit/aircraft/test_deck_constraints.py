@@ -57,6 +57,27 @@ def test_one_box_on_a_beam_by_every_rigid_card(tmp_path: Path) -> None:
     assert loose.frequencies_hz[0] < 0.01 * expected[0]
 
 
+@pytest.mark.parametrize("chain", [1, 3])
+def test_a_carried_node_moves_as_part_of_the_body(chain: int, tmp_path: Path) -> None:
+    """Signs: u + θ × r by hand, through one equation for each component and a chain of rigid elements."""
+    places = np.array([[0.0, 2.0, 0.0], [0.1, 2.0, 0.05], [0.3, 1.7, 0.4], [0.2, 1.5, -0.2]])
+    nodes = [fields("GRID", 30 + n, None, *places[n]) for n in range(1, 4)]
+    x, _, z = places[1] - places[0]
+    ties = [
+        fields("MPC", 7, 31, 1, 1.0, 5, 1, -1.0, None, None, 5, 5, -z),
+        fields("MPC", 7, 31, 2, 2.0, 5, 2, -2.0, None, None, 5, 6, -2 * x, 5, 4, 2 * z),
+        fields("MPC", 7, 31, 3, 1.0, 5, 3, -1.0, None, None, 5, 5, x),
+        *(fields("MPC", 7, 31, c, 1.0, 5, c, -1.0) for c in (4, 5, 6)),
+        fields("RBAR", 41, 31, 32, 123456), fields("RBE3", 42, None, 33, 123456, 1.0, 123456, 32),
+    ]  # fmt: skip
+    structure = assembled(deck_of_text(tmp_path, *beam_cards(4), *nodes, *ties), equation_set=7)
+    motion = structure.motion.toarray().reshape(len(structure.nodes), 6, -1)
+    leader, follower = (motion[structure.nodes.index(node)] for node in (5, 30 + chain))
+    arm = places[chain] - places[0]
+    expected = np.vstack([leader[:3] + np.cross(leader[3:], arm, axisa=0, axisc=0), leader[3:]])
+    assert follower == pytest.approx(expected, abs=1e-12)
+
+
 MEAN = fields("RBE3", 40, None, 30, 123456, 1.0, 123, 21, 22, 2.5, 123, 23, 24)
 
 
@@ -119,6 +140,11 @@ def test_a_mean_solved_for_its_nodes_is_the_same_mean(tmp_path: Path) -> None:
     # UM begins a line of its own
     redefined = MEAN + "\n" + fields("+", "UM", 22, 123, 23, 23, 24, 2)
     assert frequencies(tmp_path, *deck, redefined) == pytest.approx(frequencies(tmp_path, *deck, MEAN), rel=1e-9)
+    followers, motion, nodes = rows_of(tmp_path, 30, *deck, MEAN)
+    moved = [6 * nodes.index(node) + c for node in (21, 22, 23, 24) for c in range(3)]
+    shares = followers @ np.linalg.inv(motion[moved])
+    row, motion, nodes = rows_of(tmp_path, 30, *deck, redefined)
+    assert row == pytest.approx(shares @ motion[moved], abs=1e-12)
 
 
 def test_a_rigid_rod_keeps_its_length(tmp_path: Path) -> None:
@@ -143,7 +169,7 @@ def test_rigid_elements_that_go_round_are_solved(tmp_path: Path) -> None:
         fields("MPC", 7, 1, 1, 1.0, 2, 1, -0.5, None, None, 3, 1, -1.0), fields("MPC", 7, 2, 1, 2.0, 1, 1, -1.0),
     ]  # fmt: skip
     structure = assembled(deck_of_text(tmp_path, *nodes, *masses, *equations), equation_set=7)
-    assert structure.mass == pytest.approx(np.array([[16 / 9 + 4 / 9 + 1]]))
+    assert structure.motion.toarray()[::6, 0] == pytest.approx([4 / 3, 2 / 3, 1])
 
 
 def test_static_condensation_of_a_chain(tmp_path: Path) -> None:

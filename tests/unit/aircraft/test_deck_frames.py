@@ -68,6 +68,22 @@ def test_radial_springs_hold_along_the_radius(tmp_path: Path) -> None:
     assert (motion @ structure.stiffness @ motion.T)[:2, :2] == pytest.approx(expected)
 
 
+def test_springs_along_the_directions_of_a_sphere(tmp_path: Path) -> None:
+    """At θ 90° and φ 90° the directions r, θ, φ are y, −z, −x."""
+    cards = [
+        fields("CORD2S", 5, None, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0),
+        fields("GRID", 1, 5, 2.0, 90.0, 90.0, 5, "456"),
+        fields("CONM2", 1, 1, 0, 3.0),
+        *(fields("CELAS2", c, 100.0 * c, 1, c) for c in (1, 2, 3)),
+        fields("CELAS2", 9, 10.0, 1, 1, 1, 3),
+    ]
+    structure = assembled(deck_of_text(tmp_path, *cards))
+    motion = structure.motion.toarray()[:3]
+    # the last spring stretches with u_r − u_φ = y + x
+    expected = np.diag([300.0, 100.0, 200.0]) + 10 * np.outer([1, 1, 0], [1, 1, 0])
+    assert motion @ structure.stiffness @ motion.T == pytest.approx(expected, abs=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["CORD2C", "CORD2S"])
 def test_directions_of_displacements_change_no_frequency(kind: str, tmp_path: Path) -> None:
     """A bent free beam with a rigid arm, a mean and offsets, all in basic axes or along curved ones."""

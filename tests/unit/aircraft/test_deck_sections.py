@@ -85,6 +85,29 @@ def test_mass_of_a_tapered_beam(coupled: int, tmp_path: Path) -> None:
     assert total[3, 3] == pytest.approx(along if coupled else at_ends, rel=1e-4)
 
 
+@pytest.mark.parametrize("coupled", [0, 1])
+def test_inertia_about_the_axis(coupled: int, tmp_path: Path) -> None:
+    """NSI from 0.3 to 0.1 along 2 m, besides ρ (I1 + I2) l."""
+    section = fields("PBEAM", 1, 1, 2e-4, 3e-8, 2e-8, None, 5e-9, None, *[0.0] * 8, 1.0, 1.0, 0.0, 0.0, 0.3, 0.1)
+    structure = assembled(deck_of_text(tmp_path, *ONE_BEAM, section, fields("PARAM", "COUPMASS", coupled)))
+    assert structure.rigid_mass([0, 0, 0])[4, 4] == pytest.approx(0.2 * 2.0 + RHO * 5e-8 * 2.0, rel=1e-9)
+    at_a = structure.total_mass.toarray()[4, 4]
+    # linear twist: ∫ (0.3 − 0.2 s)(1 − s)² l ds, and at the ends ∫ (0.3 − 0.2 s)(1 − s) l ds
+    expected = 2 * (0.3 / 3 - 0.2 / 12) + 2 * RHO * 5e-8 / 3 if coupled else 2 * (0.15 - 0.2 / 6) + RHO * 5e-8
+    assert at_a == pytest.approx(expected, rel=1e-9)
+
+
+def test_both_planes_of_a_round_beam_are_one(tmp_path: Path) -> None:
+    cards = beam_cards(2, kind="CBEAM", section=(2e-4, 3e-9, 3e-9, None, 5e-9))
+    modes = normal_modes(
+        deck_of_text(tmp_path, *cards, CLAMPED, fields("PARAM", "COUPMASS", 1)), n_modes=4, constraint_set=9
+    )
+    found = modes.frequencies_hz
+    assert found[[0, 2]] == pytest.approx(found[[1, 3]], rel=1e-9)
+    exact = np.array([1.8751041, 4.6940911]) ** 2 / (2 * np.pi * 4.0) * np.sqrt(E * 3e-9 / (RHO * 2e-4))
+    assert found[[0, 2]] == pytest.approx(exact, rel=1e-2)
+
+
 def test_a_tapered_beam_is_many_short_ones(tmp_path: Path) -> None:
     """Steps of as many elements come near it with the square of their length."""
 
@@ -112,13 +135,14 @@ def test_stations_between_and_blank_numbers(tmp_path: Path) -> None:
     deck = deck_of_text(
         tmp_path,
         fields("PBEAM", 1, 1, 4.0, 4.0, 2.0, None, 1.0, 0.5, *[0.0] * 8,
-               "YESA", 0.5, 1.0, None, None, None, None, None, "NO", 1.0, 2.0),
+               "YESA", 0.25, 1.0, None, None, None, None, None, "NO", 1.0, 2.0, 2.0),
         fields("PBEAML", 2, 1, None, "BAR", *[None] * 4, 2.0, 3.0, 0.5, "NO", 1.0, 1.0, 2.0),
     )  # fmt: skip
     tapered = deck.sections["BEAM", 1]
     assert isinstance(tapered, TaperedSection)
-    assert (tapered.stations, [s.area for s in tapered.sections]) == ((0.0, 0.5, 1.0), [4.0, 1.0, 2.0])
-    assert tapered.at(0.75).area == pytest.approx(1.5)
+    assert (tapered.stations, [s.area for s in tapered.sections]) == ((0.0, 0.25, 1.0), [4.0, 1.0, 2.0])
+    assert tapered.at(0.625).area == pytest.approx(1.5)
+    assert tapered.sections[1].inertia_1 == pytest.approx(3.5)
     assert tapered.sections[1].mass_per_length == 0.5
     shaped = deck.sections["BEAM", 2]
     assert isinstance(shaped, TaperedSection)
@@ -193,12 +217,12 @@ def test_offsets_and_orientations_in_other_axes(tmp_path: Path) -> None:
     turned = fields("CORD2R", 5, None, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0)  # its x is basic y, y is −x
     nodes = [fields("GRID", 1, None, 0.0, 0.0, 0.0, 5), fields("GRID", 2, None, 0.0, 2.0, 0.0, 5)]
     section = [MATERIAL, fields("PBEAM", 1, 1, 2e-4, 7e-9, 2e-9, None, 5e-9), CLAMPED]
-    # along y, orientation x: the line, then x, then −z
+    # orientation x and z; along the line, then z, then x
     for one, two in (
         (fields("CBEAM", 1, 1, 1, 2, 1.0, 0.0, 0.2, "BGG"), fields("CBEAM", 1, 1, 1, 2, 0.0, -1.0, 0.2)),
         (
-            fields("CBEAM", 1, 1, 1, 2, 1.0, 0.0, 0.0, "BOG", None, None, 0.1, 0.2, 0.3, 0.4, 0.0, 0.1),
-            fields("CBEAM", 1, 1, 1, 2, 0.0, -1.0, 0.0, "GGG", None, None, 0.1, -0.2, -0.3, 0.4, 0.0, 0.1),
+            fields("CBEAM", 1, 1, 1, 2, 0.0, 0.0, 1.0, "BOG", None, None, 0.1, 0.2, 0.3, 0.4, 0.0, 0.1),
+            fields("CBEAM", 1, 1, 1, 2, 0.0, 0.0, 1.0, "GGG", None, None, 0.1, -0.3, 0.2, 0.4, 0.0, 0.1),
         ),
     ):
         both = [
