@@ -167,9 +167,11 @@ def _stiffness(deck: Deck, row: dict[int, int]) -> sparse.csr_matrix:
             ) from error
         entries.add(_at(row, beam.ends), block)
     for rod in deck.rods.values():
-        entries.add(_at(row, rod.ends), rod_matrices(deck, rod)[0])
+        block, _ = rod_matrices(deck, rod)
+        entries.add(_at(row, rod.ends), block)
     for bush in deck.bushes.values():
-        entries.add(_at(row, bush.ends), bush_stiffness(deck, bush))
+        block = bush_stiffness(deck, bush)
+        entries.add(_at(row, bush.ends), block)
     for spring in deck.springs.values():
         _add_scalar(deck, row, entries, spring.ends, spring.value, spring.place)
     return entries.matrix()
@@ -182,7 +184,8 @@ def _mass(deck: Deck, row: dict[int, int]) -> sparse.csr_matrix:
         _, block = beam_matrices(deck, beam, consistent_mass=consistent)
         entries.add(_at(row, beam.ends), block)
     for rod in deck.rods.values():
-        entries.add(_at(row, rod.ends), rod_matrices(deck, rod, consistent_mass=consistent)[1])
+        _, block = rod_matrices(deck, rod, consistent_mass=consistent)
+        entries.add(_at(row, rod.ends), block)
     for node_mass in deck.node_masses.values():
         entries.add(_at(row, (node_mass.grid,)), node_mass.matrix)
     for mass in deck.masses.values():

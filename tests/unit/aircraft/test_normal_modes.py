@@ -183,6 +183,8 @@ def test_negative_mass_and_mechanism_are_refused(tmp_path: Path) -> None:
     ("cards", "message"),
     [
         ([fields("CBAR", 99, 1, 1, 77, 0.0, 0.0, 1.0)], "CBAR: got node 77"),
+        ([fields("CONROD", 99, 1, 77, 1, 1.0)], "CONROD: got node 77"),
+        ([fields("CBUSH", 99, 7, 1, 77, None, None, None, 0), fields("PBUSH", 7, "K", 1.0)], "CBUSH: got node 77"),
         ([fields("CBAR", 99, 8, 1, 3, 0.0, 0.0, 1.0)], "CBAR: got property 8; allowed: a PBAR"),
         ([fields("CBAR", 99, 1, 1, 3, 0.0, 1.0, 0.0)], "an orientation along it"),
         ([fields("RBE2", 1, 1, 123, 3), fields("RBE2", 2, 2, 3, 3)], "node 3, component 3, dependent twice"),
