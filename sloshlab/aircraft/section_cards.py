@@ -43,8 +43,9 @@ def _share_in_shear(value: float | None) -> float:
 def _bar(deck: Deck, card: Card) -> None:
     area, i1, i2, torsion, per_length = card.reals(4, 5)
     # line 2 has places for stresses, line 3 shear and I12
-    shear_1, shear_2 = (_share_in_shear(card.real(field, 0.0)) for field in (18, 19))
     i12 = card.real(20, 0.0)
+    # with I12 the manual ignores areas in shear
+    shear_1, shear_2 = (inf if i12 else _share_in_shear(card.real(field, 0.0)) for field in (18, 19))
     section = Section(card.identifier(3), area, i1, i2, i12, torsion, per_length, shear_1, shear_2)
     _put(deck, card, "BAR", {0.0: section})
 

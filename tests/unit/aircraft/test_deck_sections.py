@@ -149,6 +149,13 @@ def test_stations_between_and_blank_numbers(tmp_path: Path) -> None:
     assert [(s.area, s.mass_per_length) for s in shaped.sections] == [(6.0, 0.5), (2.0, 0.5)]
 
 
+def test_a_bar_with_a_product_of_inertia_has_no_shear(tmp_path: Path) -> None:
+    card = ("PBAR", 1, 1, 2.0, 3.0, 4.0, 5.0, *[None] * 10, 0.5, 0.6)
+    found = [deck_of_text(tmp_path, fields(*card, *i12)).sections["BAR", 1] for i12 in ((), (1.0,))]
+    shears = [(s.shear_1, s.shear_2) for s in found if isinstance(s, Section)]
+    assert shears == [(0.5, 0.6), (np.inf, np.inf)]
+
+
 def polygon(rectangles: list[tuple[float, float, float, float]]) -> tuple[float, float, float]:
     """Area and moments of area of rectangles (width, height, z, y of the middle, sign by the width), by sums."""
     area = sum(w * h for w, h, _, _ in rectangles)
