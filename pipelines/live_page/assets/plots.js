@@ -65,6 +65,21 @@ function power(value) {
   return exponent >= -2 && exponent <= 4 ? String(Number((10 ** exponent).toPrecision(1))) : `10${raised(exponent)}`;
 }
 
+// Text with bars over its letters, begun at its upper left corner. Many fonts have no macron to put over a letter, and
+// where they have one it is three pixels wide at this size; so the bar is drawn, as wide as its letter.
+function barred(pen, text, x, y) {
+  const [first, ...others] = text.split("\u0304");
+  let at = x, part = first;
+  for (const next of others) {
+    const begin = at + pen.measureText(part.slice(0, -1)).width, end = at + pen.measureText(part).width;
+    pen.fillText(part, at, y);
+    pen.fillRect(begin + 1, Math.round(y) - 2, end - begin - 2, 1);
+    at = end;
+    part = next;
+  }
+  pen.fillText(part, at, y);
+}
+
 // a frame with axes; returns how values become places
 function axes(canvas, box) {
   const { pen, width, height } = context(canvas);
@@ -98,7 +113,7 @@ function axes(canvas, box) {
   }
   if (box.xLabel) pen.fillText(box.xLabel, (left + right) / 2, bottom + 17);
   pen.textAlign = "left";
-  if (box.yLabel) pen.fillText(box.yLabel, 2, 4);
+  if (box.yLabel) barred(pen, box.yLabel, 2, 5);
   return { pen, x, y, left, right, top, bottom };
 }
 
