@@ -76,13 +76,15 @@ def ball_from_decays(
     # at the rate of the recordings, because the reading of the decrement depends on it
     decay = simulated_decay(found.ball, rig, release, duration, sampling_rate_hz=rate)
     steady = np.geomspace(measured.acceleration_m_per_s2.min(), measured.acceleration_m_per_s2.max(), 30)
+    traces = [_measured_trace(recording, rig) for recording in recordings]
     response = _response(found.ball, rig, settings.n_map)
     result = DecayResult(
         measured=measured,
         simulated=simulated_curve(decay, measured.frequency_hz),
         initial_displacement_m=release,
-        trace=_measured_trace(recordings[0], rig),
+        trace=traces[0],
         simulated_trace=_simulated_trace(decay, rig),
+        traces=tuple((run.run_id, trace) for (_, run), trace in zip(sloshing, traces, strict=True)),
         shares=damping_shares(found.ball, rig, release, 2 * duration),
         frozen=frozen,
         steady_acceleration_m_per_s2=steady,

@@ -13,7 +13,7 @@ _CYCLES_OF_FORCE = 12
 _STILL_G = 0.2
 """Below it the tank counts as at rest."""
 _SHARE_COLOURS = dict(zip(("all", "ball", "coulomb", "viscous"), DISTINCT_COLOURS, strict=False))
-_SHARE_NAMES = {"all": "all together", "ball": "ball", "coulomb": "Coulomb friction", "viscous": "viscous damping"}
+SHARE_NAMES = {"all": "all together", "ball": "ball", "coulomb": "Coulomb friction", "viscous": "viscous damping"}
 
 
 def motion_and_damping(name: str, experiment: BallExperiment, result: DecayResult) -> ReportFigure:
@@ -79,7 +79,7 @@ def damping_shares(name: str, experiment: BallExperiment, result: DecayResult) -
     largest = float(result.measured.acceleration_g.max())
     for which, curve in result.shares.items():
         axes.plot(curve.acceleration_g, 100 * curve.damping_ratio, color=_SHARE_COLOURS[which],
-                  label=_SHARE_NAMES[which])  # fmt: skip
+                  label=SHARE_NAMES[which])  # fmt: skip
     at = np.geomspace(float(result.measured.acceleration_m_per_s2.min()), GRAVITY_M_PER_S2 * largest, 60)
     total = sum(result.shares[which].at(at) for which in ("ball", "coulomb", "viscous"))
     axes.plot(at / GRAVITY_M_PER_S2, 100 * total, "--", color="#333333", lw=1.0, label="sum of the three")

@@ -41,6 +41,8 @@ class DecayResult:
     initial_displacement_m : float
     trace, simulated_trace : ForceTrace
         Of the first decay and of the ball.
+    traces : tuple of (str, ForceTrace)
+        Every sloshing decay with the name of its run.
     shares : dict of str to DampingCurve
         ζ(a) of all dampings and of each alone.
     steady_acceleration_m_per_s2, steady_loss_factor : ndarray, shape (n,)
@@ -58,6 +60,7 @@ class DecayResult:
     initial_displacement_m: float
     trace: ForceTrace
     simulated_trace: ForceTrace
+    traces: tuple[tuple[str, ForceTrace], ...]
     shares: dict[str, DampingCurve]
     steady_acceleration_m_per_s2: FloatArray
     steady_loss_factor: FloatArray

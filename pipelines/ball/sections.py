@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from pipelines.ball import figures_decay, figures_line, figures_map, tables
+from pipelines.ball import figures_decay, figures_line, figures_map, tables, touchable_decays, touchable_lines
 from pipelines.ball.results import BallExperiment, DecayResult, LineResult
 from pipelines.report.citations import Citation, citation
 from pipelines.report.numbers import text
@@ -50,9 +50,9 @@ def page_of(experiment: BallExperiment) -> Page:
 
 def _decay_plans(experiment: BallExperiment, result: DecayResult) -> tuple[SectionPlan, ...]:
     decay = {
-        "decay": figures_decay.motion_and_damping,
+        "decay": touchable_decays.motion,
         "sloshing_force": figures_decay.sloshing_force,
-        "damping_shares": figures_decay.damping_shares,
+        "damping_shares": touchable_decays.damping,
         "loss_factors": figures_decay.loss_factors,
     }
     if result.frozen is not None:
@@ -71,7 +71,7 @@ def _decay_plans(experiment: BallExperiment, result: DecayResult) -> tuple[Secti
 
 
 def _line_plans(experiment: BallExperiment, result: LineResult) -> tuple[SectionPlan, ...]:
-    tuned = {"tuned_line": figures_line.tuned_line}
+    tuned = {"tuned_line": touchable_lines.tuned_line}
     away = {
         "map_of_ball": figures_line.map_of_ball,
         "other_frequencies": figures_line.other_frequencies,

@@ -121,7 +121,7 @@ def where(name: str, diagnosis: Diagnosis) -> ReportFigure:
     if diagnosis.after is not None:
         after = mismatches(found.fitting, found.readings(diagnosis.after))
         both.append((extended_label(diagnosis), _same(after, worst)))
-    top = _highest(worst)
+    top = highest_missed_band(worst)
     figure = new_figure(3.0)
     panels = np.atleast_1d(figure.subplots(1, len(both), sharey=True))
     largest = float(np.log10(1 + worst.excess[:, : top + 1].max()))
@@ -289,7 +289,7 @@ def _same(found: list[ChannelMismatch], wanted: ChannelMismatch) -> ChannelMisma
     return next(mismatch for mismatch in found if (mismatch.run, mismatch.channel) == (wanted.run, wanted.channel))
 
 
-def _highest(channel_mismatch: ChannelMismatch) -> int:
+def highest_missed_band(channel_mismatch: ChannelMismatch) -> int:
     """The band below which nearly all of the misfit lies that is no noise."""
     inner = channel_mismatch.excess[1:-1] if channel_mismatch.excess.shape[0] > 4 else channel_mismatch.excess
     beyond = np.maximum(inner.mean(axis=0) - _EXCESS_OF_NOISE, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from pipelines.diagnosis import figures, figures_force, figures_where, tables, touchable_histories
+from pipelines.diagnosis import figures, figures_force, figures_where, tables, touchable_histories, touchable_where
 from pipelines.diagnosis.banner import banner_of
 from pipelines.diagnosis.next_experiment import next_experiment
 from pipelines.diagnosis.results import Diagnosis
@@ -48,7 +48,10 @@ def page_of(diagnosis: Diagnosis) -> Page:
     }
     before_and_after: dict[str, tuple[dict[str, Draw], tuple[Table | None, ...]]] = {
         "Before and after": (
-            {"time_histories": touchable_histories.time_histories, "held_out_errors": figures.held_out_errors},
+            {
+                touchable_where.HISTORIES: touchable_histories.time_histories,
+                "held_out_errors": figures.held_out_errors,
+            },
             (tables.effect_parameter_table(diagnosis),),
         )
     }
@@ -63,7 +66,7 @@ def page_of(diagnosis: Diagnosis) -> Page:
         "Where": (
             {
                 "block_shares": figures_where.block_shares,
-                "where": figures.where,
+                "where": touchable_where.where,
                 "residual_profiles": figures_where.residual_profiles,
             },
             where_tables,

@@ -20,6 +20,7 @@ FloatArray = NDArray[np.float64]
 _RECORDED: Final = "recorded"
 _BELIEVED: Final = "as believed"
 _RETUNED: Final = "baseline retuned"
+GROUPS: Final = ("held out: chose nothing", "fitted")
 _CAPTION: Final = (
     "Every run and channel, recorded and simulated; below, what the recording has beyond each of them, and power "
     "densities after Welch. Shown first is the run that is missed most, in the cycles that the retuned baseline "
@@ -37,10 +38,10 @@ def time_histories(name: str, diagnosis: Diagnosis) -> ReportFigure:
 def histories_of(diagnosis: Diagnosis) -> Histories:
     """All runs, held-out ones first, with all channels: recorded, believed, retuned, and with what was found."""
     found = diagnosis.findings
-    groups = {"held out: chose nothing": found.held_out, "fitted": found.fitting}
+    groups = zip(GROUPS, (found.held_out, found.fitting), strict=True)
     runs = [
         _run(diagnosis, observed, group)
-        for group, them in groups.items()
+        for group, them in groups
         for observed in by_misfit(diagnosis, them)
         if observed
     ]

@@ -22,7 +22,7 @@ LEVELS: Final = (("low", 0.15), ("medium", 0.5), ("large", 0.9))
 """Names and shares of the largest acceleration at which time histories are shown."""
 _LEVEL_TOLERANCE: Final = 0.12
 """Relative distance from the wanted level within which a cycle may begin what is shown."""
-_CYCLES_SHOWN: Final = 12
+CYCLES_SHOWN: Final = 12
 _CYCLES_ZOOMED: Final = 3
 _MOST_POINTS: Final = 3000
 _STRONGEST: Final = 0.98
@@ -72,7 +72,7 @@ def time_histories(name: str, validated: ValidatedModel) -> ReportFigure:
     for row, (word, at) in zip(grid, places, strict=True):
         cycles = run.cycles
         title = f"{word}: {cycles.acceleration_g[at]:.2g} g, {cycles.frequency_hz[at]:.1f} Hz"
-        for axes, n_cycles in zip(row, (_CYCLES_SHOWN, _CYCLES_ZOOMED), strict=True):
+        for axes, n_cycles in zip(row, (CYCLES_SHOWN, _CYCLES_ZOOMED), strict=True):
             _excerpt(axes, run, at, n_cycles)
         row[0].set_title(title)
         row[1].set_title("zoom")
@@ -83,7 +83,7 @@ def time_histories(name: str, validated: ValidatedModel) -> ReportFigure:
     caption = (
         f"Measured (black) and predicted (red) force in excerpts of {plain(run.name, 60)} at low, medium "
         "and large "
-        f"amplitude, {_CYCLES_SHOWN} cycles and a zoom on {_CYCLES_ZOOMED}. Of all places with that "
+        f"amplitude, {CYCLES_SHOWN} cycles and a zoom on {_CYCLES_ZOOMED}. Of all places with that "
         "amplitude, the "
         "one whose error is the median is shown, neither the best nor the worst."
     )
@@ -94,11 +94,11 @@ def typical_cycle(run: ComparedRun, share: float) -> int | None:
     """Of all places at a share of the largest acceleration, the first cycle of that with the median error."""
     cycles = run.cycles
     level = cycles.acceleration_g
-    if level.size <= _CYCLES_SHOWN:
+    if level.size <= CYCLES_SHOWN:
         return None
     wanted = share * float(np.quantile(level, _STRONGEST))
     starts = np.flatnonzero(np.abs(level / wanted - 1) < _LEVEL_TOLERANCE)
-    starts = starts[starts + _CYCLES_SHOWN < level.size]
+    starts = starts[starts + CYCLES_SHOWN < level.size]
     errors = np.array([_relative_error(run, int(at)) for at in starts])
     starts, errors = starts[np.isfinite(errors)], errors[np.isfinite(errors)]
     return int(starts[np.argsort(errors)[errors.size // 2]]) if starts.size else None
@@ -106,21 +106,22 @@ def typical_cycle(run: ComparedRun, share: float) -> int | None:
 
 def _relative_error(run: ComparedRun, at: int) -> float:
     """Of the cycles that are shown; NaN where not all is known."""
-    shown = _samples(run, at, _CYCLES_SHOWN)
+    shown = samples_of_cycles(run, at, CYCLES_SHOWN)
     force, free = run.signals.dynamic_force_n[shown], run.free[shown]
     if not (np.isfinite(force).all() and np.isfinite(free).all()):
         return float("nan")
     return -fit_quality(force, free).fit_percent
 
 
-def _samples(run: ComparedRun, at: int, n_cycles: int) -> slice:
+def samples_of_cycles(run: ComparedRun, at: int, n_cycles: int) -> slice:
+    """Samples of so many cycles from one on."""
     rate = run.signals.sampling_rate_hz
     first, last = run.cycles.start_s[at], run.cycles.start_s[at + n_cycles]
     return slice(int(first * rate), int(last * rate) + 1)
 
 
 def _excerpt(axes: Axes, run: ComparedRun, at: int, n_cycles: int) -> None:
-    shown = _samples(run, at, n_cycles)
+    shown = samples_of_cycles(run, at, n_cycles)
     time_s = np.arange(shown.start, shown.stop) / run.signals.sampling_rate_hz
     axes.plot(time_s, run.signals.dynamic_force_n[shown], color=MEASURED_COLOUR, lw=1.0, label="measured")
     axes.plot(time_s, run.free[shown], color=REFERENCE_COLOUR, lw=1.0, label="predicted, free run")

@@ -10,10 +10,10 @@ import numpy as np
 from pipelines.liquid_model import (
     figures_domain,
     figures_maps,
-    figures_residual,
     figures_signals,
     figures_training,
     tables,
+    touchable_runs,
 )
 from pipelines.liquid_model.results import ValidatedModel
 from pipelines.report.citations import SCIPY, SOURCE, XARRAY, Citation
@@ -86,24 +86,22 @@ def planned_sections(validated: ValidatedModel) -> tuple[SectionPlan, ...]:
             name: partial(figures_maps.compared_maps, quantity=quantity, counterpart=counterpart)
             for name, (quantity, counterpart) in maps.items()
         },
-        windows_compared=partial(figures_training.windows_compared),
+        windows_compared=partial(touchable_runs.windows_compared),
     )
     return (
         SectionPlan(
             "Time histories",
             plans(
-                whole_run=partial(figures_signals.whole_run),
+                whole_run=partial(touchable_runs.whole_run),
                 time_histories=partial(figures_signals.time_histories),
             ),
             (tables.fit_table(validated), tables.amplitude_table(validated)),
         ),
-        SectionPlan(
-            "Ceiling", plans(ceiling=partial(figures_training.ceiling)), (tables.ceiling_table(validated),)
-        ),
+        SectionPlan("Ceiling", plans(ceiling=partial(touchable_runs.ceiling)), (tables.ceiling_table(validated),)),
         SectionPlan("Maps", of_maps, (tables.map_table(validated),)),
         SectionPlan(
             "Residual",
-            plans(residual=partial(figures_residual.correlations)),
+            plans(residual=partial(touchable_runs.correlations)),
             (tables.residual_table(validated),),
         ),
         SectionPlan(

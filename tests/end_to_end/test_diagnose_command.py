@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from page_contents import Scripts
 from scipy.integrate import solve_ivp
 from short_runs import DONE_BUT_FLAGGED, contents, leftovers, refusal
 
@@ -176,7 +177,17 @@ def test_a_spring_that_hardens_is_named_with_its_size_and_reported(tmp_path: Pat
     fit = verdict["fit"]
     assert fit["heldout_after"] < 1.3 < 3 * fit["heldout_after"] < fit["heldout_retuned"]
     assert not (folder / "diagnosis").exists()
-    assert "cubic stiffness" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "cubic stiffness" in page
+    data = {content["kind"]: content for content in Scripts(page).data}
+    # a cell of the misfit finds its run and channel among the time histories
+    misfit, histories = (
+        [(each["name"], [channel["name"] for channel in each["channels"]]) for each in data[kind]["runs"]]
+        for kind in ("misfit", "histories")
+    )
+    assert misfit == histories
+    assert len(misfit) == 6
+    assert data["misfit"]["models"] == ["baseline retuned", "with what was left out"]
 
 
 Spoil = Callable[[Path], Any]

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from touchable_page import histories, window_map, written_page
+from touchable_page import HOSTILE, charts, histories, misfit_map, window_map, written_page
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 BROWSER = os.environ.get("SLOSHLAB_BROWSER") or next(
@@ -26,6 +26,7 @@ try:
 except metadata.PackageNotFoundError:
     pytest.skip("needs the package bokeh (extra interactive)", allow_module_level=True)
 
+CONTENTS = {"histories": histories(), "map": window_map(), "charts": charts(), "misfit": misfit_map()}
 WIDE, NARROW = {"width": 1400, "height": 900}, {"width": 400, "height": 800}
 LINES = """name => {
   const lines = [];
@@ -48,7 +49,7 @@ PLACE = """([name, point]) => {
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return written_page(tmp_path_factory.mktemp("page"), {"histories": histories(), "map": window_map()})
+    return written_page(tmp_path_factory.mktemp("page"), CONTENTS)
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +95,7 @@ def test_every_figure_is_drawn_and_nothing_runs_over_the_edge(
     opened: Callable[..., Any], viewport: dict[str, int], scheme: str
 ) -> None:
     page = opened(viewport, color_scheme=scheme)
-    assert states(page) == ["ready", "ready"]
+    assert states(page) == ["ready"] * len(CONTENTS)
     assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
     assert page.title() != "taken"
     for panel in page.query_selector_all(".panel"):
@@ -190,6 +191,73 @@ def test_colours_are_those_of_the_chosen_quantity(opened: Callable[..., Any]) ->
     before = page.evaluate(LINES, "map")[1]
     page.select_option("#map select >> nth=0", label="β")
     assert page.evaluate(LINES, "map")[1] != before
+
+
+SHOWN = """() => {
+  const choices = [...document.querySelectorAll("#histories select")];
+  const panel = document.querySelector("#histories .panel");
+  const { start, end } = [...Bokeh.index].find((view) => panel.contains(view.el)).model.x_range;
+  return [...choices.map((it) => it.selectedOptions[0].textContent), start, end];
+}"""
+
+
+def test_a_cell_of_the_misfit_shows_run_channel_and_stretch_in_the_time_histories(
+    opened: Callable[..., Any],
+) -> None:
+    page = opened()
+    page.select_option("#misfit select >> nth=1", label="acceleration")
+    page.locator("#misfit .panel").scroll_into_view_if_needed()
+    # four blocks a row: the third, of the second band
+    page.mouse.click(*page.evaluate(PLACE, ["misfit", 6]))
+    page.wait_for_selector("#misfit .touch-words:has-text('shown in')")
+    # 1.0 … 1.5 s, and half as much on either side
+    assert page.evaluate(SHOWN) == ["run_2", "acceleration", 0.75, 1.75]
+    assert page.get_attribute("#misfit .touch-words a", "href") == "#histories"
+    page.select_option("#misfit select >> nth=0", index=1)
+    page.select_option("#misfit select >> nth=3", index=2)
+    page.wait_for_selector("#misfit .touch-words:has-text('1.50 … 2.00')")
+    # the second of the list has the second largest misfit, 4 × 11 in the last block
+    assert page.evaluate(SHOWN) == [HOSTILE, "displacement", 1.25, 2.25]
+
+
+def test_a_cell_of_what_has_no_time_history_says_so(opened: Callable[..., Any]) -> None:
+    page = opened()
+    before = page.evaluate(SHOWN)
+    page.select_option("#misfit select >> nth=0", index=2)
+    page.select_option("#misfit select >> nth=3", index=1)
+    page.wait_for_selector("#misfit .touch-words:has-text('no time history')")
+    assert page.evaluate(SHOWN) == before
+
+
+def test_colours_of_the_misfit_are_those_of_the_chosen_model(opened: Callable[..., Any]) -> None:
+    page = opened()
+    values = """() => {
+      const panel = document.querySelector("#misfit .panel");
+      const view = [...Bokeh.index].find((view) => panel.contains(view.el));
+      return [...view.model.toolbar.tools.find((it) => it.type === "TapTool").renderers[0].data_source.data.value];
+    }"""
+    # log₁₀(1 + 8 × 10) of the third block in the lowest band, a tenth of the misfit after
+    assert page.evaluate(values)[2] == pytest.approx(1.90849, abs=1e-4)
+    page.select_option("#misfit select >> nth=2", label="after")
+    assert page.evaluate(values)[2] == pytest.approx(0.95424, abs=1e-4)
+
+
+def test_a_chart_is_chosen_and_its_curves_are_switched_by_keys(opened: Callable[..., Any]) -> None:
+    page = opened()
+    first = page.evaluate(LINES, "charts")
+    page.select_option("#charts select", index=1)
+    then = page.evaluate(LINES, "charts")
+    assert len(first) == len(then) == 2
+    assert page.evaluate("lines => JSON.parse(lines[0])[1]", then) == pytest.approx([3.0, 6.0, 9.0], rel=1e-4)
+    box = page.locator("#charts").get_by_label("measured")
+    box.focus()
+    page.keyboard.press("Space")
+    assert page.evaluate(LINES, "charts") == then[1:]
+    # the box keeps the keys, and what is off stays so for another run
+    page.keyboard.press("Space")
+    page.keyboard.press("Space")
+    page.select_option("#charts select", index=0)
+    assert page.evaluate(LINES, "charts") == first[1:]
 
 
 def test_paper_shows_the_images(opened: Callable[..., Any]) -> None:

@@ -10,6 +10,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from page_contents import Scripts, numbers, samples
 from short_runs import DONE_BUT_FLAGGED, contents, edited, refusal, rig_text, short_run
 
 import pipelines.liquid_model.study
@@ -92,6 +93,8 @@ def test_the_report_has_everything_and_says_what_the_model_does(folder, tmp_path
         assert np.abs(residual["residual_correlation"].values[np.isfinite(residual["residual_band"])]).max() <= 1
     assert said["ceiling_percent"] > said["repeat_percent"] > said["model_on_repeats_percent"]
 
+    touched_forces(page, said)
+
     # the report of the saved model is that of its training
     again = tmp_path / "again"
     arguments = ["validate", str(output), str(folder / "valid.nc"), "--rig", str(folder / "rig.toml")]
@@ -102,6 +105,30 @@ def test_the_report_has_everything_and_says_what_the_model_does(folder, tmp_path
     with xr.open_dataset(first) as trained, xr.open_dataset(second) as trained_again:
         xr.testing.assert_identical(trained.drop_attrs(), trained_again.drop_attrs())
     assert "training curve was written when it was trained" in (again / "report.html").read_text(encoding="utf-8")
+
+
+def touched_forces(page: str, said: dict[str, Any]) -> None:
+    """Every run that was not trained on can be chosen, and its curves fit as its name says."""
+    if "application/json" not in page:
+        pytest.skip("needs the package bokeh (extra interactive)")
+    assert len(page.encode()) < 6_000_000
+    data = {content["title"]: content for content in Scripts(page).data}
+    runs = data["Recorded and simulated force, runs with their fit"]["runs"]
+    names = [(run["name"].partition(":")[0], run["group"].partition(":")[0]) for run in runs]
+    tests = [(name, "test") for name in ("weak", "repeat_1", "repeat_2", "strong")]
+    assert names == [("valid", "validation"), *tests, ("train", "training")]
+    for run_ in runs:
+        force = run_["channels"][0]
+        # all samples are drawn, so that the fit is that of the run
+        assert samples(force["samples"]).size == force["of"]
+        recorded, free = (numbers(line["values"]) for line in force["lines"][:2])
+        known = np.isfinite(recorded) & np.isfinite(free)
+        error = np.linalg.norm((recorded - free)[known]) / np.linalg.norm(recorded[known] - recorded[known].mean())
+        shown = float(run_["name"].rpartition(": ")[2].removesuffix(" %"))
+        assert shown == pytest.approx(100 * (1 - error), abs=0.06)
+    assert float(runs[0]["name"].rpartition(": ")[2][:-2]) == pytest.approx(said["fit_percent"], abs=0.06)
+    assert len(data["Errors of a repeat and of the model"]["charts"]) == 2
+    assert {chart["group"] for chart in data["What is left in the residual"]["charts"]} == {"valid"}
 
 
 def test_no_report_writes_the_model_only(folder, tmp_path) -> None:

@@ -17,6 +17,8 @@ from pipelines.report.interactive.contents import (
     Window,
     WindowMap,
 )
+from pipelines.report.interactive.curves import Chart, Charts, Curve
+from pipelines.report.interactive.misfit_map import MisfitMap, MissedChannel, MissedRun
 from pipelines.report.page import Page, write_page
 from pipelines.report.sections import FigurePlan, SectionPlan
 from pipelines.report.style import new_figure, png_bytes
@@ -70,6 +72,39 @@ def window_map() -> WindowMap:
     return WindowMap(
         "Work", "Points.", "ū", "ω̄", x, y, *others, extent, quantities, tuple(windows), "F", "u", "|F|", first=3
     )  # fmt: skip
+
+
+def charts() -> Charts:
+    """ζ of two runs, the second three times as large: points at 1, 2, 3 g on a straight line."""
+    found = []
+    for name, factor in (("run_2", 1.0), (HOSTILE, 3.0)):
+        at = np.array([1.0, 2.0, 3.0])
+        curves = (
+            Curve("measured", "before", at, factor * at, is_points=True),
+            Curve("fitted", "after", np.array([0.0, np.nan, 4.0]), factor * np.array([0.0, np.nan, 4.0])),
+        )
+        found.append(Chart(name, "decays", "a [g]", f"ζ [%], {factor:g}", curves))
+    return Charts("Damping", "Run", tuple(found), "Curves.")
+
+
+def misfit_map() -> MisfitMap:
+    """Four blocks of half a second and three bands; what is missed grows with time, and tenfold less after."""
+    time, frequency = np.array([0.25, 0.75, 1.25, 1.75]), np.array([0.5, 1.5, 2.5])
+    misfit = np.outer([1.0, 2.0, 8.0, 4.0], [10.0, 1.0, 0.0])
+    runs = [
+        MissedRun(
+            name,
+            group,
+            tuple(MissedChannel(channel, time, frequency, (misfit, 0.1 * misfit)) for channel in names),
+        )
+        for name, group, names in (
+            ("run_2", "held out", ("displacement", "acceleration")),
+            (HOSTILE, "held out", ("displacement",)),
+            ("elsewhere", "fitted", ("displacement",)),
+        )
+    ]
+    colours = ("#440154", "#21918c", "#fde725")
+    return MisfitMap("Misfit", "log", ("before", "after"), tuple(runs), colours, "histories", "Cells.")
 
 
 def figure(name: str, touch: Touchable | None) -> ReportFigure:

@@ -77,6 +77,19 @@ function button(text, pressed) {
   return made;
 }
 
+// A box with the colour of its lines; those that are off are in a set, and `changed` draws anew.
+function switchOf(label, colour, off, changed) {
+  const box = element("input", { type: "checkbox" });
+  box.checked = !off.has(label);
+  box.addEventListener("change", () => {
+    if (box.checked) off.delete(label); else off.add(label);
+    changed();
+  });
+  const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
+  swatch.style.background = colour;
+  return element("label", { class: "switch" }, box, swatch, label);
+}
+
 const rethemed = [];
 DARK.addEventListener("change", () => rethemed.forEach((paint) => paint()));
 

@@ -112,10 +112,13 @@ class HistoriesFigure {
   }
 
   look(closely) {
-    const view = closely && this.shown.view ? this.shown.view : this.whole;
+    this.lookAt(closely && this.shown.view ? this.shown.view : this.whole);
+    this.views.hidden = !this.shown.view;
+  }
+
+  lookAt(view) {
     [this.x.start, this.x.end] = view;
     for (const part of ["history", "difference"]) if (this[part]) this[part].fitHeight(view, this.visible(part));
-    this.views.hidden = !this.shown.view;
   }
 
   visible(part) {
@@ -136,22 +139,27 @@ class HistoriesFigure {
         part.renderer.glyph.line_width = role === "recorded" && part === drawn.history ? 3.2 : 1.3;
         part.renderer.visible = !this.off.has(label);
       }
-      if (lines.length > 1) this.switches.append(this.switchOf(label, colour));
+      if (lines.length > 1) this.switches.append(switchOf(label, colour, this.off, () => this.hide(label)));
     });
   }
 
-  switchOf(label, colour) {
-    const box = element("input", { type: "checkbox" });
-    box.checked = !this.off.has(label);
-    box.addEventListener("change", () => {
-      if (box.checked) this.off.delete(label); else this.off.add(label);
-      this.shown.lines.forEach((line, index) => {
-        if (line.label !== label) return;
-        for (const part of Object.values(this.lines[index])) if (part) part.renderer.visible = box.checked;
-      });
+  hide(label) {
+    this.shown.lines.forEach((line, index) => {
+      if (line.label !== label) return;
+      for (const part of Object.values(this.lines[index])) if (part) part.renderer.visible = !this.off.has(label);
     });
-    const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
-    swatch.style.background = colour;
-    return element("label", { class: "switch" }, box, swatch, label);
+  }
+
+  // What another figure of the page points at: a run, its channel and a stretch of time.
+  show(run, channel, view) {
+    const runAt = this.content.runs.findIndex(({ name }) => name === run);
+    if (runAt < 0) return false;
+    const channelAt = this.content.runs[runAt].channels.findIndex(({ name }) => name === channel);
+    if (channelAt < 0) return false;
+    this.runChoice.select.value = String(runAt);
+    this.choose(runAt, channelAt);
+    if (this.channel !== channelAt) this.choose(runAt, channelAt);
+    this.lookAt(view);
+    return true;
   }
 }

@@ -17,7 +17,7 @@ from sloshlab.errors import MissingExtraError
 
 EXTRA: Final = "interactive"
 _LIBRARY: Final = ("bokeh.min.js", "bokeh-api.min.js")
-_OWN: Final = ("drawing.js", "histories.js", "window_map.js", "start.js")
+_OWN: Final = ("drawing.js", "histories.js", "window_map.js", "charts.js", "misfit_map.js", "start.js")
 
 
 @dataclass(frozen=True)

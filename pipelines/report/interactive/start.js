@@ -1,9 +1,15 @@
 // Every figure that the page carries, drawn as it comes into sight; one that fails stays as it is printed.
 
-const KINDS = { histories: HistoriesFigure, map: WindowMapFigure };
+const KINDS = { histories: HistoriesFigure, map: WindowMapFigure, charts: ChartsFigure, misfit: MisfitMapFigure };
+const begun = new Map();
 Bokeh.logger.set_level("error");
 
-async function begin(figure) {
+function begin(figure) {
+  if (!begun.has(figure.id)) begun.set(figure.id, draw(figure));
+  return begun.get(figure.id);
+}
+
+async function draw(figure) {
   const place = figure.querySelector(".touch");
   const content = JSON.parse(figure.querySelector("script[type='application/json']").textContent);
   figure.classList.add("touched");
@@ -11,12 +17,20 @@ async function begin(figure) {
     const made = new KINDS[content.kind](content, place);
     await showTogether(made.panels);
     place.dataset.state = "ready";
+    return made;
   } catch (error) {
     figure.classList.remove("touched");
     place.replaceChildren();
     place.dataset.state = "failed";
     console.error(`${figure.id}: ${error.message}`);
+    return null;
   }
+}
+
+// Another figure of the page, drawn; null where it stands still.
+async function figureOf(name) {
+  const figure = document.getElementById(name);
+  return figure && figure.classList.contains("touchable") ? begin(figure) : null;
 }
 
 const seen = new IntersectionObserver((entries) => {

@@ -22,8 +22,9 @@ INKED_ROWS = """async (label) => {
   const canvas = document.querySelector("canvas");
   plots.trend(canvas, [{ x: 0, y: 0.3, error: 0 }, { x: 1, y: 0.4, error: 0 }], "time [s]", label);
   const { data } = canvas.getContext("2d").getImageData(0, 0, 13, 21);
-  return Array.from({ length: 21 }, (_, row) =>
-    Array.from({ length: 13 }, (_, column) => data[4 * (13 * row + column) + 3]).filter((alpha) => alpha > 90).length);
+  const inked = (row, column) => data[4 * (13 * row + column) + 3] > 90;
+  const columns = [...Array(13).keys()];
+  return Array.from({ length: 21 }, (_, row) => columns.filter((column) => inked(row, column)).length);
 }"""
 
 
