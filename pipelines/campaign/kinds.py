@@ -10,7 +10,7 @@ from typing import Any, Final
 from campaigns.stored_task import StoredTask
 from pipelines.campaign.case_tasks import case_folders, diagnosis_tasks, trial_tasks
 from pipelines.campaign.plan import Plan, plan_from_document, read_plan
-from pipelines.campaign.recording_tasks import beam_tasks, matching, sweep_tasks
+from pipelines.campaign.recording_tasks import matching, recording_tasks
 from pipelines.campaign.training_tasks import training_tasks
 from sealed_trial.sealing.trial_folder import COMMITMENTS
 from sloshlab.errors import InputError
@@ -18,9 +18,9 @@ from sloshlab.experiments import EXPERIMENTS
 from sloshlab.recording import read_attributes
 
 _TASKS: Final[dict[str, Callable[[Any, Path], list[StoredTask]]]] = {
-    "sweep": sweep_tasks,
-    "beam": beam_tasks,
-    "sdof": beam_tasks,
+    "sweep": recording_tasks,
+    "beam": recording_tasks,
+    "sdof": recording_tasks,
     "train": training_tasks,
     "diagnose": diagnosis_tasks,
     "trial": trial_tasks,

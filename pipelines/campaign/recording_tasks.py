@@ -16,6 +16,8 @@ from sloshlab.recording import RunAttributes, read_attributes_of_many
 
 MOST_RECORDINGS: Final = 1_000_000
 _AT_A_TIME: Final = 100
+_OF_NO_WORKER: Final = {"folder", "name", "kind", "recordings", "rigs"}
+"""Fields of a part that say which files there are, not what is done with them."""
 Files = Mapping[str, Sequence[Path]]
 
 
@@ -26,12 +28,12 @@ class _Found:
     rig: Path
 
 
-def sweep_tasks(part: SweepPart, kept_out: Path) -> list[StoredTask]:
-    """One task for every sweep or VFA run of a folder.
+def recording_tasks(part: SweepPart | BeamPart, kept_out: Path) -> list[StoredTask]:
+    """One task for every sweep or VFA run with the still runs of its rig, or for every run of a structure.
 
     Parameters
     ----------
-    part : SweepPart
+    part : SweepPart or BeamPart
     kept_out : Path
         Recordings below it are results.
 
@@ -41,47 +43,27 @@ def sweep_tasks(part: SweepPart, kept_out: Path) -> list[StoredTask]:
         If a recording or its rig is missing or cannot be read.
     """
     found = _found(part, kept_out)
+    if isinstance(part, BeamPart):
+        return [_task(part, run, {}) for run in found]
     still: dict[tuple[Path, Path], list[Path]] = {}
     for run in found:
         if run.attributes.configuration in STILL_CONFIGURATIONS:
             still.setdefault((run.path.parent, run.rig), []).append(run.path)
-    arguments = part.model_dump(include={"p", "m", "boundaries", "allow_incomplete", "report"})
     return [
-        StoredTask(
-            name_of(part.name, run.path.relative_to(part.folder)),
-            "pipelines.campaign.recording_tasks:analysed_sweep",
-            {"recording": [run.path], "still": still.get((run.path.parent, run.rig), []), "rig": [run.rig]},
-            arguments,
-        )
+        _task(part, run, {"still": still.get((run.path.parent, run.rig), [])})
         for run in found
         if run.attributes.configuration == SLOSHING
     ]
 
 
-def beam_tasks(part: BeamPart, kept_out: Path) -> list[StoredTask]:
-    """One task for every run of a beam or a guided tank in a folder.
-
-    Parameters
-    ----------
-    part : BeamPart
-    kept_out : Path
-        Recordings below it are results.
-
-    Raises
-    ------
-    InputError
-        If a recording or its rig is missing or cannot be read.
-    """
-    arguments = part.model_dump(include={"modes", "cycles", "segment_s", "report"})
-    return [
-        StoredTask(
-            name_of(part.name, run.path.relative_to(part.folder)),
-            "pipelines.campaign.recording_tasks:analysed_beam",
-            {"recording": [run.path], "rig": [run.rig]},
-            arguments,
-        )
-        for run in _found(part, kept_out)
-    ]
+def _task(part: SweepPart | BeamPart, run: _Found, more: Files) -> StoredTask:
+    worker = "analysed_beam" if isinstance(part, BeamPart) else "analysed_sweep"
+    return StoredTask(
+        name_of(part.name, run.path.relative_to(part.folder)),
+        f"pipelines.campaign.recording_tasks:{worker}",
+        {"recording": [run.path], **more, "rig": [run.rig]},
+        part.model_dump(exclude=_OF_NO_WORKER),
+    )
 
 
 def analysed_sweep(

@@ -20,6 +20,7 @@ from urllib.parse import urlsplit
 import netCDF4
 import numpy as np
 import pytest
+from browser_that_is_there import opened_browser
 from live_commands import (
     RATE_HZ,
     Command,
@@ -42,9 +43,6 @@ pytest.importorskip("starlette", reason="needs the extra live")
 pytest.importorskip("websockets", reason="needs the extra live")
 
 N_SAMPLES = 4096
-BROWSER = os.environ.get("SLOSHLAB_BROWSER") or next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
 
 
 @pytest.fixture(scope="module")
@@ -291,13 +289,8 @@ def test_a_mark_of_the_page_starts_a_recording(bench: Path, lab: Path) -> None:
 
 @pytest.fixture
 def browser() -> Iterator[Any]:
-    sync_api = pytest.importorskip("playwright.sync_api", reason="looks at the page by Playwright")
-    if BROWSER is None:
-        pytest.skip("no browser: install Chromium, or name one by SLOSHLAB_BROWSER")
-    with sync_api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+    with opened_browser() as opened:
         yield opened
-        opened.close()
 
 
 def pixels_like(page: Any, colour: str) -> int:

@@ -1,26 +1,16 @@
-"""Reports in a real browser: nothing is fetched, nothing is reported as an error, and what is touched changes.
-
-Playwright drives a browser that is there: the one that SLOSHLAB_BROWSER names, or Chromium or Chrome on the path.
-"""
+"""Reports in a real browser: nothing is fetched, nothing is reported as an error, and what is touched changes."""
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import pytest
+from browser_that_is_there import opened_browser
 from touchable_page import HOSTILE, charts, histories, misfit_map, window_map, written_page
 
-playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-BROWSER = os.environ.get("SLOSHLAB_BROWSER") or next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-if BROWSER is None:
-    pytest.skip("needs Chromium or Chrome; SLOSHLAB_BROWSER may name it", allow_module_level=True)
 try:
     metadata.version("bokeh")
 except metadata.PackageNotFoundError:
@@ -54,10 +44,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as started:
-        launched = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+    with opened_browser() as launched:
         yield launched
-        launched.close()
 
 
 @pytest.fixture

@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from importlib import resources
 from typing import Any
 
-import pytest
-
-playwright = pytest.importorskip("playwright.sync_api", reason="looks at the page by Playwright")
-BROWSER = os.environ.get("SLOSHLAB_BROWSER") or next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-if BROWSER is None:
-    pytest.skip("no browser: install Chromium, or name one by SLOSHLAB_BROWSER", allow_module_level=True)
+from browser_that_is_there import opened_browser
 
 PAGE = "<!doctype html><meta charset=utf-8><canvas style='width:400px;height:120px'></canvas>"
 INKED_ROWS = """async (label) => {
@@ -38,13 +29,11 @@ def served(route: Any) -> None:
 
 
 def test_a_bar_over_a_letter_is_as_wide_as_the_letter() -> None:
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+    with opened_browser() as browser:
         page = browser.new_page()
         page.route("**/*", served)
         page.goto("http://live.invalid/")
         plain, barred = (page.evaluate(INKED_ROWS, label) for label in ("W [1]", "W̄ [1]"))
-        browser.close()
     added = [row for row in range(21) if barred[row] > plain[row]]
     top = next(row for row in range(21) if plain[row])
     # a W of 11 pixels is 11 wide; the bar leaves out one at either side, and stands clear of the letter
