@@ -32,8 +32,9 @@ def line_charts(result: LineResult) -> Charts:
             "tuned",
             (
                 Curve("measured", "before", tuned.u_bar, tuned.w_bar, is_points=True),
-                Curve("ball, decaying motion", "after", tuned.u_bar, result.line_of_ball),
+                # second, as in the other charts: its colour goes by its place
                 Curve("ball, steady motion", "other", tuned.u_bar, result.steady_w_bar),
+                Curve("ball, decaying motion", "after", tuned.u_bar, result.line_of_ball),
             ),
         )
     ]

@@ -95,5 +95,5 @@ def test_the_tuned_frequency_comes_first() -> None:
     )  # fmt: skip
     tuned, other = line_charts(result).charts
     assert (tuned.name, tuned.group, other.name, other.group) == ("ω̄ = 4.00", "tuned", "ω̄ = 2.00", "not tuned")
-    assert [each.y[0] for each in tuned.curves] == [0.5, 0.6, 0.7]
+    assert [each.y[0] for each in tuned.curves] == [0.5, 0.7, 0.6]
     assert [each.y[0] for each in other.curves] == [0.2, 0.9]
