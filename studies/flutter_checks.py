@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.flutter.checks import axes_apart, frozen_liquid_apart
 from sloshlab import atomic_file
 from sloshlab.aeroelastic.cantilever_wing import CantileverWing, Station
 from sloshlab.aeroelastic.generalised_forces import generalised_forces, usual_reduced_frequencies
@@ -29,12 +30,11 @@ from sloshlab.aeroelastic.lift_deficiency import (
 from sloshlab.aeroelastic.modal_structure import ModalStructure
 from sloshlab.aeroelastic.p_k import p_k_flutter
 from sloshlab.aeroelastic.planform import Boxes, Trapezoid, boxes_of
-from sloshlab.aeroelastic.rational_functions import RationalForces
 from sloshlab.aeroelastic.rational_roger import roger_fit
 from sloshlab.aeroelastic.root_locus import Crossing, root_locus
 from sloshlab.aeroelastic.section_forces import Section, rational_forces
 from sloshlab.aeroelastic.splines import BoxMotion, rigid_motion
-from sloshlab.aeroelastic.state_space import state_matrix, system_over_speed
+from sloshlab.aeroelastic.state_space import system_over_speed
 from sloshlab.aeroelastic.strip import strip_rational, strip_table
 from sloshlab.aircraft.flight_stability import Liquids, flight_system
 from sloshlab.aircraft.lifting_surfaces import lifting_surfaces
@@ -192,15 +192,7 @@ def liquids() -> Iterator[Check]:
             # half a unit of the last printed digit; 11.7949 is printed as 11.80, rounded twice
             within = 0.0051 / asked
             yield Check(f"side {side:g} m, sloshing mode {number + 1}", asked, float(reached), within, table)
-    model = load_model(MAEWING1 / "case_1.toml")
-    added = (model.frozen_mass_matrix - model.structure.mass_matrix)[:6, :6]
-    mass, box = 650 * 0.18 * 0.18 * 0.065, np.array([0.18, 0.18, 0.065])
-    below = np.array([0.0, 0.0, 0.065 / 2])
-    arm = model.tanks[0].place_m - below - model.structure.mass_centre_m
-    cross = np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
-    inertia = mass / 12 * np.diag((box**2).sum() - box**2) - mass * cross @ cross
-    expected = np.block([[mass * np.eye(3), -mass * cross], [mass * cross, inertia]])
-    error = float(np.abs(added - expected).max() / np.abs(expected).max())
+    error = frozen_liquid_apart(load_model(MAEWING1 / "case_1.toml"))
     yield Check("frozen liquid, six directions", 0.0, error, 1e-10, "rigid-body mechanics")
 
 
@@ -231,23 +223,8 @@ def flying_wing() -> Iterator[Check]:
     # between 0.3 and 2 %, as the source finds −0.8 and +1.2 % on its aircraft
     yield Check("… sloshing, flutter speed, %", -1.15, of_speed, 0.85 / 1.15, "−0.3 … −2")
     yield Check("… sloshing, flutter frequency, %", 1.15, of_frequency, 0.85 / 1.15, "+0.3 … +2")
-    yield Check("body axes against inertial axes", 0.0, _axes_apart(tank, air, density), 1e-8, "the same physics")
-
-
-def _axes_apart(model: AircraftModel, air: RationalForces, density: float) -> float:
-    """Largest distance of oscillating poles in body axes from those in inertial axes, over their size, at 25 m/s.
-
-    Heading and places play no part in inertial axes; in body axes they do not once columns of rigid translation
-    are zero, which those of a spline are to rounding error.
-    """
-    system = flight_system(model, air, "lateral", density_kg_per_m3=density, gravity=False)
-    inertial = state_matrix(
-        system.structure, air.transferred(system.motion), density_kg_per_m3=density, speed_m_per_s=25.0
-    )
-    expected = np.linalg.eigvals(inertial)
-    found = np.linalg.eigvals(system.matrix_at(25.0))
-    oscillating = expected[expected.imag > 1.0]
-    return max(float(np.abs(found - pole).min() / np.abs(pole)) for pole in oscillating)
+    apart = axes_apart(tank, air, "lateral", 25.0)
+    yield Check("body axes against inertial axes", 0.0, apart, 1e-8, "the same physics")
 
 
 def all_checks() -> list[Check]:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from pipelines.flutter.checks import ModelCheck
 from pipelines.flutter.model_file import read_model
 from pipelines.flutter.problem import FlutterProblem, Variant, problem_of
 from pipelines.report.progress import progress
@@ -133,6 +134,7 @@ class FlutterExperiment:
     settings: FlutterSettings
     inputs: tuple[Path, ...]
     results: tuple[Stability, ...]
+    checks: tuple[ModelCheck, ...] = ()
     provenance: dict[str, object] = field(default_factory=dict)
 
     @property
@@ -140,6 +142,11 @@ class FlutterExperiment:
         """What must be read before the results, with the variant's name where there are several."""
         several = len(self.results) > 1
         found = [f"{result.name}: {flag}" if several else flag for result in self.results for flag in result.flags]
+        found += [
+            f"{check.what}: {check.reached:.2g} apart, asked {check.largest:.2g}"
+            for check in self.checks
+            if not check.is_met
+        ]
         if self.problem.cache is CacheStatus.DAMAGED:
             found.append(f"generalised forces were {self.problem.cache.value}")
         return tuple(found)
@@ -165,7 +172,8 @@ def analyse_flutter(path: Path, settings: FlutterSettings, *, cache: Path | None
     # matrices of a hundred rows: threads of BLAS only wait for one another
     with threadpool_limits(1), progress("root loci", 2 * len(problem.variants)) as advance:
         results = tuple(_stability(problem, variant, settings, advance) for variant in problem.variants)
-    return FlutterExperiment(problem, settings, (path,), results)
+        checks = problem.checks(0.5 * (settings.first_m_per_s + settings.last_m_per_s))
+    return FlutterExperiment(problem, settings, (path,), results, checks)
 
 
 def _stability(

@@ -74,6 +74,9 @@ def write_flutter(
     return {
         "name": name,
         "models": {result.name: _summary(result) for result in experiment.results},
+        "checks": [
+            {"what": check.what, "asked": check.largest, "reached": check.reached} for check in experiment.checks
+        ],
         "flags": list(experiment.flags),
         "lines": [*_sentences(experiment), *report_lines(folder, written=report)],
     }
@@ -164,6 +167,7 @@ def _page(experiment: FlutterExperiment) -> Page:
     sections += [
         SectionPlan("Modes without flow", (shapes,)),
         SectionPlan("Forces of the air", (forces,), (_fit_table(experiment.problem),)),
+        *([SectionPlan("Checks", (), (_check_table(experiment),))] if experiment.checks else []),
         SectionPlan("Provenance", (), (provenance_table(experiment.provenance),)),
     ]
     return Page(
@@ -247,6 +251,19 @@ def _crossing_table(result: Stability) -> Table:
         ("kind", "branch", "speed [m/s]", "frequency [rad/s]", "reduced frequency"),
         rows,
         note,
+    )
+
+
+def _check_table(experiment: FlutterExperiment) -> Table:
+    rows = tuple(
+        (check.what, f"≤ {check.largest:.0e}", f"{check.reached:.1e}", "reached" if check.is_met else "missed")
+        for check in experiment.checks
+    )
+    return Table(
+        "Checks of this model",
+        ("difference that should be none", "asked", "reached", ""),
+        rows,
+        "Relative differences; poles at the middle of the speeds, without weight, those that oscillate.",
     )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.flutter.checks import ModelCheck, checks_of
 from pipelines.flutter.model_file import WingModel
 from pipelines.report.progress import progress
 from sloshlab.aeroelastic.bending_torsion_beam import WingModes
@@ -100,6 +101,8 @@ class FlutterProblem:
     variants : tuple of Variant
     cache : CacheStatus or None
         Where the table is from; None for strips.
+    checks : callable
+        Identities that must hold of the model, at a speed.
     """
 
     name: str
@@ -112,6 +115,7 @@ class FlutterProblem:
     rational: RationalForces
     variants: tuple[Variant, ...]
     cache: CacheStatus | None = None
+    checks: Callable[[float], tuple[ModelCheck, ...]] = lambda _speed_m_per_s: ()
 
 
 def problem_of(model: WingModel | AircraftModel, liquids: Sequence[str], cache: Path | None) -> FlutterProblem:
@@ -210,6 +214,7 @@ def _of_aircraft(model: AircraftModel, liquids: Sequence[Liquids], cache: Path |
         rational,
         tuple(variants),
         status,
+        lambda speed: checks_of(model, surfaces, lattice, rational, (tuple(liquids), speed)),
     )
 
 

@@ -163,6 +163,9 @@ def test_a_flying_wing_with_a_tank_flutters_as_it_should(
         found = sorted(poles[[n for n, name in enumerate(names) if name.startswith("centre")]])
         # of the same script at 25 m/s, in inertial axes, without the weight of what tilts
         assert found == pytest.approx([12.42, 12.43, 22.70, 22.70, 29.27, 29.27], abs=0.06)
+    assert len(summary["checks"]) == 5
+    assert all(check["reached"] <= check["asked"] for check in summary["checks"])
+    assert "Checks of this model" in (out / "report.html").read_text(encoding="utf-8")
     figures = {path.name for path in (out / "figures").iterdir()}
     assert {"root_locus_frozen.png", "root_locus_lateral.png", "models.png", "mode_shapes.png"} <= figures
 
