@@ -28,10 +28,11 @@ from sloshlab.missing_physics.extension import Extension, with_acting
 from sloshlab.missing_physics.saved_effects import saved_effects
 from sloshlab.modal.rig_beam import scale_remarks
 from sloshlab.recording import run_attributes, write_recording
+from sloshlab.reduced_order_model.departures import Departure
 from sloshlab.rig import TANK_MODELS, Rig
 from sloshlab.toml_file import read_toml
 from sloshlab.twin.recorded_run import Block, Drive, drive_of
-from sloshlab.twin.reduced_order_model_domain import Departure, departures
+from sloshlab.twin.reduced_order_model_domain import departures
 from sloshlab.twin.simulated_channels import SimulatedRun, simulated_run
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import load_twin, save_twin

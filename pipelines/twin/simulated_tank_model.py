@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
-from sloshlab.twin.reduced_order_model_domain import Departure, without_domain
+from sloshlab.reduced_order_model.departures import Departure
+from sloshlab.twin.reduced_order_model_domain import without_domain
 from sloshlab.twin.reduced_order_model_force import NAME, description_of
 from sloshlab.twin.simulation import Simulation
 

@@ -1,13 +1,45 @@
-"""Trained models of vertical sloshing in the tanks of an aircraft: scaled to each tank (2.33–2.35)."""
+"""Trained models of vertical sloshing in the tanks of an aircraft: scaled to each tank (2.33–2.35), and judged."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
 from sloshlab.aircraft.model import AircraftTank
+from sloshlab.aircraft.tank_simulation import FlightResponse
+from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.errors import InputError
 from sloshlab.lateral_sloshing.box_tank import BoxTank
+from sloshlab.reduced_order_model.departures import Departure, TankHeight, departures_of_motion
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.stepping import SteppedModel
 from sloshlab.reduced_order_model.tank_scaling import TankScaling, scaled_to
+from sloshlab.reduced_order_model.validity_domain import ValidityDomain, motion_cycles
 from sloshlab.rig import Liquid, Rig, Tank
+
+LARGEST_ACCELERATION_G: Final = 6.0
+"""Up to it the source trained, and below it the tanks of its wing stayed."""
+
+
+@dataclass(frozen=True)
+class TankDeparture:
+    """A tank that left what its model knows.
+
+    Attributes
+    ----------
+    tank : str
+    reason : Departure or str
+        From the domain of the training, or one line: beyond 6 g, or a model without a domain.
+    """
+
+    tank: str
+    reason: Departure | str
+
+    def __str__(self) -> str:
+        return f"tank {self.tank}: {self.reason}"
 
 
 def model_in_tank(model: ReducedOrderModel, tank: AircraftTank) -> SteppedModel:
@@ -26,6 +58,57 @@ def model_in_tank(model: ReducedOrderModel, tank: AircraftTank) -> SteppedModel:
     """
     factors = TankScaling.of_facts(model.facts, _as_rig(tank.box))
     return SteppedModel(model if factors.is_same else scaled_to(model, factors))
+
+
+def tank_departures(response: FlightResponse, models: Mapping[str, ReducedOrderModel]) -> list[TankDeparture]:
+    """What to flag of a simulation, tank by tank.
+
+    Parameters
+    ----------
+    response : FlightResponse
+    models : mapping
+        The trained models by the names of their tanks, as `model_in_tank` took them.
+
+    Notes
+    -----
+    Motion is judged cycle by cycle, at the instants of the model and in the units of its training.
+
+    Raises
+    ------
+    InputError
+        If a tank had no model in the simulation.
+    """
+    found: list[TankDeparture] = []
+    for number, tank in enumerate(response.flight.model.tanks):
+        if tank.name in models:
+            left = [*_from_domain(response, tank, models[tank.name]), *_beyond_six_g(response, number)]
+            found += [TankDeparture(tank.name, reason) for reason in left]
+    return found
+
+
+def _from_domain(
+    response: FlightResponse, tank: AircraftTank, model: ReducedOrderModel
+) -> list[Departure] | list[str]:
+    if tank.name not in response.seen_velocity_m_per_s:
+        raise InputError(f"tank {tank.name}", got="no model in the simulation", remedy="name tanks that had one")
+    if "domain" not in model.facts:
+        return ["its model does not tell where it was trained; whether it is valid here is not known"]
+    velocity, rate_hz = response.seen_velocity_m_per_s[tank.name], response.model_rate_hz[tank.name]
+    factors = TankScaling.of_facts(model.facts, _as_rig(tank.box))
+    height = TankHeight(tank.box.height_m, factors.time**2)
+    domain = ValidityDomain.of_facts(model.facts["domain"])
+    return departures_of_motion(motion_cycles(velocity, rate_hz), velocity, rate_hz, domain, height)
+
+
+def _beyond_six_g(response: FlightResponse, number: int) -> list[str]:
+    in_g = np.abs(response.tank_acceleration_m_per_s2[:, number]) / GRAVITY_M_PER_S2
+    beyond = np.flatnonzero(in_g > LARGEST_ACCELERATION_G)
+    if not beyond.size:
+        return []
+    first_s, worst_s = response.time_s[beyond[0]], response.time_s[np.argmax(in_g)]
+    return [
+        f"beyond {LARGEST_ACCELERATION_G:g} g from {first_s:.2f} s on, most {in_g.max():.3g} g at {worst_s:.2f} s"
+    ]
 
 
 def _as_rig(box: BoxTank) -> Rig:

@@ -176,7 +176,6 @@ def test_a_gust_on_lateral_tanks_against_a_general_integrator(is_free: bool) -> 
     rates = states @ matrix.T + np.stack([wind, slopes], axis=1) @ inputs.T
     flight = flight_of(model)
     found = simulate_flight(flight, duration_s=0.6, output_step_s=step, gust=GUST)
-    print("gust", compared(flight, found, states, rates))
     assert compared(flight, found, states, rates) < 1e-9
 
 
@@ -206,7 +205,6 @@ def test_dampers_in_lateral_tanks_against_a_general_integrator(is_free: bool) ->
             tanks[name] = Damper(damping, factor * rate, np.array(past))
         found = simulate_flight(flight, tanks, duration_s=0.6, output_step_s=2e-3, initial_state=own)
         errors.append(compared(flight, found, solved.y.T, solved.y.T @ matrix.T))
-    print("dampers", errors)
     assert errors[1] < 1e-6
     assert 3.5 < math.log2(errors[0] / errors[1]) < 5.5
 
@@ -230,7 +228,6 @@ def test_without_air_and_damping_energy_stays(liquids: str, is_free: bool, durat
     place, rate = states[:, :m] @ axes.T, states[:, m:] @ axes.T
     twice = (rate @ structure.mass) * rate + (place @ structure.stiffness) * place
     energy = 0.5 * twice.sum(axis=1)
-    print("energy", liquids, is_free, abs(energy / energy[0] - 1).max())
     np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
 
 
@@ -252,7 +249,6 @@ def test_two_halves_of_a_tank_at_one_place_are_the_tank(name: str, liquids: str)
         (two.force_n.sum(axis=1), one.force_n[:, 0]),
         (two.coordinate("mode 2"), one.coordinate("mode 2")),
     ):
-        print("V14", name, liquids, abs(own - other).max() / abs(other).max())
         assert abs(own - other).max() < 1e-9 * abs(other).max()
 
 
@@ -287,5 +283,4 @@ def test_the_tank_of_the_training_on_one_mode_is_that_of_the_twin(name: str) -> 
         (found.states[:, 1], expected.velocity_m_per_s),
         (found.force_n[:, 0], expected.tank_force_n),
     ):
-        print(name, abs(own - other).max() / abs(other).max())
         assert abs(own - other).max() < 1e-6 * abs(other).max()
