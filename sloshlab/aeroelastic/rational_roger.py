@@ -32,6 +32,7 @@ def roger_fit(
     lags: FloatArray | None = None,
     with_mass: bool = True,
     optimise_lags: bool = False,
+    slope_at_zero: FloatArray | None = None,
 ) -> RationalForces:
     """Fit a table of generalised forces.
 
@@ -49,6 +50,9 @@ def roger_fit(
         False leaves A₂ out, for gusts.
     optimise_lags : bool
         Move the lags to where the error is least; a local search from where they are.
+    slope_at_zero : ndarray, shape (n, m), optional
+        dQ/d(jk) at k = 0 where it is known from elsewhere, which the fit then has exactly; a column with NaN is
+        free.
 
     Returns
     -------
@@ -68,8 +72,14 @@ def roger_fit(
         raise AnalysisError("reduced frequencies", got=f"{k.size}", allowed=f"enough for {beta.size} lags")
     if optimise_lags and beta.size:
         beta = _better_lags(k, table, beta, with_mass)
-    parts = _fitted(k, table, beta, with_mass)
     n, m = table.shape[1:]
+    parts = _fitted(k, table, beta, with_mass)
+    if slope_at_zero is not None:
+        require_shape("slope_at_zero", np.nan_to_num(slope_at_zero), (n, m))
+        known = ~np.isnan(slope_at_zero).any(axis=0)
+        held = _fitted_with_slope(k, table[:, :, known], beta, with_mass, slope_at_zero[:, known])
+        for part, of_known in zip(parts, held, strict=True):
+            part[:, known] = of_known
     form = RationalForces(
         a0=table[0].real.copy(),
         a1=parts[0],
@@ -129,6 +139,21 @@ def _fitted(k: FloatArray, table: ComplexArray, beta: FloatArray, with_mass: boo
     solution = np.linalg.lstsq(_columns(k, beta, with_mass), _right(table), rcond=None)[0]
     parts = [part.reshape(table.shape[1:]) for part in solution]
     return parts if with_mass else [parts[0], np.zeros(table.shape[1:]), *parts[1:]]
+
+
+def _fitted_with_slope(
+    k: FloatArray, table: ComplexArray, beta: FloatArray, with_mass: bool, slope: FloatArray
+) -> list[FloatArray]:
+    """As `_fitted` with A₁ + Σ A_{2+l}/β_l = slope."""
+    s = 1j * k[1:, None]
+    functions = np.hstack([s**2, s / (s + beta) - s / beta] if with_mass else [s / (s + beta) - s / beta])
+    moved = (table[1:] - table[0].real - s[:, :, None] * slope).reshape(k.size - 1, -1)
+    columns, right = (np.vstack([part.real, part.imag]) for part in (functions, moved))
+    solution = np.linalg.lstsq(columns, right, rcond=None)[0]
+    parts = [part.reshape(table.shape[1:]) for part in solution]
+    mass = parts.pop(0) if with_mass else np.zeros(table.shape[1:])
+    a1 = slope - sum((part / lag for part, lag in zip(parts, beta, strict=True)), np.zeros(table.shape[1:]))
+    return [a1, mass, *parts]
 
 
 def _better_lags(k: FloatArray, table: ComplexArray, beta: FloatArray, with_mass: bool) -> FloatArray:
