@@ -31,6 +31,7 @@ from sloshlab.aeroelastic.root_locus import System
 from sloshlab.aeroelastic.splines import BoxMotion
 from sloshlab.aeroelastic.state_space import system_over_speed
 from sloshlab.aeroelastic.strip import strip_table
+from sloshlab.aircraft.air_of_free_flight import air_of_free_flight
 from sloshlab.aircraft.flight_stability import LIQUIDS, Liquids, flight_system
 from sloshlab.aircraft.lifting_surfaces import lifting_surfaces
 from sloshlab.aircraft.model import AircraftModel, RationalFit
@@ -82,6 +83,11 @@ class Variant:
     rigid: tuple[str, ...] = ()
 
 
+def _no_checks(speed_m_per_s: float) -> tuple[ModelCheck, ...]:
+    """Of a wing of stations, whose numbers are checked by themselves."""
+    return ()
+
+
 @dataclass(frozen=True, eq=False)
 class FlutterProblem:
     """A model file, ready.
@@ -115,7 +121,7 @@ class FlutterProblem:
     rational: RationalForces
     variants: tuple[Variant, ...]
     cache: CacheStatus | None = None
-    checks: Callable[[float], tuple[ModelCheck, ...]] = lambda _speed_m_per_s: ()
+    checks: Callable[[float], tuple[ModelCheck, ...]] = _no_checks
 
 
 def problem_of(model: WingModel | AircraftModel, liquids: Sequence[str], cache: Path | None) -> FlutterProblem:
@@ -191,7 +197,11 @@ def _of_aircraft(model: AircraftModel, liquids: Sequence[Liquids], cache: Path |
     surfaces = lifting_surfaces(model.structure, chosen.n_boxes)
     k = usual_reduced_frequencies(chosen.largest_reduced_frequency, chosen.n_reduced_frequencies)
     lattice, status = _lattice(surfaces.boxes, surfaces.motion, k, (surfaces.semi_chord_m, model.flow.mach), cache)
-    rational = _fit(chosen, k, lattice.motion, surfaces.semi_chord_m)
+    if model.structure.is_free and chosen.rational == "roger":
+        lags, b = np.array(chosen.lags), surfaces.semi_chord_m
+        rational = air_of_free_flight(k, lattice.motion, semi_chord_m=b, lags=lags)
+    else:
+        rational = _fit(chosen, k, lattice.motion, surfaces.semi_chord_m)
     variants = []
     for name in liquids:
         system = flight_system(model, rational, name, density_kg_per_m3=density)
