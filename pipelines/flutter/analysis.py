@@ -80,26 +80,30 @@ class Stability:
 
     @property
     def p_k_flutter_m_per_s(self) -> float:
-        """The p-k crossing that is nearest to the first flutter of the root locus, NaN if there is none."""
+        """The p-k crossing nearest to the first flutter of the root locus, else the lowest; NaN if none."""
         found, flutter = self._p_k_crossings(), self.locus.flutter
-        if flutter is None or not found:
-            return float("nan")
+        if flutter is None:
+            # roots of the body as a whole come first; without weight they cross without meaning
+            return min(
+                (speed for speed, _, mode in found if mode >= len(self.variant.rigid)), default=float("nan")
+            )
 
-        def distance(crossing: tuple[float, float]) -> float:
-            speed, frequency = crossing
+        def distance(crossing: tuple[float, float, int]) -> float:
+            speed, frequency, _ = crossing
             return abs(speed / flutter.speed_m_per_s - 1) + abs(frequency / flutter.frequency_rad_per_s - 1)
 
-        return min(found, key=distance)[0]
+        return min(found, key=distance, default=(float("nan"), 0.0, 0))[0]
 
-    def _p_k_crossings(self) -> list[tuple[float, float]]:
-        """Speed and frequency where p-k roots begin to grow, linear between computed speeds."""
+    def _p_k_crossings(self) -> list[tuple[float, float, int]]:
+        """Speed, frequency and mode where p-k roots begin to grow, linear between computed speeds."""
         pole, speed = self.p_k.pole_rad_per_s, self.p_k.speed_m_per_s
         grows = (pole.real[:-1] <= 0) & (pole.real[1:] > 0) & (pole.imag[1:] > 0)
         found = []
         for row, column in zip(*np.nonzero(grows), strict=True):
             low, high = pole[row, column], pole[row + 1, column]
             weight = float(-low.real / (high.real - low.real))
-            found.append((float(speed[row] + weight * (speed[row + 1] - speed[row])), float(high.imag)))
+            at_m_per_s = float(speed[row] + weight * (speed[row + 1] - speed[row]))
+            found.append((at_m_per_s, float(high.imag), int(column)))
         return found
 
     @property
@@ -108,6 +112,8 @@ class Stability:
         found = list(self.locus.flags)
         found += [text for crossing in self.locus.crossings for text in self._beyond(crossing)]
         flutter = self.locus.flutter
+        if flutter is None and np.isfinite(self.p_k_flutter_m_per_s):
+            found.append(f"p-k finds flutter at {self.p_k_flutter_m_per_s:.5g} m/s, the root locus none")
         if flutter is not None:
             difference = self.p_k_flutter_m_per_s / flutter.speed_m_per_s - 1
             if np.isnan(difference):
