@@ -308,8 +308,8 @@ class FreeRunProblem:
 
     def residuals_moved(
         self, thetas: Sequence[FloatArray], columns: Sequence[int], at: FloatArray
-    ) -> list[FloatArray]:
-        """Residuals after some parameters were moved.
+    ) -> Iterator[FloatArray]:
+        """Residuals after some parameters were moved, one after another: all together would fill the memory.
 
         Unchanged in other runs and channels where the parameters have their own.
 
@@ -323,13 +323,11 @@ class FreeRunProblem:
         """
         blocks, by_run = self._changed_by(columns)
         weighted = iter(self._weighted([(chosen, self.values(theta)) for theta in thetas for chosen in by_run]))
-        found = []
         for _ in thetas:
             moved = at.copy()
             for block in blocks:
                 moved[self._rows[block]] = next(weighted)
-            found.append(moved)
-        return found
+            yield moved
 
     def _changed_by(self, columns: Sequence[int]) -> tuple[list[int], list[list[Observation]]]:
         """Blocks that any of some parameters changes, and their observations run by run."""

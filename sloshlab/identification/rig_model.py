@@ -33,7 +33,7 @@ from sloshlab.identification.rig_parameters import (
 from sloshlab.missing_physics.candidate import BLOCKS, Candidate, extension_of
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
 from sloshlab.missing_physics.saved_effects import effect_lines
-from sloshlab.recording import channels
+from sloshlab.recording import channels, with_values
 from sloshlab.rig import Rig
 from sloshlab.twin.excitation import with_cached_inputs
 from sloshlab.twin.lane_preparation import IN_TURN, Executor, Lane, done, motions
@@ -524,9 +524,7 @@ def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str
         if fault.channel not in recording.data_vars:
             continue
         others = {name: np.asarray(recording[name].values, np.float64) for name in channels(recording)}
-        corrected = fault.undone(
-            others[fault.channel], run.attributes.sampling_rate_hz, others, others[fault.channel]
-        )
-        variable = recording[fault.channel].copy(data=corrected)
-        recording = recording.assign({fault.channel: variable})
+        recorded = others[fault.channel]
+        truth = fault.undone(recorded, run.attributes.sampling_rate_hz, others, recorded)
+        recording = with_values(recording, fault.channel, truth)
     return recording

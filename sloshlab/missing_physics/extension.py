@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from sloshlab.recording import with_values
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import Term
 
@@ -68,9 +69,8 @@ def with_acting(recording: xr.Dataset, drives: tuple[ActingDrive, ...]) -> xr.Da
     """A copy of a recording whose driving channels hold what acts; channels that it has not are left out."""
     for drive in drives:
         if drive.channel in recording.data_vars:
-            commanded = recording[drive.channel]
-            acting = drive.acting(np.asarray(commanded.values, np.float64))
-            recording = recording.assign({drive.channel: commanded.copy(data=acting)})
+            commanded = np.asarray(recording[drive.channel].values, np.float64)
+            recording = with_values(recording, drive.channel, drive.acting(commanded))
     return recording
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from math import isfinite, log
 from typing import Final
 
@@ -26,6 +27,8 @@ from sloshlab.missing_physics.candidate import Candidate
 FloatArray = NDArray[np.float64]
 _SMALL: Final = 1e-3
 """Of the size at which an effect starts: a mass that moves a frequency by percents is not linear over a run."""
+_SIZES: Final = (_SMALL, 2 * _SMALL, 3 * _SMALL)
+"""From which the slope at no size is told: to the third order."""
 _LEAST_LIFT: Final = 1e-9
 """Of a diagonal that is added to it, so that it can be inverted."""
 _N_REWEIGHTED: Final = 8
@@ -75,14 +78,15 @@ def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
         thetas = [
             extended.theta_of({**fit.values, **candidate.sized(start, size)})
             for start in starts
-            for size in (_SMALL, 2 * _SMALL, 3 * _SMALL)
+            for size in _SIZES
         ]
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
         spacings, found = places_in_runs(extended, candidate), []
         ranges = {prior.name: prior.high - prior.low for prior in candidate.prior}
         chosen_among = sum(log(max(ranges[name] / spacing, 1.0)) for name, spacing in spacings.items())
         moved = extended.residuals_moved(thetas, own, about.residual)
-        for start, *of_sizes in zip(starts, *(moved[k::3] for k in range(3)), strict=True):
+        for start in starts:
+            of_sizes = list(islice(moved, len(_SIZES)))
             if not all(np.isfinite(each).all() for each in of_sizes):
                 continue
             one, two, three = of_sizes

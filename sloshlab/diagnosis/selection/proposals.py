@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -24,6 +25,10 @@ _DRAWS_PER_NUMBER: Final = 6
 """Quasi-random starts from the prior of an effect, for each of its numbers; those of single runs count once."""
 _MOST_STEP: Final = 3.0
 """Factor up to which a size follows the linear step: about the spacing of the sizes that are tried."""
+
+
+_N_AT_ONCE: Final = 8
+"""Starts that are tested together, so that few residuals are held at once; results change by rounding alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,13 +156,16 @@ def _beside(
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
-        moved = extended.residuals_moved(thetas, own, residual)
-        # A start that explodes is no reason to drop the candidate as long as another one runs.
-        running = [(start, at) for start, at in zip(sets, moved, strict=True) if np.isfinite(at).all()]
-        if not running:
-            return []
+        moved = zip(sets, extended.residuals_moved(thetas, own, residual), strict=True)
+        found: list[Proposal] = []
+        while some := list(islice(moved, _N_AT_ONCE)):
+            # A start that explodes is no reason to drop the candidate as long as another one runs.
+            found += promised(candidate, [(start, at) for start, at in some if np.isfinite(at).all()])
+        return found
+
+    def promised(candidate: Candidate, running: Sequence[tuple[dict[str, float], FloatArray]]) -> list[Proposal]:
         changes = [at_start - residual for _, at_start in running]
-        gains = [test.gains(changes) for _, test, _ in tests]
+        gains = [test.gains(changes) for _, test, _ in tests] if changes else []
         found = []
         for i, (start, at_start) in enumerate(running):
             predicted = tuple(
@@ -168,14 +176,8 @@ def _beside(
             at_once = huber_cost(first_weights * at_start) / max(least[first], 1e-300)
             factor = gains[int(np.argmin(predicted))][i][1]
             sized = candidate.sized(start, min(max(factor, 1.0 / _MOST_STEP), _MOST_STEP))
-            found.append(
-                Proposal(
-                    (*base.fit.candidates, candidate),
-                    {**base.fit.values, **sized},
-                    (*predicted, at_once),
-                    base.jacobian,
-                )
-            )
+            values = {**base.fit.values, **sized}
+            found.append(Proposal((*base.fit.candidates, candidate), values, (*predicted, at_once), base.jacobian))
         return found
 
     others = missing_from(base.fit, pool)

@@ -6,7 +6,7 @@ What repeats from run to run is size, period and frequency; instants and phases 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from math import pi
+from math import ceil, log, log1p, pi
 from typing import Final
 
 import numpy as np
@@ -34,6 +34,8 @@ from sloshlab.twin.terms import Term
 FloatArray = NDArray[np.float64]
 _WIDTHS: Final = (0.1, 0.25, 0.5, 1.0, 2.0)
 """Of pulses that are sought in a missing force, in periods of the motion; wider ones are a slow force."""
+_PLACES_PER_WIDTH: Final = 8
+"""At which a pulse is sought: off by a sixteenth of its width, a raised cosine explains five per cent less."""
 _MOST_LINES: Final = 3
 """Of a missing force, that are proposed."""
 
@@ -102,15 +104,19 @@ def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], li
 
     def proposed(at: Surroundings, missing: MissingForces) -> list[Numbers]:
         best: dict[float, tuple[float, int, Numbers]] = {}
-        for width in _WIDTHS:
-            n = max(4, round(width / at.frequency_hz * at.sampling_rate_hz))
+        for in_periods in _WIDTHS:
+            n = max(4, round(in_periods / at.frequency_hz * at.sampling_rate_hz))
             shape = 0.5 * (1 - np.cos(2 * pi * np.arange(n) / n))
             longest = min((force.size for force in missing.values()), default=0)
             if longest <= 4 * n:
                 continue
-            # force along the shape of a pulse that begins at each sample
-            along = {run: np.correlate(force, shape, "valid") / (shape @ shape) for run, force in missing.items()}
-            periods = _periods(n, longest)
+            # force along the shape of a pulse that begins at each place, of which eight are within a width
+            apart = max(1, n // _PLACES_PER_WIDTH)
+            along = {
+                run: (np.correlate(force, shape, "valid") / (shape @ shape))[::apart]
+                for run, force in missing.items()
+            }
+            periods = _periods(n / apart, longest / apart)
             # (run, period, direction, column)
             places = np.stack([_best_places(values, periods, alternate) for values in along.values()])
             explained, force, weight, _ = np.moveaxis(places.sum(axis=0), -1, 0)
@@ -118,51 +124,55 @@ def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], li
                 k = int(np.argmax(explained[:, row]))
                 score = float(explained[k, row] * (shape @ shape))
                 if score > best.get(sign, (0.0,))[0]:
-                    rate = at.sampling_rate_hz
+                    rate = at.sampling_rate_hz / apart
                     first = zip(along, places[:, k, row, 3].tolist(), strict=True)
                     starts = {in_run("start_s", run): place / rate for run, place in first}
                     size = float(sign * force[k, row] / weight[k, row])
-                    train = {"size_n": size, "period_s": float(periods[k]) / rate, "width_s": n / rate, **starts}
-                    best[sign] = (score, sum(start < 0 for start in starts.values()), train)
+                    train = {
+                        "size_n": size,
+                        "period_s": float(periods[k]) / rate,
+                        "width_s": n / at.sampling_rate_hz,
+                    }
+                    best[sign] = (score, sum(start < 0 for start in starts.values()), {**train, **starts})
         # what alternates is as well its own reverse, begun earlier: it is told by the pulse it begins with
         return [train for *_, train in sorted(best.values(), key=lambda found: (-found[0], found[1]))]
 
     return proposed
 
 
-def _periods(width: int, longest: int) -> NDArray[np.int64]:
-    """Periods [samples], so near to each other that the last pulse slips by half a width at most."""
-    found, period = [], 2.0 * width
-    while period <= longest:
-        found.append(round(period))
-        period += max(1.0, 0.5 * width * period / longest)
-    return np.array(found, np.int64)
+def _periods(width: float, longest: float) -> FloatArray:
+    """Periods, so near to each other that the last pulse slips by half a width at most; all in one unit."""
+    n = ceil(log(max(longest / (2.0 * width), 1.0)) / log1p(0.5 * width / longest)) + 1
+    return np.asarray(2.0 * width * (1.0 + 0.5 * width / longest) ** np.arange(n), np.float64)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _best_places(values: FloatArray, periods: NDArray[np.int64], alternate: bool) -> FloatArray:
+def _best_places(values: FloatArray, periods: FloatArray, alternate: bool) -> FloatArray:
     """Where a train of each period explains most of a series, upward and downward, shape (n_periods, 2, 4).
 
     Columns: what it explains; the sum of the values at its pulses, positive along its direction; how many these
-    are; when it begins [samples], within the first two periods, or, where pulses alternate and every other one
-    counts reversed, up to a period before the series.
+    are; when it begins, within the first two periods, or, where pulses alternate and every other one counts
+    reversed, up to a period before the series. Periods and beginnings are in places of the series.
     """
     best = np.zeros((periods.size, 2, 4))
     for i, period in enumerate(periods):
-        sums, counts = np.zeros(period), np.zeros(period)
+        n_places = int(period)
+        sums, counts = np.zeros(n_places), np.zeros(n_places)
         sign = 1.0
-        for start in range(0, values.size, period):
-            for k in range(min(period, values.size - start)):
+        for pulse in range(int(values.size / period) + 1):
+            # a period need not be a whole number of places, or later pulses would slip
+            start = round(pulse * period)
+            for k in range(min(n_places, values.size - start)):
                 sums[k] += sign * values[start + k]
                 counts[k] += 1.0
             if alternate:
                 sign = -sign
         # A train that explains nothing has its first pulse, too: its weight must not be zero.
         best[i, :, 2] = counts[0]
-        for k in range(min(period, values.size)):
+        for k in range(min(n_places, values.size)):
             later = sums[k] - values[k]
             for total, count, begins in (
-                (sums[k], counts[k], k),
+                (sums[k], counts[k], float(k)),
                 (-sums[k] if alternate else 0.0, counts[k], k - period),
                 (-later if alternate else later, counts[k] - 1.0, k + period),
             ):
