@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigh
 
 from sloshlab.errors import AnalysisError, InputError
-from sloshlab.twin.simulation import Simulation
+from sloshlab.twin.motion import Motion
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.structure_forces import MASS_ERROR
 from sloshlab.twin.terms import Term
@@ -232,16 +232,16 @@ def _series(values: ArrayLike | None, n_samples: int, what: str) -> FloatArray |
     return array
 
 
-def reading_of(reading: Reading, simulation: Simulation, modes: FloatArray, channel: str) -> FloatArray:
+def reading_of(reading: Reading, motion: Motion, modes: FloatArray, channel: str) -> FloatArray:
     """What a perfect sensor shows, shape (n_samples,)."""
-    n_samples, n = simulation.modes.shape[0], modes.shape[0]
+    n_samples, n = motion.modes.shape[0], modes.shape[0]
     total = np.zeros(n_samples)
     for order, name in enumerate(("displacement", "velocity", "acceleration")):
         weights = np.atleast_1d(_numbers(getattr(reading, name), f"reading {channel}: {name}"))
         if weights.shape not in ((n,), (1,)):
             raise InputError(f"reading {channel}: {name}", got=f"shape {weights.shape}", allowed=f"({n},)")
         if weights.any():
-            total += simulation.modes[:, order] @ (np.broadcast_to(weights, n) @ modes)
+            total += motion.modes[:, order] @ (np.broadcast_to(weights, n) @ modes)
     plus = _numbers(reading.plus, f"reading {channel}: plus")
     if plus.shape not in ((), (n_samples,)):
         raise InputError(f"reading {channel}: plus", got=f"shape {plus.shape}", allowed=f"({n_samples},)")

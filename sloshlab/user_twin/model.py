@@ -24,7 +24,7 @@ from sloshlab.twin.twin import Twin
 from sloshlab.units import SI_UNITS
 from sloshlab.user_twin.description import Compared, EquationTwin, FreeTwin, Parameter, TwinRun, UserTwin
 from sloshlab.user_twin.extended import save_extended
-from sloshlab.user_twin.simulators import simulator_of
+from sloshlab.user_twin.simulators import Asked, Truth, or_why_not, simulator_of
 
 FloatArray = NDArray[np.float64]
 _MOST_KEPT: Final = 400
@@ -57,7 +57,7 @@ class UserTwinModel:
         # A simulation of a user's own may not bear several workers.
         self.executor: Executor = IN_TURN if isinstance(twin, FreeTwin) else executor
         self._lock = threading.Lock()
-        self._truths: OrderedDict[tuple[Any, ...], tuple[dict[str, FloatArray], FloatArray]] = OrderedDict()
+        self._truths: OrderedDict[tuple[Any, ...], Truth] = OrderedDict()
         self._shown = {
             channel: shown if isinstance(shown, Compared) else Compared(shown)
             for channel, shown in twin.compared.items()
@@ -104,42 +104,73 @@ class UserTwinModel:
         AnalysisError
             If the simulation does not reach its end.
         """
-        truth, _ = self._truth(run, values, extension)
-        others = {**self._views[run.name].channels, **truth}
-        rate, readings = run.attributes.sampling_rate_hz, {}
+        [found] = self.simulate_many([Request(run, values, extension, only)])
+        if isinstance(found, SloshlabError):
+            raise found
+        return found
+
+    def simulate_many(self, requests: Sequence[Request]) -> list[Readings | SloshlabError]:
+        """The same of many simulations; in place of those that do not end, why."""
+        return [
+            truth if isinstance(truth, SloshlabError) else or_why_not(self._readings, request, truth[0])
+            for request, truth in zip(requests, self._truths_of(requests), strict=True)
+        ]
+
+    def _readings(self, request: Request, truth: Mapping[str, FloatArray]) -> Readings:
+        run, values = request.run, request.values
+        known = self._views[run.name].channels
+        others, rate, readings = {**known, **truth}, run.attributes.sampling_rate_hz, {}
         for name, true in truth.items():
-            if only and name not in only:
+            if request.only and name not in request.only:
                 continue
             reading = true * values.get(f"gain of {name}", 1.0)
-            for fault in extension.faults:
+            for fault in request.extension.faults:
                 if fault.acts_on(name, run.name):
-                    reading = fault.reading(reading, rate, others, self._views[run.name].channels[name])
+                    reading = fault.reading(reading, rate, others, known[name])
             readings[name] = reading + values.get(f"offset of {name} in {run.name}", 0.0)
         return readings
 
-    def simulate_many(self, requests: Sequence[Request]) -> list[Readings | SloshlabError]:
-        """The same of many simulations, one after the other; in place of those that do not end, why."""
-        return [self._simulated(request) for request in requests]
-
-    def _simulated(self, request: Request) -> Readings | SloshlabError:
-        try:
-            return self.simulate(request.run, request.values, request.extension, request.only)
-        except SloshlabError as error:
-            return error
-
     def motion(self, run: CaseRun, values: Mapping[str, float], extension: Extension = NOTHING) -> FloatArray:
         """Displacement, velocity, acceleration of the coordinate on which added forces act, shape (n, 3)."""
-        return self._truth(run, values, extension)[1]
+        [found] = self._truths_of([Request(run, values, extension)])
+        if isinstance(found, SloshlabError):
+            raise found
+        return found[1]
 
     def save_extended(self, values: Mapping[str, float], candidates: Sequence[Candidate], path: Path) -> None:
         """Write parameters and effects as TOML; the module itself stays where it is."""
         known = {parameter.name: values.get(parameter.name, parameter.believed) for parameter in self.parameters}
         save_extended(self.name, known, candidates, values, path)
 
-    def _truth(
-        self, run: CaseRun, values: Mapping[str, float], extension: Extension
-    ) -> tuple[dict[str, FloatArray], FloatArray]:
-        own = self._own(run, values)
+    def _truths_of(self, requests: Sequence[Request]) -> list[Truth | SloshlabError]:
+        """What perfect sensors read, simulated together where it is not kept from before."""
+        found: dict[tuple[Any, ...], Truth | SloshlabError] = {}
+        keys, unknown = [], dict[tuple[Any, ...], Asked]()
+        for request in requests:
+            key, undone = self._key(request)
+            keys.append(key)
+            with self._lock:
+                if key in self._truths:
+                    self._truths.move_to_end(key)
+                    found[key] = self._truths[key]
+            if key not in found and key not in unknown:
+                asked = or_why_not(self._asked, request, undone)
+                if isinstance(asked, SloshlabError):
+                    found[key] = asked
+                else:
+                    unknown[key] = asked
+        for key, truth in zip(unknown, self._simulator.truths(list(unknown.values()), self.executor), strict=True):
+            found[key] = truth
+            if not isinstance(truth, SloshlabError):
+                with self._lock:
+                    self._truths[key] = truth
+                    while len(self._truths) > _MOST_KEPT:
+                        self._truths.popitem(last=False)
+        return [found[key] for key in keys]
+
+    def _key(self, request: Request) -> tuple[tuple[Any, ...], tuple[SensorFault, ...]]:
+        """What a motion depends on, and the faults of driving channels."""
+        run, extension = request.run, request.extension
         # A fault of a driving channel changes the motion and is part of the key, others are read from the same
         # motion.
         driving = self.described.driving
@@ -147,19 +178,14 @@ class UserTwinModel:
             fault for fault in extension.faults if any(fault.acts_on(name, run.name) for name in driving)
         )
         forces = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
-        key = (run.name, *own.values(), tuple(forces), tuple(fault.key for fault in undone))
-        with self._lock:
-            if key in self._truths:
-                self._truths.move_to_end(key)
-                return self._truths[key]
+        own = self._own(run, request.values)
+        return (run.name, *own.values(), tuple(forces), tuple(fault.key for fault in undone)), undone
+
+    def _asked(self, request: Request, undone: tuple[SensorFault, ...]) -> Asked:
+        run, extension = request.run, request.extension
         is_changed = undone or extension.drives
         view = _view(run, undone, extension.drives) if is_changed else self._views[run.name]
-        found = self._simulator.truth(view, own, extension.terms_in(run.name))
-        with self._lock:
-            self._truths[key] = found
-            while len(self._truths) > _MOST_KEPT:
-                self._truths.popitem(last=False)
-        return found
+        return Asked(view, self._own(run, request.values), extension.terms_in(run.name))
 
     def _own(self, run: CaseRun, values: Mapping[str, float]) -> dict[str, float]:
         """Values of the user's parameters, and of the states that a run starts from, under the user's names."""
@@ -260,7 +286,7 @@ class UserTwinModel:
     def _check_that_it_runs(self) -> None:
         for run in self.runs:
             try:
-                self._truth(run, {}, NOTHING)
+                self.motion(run, {})
             except SloshlabError as error:
                 text = str(error).removeprefix(f"{self.name}: ")
                 text = text if text.startswith(f"{run.name}: ") else f"{run.name}: {text}"

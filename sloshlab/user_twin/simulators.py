@@ -8,7 +8,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import comb
-from typing import Any, Final, Protocol
+from typing import Any, Final, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,8 @@ from sloshlab.errors import AnalysisError, InputError, SloshlabError
 from sloshlab.identification.rig_model import steps_per_sample
 from sloshlab.missing_physics.user_module import one_line
 from sloshlab.twin.excitation import Excitation, free, recorded, recorded_for_equations, with_cached_inputs
+from sloshlab.twin.lane_preparation import Executor, Lane, done, motions
+from sloshlab.twin.motion import Motion
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.state_equations import CompiledEquations, StateEquations, named_numbers
 from sloshlab.twin.structure import single_degree_of_freedom
@@ -41,11 +43,19 @@ _STEP_TOLERANCE: Final = 1e-4
 """Of the RMS of a reading, by which half the step may change it: below what any sensor tells."""
 
 
+class Asked(NamedTuple):
+    """One simulation of many: a run, the twin's own numbers, and forces that are added."""
+
+    run: TwinRun
+    own: Mapping[str, float]
+    terms: Sequence[Term]
+
+
 class Simulator(Protocol):
     """A described twin that can be run."""
 
-    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
-        """Simulate a run with numbers of its own and added forces; raises where that does not end."""
+    def truths(self, asked: Sequence[Asked], executor: Executor) -> list[Truth | SloshlabError]:
+        """What many simulations show; of those that do not reach their end, why."""
 
     def stand_in(self, run: TwinRun, own: Mapping[str, float]) -> Twin:
         """The twin, or a mass on a spring that stands for it where effects ask for masses and stiffnesses."""
@@ -113,7 +123,66 @@ class _Excitations:
         return excitation
 
 
-class _OfMechanism:
+_T = TypeVar("_T")
+
+
+def or_why_not(function: Callable[..., _T], *arguments: Any) -> _T | SloshlabError:
+    """What a function gives back, or the error that it raises: one simulation of many must not end the others.
+
+    Parameters
+    ----------
+    function : callable
+    arguments
+        Its own.
+    """
+    try:
+        return function(*arguments)
+    except SloshlabError as error:
+        return error
+
+
+class _InLanes(Generic[_T]):
+    """Simulations that run side by side in the engine: before, what each needs; behind, what each shows."""
+
+    def _lane(self, asked: Asked) -> tuple[Lane | None, _T]:
+        """What is to be simulated, if anything, and what else is needed to read it."""
+        raise NotImplementedError
+
+    def _read(self, asked: Asked, needed: _T, motion: Motion | None) -> Truth:
+        raise NotImplementedError
+
+    def truths(self, asked: Sequence[Asked], executor: Executor) -> list[Truth | SloshlabError]:
+        """See `Simulator`."""
+        prepared = [or_why_not(self._lane, each) for each in asked]
+        lanes = [ready[0] for ready in prepared if isinstance(ready, tuple) and ready[0] is not None]
+        simulated = iter(motions(lanes, executor))
+        found: list[Truth | SloshlabError] = []
+        for each, ready in zip(asked, prepared, strict=True):
+            if isinstance(ready, SloshlabError):
+                found.append(ready)
+                continue
+            motion = None if ready[0] is None else next(simulated)
+            found.append(or_why_not(self._read_if_done, each, ready[1], motion))
+        return found
+
+    def _read_if_done(self, asked: Asked, needed: _T, motion: Motion | InputError | None) -> Truth:
+        return self._read(asked, needed, None if motion is None else done(motion))
+
+
+class _OneByOne:
+    """Simulations that run one after the other."""
+
+    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
+        """Simulate a run with numbers of its own and added forces; raises where that does not end."""
+        raise NotImplementedError
+
+    def truths(self, asked: Sequence[Asked], executor: Executor) -> list[Truth | SloshlabError]:
+        """See `Simulator`."""
+        del executor  # those who ask share candidates among its workers
+        return [or_why_not(self.truth, *each) for each in asked]
+
+
+class _OfMechanism(_InLanes[tuple[EngineTwin, Mechanism]]):
     """Masses, springs and dampers, in the engine."""
 
     def __init__(self, twin: MechanicalTwin, name: str, excitations: _Excitations) -> None:
@@ -121,25 +190,26 @@ class _OfMechanism:
         # The function that describes the mechanism is a user's own and is called by one worker at a time.
         self._lock = threading.Lock()
 
-    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
-        ready, mechanism = self._ready(run, own, terms)
-        simulation = ready.twin.simulate(
-            self._excitation(ready, run),
-            initial_displacement_m=mechanism.initial_displacement_m,
-            initial_velocity_m_per_s=mechanism.initial_velocity_m_per_s,
-            n_substeps=steps_per_sample(ready.twin, run.sampling_rate_hz),
-        ).require_done()
+    def _lane(self, asked: Asked) -> tuple[Lane, tuple[EngineTwin, Mechanism]]:
+        ready, mechanism = self._ready(*asked)
+        start = (mechanism.initial_displacement_m, mechanism.initial_velocity_m_per_s)
+        n_substeps = steps_per_sample(ready.twin, asked.run.sampling_rate_hz)
+        return Lane(ready.twin, self._excitation(ready, asked.run), start, n_substeps), (ready, mechanism)
+
+    def _read(self, asked: Asked, needed: tuple[EngineTwin, Mechanism], motion: Motion | None) -> Truth:
+        assert motion is not None
+        ready, mechanism = needed
         missing = [name for name in self._twin.compared if name not in mechanism.readings]
         if missing:
             raise InputError(
                 f"{self._name}: readings", got=f"none for {', '.join(missing)}", allowed="every channel"
             )
         truth = {
-            name: reading_of(mechanism.readings[name], simulation, ready.modes, name)
+            name: reading_of(mechanism.readings[name], motion, ready.modes, name)
             for name in self._twin.compared
-            if name in run.channels
+            if name in asked.run.channels
         }
-        return truth, simulation.places[:, 0]
+        return truth, motion.places[:, 0]
 
     def _excitation(self, ready: EngineTwin, run: TwinRun) -> Excitation:
         rate = run.sampling_rate_hz
@@ -168,7 +238,7 @@ class _OfMechanism:
         return engine_twin(mechanism, terms, run.n_samples), mechanism
 
 
-class _OfEquations:
+class _OfEquations(_OneByOne):
     """State equations, compiled, in the engine."""
 
     def __init__(self, twin: EquationTwin, name: str, excitations: _Excitations) -> None:
@@ -269,7 +339,7 @@ class _OfEquations:
         return _STEPS_TRIED[-1]
 
 
-class _OfPrescribedMotion:
+class _OfPrescribedMotion(_InLanes[FloatArray]):
     """Forces along a motion that a testing machine prescribes: there is nothing to integrate but their memory."""
 
     def __init__(self, twin: EquationTwin, name: str, excitations: _Excitations) -> None:
@@ -280,22 +350,24 @@ class _OfPrescribedMotion:
         self._motions: dict[bytes, FloatArray] = {}
         self._lock = threading.Lock()
 
-    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
-        motion = self._motion(run)
-        forces = np.zeros(run.n_samples)
-        if terms:
-            series = {"displacement": motion[:, 0], "velocity": motion[:, 1], "acceleration": motion[:, 2]}
-            rate = run.sampling_rate_hz
-            excitation = self._excitations.of(lambda: recorded(rate, **series), rate, series)
-            # on what moves absolutely, with steps as small as forces with memory need
-            twin = Twin(None, tuple(replace(term, place="tank") for term in terms))
-            steps = steps_per_sample(twin, rate)
-            forces = twin.simulate(excitation, n_substeps=steps).require_done().forces_n.sum(axis=1)
-        readings = self._answers(run, own, motion, forces)
+    def _lane(self, asked: Asked) -> tuple[Lane | None, FloatArray]:
+        prescribed, rate = self._motion(asked.run), asked.run.sampling_rate_hz
+        if not asked.terms:
+            return None, prescribed
+        series = dict(zip(("displacement", "velocity", "acceleration"), prescribed.T, strict=True))
+        excitation = self._excitations.of(lambda: recorded(rate, **series), rate, series)
+        # on what moves absolutely, with steps as small as forces with memory need
+        twin = Twin(None, tuple(replace(term, place="tank") for term in asked.terms))
+        return Lane(twin, excitation, n_substeps=steps_per_sample(twin, rate)), prescribed
+
+    def _read(self, asked: Asked, needed: FloatArray, motion: Motion | None) -> Truth:
+        run, own, _ = asked
+        forces = np.zeros(run.n_samples) if motion is None else motion.tank_force_n
+        readings = self._answers(run, own, needed, forces)
         truth = {name: readings[:, k] for k, name in enumerate(self._twin.compared) if name in run.channels}
         for name, values in truth.items():
             _require_finite(values, f"{self._name}: {run.name}: reading {name}", run.sampling_rate_hz)
-        return truth, motion
+        return truth, needed
 
     def stand_in(self, run: TwinRun, own: Mapping[str, float]) -> Twin:
         mass = self.moving_mass_kg(run, own)
@@ -359,7 +431,7 @@ class _OfPrescribedMotion:
 _DERIVATIVES: Final = ("velocity", "acceleration")
 
 
-class _OfOwnCode:
+class _OfOwnCode(_OneByOne):
     """A simulation that a user wrote, which adds the force by itself."""
 
     def __init__(self, twin: FreeTwin, name: str) -> None:
