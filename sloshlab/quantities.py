@@ -173,6 +173,24 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "crossing_origin": Quantity("1", "branch of a root that begins to grow"),
     "crossing_speed": Quantity("m s-1", "speed at which a root begins to grow"),
     "crossing_frequency": Quantity("rad s-1", "its angular frequency, 0 if it does not oscillate"),
+    "time": Quantity("s", "time from the beginning of a simulation", "t"),
+    "case": Quantity("1", "name of a gust that an aircraft or wing flies through"),
+    "tank": Quantity("1", "name of a tank"),
+    "liquid": Quantity("1", "tank, plane and number of a liquid that sloshes sideways"),
+    "angle_of_attack": Quantity("rad", "local angle of attack by motion, nose up positive", "Δw/U"),
+    "tip_acceleration": Quantity("m s-2", "vertical acceleration of the tip, upward positive", "ẅ_tip"),
+    "modal_coordinate": Quantity("m", "coordinate of a mode of the dry structure, with its modal mass", "q"),
+    "tank_acceleration": Quantity("m s-2", "absolute vertical acceleration of a tank, upward positive", "ü_T"),
+    "sloshing_force": Quantity("N", "force of the liquid beyond the frozen liquid, upward positive", "Δf"),
+    "sloshing_coordinate": Quantity(
+        "m", "displacement of an equivalent mass of the liquid against its tank, r over √m_n", "r/√m"
+    ),
+    "w_gust": Quantity("m s-1", "vertical speed of the gust, up positive", "w_g"),
+    "outside_domain": Quantity("1", "1 while a tank is outside what its model was trained on"),
+    "gust_speed": Quantity("m s-1", "speed of the air", "U"),
+    "gust_amplitude": Quantity("m s-1", "largest vertical speed of the gust", "w_ga"),
+    "gust_length": Quantity("m", "length of the gust along the path", "L_g"),
+    "ending": Quantity("1", "why a simulation ended before its time, and when; empty where it did not"),
     "residual_explained": Quantity("1", "share of the residual's variance that a linear filter would give"),
 }
 

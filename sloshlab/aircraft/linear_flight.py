@@ -19,6 +19,7 @@ from sloshlab.aeroelastic.rational_functions import RationalForces
 from sloshlab.aircraft.flight_stability import Liquids, flight_system
 from sloshlab.aircraft.model import AircraftModel
 from sloshlab.aircraft.practical_mean_axes import to_body_axes
+from sloshlab.lateral_sloshing.box_tank import equivalent_model
 
 FloatArray = npt.NDArray[np.float64]
 LiquidModel = Literal["frozen", "lateral", "vertical", "full"]
@@ -78,6 +79,23 @@ class LinearFlight:
     def rates(self) -> slice:
         """Of the coordinates, in x."""
         return slice(self.n_coordinates, 2 * self.n_coordinates)
+
+    @property
+    def liquids(self) -> tuple[str, ...]:
+        """Names of the coordinates of liquids that slosh sideways; none if they are frozen."""
+        return self.names[self.to_structure.shape[0] :]
+
+    @property
+    def liquid_masses_kg(self) -> FloatArray:
+        """Equivalent mass m_n of each of `liquids`: its displacement against the tank is r/√m_n."""
+        if not self.liquids:
+            return np.zeros(0)
+        planes = [
+            equivalent_model(tank.box, axis, n_modes=tank.n_sloshing_modes).masses_kg
+            for tank in self.model.tanks
+            for axis in ("x", "y")
+        ]
+        return np.concatenate(planes)
 
     def velocity_at(self, node: int) -> FloatArray:
         """Absolute vertical velocity of a node [m/s], up, per state; its rate of change is the acceleration.

@@ -91,6 +91,12 @@ class FlightResponse:
         return np.asarray(self.states[:, self.flight.names.index(name)])
 
     @property
+    def liquid_displacement_m(self) -> FloatArray:
+        """Of each sideways equivalent mass against its tank, shape (n_times, n_liquids); see `flight.liquids`."""
+        n = self.flight.n_coordinates
+        return np.asarray(self.states[:, n - len(self.flight.liquids) : n] / np.sqrt(self.flight.liquid_masses_kg))
+
+    @property
     def state_rates(self) -> FloatArray:
         """ẋ, shape (n_times, n_states)."""
         flight = self.flight
