@@ -30,6 +30,9 @@ from pipelines.commands import models
 from pipelines.commands import flutter
 
 # isort: split
+from pipelines.commands import aircraft
+
+# isort: split
 from pipelines.commands import case
 
 # isort: split
@@ -62,6 +65,7 @@ __all__ = [
     "INPUT_IS_BAD",
     "INTERRUPTED",
     "USAGE",
+    "aircraft",
     "analysis",
     "app",
     "campaign",

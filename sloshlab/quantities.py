@@ -179,7 +179,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "liquid": Quantity("1", "tank, plane and number of a liquid that sloshes sideways"),
     "angle_of_attack": Quantity("rad", "local angle of attack by motion, nose up positive", "Δw/U"),
     "tip_acceleration": Quantity("m s-2", "vertical acceleration of the tip, upward positive", "ẅ_tip"),
-    "modal_coordinate": Quantity("m", "coordinate of a mode of the dry structure, with its modal mass", "q"),
+    "modal_coordinate": Quantity("m", "displacement of the node that a dry mode moves farthest", "q"),
     "tank_acceleration": Quantity("m s-2", "absolute vertical acceleration of a tank, upward positive", "ü_T"),
     "sloshing_force": Quantity("N", "force of the liquid beyond the frozen liquid, upward positive", "Δf"),
     "sloshing_coordinate": Quantity(
@@ -191,6 +191,18 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "gust_amplitude": Quantity("m s-1", "largest vertical speed of the gust", "w_ga"),
     "gust_length": Quantity("m", "length of the gust along the path", "L_g"),
     "ending": Quantity("1", "why a simulation ended before its time, and when; empty where it did not"),
+    "pair": Quantity("1", "pair of nodes that carry the tanks, from the middle outwards"),
+    "x_offset": Quantity("m", "of the tanks' centres from their nodes, aft positive"),
+    "tank_x": Quantity("m", "centre of the right tank, aft positive", "x"),
+    "tank_y": Quantity("m", "centre of the right tank, to starboard positive", "y"),
+    "static_margin": Quantity("1", "neutral point behind the centre of mass, in reference chords, frozen liquid"),
+    "frozen_flutter_speed": Quantity("m s-1", "first symmetric flutter, frozen liquid", "U_F"),
+    "frozen_flutter_frequency": Quantity("rad s-1", "angular frequency there"),
+    "frozen_antisymmetric_speed": Quantity("m s-1", "first antisymmetric flutter, frozen liquid"),
+    "lateral_flutter_speed": Quantity("m s-1", "first symmetric flutter, liquid that sloshes sideways", "U_F"),
+    "lateral_flutter_frequency": Quantity("rad s-1", "angular frequency there"),
+    "lateral_antisymmetric_speed": Quantity("m s-1", "first antisymmetric flutter, liquid that sloshes sideways"),
+    "lateral_sloshing_speed": Quantity("m s-1", "where an oscillation of the liquid itself begins to grow"),
     "residual_explained": Quantity("1", "share of the residual's variance that a linear filter would give"),
 }
 

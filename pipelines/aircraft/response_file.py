@@ -99,7 +99,7 @@ def response_dataset(cases: Sequence[RecordedCase], node: int) -> xr.Dataset:
     along = ("case", "model", "time")
     variables = {
         motion: (along, filled(lambda run: seen(run.response))),
-        "modal_coordinate": ((*along, "mode"), filled(lambda run: _modal(run.response, modes), modes)),
+        "modal_coordinate": ((*along, "mode"), filled(lambda run: largest_displacements(run.response), modes)),
         "tank_acceleration": (
             (*along, "tank"), filled(lambda run: run.response.tank_acceleration_m_per_s2, tanks)
         ),
@@ -133,8 +133,15 @@ def _motion_at(node: int, *, is_free: bool) -> tuple[str, Any]:
     return "tip_acceleration", lambda response: response.acceleration_at(node)
 
 
-def _modal(response: FlightResponse, modes: Sequence[str]) -> FloatArray:
-    return np.stack([response.coordinate(name) for name in modes], axis=1)
+def largest_displacements(response: FlightResponse) -> FloatArray:
+    """Each mode as the displacement [m] of the node that it moves farthest, shape (n_times, n_modes).
+
+    A mode then has unit tip displacement, whatever its modal mass.
+    """
+    structure = response.flight.model.structure
+    farthest = np.linalg.norm(structure.shapes[:, :, :3], axis=2).max(axis=1)
+    first = response.flight.to_structure.shape[0] - structure.n_modes
+    return np.asarray(response.states[:, first : first + structure.n_modes] * farthest)
 
 
 def _displacements(response: FlightResponse, liquids: Sequence[str]) -> FloatArray:

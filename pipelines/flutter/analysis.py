@@ -174,12 +174,24 @@ def analyse_flutter(path: Path, settings: FlutterSettings, *, cache: Path | None
     -------
     FlutterExperiment
     """
-    problem = problem_of(read_model(path), settings.models, cache)
+    return flutter_of(problem_of(read_model(path), settings.models, cache), settings, (path,))
+
+
+def flutter_of(problem: FlutterProblem, settings: FlutterSettings, inputs: tuple[Path, ...]) -> FlutterExperiment:
+    """Compute root locus and p-k roots of a model that is read already.
+
+    Parameters
+    ----------
+    problem : FlutterProblem
+    settings : FlutterSettings
+    inputs : tuple of Path
+        Files that it was read from.
+    """
     # matrices of a hundred rows: threads of BLAS only wait for one another
     with threadpool_limits(1), progress("root loci", 2 * len(problem.variants)) as advance:
         results = tuple(_stability(problem, variant, settings, advance) for variant in problem.variants)
         checks = problem.checks(0.5 * (settings.first_m_per_s + settings.last_m_per_s))
-    return FlutterExperiment(problem, settings, (path,), results, checks)
+    return FlutterExperiment(problem, settings, inputs, results, checks)
 
 
 def _stability(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import xarray as xr
@@ -23,7 +23,7 @@ from pipelines.report.tables import Table, provenance_table
 from sloshlab import __version__
 from sloshlab.quantities import described
 
-_PAPERS = (
+PAPERS: Final = (
     Citation(
         "strip theory",
         "T. Theodorsen: General theory of aerodynamic instability and the mechanism of flutter. NACA Report 496 "
@@ -48,6 +48,7 @@ _PAPERS = (
         "10.2514/3.57379",
     ),
 )
+"""What flutter rests on."""
 
 
 def files_of(*, report: bool) -> tuple[str, ...]:
@@ -62,7 +63,7 @@ def write_flutter(
     provenance = provenance_of(command, experiment.inputs, settings=experiment.settings)
     name = experiment.problem.name
     with result_folder(folder, provenance) as complete:
-        dataset = _dataset(experiment).assign_attrs(
+        dataset = stability_dataset(experiment).assign_attrs(
             title="Stability over the speed", name=name, **stamp_of(provenance)
         )
         write_dataset(dataset, complete / "stability.nc")
@@ -78,7 +79,7 @@ def write_flutter(
             {"what": check.what, "asked": check.largest, "reached": check.reached} for check in experiment.checks
         ],
         "flags": list(experiment.flags),
-        "lines": [*_sentences(experiment), *report_lines(folder, written=report)],
+        "lines": [*stability_sentences(experiment), *report_lines(folder, written=report)],
     }
 
 
@@ -104,8 +105,18 @@ def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _dataset(experiment: FlutterExperiment) -> xr.Dataset:
-    """Models side by side; one with fewer branches has NaN for the rest."""
+def stability_dataset(experiment: FlutterExperiment) -> xr.Dataset:
+    """Put models side by side; one with fewer branches has NaN for the rest.
+
+    Parameters
+    ----------
+    experiment : FlutterExperiment
+
+    Returns
+    -------
+    xarray.Dataset
+        As ``stability.nc`` keeps it.
+    """
     results = experiment.results
     loci = [result.locus for result in results]
     n_branches = max(len(locus.origin) for locus in loci)
@@ -142,9 +153,29 @@ def _dataset(experiment: FlutterExperiment) -> xr.Dataset:
 
 
 def _page(experiment: FlutterExperiment) -> Page:
-    def plan(name: str, draw: Any, **more: Any) -> FigurePlan:
-        return FigurePlan(name, partial(draw, **more))
+    sections = [*stability_sections(experiment), *model_sections(experiment)]
+    provenance = SectionPlan("Provenance", (), (provenance_table(experiment.provenance),))
+    return Page(
+        title="Flutter",
+        subtitle=f"{experiment.problem.name} · sloshlab {__version__}",
+        flags=experiment.flags,
+        summary=stability_sentences(experiment),
+        plans=(*sections, provenance),
+        papers=PAPERS,
+    )
 
+
+def _plan(name: str, draw: Any, **more: Any) -> FigurePlan:
+    return FigurePlan(name, partial(draw, **more))
+
+
+def stability_sections(experiment: FlutterExperiment) -> list[SectionPlan]:
+    """Sections on the stability of each model, and of several together first.
+
+    Parameters
+    ----------
+    experiment : FlutterExperiment
+    """
     several = len(experiment.results) > 1
     sections = []
     for result in experiment.results:
@@ -153,34 +184,41 @@ def _page(experiment: FlutterExperiment) -> Page:
             SectionPlan(
                 f"Stability, {result.name}" if several else "Stability",
                 (
-                    plan(f"root_locus{ending}", figures.root_locus, result=result),
-                    plan(f"damping_and_frequency{ending}", figures.damping_and_frequency, result=result),
+                    _plan(f"root_locus{ending}", figures.root_locus, result=result),
+                    _plan(f"damping_and_frequency{ending}", figures.damping_and_frequency, result=result),
                 ),
                 (_crossing_table(result),),
             )
         )
     if several:
-        compared = plan("models", figures.models_compared, results=experiment.results)
+        compared = _plan("models", figures.models_compared, results=experiment.results)
         sections.insert(0, SectionPlan("Frozen and sloshing", (compared,), (_model_table(experiment),)))
-    shapes = plan("mode_shapes", mode_figures.mode_shapes, shapes=experiment.problem.shapes)
-    forces = plan("fit_of_forces", figures.fit_of_forces, problem=experiment.problem)
-    sections += [
+    return sections
+
+
+def model_sections(experiment: FlutterExperiment) -> list[SectionPlan]:
+    """Sections on modes without flow, forces of the air, and checks of the model.
+
+    Parameters
+    ----------
+    experiment : FlutterExperiment
+    """
+    shapes = _plan("mode_shapes", mode_figures.mode_shapes, shapes=experiment.problem.shapes)
+    forces = _plan("fit_of_forces", figures.fit_of_forces, problem=experiment.problem)
+    return [
         SectionPlan("Modes without flow", (shapes,)),
         SectionPlan("Forces of the air", (forces,), (_fit_table(experiment.problem),)),
         *([SectionPlan("Checks", (), (_check_table(experiment),))] if experiment.checks else []),
-        SectionPlan("Provenance", (), (provenance_table(experiment.provenance),)),
     ]
-    return Page(
-        title="Flutter",
-        subtitle=f"{experiment.problem.name} · sloshlab {__version__}",
-        flags=experiment.flags,
-        summary=_sentences(experiment),
-        plans=tuple(sections),
-        papers=_PAPERS,
-    )
 
 
-def _sentences(experiment: FlutterExperiment) -> tuple[str, ...]:
+def stability_sentences(experiment: FlutterExperiment) -> tuple[str, ...]:
+    """What grows from where on, model by model, and what sideways sloshing changes.
+
+    Parameters
+    ----------
+    experiment : FlutterExperiment
+    """
     first, last = experiment.settings.first_m_per_s, experiment.settings.last_m_per_s
     several = len(experiment.results) > 1
     found = []

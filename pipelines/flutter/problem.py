@@ -21,6 +21,7 @@ from sloshlab.aeroelastic.generalised_forces import (
     generalised_forces,
     usual_reduced_frequencies,
 )
+from sloshlab.aeroelastic.gust import gust_fit
 from sloshlab.aeroelastic.modal_structure import ModalStructure, of_modes
 from sloshlab.aeroelastic.p_k import Forces
 from sloshlab.aeroelastic.planform import Boxes
@@ -83,6 +84,21 @@ class Variant:
     rigid: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class FlownAircraft:
+    """What a gust response of an aircraft needs beside the forces of its own motion.
+
+    Attributes
+    ----------
+    model : AircraftModel
+    gust : RationalForces
+        By w_g/U that is the same everywhere.
+    """
+
+    model: AircraftModel
+    gust: RationalForces
+
+
 def _no_checks(speed_m_per_s: float) -> tuple[ModelCheck, ...]:
     """Of a wing of stations, whose numbers are checked by themselves."""
     return ()
@@ -109,6 +125,8 @@ class FlutterProblem:
         Where the table is from; None for strips.
     checks : callable
         Identities that must hold of the model, at a speed.
+    flown : FlownAircraft or None
+        The aircraft and what a gust does to it; None of a wing of stations.
     """
 
     name: str
@@ -122,6 +140,7 @@ class FlutterProblem:
     variants: tuple[Variant, ...]
     cache: CacheStatus | None = None
     checks: Callable[[float], tuple[ModelCheck, ...]] = _no_checks
+    flown: FlownAircraft | None = None
 
 
 def problem_of(model: WingModel | AircraftModel, liquids: Sequence[str], cache: Path | None) -> FlutterProblem:
@@ -225,6 +244,7 @@ def _of_aircraft(model: AircraftModel, liquids: Sequence[Liquids], cache: Path |
         tuple(variants),
         status,
         lambda speed: checks_of(model, surfaces, lattice, rational, (tuple(liquids), speed)),
+        FlownAircraft(model, gust_fit(lattice)),
     )
 
 

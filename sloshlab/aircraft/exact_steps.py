@@ -22,6 +22,8 @@ _N_ENTRIES: Final = 4
 """Of each table. More would save terms of the series, but a matrix that is seldom used comes from slow memory."""
 _MOST_TERMS: Final = 25
 _ERROR: Final = 1e-16
+_ROUNDING: Final = 1e-10
+"""Of the finer table's step, by which instants of half a minute miss their place: a distance that close is one."""
 
 
 class ExactSteps:
@@ -75,6 +77,11 @@ class ExactSteps:
             h, 0 to the longest.
         """
         whole, rest = divmod(step_s / self._fine_s, 1.0)
+        # instants that recur are told apart by rounding alone; a series for that would be most of the work
+        if rest > 1 - _ROUNDING:
+            whole, rest = whole + 1, 0.0
+        elif rest < _ROUNDING:
+            rest = 0.0
         coarse, fine = divmod(int(whole), _N_ENTRIES)
         y = x / self._scale
         if coarse:

@@ -1,0 +1,110 @@
+"""Frequency, damping and limit cycle of a response, from its extremes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import find_peaks
+
+FloatArray = npt.NDArray[np.float64]
+Fate = Literal["decays", "grows", "limit cycle", "at rest"]
+
+_STEADY: Final = 0.05
+"""Change of the amplitude between the last two sixths of a response that counts as a limit cycle."""
+_GONE: Final = 1e-3
+"""Of the largest amplitude, below which an oscillation has decayed, however steady it is."""
+_LEAST_PROMINENCE: Final = 1e-3
+"""Of the whole range, that an extreme stands out from its neighbours; smaller ones are ripples."""
+
+
+@dataclass(frozen=True)
+class OscillationMeasures:
+    """What a damped, growing or lasting oscillation does.
+
+    Attributes
+    ----------
+    frequency_hz, damping_ratio : float
+        From the first peak after the gust to the third; NaN if there are less.
+    late_frequency_hz, late_growth_per_s : float
+        Over the last third; NaN where it is at rest.
+    largest, limit_cycle : float
+        Largest amplitude after the gust, and that of the limit cycle, NaN if there is none.
+    fate : str
+    """
+
+    frequency_hz: float
+    damping_ratio: float
+    late_frequency_hz: float
+    late_growth_per_s: float
+    largest: float
+    limit_cycle: float
+    fate: Fate
+
+
+def oscillation_measures(time_s: FloatArray, values: FloatArray, *, start_s: float = 0.0) -> OscillationMeasures:
+    """Measure an oscillation after a gust has passed.
+
+    Parameters
+    ----------
+    time_s, values : ndarray, shape (n,)
+    start_s : float
+        From when on.
+
+    Returns
+    -------
+    OscillationMeasures
+
+    Notes
+    -----
+    An amplitude is half the way from a peak to the mean of the troughs beside it, so that a slow drift under the
+    oscillation does not count. ζ = δ/√(4π² + δ²) with δ = ½ ln(a₁/a₃) of the first and third peak.
+    """
+    peak_s, amplitude = _amplitudes(time_s[time_s >= start_s], values[time_s >= start_s])
+    nan = math.nan
+    if peak_s.size < 3 or amplitude.max() <= 0:
+        largest = float(amplitude.max()) if peak_s.size else 0.0
+        return OscillationMeasures(nan, nan, nan, nan, largest, nan, "at rest")
+    decrement = 0.5 * math.log(amplitude[0] / amplitude[2])
+    frequency = 2 / float(peak_s[2] - peak_s[0])
+    ratio = decrement / math.hypot(2 * math.pi, decrement)
+    late_frequency, growth, fate, limit = _end(peak_s, amplitude, start_s, float(time_s[-1]))
+    return OscillationMeasures(frequency, ratio, late_frequency, growth, float(amplitude.max()), limit, fate)
+
+
+def _amplitudes(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Times of peaks that have a trough on both sides, and half the way between."""
+    if values.size < 3:
+        return np.zeros(0), np.zeros(0)
+    prominence = max(_LEAST_PROMINENCE * float(np.ptp(values)), 1e-15)
+    peaks, _ = find_peaks(values, prominence=prominence)
+    troughs, _ = find_peaks(-values, prominence=prominence)
+    after = np.searchsorted(troughs, peaks)
+    inner = (after > 0) & (after < troughs.size)
+    peaks, after = peaks[inner], after[inner]
+    if not peaks.size:
+        return np.zeros(0), np.zeros(0)
+    beside = 0.5 * (values[troughs[after - 1]] + values[troughs[after]])
+    return time_s[peaks], np.maximum(0.5 * (values[peaks] - beside), np.finfo(float).tiny)
+
+
+def _end(
+    peak_s: FloatArray, amplitude: FloatArray, start_s: float, end_s: float
+) -> tuple[float, float, Fate, float]:
+    """Frequency and growth over the last third, and what becomes of the oscillation."""
+    edges = end_s - (end_s - start_s) * np.array([1 / 3, 1 / 6, 0.0])
+    before = amplitude[(peak_s >= edges[0]) & (peak_s < edges[1])]
+    last = amplitude[peak_s >= edges[1]]
+    late = peak_s[peak_s >= edges[0]]
+    nan = math.nan
+    if before.size < 2 or last.size < 2 or np.median(last) < _GONE * amplitude.max():
+        return nan, nan, "decays", nan
+    frequency = (late.size - 1) / float(late[-1] - late[0])
+    ratio = float(np.median(last) / np.median(before))
+    growth = math.log(ratio) / float(edges[2] - edges[1])
+    if abs(ratio - 1) <= _STEADY:
+        return frequency, growth, "limit cycle", float(np.median(last))
+    return frequency, growth, "grows" if ratio > 1 else "decays", nan
