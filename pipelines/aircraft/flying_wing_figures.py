@@ -20,6 +20,7 @@ from pipelines.report.style import (
     plain,
     png_bytes,
 )
+from sloshlab.aircraft.oscillation_measures import oscillation_amplitudes
 from sloshlab.aircraft.tank_simulation import FlightResponse
 
 if TYPE_CHECKING:
@@ -31,10 +32,12 @@ MODEL_COLOURS: Final = dict(
     zip(("frozen", "lateral", "vertical", "full"), ("#5b6770", *DISTINCT_COLOURS[:3]), strict=True)
 )
 MODEL_LINES: Final = {"frozen": "--", "lateral": "-.", "vertical": "-", "full": "-"}
-_SHOWN_S: Final = 8.0
-"""The first seconds, beside the whole."""
+_SHOWN_S: Final = 4.0
+"""The first seconds, beside the amplitudes over the whole."""
 _SLOW_RAD_PER_S: Final = 32.0
 """Up to the first modes of sideways liquids and the flutter."""
+_DECADES: Final = 1e-4
+"""Of the largest amplitude, down to which decays are shown."""
 _BEYOND: Final = 3.0
 """Responses that grow are cut off at so many times the largest of those that do not."""
 
@@ -63,18 +66,19 @@ def layout(name: str, *, experiment: AircraftExperiment) -> ReportFigure:
         axes.add_patch(box)
         below_mm = -1000 * float(tank.place_m[2])
         axes.annotate(
-            f"{plain(tank.name)}: {1000 * x:.0f}, {1000 * y:.0f} mm, {below_mm:.0f} mm below",
-            (y, x), xytext=(0, -22 - 12 * number), textcoords="offset points", ha="center", fontsize=8,
+            f"{plain(tank.name)}: x = {1000 * x:.0f}, y = {1000 * y:.0f} mm, centre {below_mm:.0f} mm below",
+            (0.5, 0.02), xycoords="axes fraction", xytext=(0, 12 * (len(model.tanks) - 1 - number)),
+            textcoords="offset points", ha="center", fontsize=8,
         )  # fmt: skip
     centre = structure.mass_centre_m
     axes.plot(centre[1], centre[0], "x", color=REFERENCE_COLOUR, label="centre of mass, dry")
     spread = np.ptp(corner.reshape(-1, 2), axis=0)
     axes.set_xlim(corner[..., 0].min() - 0.03 * spread[0], corner[..., 0].max() + 0.03 * spread[0])
-    axes.set_ylim(corner[..., 1].max() + 0.05 * spread[1], corner[..., 1].min() - 0.05 * spread[1])
+    axes.set_ylim(corner[..., 1].max() + 0.12 * spread[1], corner[..., 1].min() - 0.05 * spread[1])
     axes.set_aspect("equal")
     axes.set_xlabel("y, to starboard [m]")
     axes.set_ylabel("x, aft [m]")
-    axes.legend(loc="lower left")
+    axes.legend(loc="upper left")
     caption = (
         "Boxes of the doublet lattice, nodes of the structure and tanks from above, nose up. Places of the tanks "
         "are of this model file: the source prints none."
@@ -123,7 +127,7 @@ def root_loci(name: str, *, experiment: AircraftExperiment) -> ReportFigure:
 
 
 def responses(name: str, *, experiment: AircraftExperiment, result: GustResult) -> ReportFigure:
-    """Angle of attack and first mode of all models, the first seconds and the whole."""
+    """Angle of attack and first mode of all models: the first seconds, and the amplitude over the whole."""
     figure = new_figure(5.4)
     panels = figure.subplots(2, 2, sharex="col")
     quantities: tuple[tuple[str, Any], ...] = (
@@ -135,15 +139,18 @@ def responses(name: str, *, experiment: AircraftExperiment, result: GustResult) 
             model: (run.recorded.response.time_s, of_response(run.recorded.response), run.has_diverged)
             for model, run in result.runs.items()
         }
-        for axes, end_s in zip(panels[row], (_SHOWN_S, experiment.settings.duration_s), strict=True):
-            for model, (time, values, _) in signals.items():
-                chosen = time <= end_s
-                axes.plot(
-                    time[chosen], values[chosen], MODEL_LINES[model], color=MODEL_COLOURS[model], label=model,
-                    linewidth=1.0,
-                )  # fmt: skip
-            _limit(axes, [(values[time <= end_s], grows) for time, values, grows in signals.values()])
-        panels[row, 0].set_ylabel(label)
+        first, whole = panels[row]
+        for model, (time, values, _) in signals.items():
+            chosen = time <= _SHOWN_S
+            style = {"color": MODEL_COLOURS[model], "label": model, "linewidth": 1.0}
+            first.plot(time[chosen], values[chosen], MODEL_LINES[model], **style)
+            peak_s, amplitude = oscillation_amplitudes(time, values)
+            whole.semilogy(peak_s, amplitude, MODEL_LINES[model], **style)
+        _limit(first, [(values[time <= _SHOWN_S], grows) for time, values, grows in signals.values()])
+        first.set_ylabel(label)
+        whole.set_ylabel(f"amplitude of {label}")
+        lowest, highest = whole.get_ylim()
+        whole.set_ylim(max(lowest, _DECADES * highest), highest)
     for axes in panels[1]:
         axes.set_xlabel("time [s]")
     handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -152,7 +159,8 @@ def responses(name: str, *, experiment: AircraftExperiment, result: GustResult) 
     caption = (
         f"Gust of {gust.amplitude_m_per_s:g} m/s and {gust.length_m:.3g} m at {gust.speed_m_per_s:.2f} m/s: local "
         f"angle of attack at node {experiment.node} without that of the gust, and first mode as the displacement "
-        "of the node that it moves farthest. Responses that grow are cut off."
+        "of the node that it moves farthest. Left: responses that grow are cut off. Right: half the way from each "
+        "peak to the troughs beside it."
     )
     return ReportFigure(name, caption, gust.figures, png_bytes(figure))
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from pipelines.aircraft.flying_wing_gusts import PRINTED_FLUTTER
 from pipelines.aircraft.flying_wing_results import AircraftExperiment, GustResult, GustRun
+from pipelines.aircraft.offset_scan import LEAST_STATIC_MARGIN
 from pipelines.report.numbers import interval, text
 from pipelines.report.tables import Table
 from sloshlab.aircraft.flutter_crossings import FlutterCrossing
@@ -147,11 +148,11 @@ def _of_two_tanks(experiment: AircraftExperiment) -> list[Compared]:
         if result is not None:
             rows.append(_fates(result, fates))
             rows += _most_damped(result, label)
-    rows += _sideways(_gust(experiment, "before"))
     return rows
 
 
 def _sideways(result: GustResult | None) -> list[Compared]:
+    """Of a tank in the plane of symmetry; one beside it rolls as its wing bends."""
     if result is None or "lateral" not in result.runs:
         return []
     share = result.runs["lateral"].sideways
@@ -185,9 +186,11 @@ def _larger(result: GustResult) -> list[Compared]:
         Compared(
             f"limit cycle of Δw/U, {result.gust.name}",
             "full larger than vertical",
-            ", ".join(f"{model} {_degrees(value)}" for model, value in amplitude.items()),
+            ", ".join(f"{model} {fate_of(result.runs[model])}" for model in amplitude),
             "",
-            amplitude["full"] > amplitude["vertical"],
+            # one that decays ends on none
+            amplitude["full"]
+            > (0.0 if result.runs["vertical"].angle_of_attack.fate == "decays" else amplitude["vertical"]),
         )
     ]
 
@@ -251,8 +254,9 @@ def gust_table(result: GustResult) -> Table:
             "members of the ensemble",
         ),
         tuple(rows),
-        f"U = {result.gust.speed_m_per_s:.3f} m/s, L_g = {result.gust.length_m:.3g} m. f and ζ from the first peak "
-        "after the gust to the third; growth over the last sixths. Members: range of the limit cycle of Δw/U, or of ζ where there is none.",
+        f"U = {result.gust.speed_m_per_s:.3f} m/s, L_g = {result.gust.length_m:.3g} m. f and ζ from the first "
+        "peak after the gust to the third; growth over the last sixths. Members: range of the limit cycle of "
+        "Δw/U, or of ζ where there is none.",
     )
 
 
@@ -288,11 +292,12 @@ def scan_sentence(experiment: AircraftExperiment) -> tuple[str, ...]:
     )
     chosen = experiment.scan.chosen()
     if chosen is None:
-        return (said, "it raises it nowhere where the rigid aircraft is stable")
+        return (said, f"it raises it nowhere with a static margin of {100 * LEAST_STATIC_MARGIN:g} % of the chord")
     place = experiment.scan.places[chosen[0]][chosen[1]]
+    where = f"x = {place.x_m:.3f} m, y = ±{place.y_m:.3f} m"
     return (
         said,
-        f"most at a stable place: {_percent(place.change)} at x = {place.x_m:.3f} m, y = ±{place.y_m:.3f} m",
+        f"most with a static margin of {100 * LEAST_STATIC_MARGIN:g} %: {_percent(place.change)} at {where}",
     )
 
 

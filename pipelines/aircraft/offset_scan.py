@@ -29,6 +29,8 @@ FloatArray = npt.NDArray[np.float64]
 
 _PITCH, _HEAVE = 4, 2
 _MOST_PLACES: Final = 2000
+LEAST_STATIC_MARGIN: Final = 0.05
+"""Of a place that is chosen: with less an aircraft pitches up in every gust before anything oscillates."""
 _Offset = Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)]
 
 
@@ -132,13 +134,13 @@ class OffsetScan:
     def chosen(self) -> tuple[int, int] | None:
         """The place at which sideways sloshing raises the symmetric flutter most.
 
-        Among places where the rigid aircraft is stable; None if sloshing raises it nowhere.
+        Among places with `LEAST_STATIC_MARGIN`; None if sloshing raises it nowhere.
         """
         best: tuple[float, tuple[int, int]] | None = None
         for row, places in enumerate(self.places):
             for column, place in enumerate(places):
                 is_better = place.change > (0.0 if best is None else best[0])
-                if is_better and place.static_margin > 0:
+                if is_better and place.static_margin >= LEAST_STATIC_MARGIN:
                     best = (place.change, (row, column))
         return None if best is None else best[1]
 

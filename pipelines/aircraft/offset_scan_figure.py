@@ -42,6 +42,6 @@ def offset_map(name: str, *, experiment: AircraftExperiment) -> ReportFigure:
     caption = (
         "First symmetric flutter over the place of the right tank, the left one being its mirror image; nose up. "
         "Crosses: no flutter within the range; bars: statically unstable; star: where sideways sloshing raises it "
-        "most among stable places; ring: the tank of this model file."
+        "most with a static margin of 5 % of the chord; ring: the tank of this model file."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))

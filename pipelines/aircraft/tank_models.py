@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sloshlab.aircraft.drifting_tank import DriftFree, corner_of_drift_hz
 from sloshlab.aircraft.model import AircraftModel, AircraftTank
 from sloshlab.aircraft.tank_simulation import FlightResponse, VerticalForce
 from sloshlab.aircraft.vertical_sloshing import TankDeparture, model_in_tank, tank_departures
@@ -28,12 +29,15 @@ class TankModels:
     tanks : tuple of AircraftTank
     files : tuple of Path
         That were read.
+    can_drift : bool
+        Whether the aircraft flies freely: motion slower than the training is then kept from the models.
     """
 
     model: ReducedOrderModel
     members: tuple[ReducedOrderModel, ...]
     tanks: tuple[AircraftTank, ...]
     files: tuple[Path, ...]
+    can_drift: bool = False
 
     def forces(self, member: int | None = None) -> dict[str, VerticalForce]:
         """Make one model at rest for each tank, with its rate and in its units; each serves one simulation.
@@ -44,7 +48,13 @@ class TankModels:
             Of the ensemble; `model` itself if not given.
         """
         chosen = self._chosen(member)
-        return {tank.name: model_in_tank(chosen, tank) for tank in self.tanks}
+        return {tank.name: self._in_tank(chosen, tank) for tank in self.tanks}
+
+    def _in_tank(self, model: ReducedOrderModel, tank: AircraftTank) -> VerticalForce:
+        stepped, corner_hz = model_in_tank(model, tank), corner_of_drift_hz(model)
+        if not self.can_drift or corner_hz is None:
+            return stepped
+        return DriftFree(stepped, corner_hz * stepped.sampling_rate_hz / model.sampling_rate_hz)
 
     def departures(self, response: FlightResponse, member: int | None = None) -> list[TankDeparture]:
         """What to flag of a simulation with `forces`, tank by tank."""
@@ -76,7 +86,8 @@ def load_tank_models(model: AircraftModel, rom: Path, ensemble: Path | None = No
     members = () if ensemble is None else _members(trained, ensemble)
     for each in (trained, *members):
         _require_use_in(model.tanks, each)
-    return TankModels(trained, members, model.tanks, (rom, *([] if ensemble is None else [ensemble])))
+    files = (rom, *([] if ensemble is None else [ensemble]))
+    return TankModels(trained, members, model.tanks, files, model.structure.is_free)
 
 
 def require_light_liquid(model: AircraftModel) -> None:

@@ -63,7 +63,7 @@ def oscillation_measures(time_s: FloatArray, values: FloatArray, *, start_s: flo
     An amplitude is half the way from a peak to the mean of the troughs beside it, so that a slow drift under the
     oscillation does not count. ζ = δ/√(4π² + δ²) with δ = ½ ln(a₁/a₃) of the first and third peak.
     """
-    peak_s, amplitude = _amplitudes(time_s[time_s >= start_s], values[time_s >= start_s])
+    peak_s, amplitude = oscillation_amplitudes(time_s[time_s >= start_s], values[time_s >= start_s])
     nan = math.nan
     if peak_s.size < 3 or amplitude.max() <= 0:
         largest = float(amplitude.max()) if peak_s.size else 0.0
@@ -75,8 +75,18 @@ def oscillation_measures(time_s: FloatArray, values: FloatArray, *, start_s: flo
     return OscillationMeasures(frequency, ratio, late_frequency, growth, float(amplitude.max()), limit, fate)
 
 
-def _amplitudes(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Times of peaks that have a trough on both sides, and half the way between."""
+def oscillation_amplitudes(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Amplitude at each peak that has a trough on both sides.
+
+    Parameters
+    ----------
+    time_s, values : ndarray, shape (n,)
+
+    Returns
+    -------
+    peak_s, amplitude : ndarray, shape (n_peaks,)
+        Half the way from the peak to the mean of the troughs beside it.
+    """
     if values.size < 3:
         return np.zeros(0), np.zeros(0)
     prominence = max(_LEAST_PROMINENCE * float(np.ptp(values)), 1e-15)
@@ -87,8 +97,21 @@ def _amplitudes(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, Flo
     peaks, after = peaks[inner], after[inner]
     if not peaks.size:
         return np.zeros(0), np.zeros(0)
-    beside = 0.5 * (values[troughs[after - 1]] + values[troughs[after]])
-    return time_s[peaks], np.maximum(0.5 * (values[peaks] - beside), np.finfo(float).tiny)
+    peak_s, top = _refined(time_s, values, peaks)
+    _, bottom = _refined(time_s, values, troughs)
+    beside = 0.5 * (bottom[after - 1] + bottom[after])
+    return peak_s, np.maximum(0.5 * (top - beside), np.finfo(float).tiny)
+
+
+def _refined(
+    time_s: FloatArray, values: FloatArray, places: npt.NDArray[np.int64]
+) -> tuple[FloatArray, FloatArray]:
+    """Extremes between samples, of the parabola through three of them."""
+    before, at, after = values[places - 1], values[places], values[places + 1]
+    bend = before - 2 * at + after
+    shift = np.where(bend != 0, 0.5 * (before - after) / np.where(bend != 0, bend, 1.0), 0.0)
+    step_s = 0.5 * (time_s[places + 1] - time_s[places - 1])
+    return time_s[places] + shift * step_s, at - 0.25 * (before - after) * shift
 
 
 def _end(
