@@ -23,7 +23,7 @@ VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -76,6 +76,11 @@ flutter-checks: setup  ## numbers of aeroelasticity, asked and reached, and a fl
 	mkdir -p $(RESULTS)
 	$(BIN)/python -m studies.flutter_checks $(RESULTS)/flutter_checks.json
 	$(BIN)/sloshlab flutter raw_data/aircraft/maewing1/case_1.toml -o $(RESULTS)/flutter
+
+aircraft: setup  ## a flying wing with one tank and with two: flutter, gusts, places of the tanks, with $(ROM) of `make rom` (minutes)
+	for case in 1 2; do $(BIN)/sloshlab aircraft raw_data/aircraft/maewing1/case_$$case.toml --rom $(ROM) \
+	  --cache $(RESULTS)/aircraft/forces $$([ $$case = 1 ] || echo --scan raw_data/aircraft/maewing1/offset_scan.toml) \
+	  -o $(RESULTS)/aircraft/case_$$case || [ $$? -eq 3 ] || exit 1; done
 
 rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
 	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study

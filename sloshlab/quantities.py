@@ -196,6 +196,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "tank_x": Quantity("m", "centre of the right tank, aft positive", "x"),
     "tank_y": Quantity("m", "centre of the right tank, to starboard positive", "y"),
     "static_margin": Quantity("1", "neutral point behind the centre of mass, in reference chords, frozen liquid"),
+    "is_beneath": Quantity("1", "1 where the tank's centre is beneath the wing"),
     "frozen_flutter_speed": Quantity("m s-1", "first symmetric flutter, frozen liquid", "U_F"),
     "frozen_flutter_frequency": Quantity("rad s-1", "angular frequency there"),
     "frozen_antisymmetric_speed": Quantity("m s-1", "first antisymmetric flutter, frozen liquid"),

@@ -20,11 +20,11 @@ from pipelines.aircraft.flying_wing_results import (
     OneGust,
 )
 from pipelines.aircraft.gust_runs import GustedAircraft
-from pipelines.aircraft.offset_scan import OffsetScan, read_scan, require_pair, scan_offsets
+from pipelines.aircraft.offset_scan import OffsetScan, ScanFile, read_scan, require_pair, scan_offsets
 from pipelines.aircraft.response_file import largest_displacements
 from pipelines.aircraft.tank_models import TankModels, load_tank_models, require_light_liquid
 from pipelines.flutter.analysis import flutter_of
-from pipelines.flutter.problem import FlutterProblem, problem_of
+from pipelines.flutter.problem import BoxShapes, FlutterProblem, problem_of
 from pipelines.report.progress import progress
 from sloshlab.aeroelastic.gust import USUAL_LENGTH_IN_SEMI_CHORDS
 from sloshlab.aircraft.flutter_crossings import FlutterCrossing, first_flutter, flutter_crossings
@@ -88,8 +88,14 @@ def analyse_aircraft(
     crossings, by_damping = _crossings(model, problem, settings)
     node = _nearest_to_centre(model)
     gusts = _gust_results(problem, tanks, _planned(crossings, problem, settings), settings, node)
-    scanned: OffsetScan | None = None if asked is None else scan_offsets(model, problem.rational, asked)
+    scanned = _scanned(model, problem, asked)
     return AircraftExperiment(flutter, settings, inputs, model, crossings, by_damping, node, gusts, tanks, scanned)
+
+
+def _scanned(model: AircraftModel, problem: FlutterProblem, asked: ScanFile | None) -> OffsetScan | None:
+    if asked is None or not isinstance(problem.shapes, BoxShapes):
+        return None
+    return scan_offsets(model, problem.rational, problem.shapes.boxes, asked)
 
 
 def _nearest_to_centre(model: AircraftModel) -> int:

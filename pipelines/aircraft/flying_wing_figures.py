@@ -151,6 +151,9 @@ def responses(name: str, *, experiment: AircraftExperiment, result: GustResult) 
         whole.set_ylabel(f"amplitude of {label}")
         lowest, highest = whole.get_ylim()
         whole.set_ylim(max(lowest, _DECADES * highest), highest)
+        # powers of ten would be mathematics, which reports do not set
+        whole.yaxis.set_major_formatter("{x:g}")
+        whole.yaxis.set_minor_formatter("")
     for axes in panels[1]:
         axes.set_xlabel("time [s]")
     handles, labels = panels[0, 0].get_legend_handles_labels()

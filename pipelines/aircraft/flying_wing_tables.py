@@ -8,7 +8,6 @@ from typing import Final
 
 from pipelines.aircraft.flying_wing_gusts import PRINTED_FLUTTER
 from pipelines.aircraft.flying_wing_results import AircraftExperiment, GustResult, GustRun
-from pipelines.aircraft.offset_scan import LEAST_STATIC_MARGIN
 from pipelines.report.numbers import interval, text
 from pipelines.report.tables import Table
 from sloshlab.aircraft.flutter_crossings import FlutterCrossing
@@ -292,12 +291,12 @@ def scan_sentence(experiment: AircraftExperiment) -> tuple[str, ...]:
     )
     chosen = experiment.scan.chosen()
     if chosen is None:
-        return (said, f"it raises it nowhere with a static margin of {100 * LEAST_STATIC_MARGIN:g} % of the chord")
+        return (said, "it raises it nowhere beneath the wings where the rigid aircraft is stable")
     place = experiment.scan.places[chosen[0]][chosen[1]]
     where = f"x = {place.x_m:.3f} m, y = ±{place.y_m:.3f} m"
     return (
         said,
-        f"most with a static margin of {100 * LEAST_STATIC_MARGIN:g} %: {_percent(place.change)} at {where}",
+        f"most beneath the wings where the rigid aircraft is stable: {_percent(place.change)} at {where}",
     )
 
 

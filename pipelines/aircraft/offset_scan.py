@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from threadpoolctl import threadpool_limits
 
 from pipelines.report.progress import progress
+from sloshlab.aeroelastic.planform import Boxes
 from sloshlab.aeroelastic.rational_functions import RationalForces
 from sloshlab.aircraft.flutter_crossings import FlutterCrossing, first_flutter, flutter_crossings
 from sloshlab.aircraft.model import AircraftModel
@@ -29,8 +30,6 @@ FloatArray = npt.NDArray[np.float64]
 
 _PITCH, _HEAVE = 4, 2
 _MOST_PLACES: Final = 2000
-LEAST_STATIC_MARGIN: Final = 0.05
-"""Of a place that is chosen: with less an aircraft pitches up in every gust before anything oscillates."""
 _Offset = Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)]
 
 
@@ -102,12 +101,15 @@ class PlaceOfTanks:
         Of the centre of the right tank.
     static_margin : float
         Of the rigid aircraft with frozen liquid, in reference chords; positive is stable.
+    is_beneath : bool
+        Whether the tank's centre is beneath the wing.
     frozen, lateral : tuple of FlutterCrossing
     """
 
     x_m: float
     y_m: float
     static_margin: float
+    is_beneath: bool
     frozen: tuple[FlutterCrossing, ...]
     lateral: tuple[FlutterCrossing, ...]
 
@@ -132,15 +134,15 @@ class OffsetScan:
     places: list[list[PlaceOfTanks]]
 
     def chosen(self) -> tuple[int, int] | None:
-        """The place at which sideways sloshing raises the symmetric flutter most.
+        """The place beneath the wings at which sideways sloshing raises the symmetric flutter most.
 
-        Among places with `LEAST_STATIC_MARGIN`; None if sloshing raises it nowhere.
+        Among those where the rigid aircraft is statically stable; None if sloshing raises it at none of them.
         """
         best: tuple[float, tuple[int, int]] | None = None
         for row, places in enumerate(self.places):
             for column, place in enumerate(places):
                 is_better = place.change > (0.0 if best is None else best[0])
-                if is_better and place.static_margin >= LEAST_STATIC_MARGIN:
+                if is_better and place.static_margin > 0 and place.is_beneath:
                     best = (place.change, (row, column))
         return None if best is None else best[1]
 
@@ -155,6 +157,7 @@ class OffsetScan:
             "tank_x": (along, each(lambda place: place.x_m)),
             "tank_y": (along, each(lambda place: place.y_m)),
             "static_margin": (along, each(lambda place: place.static_margin)),
+            "is_beneath": (along, each(lambda place: float(place.is_beneath))),
             "frozen_flutter_speed": (along, each(lambda place: _speed(first_flutter(place.frozen)))),
             "frozen_flutter_frequency": (along, each(lambda place: _frequency(first_flutter(place.frozen)))),
             "frozen_antisymmetric_speed": (along, each(lambda place: _first(place.frozen, "antisymmetric"))),
@@ -182,7 +185,7 @@ def _first(crossings: tuple[FlutterCrossing, ...], kind: str) -> float:
     return _speed(next((crossing for crossing in crossings if crossing.kind == kind), None))
 
 
-def scan_offsets(model: AircraftModel, air: RationalForces, asked: ScanFile) -> OffsetScan:
+def scan_offsets(model: AircraftModel, air: RationalForces, boxes: Boxes, asked: ScanFile) -> OffsetScan:
     """Move the pair of tanks of an aircraft from place to place.
 
     Parameters
@@ -191,6 +194,8 @@ def scan_offsets(model: AircraftModel, air: RationalForces, asked: ScanFile) -> 
         Free, with two like tanks.
     air : RationalForces
         Of its coordinates; tanks play no part in them.
+    boxes : Boxes
+        Of the doublet lattice.
     asked : ScanFile
 
     Raises
@@ -205,7 +210,7 @@ def scan_offsets(model: AircraftModel, air: RationalForces, asked: ScanFile) -> 
         for pair in zip(asked.left, asked.right, strict=True):
             row = []
             for offset in asked.x_offset_m:
-                row.append(_place(with_pair_at(model, pair, offset), air, asked.speeds_m_per_s))
+                row.append(_place(with_pair_at(model, pair, offset), air, boxes, asked.speeds_m_per_s))
                 advance(f"nodes {pair[0]} and {pair[1]}, {offset:+.2f} m")
             places.append(row)
     return OffsetScan(asked, places)
@@ -246,15 +251,33 @@ def with_pair_at(model: AircraftModel, nodes: tuple[int, int], x_offset_m: float
     return replace(model, tanks=tuple(moved))
 
 
-def _place(model: AircraftModel, air: RationalForces, speeds: FloatArray) -> PlaceOfTanks:
+def _place(model: AircraftModel, air: RationalForces, boxes: Boxes, speeds: FloatArray) -> PlaceOfTanks:
     right = max(model.tanks, key=lambda tank: tank.place_m[1])
     return PlaceOfTanks(
         float(right.place_m[0]),
         float(right.place_m[1]),
         static_margin(model, air),
+        is_beneath(boxes, right.place_m),
         flutter_crossings(model, air, "frozen", speeds),
         flutter_crossings(model, air, "lateral", speeds),
     )
+
+
+def is_beneath(boxes: Boxes, place_m: FloatArray) -> bool:
+    """Whether a place is below or above a box of a surface that is nearly level.
+
+    Parameters
+    ----------
+    boxes : Boxes
+    place_m : ndarray, shape (3,)
+    """
+    level = np.abs(boxes.normal[:, 2]) > 0.5
+    # around each box: a place within has all edges on one side
+    corner = boxes.corner_m[level][:, [0, 1, 3, 2], :2]
+    edge = np.roll(corner, -1, axis=1) - corner
+    way = np.asarray(place_m)[:2] - corner
+    side = edge[..., 0] * way[..., 1] - edge[..., 1] * way[..., 0]
+    return bool(((side >= 0).all(axis=1) | (side <= 0).all(axis=1)).any())
 
 
 def static_margin(model: AircraftModel, air: RationalForces) -> float:

@@ -16,7 +16,7 @@ def offset_map(name: str, *, experiment: AircraftExperiment) -> ReportFigure:
         raise NothingToDrawError("no scan was asked for")
     found = scan.to_dataset()
     x, y, margin = (found[name].values for name in ("tank_x", "tank_y", "static_margin"))
-    frozen = found["frozen_flutter_speed"].values
+    frozen, beneath = found["frozen_flutter_speed"].values, found["is_beneath"].values > 0
     change = 100 * (found["lateral_flutter_speed"].values / frozen - 1)
     figure = new_figure(4.2)
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -28,6 +28,7 @@ def offset_map(name: str, *, experiment: AircraftExperiment) -> ReportFigure:
         marks = axes.scatter(y, x, c=values, cmap=colours, vmin=limits[0], vmax=limits[1], s=42, marker="s")
         unknown = ~np.isfinite(values)
         axes.plot(y[unknown], x[unknown], "x", color="#9aa5b1", markersize=5)
+        axes.plot(y[beneath], x[beneath], ".", color="black", markersize=2)
         axes.plot(y[margin <= 0], x[margin <= 0], "_", color="black", markersize=5)
         figure.colorbar(marks, ax=axes, label=label, location="top", shrink=0.9)
         for tank in experiment.model.tanks:
@@ -41,7 +42,7 @@ def offset_map(name: str, *, experiment: AircraftExperiment) -> ReportFigure:
     panels[0].invert_yaxis()
     caption = (
         "First symmetric flutter over the place of the right tank, the left one being its mirror image; nose up. "
-        "Crosses: no flutter within the range; bars: statically unstable; star: where sideways sloshing raises it "
-        "most with a static margin of 5 % of the chord; ring: the tank of this model file."
+        "Dots: beneath the wing; crosses: no flutter within the range; bars: statically unstable; star: where "
+        "sideways sloshing raises it most beneath the wings of a stable aircraft; ring: the tank of this file."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))

@@ -58,6 +58,11 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
         "sloshlab flutter wing.toml --from 60 --to 180 -o results",
         "sloshlab flutter aircraft.toml --models frozen,lateral --cache forces -o results",
     ),
+    "aircraft": (
+        "sloshlab aircraft aircraft.toml --rom rom.nc --cache forces -o results",
+        "sloshlab aircraft aircraft.toml --rom rom.nc --gust-speed 31 --gust 2 -o results",
+        "sloshlab aircraft two_tanks.toml --scan places.toml -o results",
+    ),
     "case new": ("sloshlab case new CASE --rig rig.toml --recordings run_1.nc run_2.nc",),
     "case check": ("sloshlab case check CASE",),
     "diagnose": (

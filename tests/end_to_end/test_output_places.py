@@ -24,6 +24,7 @@ FOLDERS: dict[str, list[str]] = {
     "diagnose -o": ["diagnose", "absent"],
     "benchmark -o": ["benchmark", "silverbox", "--data", "absent"],
     "flutter -o": ["flutter", "absent.toml", "--from", "60", "--to", "180"],
+    "aircraft -o": ["aircraft", "absent.toml"],
     "campaign -o": ["campaign", "absent"],
     "trial seal -o": ["trial", "seal", "--key", "absent.key"],
     "trial score -o": ["trial", "score", "absent"],
